@@ -13,7 +13,7 @@ use std::process::Command;
 use std::{env, io};
 
 /// Parts of `studio/` that do not go into the page.
-const ASIDE: [&str; 6] =
+const EXCLUDED: [&str; 6] =
     ["node_modules", "dist", "tests", "screenshots", "README.md", ".build-lock"];
 
 fn main() {
@@ -31,7 +31,7 @@ fn main() {
             Ok(PathBuf::from(folder))
         }
         (None, "skip") => Err("it was built with SIDESTEP_PAGE=skip".to_string()),
-        (None, _) => built(&studio, &out.join("page")),
+        (None, _) => build_page(&studio, &out.join("page")),
     };
     let files = page.and_then(|page| files_of(&page));
     let files = files.unwrap_or_else(|cause| {
@@ -42,7 +42,7 @@ fn main() {
 }
 
 /// Builds the page into a folder.
-fn built(studio: &Path, page: &Path) -> Result<PathBuf, String> {
+fn build_page(studio: &Path, page: &Path) -> Result<PathBuf, String> {
     let missing = || "the sources of the page are not here".to_string();
     if !studio.join("package.json").is_file() {
         return Err(missing());
@@ -50,7 +50,7 @@ fn built(studio: &Path, page: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(studio).map_err(|_| missing())?;
     let mut names: Vec<_> = entries.flatten().map(|entry| entry.file_name()).collect();
     names.sort();
-    for name in names.iter().filter(|name| ASIDE.iter().all(|aside| name != aside)) {
+    for name in names.iter().filter(|name| EXCLUDED.iter().all(|aside| name != aside)) {
         println!("cargo::rerun-if-changed={}", studio.join(name).display());
     }
     if npm().arg("--version").output().is_err() {

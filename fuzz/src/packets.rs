@@ -1,33 +1,33 @@
 //! Agents of the worlds, which receive unchecked packets.
 
-use sidestep::kernel::network::{Draft, Seal, TalkId, open};
+use sidestep::kernel::network::{ConversationId, PacketBuffer, PacketHeader, parse_packet};
 use sidestep::scenario::Source;
-use sidestep::worlds::airspace::agents::contact::Contacts;
-use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Sight, Topic};
+use sidestep::worlds::airspace::agents::traffic_state::TrafficPicture;
+use sidestep::worlds::airspace::pilot::{Fleet, Packet, Percept, Pilot, Protocol};
 use sidestep::worlds::airspace::{AirspaceWorld, airspace_run};
 use sidestep::worlds::chain::ChainState;
-use sidestep::worlds::chain::agents::{ConnectorAgent, Motion};
-use sidestep::worlds::chain::scenario::Compiled;
+use sidestep::worlds::chain::agents::{ConnectorAgent, MotionProtocol};
+use sidestep::worlds::chain::scenario::ChainScenario;
 use std::collections::VecDeque;
 use std::sync::{Arc, LazyLock};
 
 /// Hands packets to the agent of a connector in the middle of a chain: each begins with its sender and its
 /// length. For any packets, the agent comes to a decision once time is up.
 pub(crate) fn to_a_connector(mut data: &[u8]) {
-    static TEAM: LazyLock<Compiled<2>> = LazyLock::new(|| {
+    static TEAM: LazyLock<ChainScenario<2>> = LazyLock::new(|| {
         let text = "format = 1\nworld = \"chain\"\n[chain]\nself_collision = false\nbacktracks = 0\n\
                     deployment = \"team\"\nnetwork = { loss = 0.1 }\n[[obstacles]]\nat_m = [0.5, 0.3]\n\
                     radius_m = 0.2\n[[chains]]\nconnectors = 5\nrod_m = [0.4, 0.5]\n[[chains.tasks]]\n\
                     kind = \"wander\"\nconnector = 2\n";
-        Compiled::new(&Source::new("f", text, "")).expect("our own team")
+        ChainScenario::new(&Source::new("f", text, "")).expect("our own team")
     });
     let world = &*TEAM.world;
     let state = ChainState::new(world).expect("a team at its start");
-    let (chain, mut sights) = world.sights_at(&state, 0).remove(0);
+    let (chain, mut sights) = world.percepts_at(&state, 0).remove(0);
     let ids: Vec<u32> = (0..sights.len() as u32).collect();
-    let talk = TalkId::new(0, Motion, &ids);
+    let talk = ConversationId::new(0, MotionProtocol, &ids);
     let mut agent = ConnectorAgent::new(world, chain, 2);
-    agent.begin(sights.remove(2), 0).expect("a sight");
+    agent.start(sights.remove(2), 0).expect("a sight");
     let mut tick = 0;
     while let Some((&[from, length], rest)) = data.split_first_chunk() {
         let (packet, rest) = rest.split_at(rest.len().min(usize::from(length)));
@@ -37,8 +37,13 @@ pub(crate) fn to_a_connector(mut data: &[u8]) {
         if from & 0x80 > 0 {
             agent.on_packet(sender, packet, tick);
         } else {
-            let seal = Seal { fingerprint: world.fingerprint, talk, sender, sequence: 0 };
-            agent.on_packet(sender, &Draft::of_bytes(packet).sealed(&seal), tick);
+            let seal = PacketHeader {
+                fingerprint: world.fingerprint,
+                conversation: talk,
+                sender,
+                sequence: 0,
+            };
+            agent.on_packet(sender, &PacketBuffer::from_bytes(packet).into_packet(&seal), tick);
         }
         agent.on_timer(tick);
         agent.take_packets();
@@ -62,24 +67,24 @@ const TALKS: [&str; 7] = [
 /// Lets three pilots talk, on a network driven by the data: the first byte chooses the settings, and then each four
 /// bytes are a step: a packet arrives as it is, or changed with a right checksum, or damaged, or time passes.
 pub(crate) fn among_pilots(data: &[u8]) {
-    static FLEETS: LazyLock<Vec<(Arc<AirspaceWorld>, Vec<Sight>)>> = LazyLock::new(|| {
+    static FLEETS: LazyLock<Vec<(Arc<AirspaceWorld>, Vec<Percept>)>> = LazyLock::new(|| {
         let fleet = |talk: &&str| {
             let text = format!(
                 "format = 1\nworld = \"airspace\"\n[airspace]\n{talk}\nmax_rounds = 3\n\
                  [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n"
             );
             let run = airspace_run(&Source::new("f", text, ""), 1).expect("our own scenario");
-            (run.world().clone(), run.sights())
+            (run.world().clone(), run.percepts())
         };
         TALKS.iter().map(fleet).collect()
     });
     let Some((&which, steps)) = data.split_first() else { return };
     let (world, sights) = &FLEETS[usize::from(which) % FLEETS.len()];
     let mut pilots: Vec<Pilot> =
-        (0..3).map(|id| Pilot::new(world.clone(), id, Contacts::new())).collect();
+        (0..3).map(|id| Pilot::new(world.clone(), id, TrafficPicture::new())).collect();
     let (mut due, mut tick) = (VecDeque::new(), 0);
     for (pilot, sight) in pilots.iter_mut().zip(sights) {
-        pilot.begin(sight.clone(), tick);
+        pilot.start(sight.clone(), tick);
     }
     for step in steps.as_chunks::<4>().0 {
         for pilot in &mut pilots {
@@ -107,7 +112,7 @@ fn arrive(
     let Some((from, to, payload)) = due.pop_front() else { return };
     let at = usize::from(place) | usize::from(high) << 8;
     let mut bytes = payload.clone();
-    match (kind % 4, open::<Topic>(&payload, world.fingerprint)) {
+    match (kind % 4, parse_packet::<Protocol>(&payload, world.fingerprint)) {
         (1, Ok((seal, message))) => {
             let mut message = message.to_vec();
             let at = at % message.len().max(1);
@@ -115,7 +120,7 @@ fn arrive(
                 Some(byte) if change > 0 => *byte ^= change,
                 _ => message.truncate(at),
             }
-            bytes = Draft::of_bytes(&message).sealed(&seal);
+            bytes = PacketBuffer::from_bytes(&message).into_packet(&seal);
         }
         (2, _) => {
             let at = at % bytes.len();

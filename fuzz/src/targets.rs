@@ -12,8 +12,8 @@ use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_record::sweep::{Origin, read_journal};
-use sidestep_record::{McapRun, RunView, read_table};
+use sidestep_record::sweep::{SweepIdentity, read_journal};
+use sidestep_record::{McapRunInfo, RunReader, read_table};
 use sidestep_server::protocol::Edit;
 use std::sync::LazyLock;
 
@@ -47,11 +47,11 @@ pub(crate) const TARGETS: &[Target] = &[
     ("learn_csv", |data| text(data, learned)),
     ("checkpoint", |data| drop(checkpoint::decode_header(data))),
     ("journal", |data| {
-        let of = Origin { program_version: "0", fingerprint: "" };
+        let of = SweepIdentity { program_version: "0", fingerprint: "" };
         drop(read_journal(&file("f.jsonl", data), of, |_: serde_json::Value| {}));
     }),
-    ("manifest", |data| drop(RunView::open(run_folder(data)))),
-    ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
+    ("manifest", |data| drop(RunReader::open(run_folder(data)))),
+    ("mcap", |data| drop(McapRunInfo::open(&file("f.mcap", data)))),
     ("request", |data| text(data, |t| drop(sidestep_server::decode(t)))),
     ("packets", packets::among_pilots),
     ("parquet", tabled),
@@ -72,7 +72,9 @@ fn overridden(setting: &str) {
     for kind in WORLDS.0 {
         let source = Source::new("f", kind.default_scenario(), folder());
         drop(
-            source.with(&[setting.to_string()]).and_then(|source| kind.compile(&source).map(drop)),
+            source
+                .with_overrides(&[setting.to_string()])
+                .and_then(|source| kind.compile(&source).map(drop)),
         );
     }
 }
@@ -106,9 +108,9 @@ fn srdf(text: &str) {
 }
 
 /// The topics of the seeds.
-fn all_of_a_bag() -> bag::Wanted {
-    let source = |topic: &str| bag::Source { topic: topic.into(), frames: None };
-    bag::Wanted {
+fn all_of_a_bag() -> bag::TopicSelection {
+    let source = |topic: &str| bag::PoseTopic { topic: topic.into(), frames: None };
+    bag::TopicSelection {
         odometry: Some(source("/robot_0/odom")),
         truth: source("/robot_0/ground_truth"),
         scans: Some("/robot_0/sonar_ring".into()),

@@ -1,16 +1,16 @@
 //! Arms of robot models: forward and inverse kinematics of many postures and targets at once.
 
-use crate::error::{self, wrong};
-use crate::json::list;
-use crate::watch::attended;
+use crate::error::{self, argument_error};
+use crate::json::to_list;
+use crate::watch::run_polling;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sidestep::experiment::sweep::work::run_cells;
+use sidestep::experiment::sweep::scheduler::run_cells;
 use sidestep::kernel::InputError;
 use sidestep::worlds::chain::ik::Engine;
 use sidestep::worlds::chain::kinematics::{
-    ArmAnswer, ArmBody, ArmFiles, ArmGoal, Asked, ChosenArm, Frames, Pose, Sphere, Vector,
+    ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
 };
 use std::path::PathBuf;
 
@@ -29,38 +29,46 @@ use std::path::PathBuf;
 /// >>> len(arm.joints) == len(arm.units)
 /// True
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Arm(ChosenArm);
+pub(crate) struct Arm(ArmSelection);
 
 /// Returns the error of an option of the command as that of an argument.
-fn told(e: &InputError) -> PyErr {
+fn option_error(e: &InputError) -> PyErr {
     match e.place().strip_prefix("--") {
-        Some(name) => wrong(&name.replace('-', "_"), e.cause(), e.remedy()),
-        None => error::input(e),
+        Some(name) => argument_error(&name.replace('-', "_"), e.cause(), e.remedy()),
+        None => error::input_error(e),
     }
 }
 
 /// Returns the rows of an array of this width.
-fn rows(name: &str, array: &PyReadonlyArray2<'_, f64>, width: usize) -> PyResult<Vec<Vec<f64>>> {
+fn matrix_rows(
+    name: &str,
+    array: &PyReadonlyArray2<'_, f64>,
+    width: usize,
+) -> PyResult<Vec<Vec<f64>>> {
     let array = array.as_array();
     if array.ncols() != width {
         let cause = format!("has rows of {} numbers", array.ncols());
-        return Err(wrong(name, cause, format!("give an array of the shape (n, {width})")));
+        return Err(argument_error(
+            name,
+            cause,
+            format!("give an array of the shape (n, {width})"),
+        ));
     }
     let rows: Vec<Vec<f64>> = array.rows().into_iter().map(|row| row.to_vec()).collect();
     match rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
         None => Ok(rows),
         Some(k) => {
             let cause = format!("row {k} is {:?}", rows[k]);
-            Err(wrong(name, cause, "give finite numbers"))
+            Err(argument_error(name, cause, "give finite numbers"))
         }
     }
 }
 
-fn vector(row: &[f64]) -> Vector {
+fn row_vector(row: &[f64]) -> Vector {
     std::array::from_fn(|k| row[k])
 }
 
-fn shaped<'py>(
+fn to_array<'py>(
     py: Python<'py>,
     flat: Vec<f64>,
     shape: Vec<usize>,
@@ -80,13 +88,13 @@ impl Arm {
         group: Option<String>,
     ) -> PyResult<Self> {
         if group.is_some() && srdf.is_none() {
-            return Err(wrong("group", "groups are in SRDF files", "give srdf as well"));
+            return Err(argument_error("group", "groups are in SRDF files", "give srdf as well"));
         }
         if group.is_some() && (base.is_some() || tip.is_some()) {
-            return Err(wrong("group", "it names base and tip", "leave base and tip out"));
+            return Err(argument_error("group", "it names base and tip", "leave base and tip out"));
         }
         let chosen = ArmFiles { urdf, base, tip, srdf, group }.load();
-        chosen.map(Self).map_err(|e| told(&e))
+        chosen.map(Self).map_err(|e| option_error(&e))
     }
 
     /// Name of the robot.
@@ -126,7 +134,7 @@ impl Arm {
         let of = |limits: &sidestep::import::urdf::Limits| [limits.lower, limits.upper];
         let variables = &self.0.chain.variables;
         let flat = variables.iter().flat_map(|v| v.limits.as_ref().map_or(free, of)).collect();
-        shaped(py, flat, vec![variables.len(), 2])
+        to_array(py, flat, vec![variables.len(), 2])
     }
 
     /// The joint values of a named posture of the SRDF file; without a name, each value is as near to zero as its
@@ -142,7 +150,7 @@ impl Arm {
         py: Python<'py>,
         name: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(PyArray1::from_vec(py, self.0.posture(name).map_err(|e| told(&e))?))
+        Ok(PyArray1::from_vec(py, self.0.posture(name).map_err(|e| option_error(&e))?))
     }
 
     fn __repr__(&self) -> String {
@@ -157,19 +165,19 @@ impl Arm {
         joints: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let chain = &self.0.chain;
-        let rows = rows("joints", &joints, chain.variables.len())?;
+        let rows = matrix_rows("joints", &joints, chain.variables.len())?;
         let skeleton = chain.skeleton();
         let frames: Vec<Frames> = py.detach(|| rows.iter().map(|row| chain.forward(row)).collect());
         let (n, dict) = (rows.len(), PyDict::new(py));
         let flat = |of: &dyn Fn(&Frames) -> Vec<f64>| frames.iter().flat_map(of).collect();
-        dict.set_item("tip", shaped(py, flat(&|f| f.tip.origin_m.to_vec()), vec![n, 3])?)?;
+        dict.set_item("tip", to_array(py, flat(&|f| f.tip.origin_m.to_vec()), vec![n, 3])?)?;
         let rotation = flat(&|f| f.tip.rotation.concat());
-        dict.set_item("rotation", shaped(py, rotation, vec![n, 3, 3])?)?;
+        dict.set_item("rotation", to_array(py, rotation, vec![n, 3, 3])?)?;
         let quaternion = flat(&|f| f.tip.quaternion().to_vec());
-        dict.set_item("quaternion", shaped(py, quaternion, vec![n, 4])?)?;
+        dict.set_item("quaternion", to_array(py, quaternion, vec![n, 4])?)?;
         let connectors = flat(&|f| chain.connectors(&skeleton, f).concat());
-        let count = chain.connectors(&skeleton, &chain.forward(&chain.rest())).len();
-        dict.set_item("connectors", shaped(py, connectors, vec![n, count, 3])?)?;
+        let count = chain.connectors(&skeleton, &chain.forward(&chain.rest_values())).len();
+        dict.set_item("connectors", to_array(py, connectors, vec![n, count, 3])?)?;
         let inside: Vec<bool> =
             rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
         dict.set_item("inside_limits", inside.to_pyarray(py))?;
@@ -183,25 +191,25 @@ impl Arm {
         py: Python<'py>,
         targets: PyReadonlyArray2<'py, f64>,
         start: PyReadonlyArray2<'py, f64>,
-        options: Options,
+        options: IkOptions,
     ) -> PyResult<Bound<'py, PyDict>> {
         let chain = &self.0.chain;
-        let targets = rows("targets", &targets, targets.as_array().ncols())?;
-        let start = rows("start", &start, chain.variables.len())?;
-        let (goal, remarks) = options.goal(&self.0)?;
+        let targets = matrix_rows("targets", &targets, targets.as_array().ncols())?;
+        let start = matrix_rows("start", &start, chain.variables.len())?;
+        let (goal, remarks) = options.common_goal(&self.0)?;
         if start.len() != 1 && start.len() != targets.len() {
             let cause = format!("{} postures for {} targets", start.len(), targets.len());
-            return Err(wrong("start", cause, "give one for all, or one for each"));
+            return Err(argument_error("start", cause, "give one for all, or one for each"));
         }
-        let goals = targets.iter().map(|target| options.aimed(&goal, target));
+        let goals = targets.iter().map(|target| options.target_goal(&goal, target));
         let goals = goals.collect::<PyResult<Vec<ArmGoal>>>()?;
         let numbers: Vec<usize> = (0..goals.len()).collect();
-        let solved = attended(py, |watcher| {
-            let mut solved: Vec<(usize, ArmAnswer)> = Vec::with_capacity(goals.len());
+        let solved = run_polling(py, |watcher| {
+            let mut solved: Vec<(usize, IkResult)> = Vec::with_capacity(goals.len());
             let solve = |k: &usize| {
                 let start = &start[if start.len() == 1 { 0 } else { *k }];
                 let answer = || chain.solve(&goals[*k], start).map(|answer| (*k, answer));
-                watcher.go_on().then(answer)
+                watcher.should_continue().then(answer)
             };
             run_cells(&numbers, options.workers.max(1), solve, &mut |answer| {
                 solved.push(answer);
@@ -210,14 +218,19 @@ impl Arm {
             solved.sort_by_key(|(k, _)| *k);
             Ok(solved.into_iter().map(|(_, answer)| answer).collect::<Vec<_>>())
         })?;
-        answers(py, solved.map_err(|e: InputError| told(&e))?, chain.variables.len(), remarks)
+        result_arrays(
+            py,
+            solved.map_err(|e: InputError| option_error(&e))?,
+            chain.variables.len(),
+            remarks,
+        )
     }
 }
 
 /// The options of all targets.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Options {
+struct IkOptions {
     free: Vec<String>,
     engine: String,
     tolerance_m: f64,
@@ -233,20 +246,20 @@ struct Options {
     workers: usize,
 }
 
-impl Options {
+impl IkOptions {
     /// Returns the part of the goal that all targets share, and remarks on the arm's body.
-    fn goal(&self, arm: &ChosenArm) -> PyResult<(ArmGoal, Vec<String>)> {
+    fn common_goal(&self, arm: &ArmSelection) -> PyResult<(ArmGoal, Vec<String>)> {
         let engine = match self.engine.as_str() {
             "auto" => Engine::Auto,
             "chain" => Engine::Chain,
             "dls" => Engine::Dls,
-            other => return Err(unknown("engine", other, "auto, chain or dls")),
+            other => return Err(unknown_value("engine", other, "auto, chain or dls")),
         };
         let (own, shapes) = match self.body.as_str() {
             "rods" => (false, false),
             "shapes" => (false, !self.obstacles.is_empty()),
             "own" => (true, true),
-            other => return Err(unknown("body", other, "rods, shapes or own")),
+            other => return Err(unknown_value("body", other, "rods, shapes or own")),
         };
         let (body, remarks) = match shapes.then(|| arm.body()) {
             Some((body, remarks)) => (Some(body), remarks),
@@ -255,7 +268,7 @@ impl Options {
         if own && body.as_ref().is_none_or(ArmBody::is_empty) {
             let cause = [&["no link has a collision shape that can be read".into()], &remarks[..]];
             let remedy = "give the links boxes, cylinders, spheres or STL meshes";
-            return Err(wrong("body", cause.concat().join("; "), remedy));
+            return Err(argument_error("body", cause.concat().join("; "), remedy));
         }
         let sphere =
             |[x, y, z, radius_m]: &[f64; 4]| Sphere { center_m: [*x, *y, *z], radius_m: *radius_m };
@@ -278,66 +291,67 @@ impl Options {
     }
 
     /// Returns the goal of one target.
-    fn aimed(&self, goal: &ArmGoal, target: &[f64]) -> PyResult<ArmGoal> {
-        let place = vector(target);
+    fn target_goal(&self, goal: &ArmGoal, target: &[f64]) -> PyResult<ArmGoal> {
+        let place = row_vector(target);
         let target_pose = match target.len() {
-            3 => Pose { origin_m: place, ..Pose::IDENTITY },
-            6 => Pose::from_origin(&sidestep::import::urdf::Origin {
+            3 => Transform { origin_m: place, ..Transform::IDENTITY },
+            6 => Transform::from_origin(&sidestep::import::urdf::Origin {
                 xyz_m: place,
-                rpy_rad: vector(&target[3..]),
+                rpy_rad: row_vector(&target[3..]),
             }),
             width if width != 7 => {
                 let cause = format!("a target of {width} numbers");
                 let remedy = "give 3 (a place), 6 (with roll, pitch, yaw) or 7 (with a quaternion)";
-                return Err(wrong("targets", cause, remedy));
+                return Err(argument_error("targets", cause, remedy));
             }
             _ => {
                 let xyzw = std::array::from_fn(|k| target[3 + k]);
-                Pose::from_quaternion("targets", place, xyzw).map_err(|e| told(&e))?
+                Transform::from_quaternion("targets", place, xyzw).map_err(|e| option_error(&e))?
             }
         };
         let is_free = |name: &str| self.free.iter().any(|free| free == name);
         if let Some(other) =
             self.free.iter().find(|f| !["x", "y", "z", "rx", "ry", "rz"].contains(&f.as_str()))
         {
-            return Err(unknown("free", other, "x, y, z, rx, ry, rz"));
+            return Err(unknown_value("free", other, "x, y, z, rx, ry, rz"));
         }
         let (along, about) = (["x", "y", "z"].map(is_free), ["rx", "ry", "rz"].map(is_free));
-        let asked = Asked::with_free(target.len() > 3, along, about).map_err(|e| told(&e))?;
+        let asked =
+            PoseMask::with_free(target.len() > 3, along, about).map_err(|e| option_error(&e))?;
         Ok(ArmGoal { target: target_pose, asked, ..goal.clone() })
     }
 }
 
-fn unknown(name: &str, value: &str, known: &str) -> PyErr {
-    wrong(name, format!("`{value}` is none of {known}"), format!("give {known}"))
+fn unknown_value(name: &str, value: &str, known: &str) -> PyErr {
+    argument_error(name, format!("`{value}` is none of {known}"), format!("give {known}"))
 }
 
 /// Returns answers as arrays, one row for each target.
-fn answers<'py>(
+fn result_arrays<'py>(
     py: Python<'py>,
-    answers: Vec<ArmAnswer>,
+    answers: Vec<IkResult>,
     width: usize,
     remarks: Vec<String>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     let n = answers.len();
     let joints = answers.iter().flat_map(|answer| answer.values.clone()).collect();
-    dict.set_item("joints", shaped(py, joints, vec![n, width])?)?;
+    dict.set_item("joints", to_array(py, joints, vec![n, width])?)?;
     let reached: Vec<bool> = answers.iter().map(|answer| answer.reached).collect();
     dict.set_item("reached", reached.to_pyarray(py))?;
     for (name, of) in
-        [("error_m", (|a| a.error_m) as fn(&ArmAnswer) -> f64), ("error_rad", |a| a.error_rad)]
+        [("error_m", (|a| a.error_m) as fn(&IkResult) -> f64), ("error_rad", |a| a.error_rad)]
     {
         dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(of)))?;
     }
     for (name, of) in
-        [("iterations", (|a| a.iterations) as fn(&ArmAnswer) -> usize), ("starts", |a| a.starts)]
+        [("iterations", (|a| a.iterations) as fn(&IkResult) -> usize), ("starts", |a| a.starts)]
     {
         dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(|a| of(a) as i64)))?;
     }
     dict.set_item(
         "reasons",
-        list(py, answers.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
+        to_list(py, answers.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
     )?;
     let others = PyList::empty(py);
     for answer in &answers {

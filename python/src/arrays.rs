@@ -1,7 +1,7 @@
 //! Arrays: ids and values that come from Python, and columns of bodies that go to it.
 
 use crate::error;
-use crate::json::list;
+use crate::json::to_list;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
@@ -11,24 +11,24 @@ use sidestep::kernel::view::Body;
 
 /// An argument that is a whole number, which may be larger in Python than in Rust.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Whole(pub(crate) u64);
+pub(crate) struct WholeNumber(pub(crate) u64);
 
-impl FromPyObject<'_, '_> for Whole {
+impl FromPyObject<'_, '_> for WholeNumber {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        value.extract::<u64>().map(Whole).map_err(|raised| {
+        value.extract::<u64>().map(WholeNumber).map_err(|raised| {
             if !raised.is_instance_of::<PyOverflowError>(value.py()) {
                 return raised;
             }
             let remedy = format!("give a whole number from 0 to {}", u64::MAX);
-            error::wrong("argument", format!("{} is out of range", &*value), remedy)
+            error::argument_error("argument", format!("{} is out of range", &*value), remedy)
         })
     }
 }
 
 /// Returns the ids of agents; truth values are no ids, although they are integers in Python.
-pub(crate) fn ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
+pub(crate) fn agent_ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
     let told = || {
         let words = "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`";
         error::OrderError::new_err(words)
@@ -45,7 +45,7 @@ pub(crate) fn ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<Ent
 
 /// Returns the values of an order as floats, one agent after the other: an array with a row for each agent, or one number
 /// for all.
-pub(crate) fn numbers(
+pub(crate) fn order_values(
     py: Python<'_>,
     order: &str,
     values: &Bound<'_, PyAny>,
@@ -102,7 +102,7 @@ pub(crate) fn rows_by_name<'py>(
 }
 
 /// Returns a number for each body.
-pub(crate) fn column<'py, T: numpy::Element>(
+pub(crate) fn body_column<'py, T: numpy::Element>(
     py: Python<'py>,
     bodies: &[Body],
     of: impl Fn(&Body) -> T,
@@ -111,7 +111,7 @@ pub(crate) fn column<'py, T: numpy::Element>(
 }
 
 /// Returns N numbers for each body, in an array of the shape (bodies, N).
-pub(crate) fn rows<'py, const N: usize>(
+pub(crate) fn body_rows<'py, const N: usize>(
     py: Python<'py>,
     bodies: &[Body],
     of: impl Fn(&Body) -> [f64; N],
@@ -121,11 +121,11 @@ pub(crate) fn rows<'py, const N: usize>(
 }
 
 /// Returns a word for each body.
-pub(crate) fn texts<'py>(
+pub(crate) fn body_texts<'py>(
     py: Python<'py>,
     bodies: &[Body],
     of: impl Fn(&Body) -> String,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let list = list(py, bodies.iter().map(of))?;
+    let list = to_list(py, bodies.iter().map(of))?;
     py.import("numpy")?.call_method1("array", (list,))
 }

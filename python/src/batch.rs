@@ -1,26 +1,26 @@
 //! Many worlds of one scenario, stepped together.
 
-use crate::arrays::{Whole, numbers};
-use crate::error::{self, wrong};
-use crate::json::{list, to_python};
-use crate::scenario::{Made, Scenario, made};
-use crate::space::{Lent, Team, room};
+use crate::arrays::{WholeNumber, order_values};
+use crate::error::{self, argument_error};
+use crate::json::{to_list, to_python};
+use crate::scenario::{LoadedScenario, Scenario, load};
+use crate::space::{OutArrays, Team, zeroed_arrays};
 use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sidestep::kernel::batch::{self, BatchError, Start};
+use sidestep::kernel::batch::{self, BatchError, SimulationFactory};
 use sidestep::kernel::control;
 use sidestep::scenario::Source;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Time after which Python is asked for signals, between two cycles.
-const SLICE: Duration = Duration::from_millis(10);
+const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Largest number of worlds.
-const MOST_WORLDS: usize = 1 << 20;
+const MAX_WORLDS: usize = 1 << 20;
 /// Largest number of workers, as for a sweep.
-const MOST_WORKERS: usize = 1024;
+const MAX_WORKERS: usize = 1024;
 
 /// Many worlds of one scenario that step together, each with its own seed.
 ///
@@ -43,7 +43,7 @@ const MOST_WORKERS: usize = 1024;
 /// (3, 2, 2)
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Batch {
-    scenario: Arc<Made>,
+    scenario: Arc<LoadedScenario>,
     /// Its teams, which never change.
     teams: Vec<Arc<control::Team>>,
     worlds: usize,
@@ -53,41 +53,41 @@ pub(crate) struct Batch {
 
 impl Batch {
     /// Works with the worlds while other threads of Python go on.
-    fn with<T: Send>(
+    fn with_worlds<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut batch::Batch) -> Result<T, BatchError> + Send,
     ) -> PyResult<T> {
         py.detach(|| {
             let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
-            work(&mut batch).map_err(|e| told(&e))
+            work(&mut batch).map_err(|e| batch_error(&e))
         })
     }
 
-    fn named(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::Team)> {
-        let (number, team) = crate::space::named(&self.teams, team)?;
+    fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::Team)> {
+        let (number, team) = crate::space::find_team(&self.teams, team)?;
         Ok((number, &**team))
     }
 
     /// Returns a truth value for each world.
-    fn mask(&self, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<bool>>> {
+    fn parse_mask(&self, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<bool>>> {
         let Some(mask) = mask else { return Ok(None) };
         let array: Option<PyReadonlyArray1<'_, bool>> = mask.extract().ok();
         match array.filter(|array| array.len() == self.worlds) {
             Some(array) => Ok(Some(array.as_array().to_vec())),
-            None => Err(self.wrong_rows("mask", "truth values (bool)", mask)),
+            None => Err(self.row_count_error("mask", "truth values (bool)", mask)),
         }
     }
 
     /// Returns a seed for each world.
-    fn seeds_of(&self, seeds: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
-        let given: Option<Vec<u64>> = whole(seeds);
+    fn parse_seeds(&self, seeds: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
+        let given: Option<Vec<u64>> = whole_numbers(seeds);
         given
             .filter(|given| given.len() == self.worlds)
-            .ok_or_else(|| self.wrong_rows("seeds", "seeds (whole numbers from 0 on)", seeds))
+            .ok_or_else(|| self.row_count_error("seeds", "seeds (whole numbers from 0 on)", seeds))
     }
 
-    fn wrong_rows(&self, key: &str, what: &str, given: &Bound<'_, PyAny>) -> PyErr {
+    fn row_count_error(&self, key: &str, what: &str, given: &Bound<'_, PyAny>) -> PyErr {
         let shape = given.getattr("shape").map(|shape| shape.to_string());
         let found = shape.or_else(|_| given.len().map(|n| n.to_string()));
         let found = found.unwrap_or_else(|_| given.to_string());
@@ -95,21 +95,21 @@ impl Batch {
             Ok(n) if n == self.worlds => format!("they are no {what}"),
             _ => format!("there are {} worlds, and not {found} {what}", self.worlds),
         };
-        wrong(key, cause, format!("give an array of {} {what}", self.worlds))
+        argument_error(key, cause, format!("give an array of {} {what}", self.worlds))
     }
 }
 
 /// Returns a number of things, which must be at most `most`.
-fn within(name: &str, Whole(count): Whole, most: usize) -> PyResult<usize> {
+fn bounded_count(name: &str, WholeNumber(count): WholeNumber, most: usize) -> PyResult<usize> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     if (1..=most).contains(&count) {
         return Ok(count);
     }
-    Err(wrong(name, format!("is {count}"), format!("give a number from 1 to {most}")))
+    Err(argument_error(name, format!("is {count}"), format!("give a number from 1 to {most}")))
 }
 
 /// Returns whole numbers, of a list or an array.
-fn whole(values: &Bound<'_, PyAny>) -> Option<Vec<u64>> {
+fn whole_numbers(values: &Bound<'_, PyAny>) -> Option<Vec<u64>> {
     let values = match values.getattr("tolist") {
         Ok(to_list) => to_list.call0().ok()?,
         Err(_) => values.clone(),
@@ -118,14 +118,14 @@ fn whole(values: &Bound<'_, PyAny>) -> Option<Vec<u64>> {
 }
 
 /// Returns the exception of a batch.
-fn told(error: &BatchError) -> PyErr {
+fn batch_error(error: &BatchError) -> PyErr {
     match error {
         BatchError::Start { world, seed, error } => {
             let cause = format!("world {world} cannot start with seed {seed}: {}", error.cause());
-            wrong(error.place(), cause, error.remedy())
+            argument_error(error.place(), cause, error.remedy())
         }
         BatchError::Empty | BatchError::Shape { .. } => {
-            wrong("worlds", error.to_string(), "give worlds of one scenario, at least one")
+            argument_error("worlds", error.to_string(), "give worlds of one scenario, at least one")
         }
         BatchError::Broken { .. } => error::ReplayError::new_err(error.to_string()),
         _ => error::OrderError::new_err(error.to_string()),
@@ -134,7 +134,7 @@ fn told(error: &BatchError) -> PyErr {
 
 /// Returns the function that makes a world at its start: no checkpoints are made of it, so that all seeds share one
 /// text.
-fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
+fn start_function(scenario: &Arc<LoadedScenario>) -> PyResult<Arc<SimulationFactory>> {
     let source = Source::new("scenario.toml", scenario.identity()?, "");
     let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
     Ok(Arc::new(move |seed| {
@@ -153,30 +153,36 @@ fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
 impl Batch {
     #[new]
     #[pyo3(
-        signature = (scenario, worlds, *, workers=Whole(1), seeds=None),
+        signature = (scenario, worlds, *, workers=WholeNumber(1), seeds=None),
         text_signature = "(scenario, worlds, *, workers=1, seeds=None)"
     )]
     fn new(
         py: Python<'_>,
         scenario: &Bound<'_, PyAny>,
-        worlds: Whole,
-        workers: Whole,
+        worlds: WholeNumber,
+        workers: WholeNumber,
         seeds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let worlds = within("worlds", worlds, MOST_WORLDS)?;
-        let workers = within("workers", workers, MOST_WORKERS)?;
-        let scenario = made(scenario)?;
+        let worlds = bounded_count("worlds", worlds, MAX_WORLDS)?;
+        let workers = bounded_count("workers", workers, MAX_WORKERS)?;
+        let scenario = load(scenario)?;
         let first = scenario.compiled.plan().seed;
         let seeds = match seeds {
             None => (0..worlds as u64).map(|k| first.wrapping_add(k)).collect(),
-            Some(seeds) => whole(seeds).filter(|seeds| seeds.len() == worlds).ok_or_else(|| {
-                let cause = format!("{worlds} worlds, and not as many seeds");
-                wrong("seeds", cause, format!("give {worlds} whole numbers of at least 0"))
-            })?,
+            Some(seeds) => {
+                whole_numbers(seeds).filter(|seeds| seeds.len() == worlds).ok_or_else(|| {
+                    let cause = format!("{worlds} worlds, and not as many seeds");
+                    argument_error(
+                        "seeds",
+                        cause,
+                        format!("give {worlds} whole numbers of at least 0"),
+                    )
+                })?
+            }
         };
-        let start = start(&scenario)?;
+        let start = start_function(&scenario)?;
         let made = py.detach(|| batch::Batch::new(start, &seeds, workers));
-        let batch = made.map_err(|e| told(&e))?;
+        let batch = made.map_err(|e| batch_error(&e))?;
         let teams = batch.teams().iter().cloned().map(Arc::new).collect();
         Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
     }
@@ -196,31 +202,31 @@ impl Batch {
     /// The teams of each world: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        list(py, self.teams.iter().cloned().map(Team))
+        to_list(py, self.teams.iter().cloned().map(Team))
     }
 
     /// The seed of each world (uint64).
     #[getter]
     fn seeds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
-        Ok(self.with(py, |batch| Ok(batch.seeds()))?.to_pyarray(py))
+        Ok(self.with_worlds(py, |batch| Ok(batch.seeds()))?.to_pyarray(py))
     }
 
     /// The cycles that each world has done (uint64).
     #[getter]
     fn cycles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
-        Ok(self.with(py, |batch| batch.cycles())?.to_pyarray(py))
+        Ok(self.with_worlds(py, |batch| batch.cycles())?.to_pyarray(py))
     }
 
     /// Returns whether nothing can happen anymore, for each world (bool).
     #[getter]
     fn is_over<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        Ok(self.with(py, |batch| batch.is_over())?.to_pyarray(py))
+        Ok(self.with_worlds(py, |batch| batch.is_over())?.to_pyarray(py))
     }
 
     /// Digest of the state of each world, in hexadecimal; orders waiting for the next step are not in it.
     #[getter]
     fn digests(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.with(py, |batch| batch.ask(|run| run.digest().to_string()))
+        self.with_worlds(py, |batch| batch.query(|run| run.digest().to_string()))
     }
 
     /// Returns the measurements of each world so far, a list of dicts.
@@ -228,7 +234,7 @@ impl Batch {
     /// >>> [world["actions"] for world in batch.metrics()]
     /// [2, 2, 2]
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let all = self.with(py, |batch| batch.ask(|run| run.metrics()))?;
+        let all = self.with_worlds(py, |batch| batch.query(|run| run.metrics()))?;
         to_python(py, &serde_json::Value::from(all))
     }
 
@@ -246,16 +252,16 @@ impl Batch {
         values: &Bound<'_, PyAny>,
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (number, team) = self.named(team)?;
-        let space = team.ordered.iter().find(|space| space.name == name);
+        let (number, team) = self.find_team(team)?;
+        let space = team.action_spaces.iter().find(|space| space.name == name);
         let shape: Option<Vec<usize>> =
             space.map(|space| [team.agents.len()].iter().chain(&space.shape).copied().collect());
         let values = match &shape {
-            Some(shape) => numbers(py, name, values, self.worlds, Some(shape))?,
+            Some(shape) => order_values(py, name, values, self.worlds, Some(shape))?,
             // An unknown order is refused with the names of the known ones.
             None => vec![0.0; self.worlds * team.agents.len()],
         };
-        self.with(py, |batch| batch.order(number, name, values))
+        self.with_worlds(py, |batch| batch.order(number, name, values))
     }
 
     /// Advances all worlds by `cycles` cycles (one by default), or those for which `mask` (bool, one for each
@@ -268,20 +274,29 @@ impl Batch {
     /// >>> batch.step(mask=np.array([True, False, True]))
     /// >>> batch.cycles.tolist()
     /// [6, 5, 6]
-    #[pyo3(signature = (cycles=Whole(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
-    fn step(&self, py: Python<'_>, cycles: Whole, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let mask = self.mask(mask)?;
+    #[pyo3(signature = (cycles=WholeNumber(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
+    fn step(
+        &self,
+        py: Python<'_>,
+        cycles: WholeNumber,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mask = self.parse_mask(mask)?;
         let (mut left, mut at_once) = (cycles.0, 1);
         loop {
             let now = left.min(at_once);
             let began = Instant::now();
-            self.with(py, |batch| batch.advance(now, mask.as_deref()))?;
+            self.with_worlds(py, |batch| batch.advance(now, mask.as_deref()))?;
             left -= now;
             if left == 0 {
                 return Ok(());
             }
             py.check_signals()?;
-            at_once = if began.elapsed() < SLICE / 2 { at_once * 2 } else { (at_once / 2).max(1) };
+            at_once = if began.elapsed() < SIGNAL_POLL_INTERVAL / 2 {
+                at_once * 2
+            } else {
+                (at_once / 2).max(1)
+            };
         }
     }
 
@@ -301,14 +316,14 @@ impl Batch {
         team: Option<&Bound<'py, PyAny>>,
         out: Option<Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let (number, team) = self.named(team)?;
+        let (number, team) = self.find_team(team)?;
         let out = match out {
             Some(out) => out,
-            None => room(py, team, self.worlds)?,
+            None => zeroed_arrays(py, team, self.worlds)?,
         };
-        let mut lent = Lent::of(&out, team, self.worlds)?;
-        let cells = &mut lent.cells()?;
-        self.with(py, |batch| batch.observe(number, cells))?;
+        let mut lent = OutArrays::from_dict(&out, team, self.worlds)?;
+        let cells = &mut lent.buffers_mut()?;
+        self.with_worlds(py, |batch| batch.observe(number, cells))?;
         Ok(out)
     }
 
@@ -327,11 +342,11 @@ impl Batch {
         seeds: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (seeds, mask) = (self.seeds_of(seeds)?, self.mask(mask)?);
+        let (seeds, mask) = (self.parse_seeds(seeds)?, self.parse_mask(mask)?);
         let wanted = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
         let seeds: Vec<Option<u64>> =
             seeds.into_iter().enumerate().map(|(k, seed)| wanted(k).then_some(seed)).collect();
-        self.with(py, |batch| batch.restart(&seeds))
+        self.with_worlds(py, |batch| batch.restart(&seeds))
     }
 
     fn __len__(&self) -> usize {

@@ -1,14 +1,14 @@
 //! Probability collectives: games of tables, or of an objective in Python.
 
-use crate::error::wrong;
-use crate::json::list;
-use crate::watch::{heeding, interruptible};
+use crate::error::argument_error;
+use crate::json::to_list;
+use crate::watch::{catch_interrupt, run_interruptible};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sidestep::collectives::{
-    Choice, Estimator, Game, Order, Outcome, PairwiseGame, Settings, Stop, Update, Utility,
-    optimize,
+    Choice, Estimator, Game, OptimizeResult, OptimizerConfig, PairwiseGame, StopCriterion, Update,
+    UpdateOrder, Utility, optimize,
 };
 use sidestep::kernel::Seed;
 use sidestep::kernel::interrupt::{self, Interrupt};
@@ -16,12 +16,12 @@ use sidestep::kernel::stream::{Purpose, Streams};
 use std::sync::{Mutex, PoisonError};
 
 /// The random streams of the players' samples.
-const SAMPLES: Purpose = Purpose(0);
+const SAMPLES_PURPOSE: Purpose = Purpose(0);
 
 /// The settings of an optimization, as passed by `sidestep.collectives.minimize`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options {
+pub(crate) struct MinimizeOptions {
     estimator: String,
     block: usize,
     ageing: f64,
@@ -37,55 +37,63 @@ pub(crate) struct Options {
     seed: u64,
 }
 
-fn one_of<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResult<T> {
+fn parse_choice<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResult<T> {
     let found = known.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
     found.ok_or_else(|| {
         let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
-        wrong(name, format!("`{word}` is not known"), format!("give {names}"))
+        argument_error(name, format!("`{word}` is not known"), format!("give {names}"))
     })
 }
 
 /// Refuses a number outside of (0, 1].
-fn share(name: &str, value: f64) -> PyResult<f64> {
+fn check_fraction(name: &str, value: f64) -> PyResult<f64> {
     match value > 0.0 && value <= 1.0 {
         true => Ok(value),
-        false => Err(wrong(name, format!("is {value}"), "give a number above 0, up to 1")),
+        false => Err(argument_error(name, format!("is {value}"), "give a number above 0, up to 1")),
     }
 }
 
-impl Options {
-    fn settings(&self) -> PyResult<Settings> {
+impl MinimizeOptions {
+    fn settings(&self) -> PyResult<OptimizerConfig> {
         if self.block == 0 || !(0.0..=1.0).contains(&self.ageing) {
             let cause = format!("blocks of {} samples that age by {}", self.block, self.ageing);
-            return Err(wrong("block", cause, "give 1 sample or more, and an ageing from 0 to 1"));
+            return Err(argument_error(
+                "block",
+                cause,
+                "give 1 sample or more, and an ageing from 0 to 1",
+            ));
         }
-        let step = share("step", self.step)?;
+        let step = check_fraction("step", self.step)?;
         let sampled = Estimator::Sampled { block: self.block, ageing: self.ageing };
         let (newton, brouwer) = (Update::NearestNewton { step }, Update::Brouwer { step });
-        Ok(Settings {
-            estimator: one_of(
+        Ok(OptimizerConfig {
+            estimator: parse_choice(
                 "estimator",
                 &self.estimator,
                 &[("exact", Estimator::Exact), ("sampled", sampled)],
             )?,
-            update: one_of("update", &self.update, &[("newton", newton), ("brouwer", brouwer)])?,
-            order: one_of(
+            update: parse_choice(
+                "update",
+                &self.update,
+                &[("newton", newton), ("brouwer", brouwer)],
+            )?,
+            order: parse_choice(
                 "order",
                 &self.order,
-                &[("parallel", Order::Parallel), ("sequence", Order::Sequence)],
+                &[("parallel", UpdateOrder::Parallel), ("sequence", UpdateOrder::Sequence)],
             )?,
-            utility: one_of(
+            utility: parse_choice(
                 "utility",
                 &self.utility,
                 &[("joint", Utility::Joint), ("private", Utility::Private)],
             )?,
-            cooling: share("cooling", self.cooling)?,
-            stop: Stop {
+            cooling: check_fraction("cooling", self.cooling)?,
+            stop: StopCriterion {
                 threshold: self.threshold,
                 calm_rounds: self.calm_rounds.max(1),
                 max_rounds: self.max_rounds,
             },
-            choice: one_of(
+            choice: parse_choice(
                 "choice",
                 &self.choice,
                 &[("argmax", Choice::Argmax), ("draw", Choice::Draw)],
@@ -96,13 +104,13 @@ impl Options {
     fn uniform(&self) -> impl Fn(usize, u64) -> f64 + use<> {
         let streams = Streams::new(Seed(self.seed));
         // One pair of numbers for each player and draw, so that any of them can be drawn without those before it.
-        move |player, k| streams.draws(player as u32, k, SAMPLES).uniform()
+        move |player, k| streams.draws(player as u32, k, SAMPLES_PURPOSE).uniform()
     }
 }
 
 /// Returns the error of an interrupted optimization: another exception has already been raised at the interrupt.
-fn interrupted() -> PyErr {
-    wrong("minimize", "it was interrupted", "call it again")
+fn interrupted_error() -> PyErr {
+    argument_error("minimize", "it was interrupted", "call it again")
 }
 
 /// Minimizes a sum over players and pairs: the native part of `sidestep.collectives.minimize`.
@@ -111,12 +119,12 @@ pub(crate) fn minimize_pairs<'py>(
     py: Python<'py>,
     own: Vec<PyReadonlyArray1<'py, f64>>,
     pairs: Vec<(usize, usize, PyReadonlyArray2<'py, f64>)>,
-    options: Options,
+    options: MinimizeOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     let own: Vec<Vec<f64>> = own.iter().map(|costs| costs.as_array().to_vec()).collect();
     let sizes: Vec<usize> = own.iter().map(Vec::len).collect();
     if own.is_empty() || sizes.contains(&0) {
-        return Err(wrong(
+        return Err(argument_error(
             "own",
             "a player has no strategy",
             "give each player's costs, one or more",
@@ -128,19 +136,19 @@ pub(crate) fn minimize_pairs<'py>(
         let place = format!("pairs[{a}, {b}]");
         if a == b || *a >= sizes.len() || *b >= sizes.len() {
             let remedy = format!("give two different numbers below {}", sizes.len());
-            return Err(wrong(&place, "these are no two players", remedy));
+            return Err(argument_error(&place, "these are no two players", remedy));
         }
         if costs.dim() != (sizes[*a], sizes[*b]) {
             let cause = format!("has the shape {:?}", costs.dim());
             let remedy = format!("give a row per strategy of {a}: ({}, {})", sizes[*a], sizes[*b]);
-            return Err(wrong(&place, cause, remedy));
+            return Err(argument_error(&place, cause, remedy));
         }
         game.add_pair(*a, *b, costs.iter().copied().collect());
     }
     let (settings, uniform) = (options.settings()?, options.uniform());
-    let outcome = interruptible(py, || optimize(&game, &settings, uniform))?;
+    let outcome = run_interruptible(py, || optimize(&game, &settings, uniform))?;
     let cost = game.cost(&outcome.joint);
-    told(py, &outcome, cost)
+    result_dict(py, &outcome, cost)
 }
 
 /// A game with a cost that Python computes.
@@ -152,12 +160,16 @@ struct Objective {
 }
 
 impl Objective {
-    fn ask(&self, joint: &[usize]) -> PyResult<f64> {
+    fn evaluate(&self, joint: &[usize]) -> PyResult<f64> {
         Python::attach(|py| {
             let joint: Vec<i64> = joint.iter().map(|k| *k as i64).collect();
             let cost: f64 = self.cost.bind(py).call1((joint.to_pyarray(py),))?.extract()?;
             if cost.is_nan() {
-                return Err(wrong("objective", "its cost is not a number", "return a number"));
+                return Err(argument_error(
+                    "objective",
+                    "its cost is not a number",
+                    "return a number",
+                ));
             }
             py.check_signals().map(|()| cost)
         })
@@ -170,11 +182,11 @@ impl Game for Objective {
     }
 
     fn cost(&self, joint: &[usize]) -> f64 {
-        self.ask(joint).unwrap_or_else(|error| {
+        self.evaluate(joint).unwrap_or_else(|error| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
             // It unwinds: there is no cost to go on with.
             self.interrupt.raise();
-            interrupt::look();
+            interrupt::check();
             f64::NAN
         })
     }
@@ -186,32 +198,37 @@ pub(crate) fn minimize_objective<'py>(
     py: Python<'py>,
     strategies: Vec<usize>,
     objective: Py<PyAny>,
-    options: Options,
+    options: MinimizeOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     if strategies.is_empty() || strategies.contains(&0) {
         let remedy = "give a number of strategies for each player, 1 or more";
-        return Err(wrong("strategies", "a player has no strategy", remedy));
+        return Err(argument_error("strategies", "a player has no strategy", remedy));
     }
     let (raised, interrupt) = (Mutex::default(), Interrupt::default());
     let game = Objective { strategies, cost: objective, raised, interrupt };
     let (settings, uniform) = (options.settings()?, options.uniform());
-    let found = heeding(&game.interrupt, || {
+    let found = catch_interrupt(&game.interrupt, || {
         let outcome = optimize(&game, &settings, uniform);
         let cost = game.cost(&outcome.joint);
         (outcome, cost)
     });
     let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
     raised.map_or(Ok(()), Err)?;
-    let (outcome, cost) = found.ok_or_else(interrupted)?;
-    told(py, &outcome, cost)
+    let (outcome, cost) = found.ok_or_else(interrupted_error)?;
+    result_dict(py, &outcome, cost)
 }
 
-fn told<'py>(py: Python<'py>, outcome: &Outcome, cost: f64) -> PyResult<Bound<'py, PyDict>> {
+fn result_dict<'py>(
+    py: Python<'py>,
+    outcome: &OptimizeResult,
+    cost: f64,
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     let joint: Vec<i64> = outcome.joint.iter().map(|k| *k as i64).collect();
     dict.set_item("joint", joint.to_pyarray(py))?;
     dict.set_item("cost", cost)?;
-    let arrays = |rows: &[Vec<f64>]| list(py, rows.iter().map(|row| PyArray1::from_slice(py, row)));
+    let arrays =
+        |rows: &[Vec<f64>]| to_list(py, rows.iter().map(|row| PyArray1::from_slice(py, row)));
     dict.set_item("q", arrays(&outcome.q)?)?;
     dict.set_item("expected", arrays(&outcome.expected)?)?;
     dict.set_item("rounds", outcome.rounds)?;

@@ -14,7 +14,7 @@ pyo3::import_exception!(sidestep._errors, ReplayError);
 pyo3::import_exception!(sidestep._errors, ClosedError);
 
 /// Returns the exception of wrong input.
-pub(crate) fn input(error: &kernel::InputError) -> PyErr {
+pub(crate) fn input_error(error: &kernel::InputError) -> PyErr {
     let (line, column) = error.position().unzip();
     InputError::new_err((
         error.to_string(),
@@ -29,7 +29,7 @@ pub(crate) fn input(error: &kernel::InputError) -> PyErr {
 
 /// Returns the exception of input that came as a dict: its text was made from the dict, so the error names the
 /// key and no line.
-pub(crate) fn input_of_dict(error: &kernel::InputError) -> PyErr {
+pub(crate) fn dict_input_error(error: &kernel::InputError) -> PyErr {
     let place = error.key().unwrap_or(error.place()).to_string();
     let told = format!("{place}: {}\n  help: {}", error.cause(), error.remedy());
     let none: Option<usize> = None;
@@ -38,28 +38,32 @@ pub(crate) fn input_of_dict(error: &kernel::InputError) -> PyErr {
 }
 
 /// Returns the exception of wrong input that has no text: place, cause and remedy.
-pub(crate) fn wrong(place: &str, cause: impl Into<String>, remedy: impl Into<String>) -> PyErr {
-    input(&kernel::InputError::new(place, cause, remedy))
+pub(crate) fn argument_error(
+    place: &str,
+    cause: impl Into<String>,
+    remedy: impl Into<String>,
+) -> PyErr {
+    input_error(&kernel::InputError::new(place, cause, remedy))
 }
 
 /// Returns the exception of an order.
-pub(crate) fn order(error: &control::OrderError) -> PyErr {
+pub(crate) fn order_error(error: &control::OrderError) -> PyErr {
     OrderError::new_err(error.to_string())
 }
 
 /// Returns the exception of rows that cannot be stored.
-pub(crate) fn record(error: &ports::RecordError) -> PyErr {
+pub(crate) fn record_error(error: &ports::RecordError) -> PyErr {
     RecordError::new_err(error.to_string())
 }
 
 /// Returns the exception of a run that does not go on from a checkpoint.
-pub(crate) fn restore(error: &RestoreError) -> PyErr {
+pub(crate) fn restore_error(error: &RestoreError) -> PyErr {
     match error {
-        RestoreError::Record(error) => record(error),
-        RestoreError::Stored { .. } => CheckpointError::new_err(format!(
+        RestoreError::Record(error) => record_error(error),
+        RestoreError::AlreadyStored { .. } => CheckpointError::new_err(format!(
             "{error}\n  help: restore it in a copy (`sim.copy()`), or in a new Simulation without a folder"
         )),
-        RestoreError::Astray { .. } => CheckpointError::new_err(format!(
+        RestoreError::UnknownHistory { .. } => CheckpointError::new_err(format!(
             "{error}\n  help: take these rows before (`sim.tables()`), or restore it in a copy (`sim.copy()`)"
         )),
         _ => CheckpointError::new_err(error.to_string()),
@@ -67,12 +71,12 @@ pub(crate) fn restore(error: &RestoreError) -> PyErr {
 }
 
 /// Returns the exception of a session.
-pub(crate) fn session(error: &Error) -> PyErr {
+pub(crate) fn session_error(error: &Error) -> PyErr {
     match error {
-        Error::Input(error) => input(error),
-        Error::Record(error) => record(error),
+        Error::Input(error) => input_error(error),
+        Error::Record(error) => record_error(error),
         Error::Draw(_) => RecordError::new_err(error.to_string()),
-        Error::Interrupted | Error::WithinACycle(_) | Error::Stopped { .. } => {
+        Error::Interrupted | Error::InterruptedInCycle(_) | Error::Other { .. } => {
             ReplayError::new_err(error.to_string())
         }
     }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PySequence, PyString};
 use serde_json::Value;
 
-use crate::error::wrong;
+use crate::error::argument_error;
 
 /// Returns a JSON value as dicts, lists, numbers and text.
 pub(crate) fn to_python(py: Python<'_>, value: &Value) -> PyResult<Py<PyAny>> {
@@ -45,11 +45,12 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Val
         return Ok(toml::Value::Float(value.extract()?));
     }
     if value.is_instance_of::<PyInt>() {
-        let too_large = |_| wrong(key, format!("{value} is too large"), "give at most 2^63 - 1");
+        let too_large =
+            |_| argument_error(key, format!("{value} is too large"), "give at most 2^63 - 1");
         return Ok(toml::Value::Integer(value.extract().map_err(too_large)?));
     }
     if let Ok(mapping) = value.cast::<PyMapping>() {
-        return table(mapping, key).map(toml::Value::Table);
+        return to_toml_table(mapping, key).map(toml::Value::Table);
     }
     if let Ok(list) = value.cast::<PySequence>() {
         let items = (0..list.len()?).map(|k| to_toml(&list.get_item(k)?, &format!("{key}.{k}")));
@@ -64,17 +65,21 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Val
     }
     let sort = value.get_type();
     let cause = format!("a value of the type {} does not fit into a scenario", sort.name()?);
-    Err(wrong(key, cause, "give numbers, text, lists and dicts; leave a key out in place of None"))
+    Err(argument_error(
+        key,
+        cause,
+        "give numbers, text, lists and dicts; leave a key out in place of None",
+    ))
 }
 
 /// Returns a dict as a TOML table.
-pub(crate) fn table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResult<toml::Table> {
+pub(crate) fn to_toml_table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResult<toml::Table> {
     let mut table = toml::Table::new();
     for entry in mapping.items()?.iter() {
         let (name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
         let name: String = name.extract().map_err(|_| {
             let place = if key.is_empty() { "scenario" } else { key };
-            wrong(place, format!("the key {name} is no text"), "give text as keys")
+            argument_error(place, format!("the key {name} is no text"), "give text as keys")
         })?;
         let way = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
         table.insert(name, to_toml(&value, &way)?);
@@ -83,7 +88,7 @@ pub(crate) fn table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResult<toml:
 }
 
 /// Returns a list of the items of an iterator.
-pub(crate) fn list<'py, T>(
+pub(crate) fn to_list<'py, T>(
     py: Python<'py>,
     items: impl IntoIterator<Item = T>,
 ) -> PyResult<Bound<'py, PyList>>

@@ -6,9 +6,9 @@ use pyo3::prelude::*;
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
-use sidestep::learn::effector::{self, EffectorModel};
+use sidestep::learn::effector::{self, LearnedEffector};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
+use sidestep::learn::sensor::{self, LearnedSensor, SensorOptions};
 use sidestep_session::csv_table;
 use std::path::PathBuf;
 
@@ -17,8 +17,8 @@ use std::path::PathBuf;
 pub(crate) struct Learned(Model);
 
 enum Model {
-    Sensor(Box<SensorModel>),
-    Effector(Box<EffectorModel>),
+    Sensor(Box<LearnedSensor>),
+    Effector(Box<LearnedEffector>),
 }
 
 #[pymethods]
@@ -57,7 +57,7 @@ impl Learned {
             Model::Sensor(model) => profile::with_sensor("profile", text, name, model),
             Model::Effector(model) => profile::with_effector("profile", text, name, model),
         };
-        written.map_err(|e| error::input(&e))
+        written.map_err(|e| error::input_error(&e))
     }
 
     fn __str__(&self) -> String {
@@ -73,14 +73,18 @@ impl Learned {
 }
 
 /// Returns a table, from its text, or as recorded by a run.
-fn table(text: Option<&str>, run: Option<PathBuf>, name: &str) -> Result<CsvTable, InputError> {
+fn read_table(
+    text: Option<&str>,
+    run: Option<PathBuf>,
+    name: &str,
+) -> Result<CsvTable, InputError> {
     match (text, run) {
         (_, Some(run)) => csv_table(&run, name),
         (text, None) => CsvTable::parse(&name, text.unwrap_or_default()),
     }
 }
 
-fn estimate(alpha: f64, hold_out_every: usize) -> EstimateOptions {
+fn estimate_options(alpha: f64, hold_out_every: usize) -> EstimateOptions {
     EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
 }
 
@@ -93,17 +97,17 @@ pub(crate) fn learn_effector(
     alpha: f64,
     hold_out_every: usize,
 ) -> PyResult<Learned> {
-    let options = estimate(alpha, hold_out_every);
+    let options = estimate_options(alpha, hold_out_every);
     let learned =
-        py.detach(|| effector::learn_csv(&table(text.as_deref(), run, "motions")?, &options));
-    let model = learned.map_err(|e| error::input(&e))?;
+        py.detach(|| effector::learn_csv(&read_table(text.as_deref(), run, "motions")?, &options));
+    let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Effector(Box::new(model))))
 }
 
 /// The shape of a sensor, as passed by `sidestep.learn.sensor`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Shape {
+pub(crate) struct SensorShape {
     edges_m: Option<Vec<f64>>,
     classes: Vec<String>,
     bearings_deg: Option<Vec<f64>>,
@@ -117,13 +121,13 @@ pub(crate) fn learn_sensor(
     py: Python<'_>,
     text: Option<String>,
     run: Option<PathBuf>,
-    shape: Shape,
+    shape: SensorShape,
     alpha: f64,
     hold_out_every: usize,
 ) -> PyResult<Learned> {
     let default = SensorOptions::default();
     let options = SensorOptions {
-        estimate: estimate(alpha, hold_out_every),
+        estimate: estimate_options(alpha, hold_out_every),
         distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
         distance_classes: shape.classes,
         bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
@@ -131,7 +135,7 @@ pub(crate) fn learn_sensor(
         sensor: shape.sensor,
     };
     let learned =
-        py.detach(|| sensor::learn_csv(&table(text.as_deref(), run, "readings")?, &options));
-    let model = learned.map_err(|e| error::input(&e))?;
+        py.detach(|| sensor::learn_csv(&read_table(text.as_deref(), run, "readings")?, &options));
+    let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Sensor(Box::new(model))))
 }

@@ -3,6 +3,6 @@
 use pyo3::prelude::*;
 
 /// Returns an object as HTML, made by the function for its kind.
-pub(crate) fn shown<'py>(thing: &Bound<'py, PyAny>, sort: &str) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn to_html<'py>(thing: &Bound<'py, PyAny>, sort: &str) -> PyResult<Bound<'py, PyAny>> {
     thing.py().import("sidestep._notebook")?.call_method1(sort, (thing,))
 }

@@ -1,6 +1,6 @@
 //! Tables of folders: of runs, and of sweeps.
 
-use crate::error::{self, wrong};
+use crate::error::{self, argument_error};
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,7 +10,7 @@ use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
 /// The tables of a sweep's folder.
-const OF_SWEEP: [&str; 2] = ["results", "timings"];
+const SWEEP_TABLES: [&str; 2] = ["results", "timings"];
 
 /// Returns the names of the tables of a run folder or a sweep's folder.
 ///
@@ -18,9 +18,9 @@ const OF_SWEEP: [&str; 2] = ["results", "timings"];
 #[pyfunction]
 pub(crate) fn table_names(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
     if Folder::is_at(&folder) {
-        return Ok(OF_SWEEP.map(String::from).to_vec());
+        return Ok(SWEEP_TABLES.map(String::from).to_vec());
     }
-    py.detach(|| tables_of(&folder)).map_err(|e| error::input(&e))
+    py.detach(|| tables_of(&folder)).map_err(|e| error::input_error(&e))
 }
 
 /// Returns the tables of a run folder or a sweep's folder by name, all of them or the named ones.
@@ -35,7 +35,7 @@ pub(crate) fn read<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let wanted = tables;
     if Folder::is_at(&folder) {
-        return read_folder(py, &folder, wanted.as_ref());
+        return read_sweep_folder(py, &folder, wanted.as_ref());
     }
     let read = || {
         let names = wanted.map_or_else(|| tables_of(&folder), Ok)?;
@@ -43,36 +43,40 @@ pub(crate) fn read<'py>(
     };
     let read: Result<Vec<_>, sidestep::kernel::InputError> = py.detach(read);
     let dict = PyDict::new(py);
-    for (name, table) in read.map_err(|e| error::input(&e))? {
+    for (name, table) in read.map_err(|e| error::input_error(&e))? {
         dict.set_item(name, Table::new(table.schema, table.columns)?)?;
     }
     Ok(dict)
 }
 
 /// Returns the tables of a sweep's folder, for the finished runs.
-fn read_folder<'py>(
+fn read_sweep_folder<'py>(
     py: Python<'py>,
     folder: &Path,
     wanted: Option<&Vec<String>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let finished = py.detach(|| {
         let folder = Folder::open(folder)?;
-        let finished = sweep::finished(&folder)?;
+        let finished = sweep::read_finished(&folder)?;
         Ok((finished.table, folder.plan().world.clone()))
     });
-    let (table, world) = finished.map_err(|e: InputError| error::input(&e))?;
+    let (table, world) = finished.map_err(|e: InputError| error::input_error(&e))?;
     let dict = PyDict::new(py);
-    for (name, columns) in OF_SWEEP.into_iter().zip([table.results(), table.timings()]) {
+    for (name, columns) in SWEEP_TABLES.into_iter().zip([table.results(), table.timings()]) {
         if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
             let columns = columns.into_iter().cloned().collect();
-            dict.set_item(name, Table::of_runs(name, columns, &world)?)?;
+            dict.set_item(name, Table::from_runs(name, columns, &world)?)?;
         }
     }
-    let unknown = wanted.into_iter().flatten().find(|name| !OF_SWEEP.contains(&name.as_str()));
+    let unknown = wanted.into_iter().flatten().find(|name| !SWEEP_TABLES.contains(&name.as_str()));
     match unknown {
         Some(name) => {
             let cause = format!("there is no table `{name}`");
-            Err(wrong(&folder.display().to_string(), cause, "a sweep has results and timings"))
+            Err(argument_error(
+                &folder.display().to_string(),
+                cause,
+                "a sweep has results and timings",
+            ))
         }
         None => Ok(dict),
     }

@@ -1,19 +1,19 @@
 //! Scenarios: a file, text or dict, compiled once.
 
-use crate::error::{self, wrong};
-use crate::json::{list, table, to_python, to_toml};
-use crate::notebook::shown;
-use crate::watch::interruptible;
+use crate::error::{self, argument_error};
+use crate::json::{to_list, to_python, to_toml, to_toml_table};
+use crate::notebook::to_html;
+use crate::watch::run_interruptible;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Resolved, Seedless, Source};
+use sidestep::scenario::{CompiledScenario, ResolvedScenario, SeedTemplate, Source};
 use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Number of bodies up to which reseeding takes less time than starting an interruptible thread.
-const FEW_BODIES: usize = 100;
+const MAX_UNINTERRUPTED_BODIES: usize = 100;
 
 /// A scenario, read, checked and compiled. It never changes; simulations share it.
 ///
@@ -28,41 +28,41 @@ const FEW_BODIES: usize = 100;
 /// >>> scenario.world, scenario.seed, scenario.agents
 /// ('robots', 1, 2)
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Scenario(pub(crate) Arc<Made>);
+pub(crate) struct Scenario(pub(crate) Arc<LoadedScenario>);
 
 /// A compiled scenario with its text.
-pub(crate) struct Made {
-    pub(crate) compiled: Box<dyn Compiled>,
-    text: Text,
+pub(crate) struct LoadedScenario {
+    pub(crate) compiled: Box<dyn CompiledScenario>,
+    text: ScenarioText,
     /// Whether its text was made from a dict, so that users do not know its lines.
     is_dict: bool,
-    resolved: OnceLock<Result<Resolved, InputError>>,
+    resolved: OnceLock<Result<ResolvedScenario, InputError>>,
     /// The resolved text without its seed, if it has one.
-    seedless: OnceLock<Option<Seedless>>,
+    seedless: OnceLock<Option<SeedTemplate>>,
     /// Holds its files, if it was unpacked from a bundle.
     unpacked: Option<Arc<tempfile::TempDir>>,
 }
 
 /// The text of a scenario.
-enum Text {
+enum ScenarioText {
     /// A text that was read or written.
     Own(Source),
     /// Another scenario with this seed. Its text is written on demand: writing it anew takes longer than starting a
     /// small world.
-    Reseeded { of: Arc<Made>, seed: u64, source: OnceLock<Result<Source, InputError>> },
+    Reseeded { of: Arc<LoadedScenario>, seed: u64, source: OnceLock<Result<Source, InputError>> },
 }
 
-impl Made {
+impl LoadedScenario {
     /// Reads and compiles a scenario while other threads of Python go on; Ctrl-C interrupts it.
     fn new(py: Python<'_>, source: Source, is_dict: bool) -> PyResult<Self> {
-        let compiled = interruptible(py, || WORLDS.compile(&source))?;
-        let compiled = compiled.map_err(|e| told(&e, is_dict))?;
-        Ok(Self::of(compiled, Text::Own(source), is_dict, None))
+        let compiled = run_interruptible(py, || WORLDS.compile(&source))?;
+        let compiled = compiled.map_err(|e| scenario_error(&e, is_dict))?;
+        Ok(Self::from_compiled(compiled, ScenarioText::Own(source), is_dict, None))
     }
 
-    fn of(
-        compiled: Box<dyn Compiled>,
-        text: Text,
+    fn from_compiled(
+        compiled: Box<dyn CompiledScenario>,
+        text: ScenarioText,
         is_dict: bool,
         unpacked: Option<Arc<tempfile::TempDir>>,
     ) -> Self {
@@ -71,10 +71,10 @@ impl Made {
     }
 
     /// Returns the scenario of a bundle.
-    pub(crate) fn unpacked(py: Python<'_>, resolved: Resolved) -> PyResult<Self> {
+    pub(crate) fn from_bundle(py: Python<'_>, resolved: ResolvedScenario) -> PyResult<Self> {
         let unpacked = match resolved.files.is_empty() {
             true => None,
-            false => Some(Arc::new(unpack(&resolved.files)?)),
+            false => Some(Arc::new(unpack_files(&resolved.files)?)),
         };
         let base = unpacked.as_ref().map_or_else(PathBuf::new, |dir| dir.path().to_path_buf());
         let source = Source::new("scenario.toml", resolved.text.clone(), base);
@@ -85,15 +85,15 @@ impl Made {
 
     /// Returns its text with the origin of that.
     pub(crate) fn source(&self) -> PyResult<&Source> {
-        self.own_source().map_err(|e| told(e, self.is_dict))
+        self.own_source().map_err(|e| scenario_error(e, self.is_dict))
     }
 
     fn own_source(&self) -> Result<&Source, &InputError> {
         match &self.text {
-            Text::Own(source) => Ok(source),
-            Text::Reseeded { of, seed, source } => {
+            ScenarioText::Own(source) => Ok(source),
+            ScenarioText::Reseeded { of, seed, source } => {
                 let write = || match of.own_source() {
-                    Ok(source) => source.clone().with(&[format!("seed={seed}")]),
+                    Ok(source) => source.clone().with_overrides(&[format!("seed={seed}")]),
                     Err(error) => Err(error.clone()),
                 };
                 source.get_or_init(write).as_ref()
@@ -102,20 +102,20 @@ impl Made {
     }
 
     /// Returns the scenario with all its files, as kept in run folders; checkpoints belong to this text.
-    pub(crate) fn resolved(&self) -> PyResult<&Resolved> {
+    pub(crate) fn resolved(&self) -> PyResult<&ResolvedScenario> {
         let resolve = || match self.own_source() {
             Ok(source) => self.compiled.resolve(source),
             Err(error) => Err(error.clone()),
         };
-        self.resolved.get_or_init(resolve).as_ref().map_err(|e| told(e, self.is_dict))
+        self.resolved.get_or_init(resolve).as_ref().map_err(|e| scenario_error(e, self.is_dict))
     }
 
     /// Returns the text to which checkpoints belong: the resolved one.
     pub(crate) fn identity(&self) -> PyResult<String> {
-        if let Text::Reseeded { of, seed, .. } = &self.text {
-            let (resolved, find) = (of.resolved()?, Resolved::seedless);
+        if let ScenarioText::Reseeded { of, seed, .. } = &self.text {
+            let (resolved, find) = (of.resolved()?, ResolvedScenario::seed_template);
             if let Some(seedless) = of.seedless.get_or_init(|| find(resolved)) {
-                return Ok(seedless.with(*seed));
+                return Ok(seedless.with_seed(*seed));
             }
         }
         Ok(self.resolved()?.text.clone())
@@ -125,46 +125,50 @@ impl Made {
     pub(crate) fn reseeded(self: &Arc<Self>, py: Python<'_>, seed: u64) -> PyResult<Self> {
         if i64::try_from(seed).is_err() {
             let remedy = "give at most 2^63 - 1: scenario files have no larger numbers";
-            return Err(wrong("seed", format!("{seed} is too large"), remedy));
+            return Err(argument_error("seed", format!("{seed} is too large"), remedy));
         }
         // A reseeded text never refers to another reseeded one: repeated reseeding keeps one scenario alive, not a
         // chain of them.
         let of = match &self.text {
-            Text::Own(_) => self,
-            Text::Reseeded { of, .. } => of,
+            ScenarioText::Own(_) => self,
+            ScenarioText::Reseeded { of, .. } => of,
         };
         let reseeded = || self.compiled.reseeded(seed);
-        let reseeded = match self.compiled.bodies() > FEW_BODIES {
-            true => interruptible(py, reseeded)?,
+        let reseeded = match self.compiled.body_count() > MAX_UNINTERRUPTED_BODIES {
+            true => run_interruptible(py, reseeded)?,
             false => py.detach(reseeded),
         };
         let compiled = match reseeded {
             Some(compiled) => compiled,
-            None => interruptible(py, || self.compiled_with(seed))?,
+            None => run_interruptible(py, || self.compiled_with(seed))?,
         };
-        let compiled = compiled.map_err(|e| told(&e, self.is_dict))?;
-        let text = Text::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
-        Ok(Self::of(compiled, text, self.is_dict, self.unpacked.clone()))
+        let compiled = compiled.map_err(|e| scenario_error(&e, self.is_dict))?;
+        let text = ScenarioText::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
+        Ok(Self::from_compiled(compiled, text, self.is_dict, self.unpacked.clone()))
     }
 
     /// Returns the same scenario with another seed, read and compiled anew.
-    pub(crate) fn compiled_with(&self, seed: u64) -> Result<Box<dyn Compiled>, InputError> {
+    pub(crate) fn compiled_with(&self, seed: u64) -> Result<Box<dyn CompiledScenario>, InputError> {
         let source = self.own_source().map_err(InputError::clone)?;
-        WORLDS.compile(&source.clone().with(&[format!("seed={seed}")])?)
+        WORLDS.compile(&source.clone().with_overrides(&[format!("seed={seed}")])?)
     }
 
     /// Returns the same scenario with other values.
     pub(crate) fn with(&self, py: Python<'_>, overrides: &[String]) -> PyResult<Self> {
-        let source = self.source()?.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;
+        let source = self
+            .source()?
+            .clone()
+            .with_overrides(overrides)
+            .map_err(|e| scenario_error(&e, self.is_dict))?;
         Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(py, source, self.is_dict)? })
     }
 }
 
-fn told(error: &InputError, is_dict: bool) -> PyErr {
-    if is_dict { error::input_of_dict(error) } else { error::input(error) }
+fn scenario_error(error: &InputError, is_dict: bool) -> PyErr {
+    if is_dict { error::dict_input_error(error) } else { error::input_error(error) }
 }
 
-fn unpack(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
+fn unpack_files(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
     let stored = || {
         let dir = tempfile::tempdir()?;
         for (name, bytes) in files {
@@ -179,47 +183,49 @@ fn unpack(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
 }
 
 /// Returns a scenario from anything that represents one: a path, a dict, or a scenario.
-pub(crate) fn made(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<Made>> {
+pub(crate) fn load(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<LoadedScenario>> {
     if let Ok(scenario) = scenario.cast::<Scenario>() {
         return Ok(Arc::clone(&scenario.get().0));
     }
-    of_any(scenario.py(), Some(scenario), None, None).map(Arc::new)
+    load_any(scenario.py(), Some(scenario), None, None).map(Arc::new)
 }
 
-fn of_any(
+fn load_any(
     py: Python<'_>,
     scenario: Option<&Bound<'_, PyAny>>,
     text: Option<&str>,
     base: Option<PathBuf>,
-) -> PyResult<Made> {
+) -> PyResult<LoadedScenario> {
     let base = base.unwrap_or_default();
     match (scenario, text) {
-        (None, Some(text)) => Made::new(py, Source::new("text", text, base), false),
+        (None, Some(text)) => LoadedScenario::new(py, Source::new("text", text, base), false),
         (Some(given), None) => match given.cast::<PyMapping>() {
-            Ok(mapping) => Made::new(py, of_dict(mapping, &base)?, true),
+            Ok(mapping) => LoadedScenario::new(py, source_of_dict(mapping, &base)?, true),
             Err(_) => {
                 let path: PathBuf = given.extract().map_err(|_| {
                     let cause = format!("{given} is no path, dict or Scenario");
-                    wrong("scenario", cause, "give a path or a dict, or text=...")
+                    argument_error("scenario", cause, "give a path or a dict, or text=...")
                 })?;
-                let read = interruptible(py, || sidestep_session::read(WORLDS, &path, &[]))?;
-                let (source, compiled) = read.map_err(|e| error::input(&e))?;
-                Ok(Made::of(compiled, Text::Own(source), false, None))
+                let read =
+                    run_interruptible(py, || sidestep_session::read_scenario(WORLDS, &path, &[]))?;
+                let (source, compiled) = read.map_err(|e| error::input_error(&e))?;
+                Ok(LoadedScenario::from_compiled(compiled, ScenarioText::Own(source), false, None))
             }
         },
         _ => {
             let remedy = "give a path, a dict or a Scenario, or text=...";
-            Err(wrong("Scenario", "it needs one scenario", remedy))
+            Err(argument_error("Scenario", "it needs one scenario", remedy))
         }
     }
 }
 
 /// Returns the scenario of a dict, in which `format` may be left out.
-fn of_dict(mapping: &Bound<'_, PyMapping>, base: &Path) -> PyResult<Source> {
-    let mut table = table(mapping, "")?;
+fn source_of_dict(mapping: &Bound<'_, PyMapping>, base: &Path) -> PyResult<Source> {
+    let mut table = to_toml_table(mapping, "")?;
     table.entry("format").or_insert(toml::Value::Integer(1));
-    let text = toml::to_string(&table)
-        .map_err(|e| wrong("scenario", e.to_string(), "give what a scenario file may hold"))?;
+    let text = toml::to_string(&table).map_err(|e| {
+        argument_error("scenario", e.to_string(), "give what a scenario file may hold")
+    })?;
     Ok(Source::new("scenario", text, base))
 }
 
@@ -233,7 +239,7 @@ impl Scenario {
         text: Option<&str>,
         base: Option<PathBuf>,
     ) -> PyResult<Self> {
-        of_any(py, scenario, text, base).map(|made| Self(Arc::new(made)))
+        load_any(py, scenario, text, base).map(|made| Self(Arc::new(made)))
     }
 
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
@@ -267,7 +273,7 @@ impl Scenario {
     /// []
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let remarks = self.0.compiled.remarks();
-        list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
+        to_list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
     }
 
     /// Name of its world.
@@ -297,7 +303,7 @@ impl Scenario {
     /// Number of simulated bodies.
     #[getter]
     fn agents(&self) -> usize {
-        self.0.compiled.bodies()
+        self.0.compiled.body_count()
     }
 
     /// The text of its file, with all values set.
@@ -316,19 +322,19 @@ impl Scenario {
 
     /// Returns a picture of the start and the facts, for notebooks.
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        shown(slf.as_any(), "scenario")
+        to_html(slf.as_any(), "scenario")
     }
 
     /// Pickles the scenario with all files that it names.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bundle)> {
         let maker = slf.py().import("sidestep._native")?.getattr("unpack_scenario")?;
-        let Resolved { text, files } = slf.get().0.resolved()?.clone();
+        let ResolvedScenario { text, files } = slf.get().0.resolved()?.clone();
         Ok((maker, (text, files)))
     }
 
     fn __repr__(&self) -> String {
         let plan = self.0.compiled.plan();
-        let (world, n) = (self.0.compiled.world(), self.0.compiled.bodies());
+        let (world, n) = (self.0.compiled.world(), self.0.compiled.body_count());
         let name =
             if plan.name.is_empty() { world.into() } else { format!("{world} {}", plan.name) };
         format!("Scenario({name}, {n} bodies, seed {}, {} cycles)", plan.seed, plan.cycles)
@@ -345,7 +351,8 @@ pub(crate) fn unpack_scenario(
     text: String,
     files: Vec<(String, Vec<u8>)>,
 ) -> PyResult<Scenario> {
-    Made::unpacked(py, Resolved { text, files }).map(|made| Scenario(Arc::new(made)))
+    LoadedScenario::from_bundle(py, ResolvedScenario { text, files })
+        .map(|made| Scenario(Arc::new(made)))
 }
 
 /// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.
@@ -362,7 +369,7 @@ pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>>
         Some(schema) => to_python(py, &schema),
         None => {
             let (names, world) = (WORLDS.names().join(", "), world.unwrap_or_default());
-            Err(wrong(
+            Err(argument_error(
                 "schema",
                 format!("there is no world `{world}`"),
                 format!("it is one of {names}"),

@@ -1,30 +1,30 @@
 //! Simulations that Python advances, observes and orders.
 
-use crate::arrays::{Whole, column, ids, numbers, rows, texts};
+use crate::arrays::{WholeNumber, agent_ids, body_column, body_rows, body_texts, order_values};
 use crate::blocks::Blocks;
-use crate::decide::{Deciding, Numbered, decided};
-use crate::error::{self, ClosedError, wrong};
+use crate::error::{self, ClosedError, argument_error};
 use crate::json::to_python;
-use crate::notebook::shown;
-use crate::scenario::{Bundle, Made, made};
-use crate::space::{Room, Team, named, numbered};
+use crate::notebook::to_html;
+use crate::policy::{IndexedTeam, PolicyRun, run_with_policies};
+use crate::scenario::{Bundle, LoadedScenario, load};
+use crate::space::{ObservationBuffers, Team, find_team, team_at};
 use crate::table::Table;
-use crate::watch::{ForAWhile, Signals};
+use crate::watch::{SignalWatcher, TimeSlice};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
 use sidestep::kernel::ports::{TableSchema, Values};
-use sidestep::kernel::view::{Body, Kind, Look, Who};
-use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
-use sidestep::scenario::{Resolved, Source};
-use sidestep_draw::{DrawError, Film, Still};
-use sidestep_session::{Journey, Keep, Wanted, frame_rows};
+use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
+use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
+use sidestep::scenario::{ResolvedScenario, Source};
+use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
+use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Width in pixels of a picture in a notebook.
-const NOTEBOOK_PX: u32 = 480;
+const NOTEBOOK_WIDTH_PX: u32 = 480;
 
 /// A run of a scenario, at its start.
 ///
@@ -49,26 +49,26 @@ const NOTEBOOK_PX: u32 = 480;
 /// 10
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Simulation {
-    scenario: Arc<Made>,
+    scenario: Arc<LoadedScenario>,
     workers: usize,
     /// Its teams, which never change and are needed in every cycle.
     teams: Vec<Arc<control::Team>>,
     /// `None` when it is closed.
-    journey: Mutex<Option<Journey>>,
+    journey: Mutex<Option<ManagedRun>>,
     /// The view of its pictures, with their width in pixels.
-    film: Mutex<Option<(u32, Film)>>,
+    film: Mutex<Option<(u32, AnimationRenderer)>>,
 }
 
 impl Simulation {
     /// Starts a scenario while other threads of Python go on.
-    fn at_start(
+    fn start(
         py: Python<'_>,
-        scenario: Arc<Made>,
+        scenario: Arc<LoadedScenario>,
         workers: usize,
-        keep: Keep<'_>,
+        keep: OutputPaths<'_>,
     ) -> PyResult<Self> {
         if workers == 0 {
-            return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
+            return Err(argument_error("workers", "0 workers cannot simulate", "give 1 or more"));
         }
         let journey = py.detach(|| {
             // Without a folder it is identified by the text that a folder would have, so that checkpoints fit both.
@@ -76,8 +76,9 @@ impl Simulation {
                 Some(_) => scenario.source()?.clone(),
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
-            let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
-            journey.map_err(|e| error::session(&e))
+            let journey =
+                ManagedRun::start(scenario.compiled.as_ref(), &source, workers, keep, None);
+            journey.map_err(|e| error::session_error(&e))
         })?;
         let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();
         let journey = Mutex::new(Some(journey));
@@ -85,45 +86,45 @@ impl Simulation {
     }
 
     /// Works with the run while other threads of Python go on.
-    fn with<T: Send>(
+    fn with_run<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Journey) -> PyResult<T> + Send,
+        work: impl FnOnce(&mut ManagedRun) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         py.detach(|| {
             let mut journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            work(journey.as_mut().ok_or_else(closed)?)
+            work(journey.as_mut().ok_or_else(closed_error)?)
         })
     }
 
     /// Returns a value read from the run.
-    fn ask<T: Send>(
+    fn read<T: Send>(
         &self,
         py: Python<'_>,
         ask: impl FnOnce(&dyn AnySimulation) -> T + Send,
     ) -> PyResult<T> {
-        self.with(py, |journey| Ok(ask(journey.simulation())))
+        self.with_run(py, |journey| Ok(ask(journey.simulation())))
     }
 
     /// Returns the state as bytes.
-    fn saved(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
-        self.with(py, |journey| journey.checkpoint().map_err(|e| error::record(&e)))
+    fn checkpoint_bytes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.with_run(py, |journey| journey.checkpoint().map_err(|e| error::record_error(&e)))
     }
 
     /// Advances to the goal, or to the end of the run, and returns the number of cycles done.
     ///
     /// Signals are checked between two slices, while no code holds the run: their handlers are functions of Python on
     /// this thread, and may call the simulation in any way.
-    fn advance_towards(&self, py: Python<'_>, mut goal: Goal) -> PyResult<u64> {
+    fn advance_to_goal(&self, py: Python<'_>, mut goal: Goal) -> PyResult<u64> {
         let mut done = 0;
         loop {
             py.check_signals()?;
-            let slice = self.slice(py, goal)?;
+            let slice = self.advance_slice(py, goal)?;
             done += slice.done;
             if slice.is_last {
                 return Ok(done);
             }
-            goal = goal.after(slice.done);
+            goal = goal.remaining(slice.done);
         }
     }
 
@@ -131,53 +132,53 @@ impl Simulation {
     ///
     /// The cycle is read and the run advanced under one lock, with no other thread in between: of two threads that
     /// step at once, each adds its own step.
-    fn slice(&self, py: Python<'_>, goal: Goal) -> PyResult<Slice> {
+    fn advance_slice(&self, py: Python<'_>, goal: Goal) -> PyResult<SliceOutcome> {
         py.detach(|| {
             let mut held = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            let journey = held.as_mut().ok_or_else(closed)?;
+            let journey = held.as_mut().ok_or_else(closed_error)?;
             let from = journey.cycle();
-            let until = goal.from(from);
-            if let Err(error) = journey.advance_to(until, &ForAWhile::default()) {
+            let until = goal.end_from(from);
+            if let Err(error) = journey.advance_to(until, &TimeSlice::default()) {
                 // A run that broke off has no usable state.
                 *held = None;
-                return Err(error::session(&error));
+                return Err(error::session_error(&error));
             }
             let now = journey.cycle();
             let is_last = now >= until || journey.simulation().is_over();
-            Ok(Slice { done: now - from, is_last })
+            Ok(SliceOutcome { done: now - from, is_last })
         })
     }
 
     /// Returns a team by number or name, with its number.
-    fn named(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<Numbered> {
-        named(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
+    fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<IndexedTeam> {
+        find_team(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
 
     /// Returns the team of an agent; the first one for an agent that is in none: its order will be refused.
-    fn team_of(&self, agent: Option<EntityId>) -> PyResult<Numbered> {
+    fn team_of(&self, agent: Option<EntityId>) -> PyResult<IndexedTeam> {
         let has = |team: &Arc<control::Team>| {
             agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
         };
         let number = self.teams.iter().position(has).unwrap_or(0);
-        numbered(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
+        team_at(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
     }
 
-    fn perceived<'py>(
+    fn observations<'py>(
         &self,
         py: Python<'py>,
         number: usize,
         team: &Arc<control::Team>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let mut room = Room::of(team);
-        let written = self.with(py, |journey| {
-            let written = journey.simulation().observe(number, &mut room.cells());
-            written.map_err(|e| error::order(&e)).map(|()| room)
+        let mut room = ObservationBuffers::from_team(team);
+        let written = self.with_run(py, |journey| {
+            let written = journey.simulation().observe(number, &mut room.buffers_mut());
+            written.map_err(|e| error::order_error(&e)).map(|()| room)
         });
         written?.into_dict(py, team)
     }
 
     /// Gives an order to agents of a team.
-    fn ordered(
+    fn order_agents(
         &self,
         py: Python<'_>,
         order: &str,
@@ -185,32 +186,37 @@ impl Simulation {
         agents: &[EntityId],
         team: &control::Team,
     ) -> PyResult<()> {
-        let shape = team.ordered.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
-        let values = numbers(py, order, values, agents.len(), shape)?;
-        self.with(py, |journey| {
+        let shape =
+            team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
+        let values = order_values(py, order, values, agents.len(), shape)?;
+        self.with_run(py, |journey| {
             let orders = Orders { order, agents, values: &values };
-            journey.order(&orders).map_err(|e| error::order(&e))
+            journey.order(&orders).map_err(|e| error::order_error(&e))
         })
     }
 
     /// Draws the present state.
-    fn still(&self, py: Python<'_>, width: u32) -> PyResult<(Still, (u32, u32))> {
-        self.with(py, |journey| {
+    fn draw(&self, py: Python<'_>, width: u32) -> PyResult<(AnimationFrame, (u32, u32))> {
+        self.with_run(py, |journey| {
             let run = journey.simulation_mut();
-            let frame = run.frame(Look::BODIES);
+            let frame = run.frame(FrameOptions::WITHOUT_SCANS);
             let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
             let made = film.take().filter(|(its, _)| *its == width);
-            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
-            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
+            let made = made.map_or_else(
+                || AnimationRenderer::new(run.scenery(), &[], width),
+                |(_, it)| Ok(it),
+            );
+            let made =
+                made.map_err(|e| argument_error("width", e.to_string(), "give 1 to 4096 pixels"))?;
             let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
-            let still = made.still(&frame, &[], &caption).map_err(|e| undrawn(&e))?;
+            let still = made.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
             *film = Some((width, made));
             Ok((still, size))
         })
     }
 
     /// Returns the end: `until`, or else the one planned by the scenario.
-    fn end(&self, until: Option<Cycle>) -> Cycle {
+    fn end_cycle(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
     }
 }
@@ -226,7 +232,7 @@ enum Goal {
 
 impl Goal {
     /// Returns the cycle to advance to from `now`.
-    fn from(self, now: Cycle) -> Cycle {
+    fn end_from(self, now: Cycle) -> Cycle {
         match self {
             Self::Further(cycles) => now.saturating_add(cycles),
             Self::Until(until) => until.max(now),
@@ -234,7 +240,7 @@ impl Goal {
     }
 
     /// Returns the remaining goal once a number of cycles are done.
-    fn after(self, done: u64) -> Self {
+    fn remaining(self, done: u64) -> Self {
         match self {
             Self::Further(cycles) => Self::Further(cycles - done),
             Self::Until(_) => self,
@@ -243,19 +249,22 @@ impl Goal {
 }
 
 /// The outcome of advancing for a little while.
-struct Slice {
+struct SliceOutcome {
     /// Cycles done.
     done: u64,
     /// Whether the goal is reached, or the run is over.
     is_last: bool,
 }
 
-fn undrawn(error: &DrawError) -> PyErr {
+fn draw_error(error: &DrawError) -> PyErr {
     error::RecordError::new_err(error.to_string())
 }
 
 /// Returns tables by name.
-fn tables(py: Python<'_>, rows: Vec<(TableSchema, Vec<Values>)>) -> PyResult<Bound<'_, PyDict>> {
+fn tables_dict(
+    py: Python<'_>,
+    rows: Vec<(TableSchema, Vec<Values>)>,
+) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     for (schema, columns) in rows {
         dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
@@ -264,24 +273,24 @@ fn tables(py: Python<'_>, rows: Vec<(TableSchema, Vec<Values>)>) -> PyResult<Bou
 }
 
 /// The argument `record`: whether rows are kept, or the tables of the kept rows.
-pub(crate) struct Recorded(Option<Wanted>);
+pub(crate) struct RecordArgument(Option<RowSelection>);
 
-impl FromPyObject<'_, '_> for Recorded {
+impl FromPyObject<'_, '_> for RecordArgument {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
         if let Ok(is_wanted) = value.extract::<bool>() {
-            return Ok(Self(is_wanted.then(Wanted::default)));
+            return Ok(Self(is_wanted.then(RowSelection::default)));
         }
         let names = value.extract::<Vec<String>>().map_err(|_| {
             let remedy = "give True, False, or a list of names: record=[\"events\"]";
-            wrong("record", format!("{} is no list of tables", &*value), remedy)
+            argument_error("record", format!("{} is no list of tables", &*value), remedy)
         })?;
-        Ok(Self(Some(Wanted { tables: Some(names), frames: None })))
+        Ok(Self(Some(RowSelection { tables: Some(names), frames: None })))
     }
 }
 
-fn closed() -> PyErr {
+fn closed_error() -> PyErr {
     ClosedError::new_err(
         "the simulation is closed; make a new one, and restore a checkpoint in that",
     )
@@ -290,27 +299,27 @@ fn closed() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=Recorded(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=WholeNumber(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
-        seed: Option<Whole>,
-        workers: Whole,
-        record: Recorded,
+        seed: Option<WholeNumber>,
+        workers: WholeNumber,
+        record: RecordArgument,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
         let py = scenario.py();
-        let mut scenario = made(scenario)?;
-        let seed = seed.map(|Whole(seed)| seed);
+        let mut scenario = load(scenario)?;
+        let seed = seed.map(|WholeNumber(seed)| seed);
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
-        let keep = Keep { folder: out.as_deref(), mcap: None, replace };
-        let simulation = Self::at_start(py, scenario, workers.0 as usize, keep)?;
-        if let Recorded(Some(wanted)) = record {
+        let keep = OutputPaths { folder: out.as_deref(), mcap: None, replace };
+        let simulation = Self::start(py, scenario, workers.0 as usize, keep)?;
+        if let RecordArgument(Some(wanted)) = record {
             let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            let journey = journey.as_mut().ok_or_else(closed)?;
-            journey.keep_rows(&wanted).map_err(|e| error::input(&e))?;
+            let journey = journey.as_mut().ok_or_else(closed_error)?;
+            journey.keep_rows(&wanted).map_err(|e| error::input_error(&e))?;
         }
         Ok(simulation)
     }
@@ -320,9 +329,9 @@ impl Simulation {
     ///
     /// >>> sim.step(), sim.step(5)
     /// (1, 5)
-    #[pyo3(signature = (cycles=Whole(1)), text_signature = "($self, cycles=1)")]
-    fn step(&self, py: Python<'_>, cycles: Whole) -> PyResult<u64> {
-        self.advance_towards(py, Goal::Further(cycles.0))
+    #[pyo3(signature = (cycles=WholeNumber(1)), text_signature = "($self, cycles=1)")]
+    fn step(&self, py: Python<'_>, cycles: WholeNumber) -> PyResult<u64> {
+        self.advance_to_goal(py, Goal::Further(cycles.0))
     }
 
     /// Advances to cycle `until`, by default the planned end, and returns the number of cycles done.
@@ -338,15 +347,15 @@ impl Simulation {
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     fn run(
         slf: &Bound<'_, Self>,
-        until: Option<Whole>,
+        until: Option<WholeNumber>,
         decide: Option<&Bound<'_, PyAny>>,
         state: Option<Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
         let simulation = slf.get();
-        let until = simulation.end(until.map(|Whole(until)| until));
+        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
         match decide {
-            None => simulation.advance_towards(slf.py(), Goal::Until(until)),
-            Some(decide) => decided(slf.py(), simulation, decide, state, until),
+            None => simulation.advance_to_goal(slf.py(), Goal::Until(until)),
+            Some(decide) => run_with_policies(slf.py(), simulation, decide, state, until),
         }
     }
 
@@ -365,19 +374,19 @@ impl Simulation {
     /// Cycles done.
     #[getter]
     fn cycle(&self, py: Python<'_>) -> PyResult<u64> {
-        self.ask(py, |run| run.cycle())
+        self.read(py, |run| run.cycle())
     }
 
     /// Returns whether nothing can happen anymore, e.g. because all have arrived.
     #[getter]
     fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
-        self.ask(py, |run| run.is_over())
+        self.read(py, |run| run.is_over())
     }
 
     /// Digest of the state, in hexadecimal: equal for equal scenario, seed, cycle and orders.
     #[getter]
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
-        self.ask(py, |run| run.digest().to_string())
+        self.read(py, |run| run.digest().to_string())
     }
 
     /// Returns the measurements of the run so far, as in the command's summary.
@@ -385,7 +394,7 @@ impl Simulation {
     /// >>> sim.metrics()["contacts"]
     /// 0
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        to_python(py, &self.ask(py, |run| run.metrics())?)
+        to_python(py, &self.read(py, |run| run.metrics())?)
     }
 
     /// Returns the measurements of each agent.
@@ -393,13 +402,13 @@ impl Simulation {
     /// >>> len(sim.agent_metrics())
     /// 2
     fn agent_metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        to_python(py, &self.ask(py, |run| run.agent_metrics())?)
+        to_python(py, &self.read(py, |run| run.agent_metrics())?)
     }
 
     /// The teams: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        crate::json::list(py, self.teams.iter().cloned().map(Team))
+        crate::json::to_list(py, self.teams.iter().cloned().map(Team))
     }
 
     /// Returns the observations of a team's agents (by number or name) before the next cycle: arrays by name, of the
@@ -416,8 +425,8 @@ impl Simulation {
         py: Python<'py>,
         team: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let (number, team) = self.named(team)?;
-        self.perceived(py, number, &team)
+        let (number, team) = self.find_team(team)?;
+        self.observations(py, number, &team)
     }
 
     /// Gives agents an order for the next cycle: `order("action", [0, 2])`. `values` has a row for each
@@ -437,13 +446,13 @@ impl Simulation {
         agents: Option<&Bound<'_, PyAny>>,
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let agents = agents.map(|agents| ids(py, agents)).transpose()?;
+        let agents = agents.map(|agents| agent_ids(py, agents)).transpose()?;
         let (_, team) = match (team, &agents) {
             (None, Some(agents)) => self.team_of(agents.first().copied())?,
-            (team, _) => self.named(team)?,
+            (team, _) => self.find_team(team)?,
         };
         let agents = agents.as_deref().unwrap_or(&team.agents);
-        self.ordered(py, name, values, agents, &team)
+        self.order_agents(py, name, values, agents, &team)
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold such checkpoints.
@@ -451,7 +460,7 @@ impl Simulation {
     /// >>> isinstance(sim.checkpoint(), bytes)
     /// True
     fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.saved(py)?))
+        Ok(PyBytes::new(py, &self.checkpoint_bytes(py)?))
     }
 
     /// Goes on from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
@@ -469,7 +478,9 @@ impl Simulation {
     /// >>> sim.cycle
     /// 10
     fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
-        self.with(py, |journey| journey.restore(&checkpoint).map_err(|e| error::restore(&e)))
+        self.with_run(py, |journey| {
+            journey.restore(&checkpoint).map_err(|e| error::restore_error(&e))
+        })
     }
 
     /// Returns an independent copy in the same state, which records nothing.
@@ -477,8 +488,9 @@ impl Simulation {
     /// >>> sim.copy().digest == sim.digest
     /// True
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        let bytes = self.saved(py)?;
-        let copy = Self::at_start(py, Arc::clone(&self.scenario), self.workers, Keep::default())?;
+        let bytes = self.checkpoint_bytes(py)?;
+        let copy =
+            Self::start(py, Arc::clone(&self.scenario), self.workers, OutputPaths::default())?;
         copy.restore(py, bytes)?;
         Ok(copy)
     }
@@ -492,10 +504,10 @@ impl Simulation {
     }
 
     /// Pickles the simulation with its scenario, all files of that, and its state.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, PickledArgs<'py>)> {
         let (py, simulation) = (slf.py(), slf.get());
         let maker = py.import("sidestep._native")?.getattr("rebuild")?;
-        let Resolved { text, files } = simulation.scenario.resolved()?.clone();
+        let ResolvedScenario { text, files } = simulation.scenario.resolved()?.clone();
         Ok((maker, ((text, files), simulation.workers, simulation.checkpoint(py)?)))
     }
 
@@ -505,18 +517,20 @@ impl Simulation {
     /// >>> sim.snapshot()["at_m"].shape
     /// (2, 3)
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let frame = self.with(py, |journey| Ok(journey.simulation_mut().frame(Look::BODIES)))?;
+        let frame = self.with_run(py, |journey| {
+            Ok(journey.simulation_mut().frame(FrameOptions::WITHOUT_SCANS))
+        })?;
         let (dict, bodies) = (PyDict::new(py), &frame.bodies);
         dict.set_item("cycle", frame.cycle)?;
         dict.set_item("time_s", frame.time_s)?;
-        dict.set_item("kind", texts(py, bodies, |body| body.kind.name().to_string())?)?;
-        dict.set_item("number", column(py, bodies, |body| body.number))?;
-        dict.set_item("part", column(py, bodies, |body| body.part.map_or(-1, i64::from)))?;
-        dict.set_item("at_m", rows(py, bodies, |body| body.pose.at_m)?)?;
-        dict.set_item("turn", rows(py, bodies, |body| body.pose.turn)?)?;
-        dict.set_item("velocity_m_s", rows(py, bodies, |body| body.velocity_m_s)?)?;
+        dict.set_item("kind", body_texts(py, bodies, |body| body.kind.name().to_string())?)?;
+        dict.set_item("number", body_column(py, bodies, |body| body.number))?;
+        dict.set_item("part", body_column(py, bodies, |body| body.part.map_or(-1, i64::from)))?;
+        dict.set_item("at_m", body_rows(py, bodies, |body| body.pose.at_m)?)?;
+        dict.set_item("turn", body_rows(py, bodies, |body| body.pose.turn)?)?;
+        dict.set_item("velocity_m_s", body_rows(py, bodies, |body| body.velocity_m_s)?)?;
         let condition = |body: &Body| format!("{:?}", body.state).to_lowercase();
-        dict.set_item("condition", texts(py, bodies, condition)?)?;
+        dict.set_item("condition", body_texts(py, bodies, condition)?)?;
         Ok(dict)
     }
 
@@ -528,7 +542,7 @@ impl Simulation {
     /// (100, 3)
     #[pyo3(signature = (width=640))]
     fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (still, (width, height)) = self.still(py, width)?;
+        let (still, (width, height)) = self.draw(py, width)?;
         let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
         let pixels: Vec<u8> = opaque.copied().collect();
         PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
@@ -539,7 +553,7 @@ impl Simulation {
     /// >>> len(sim.frame()), sim.frame().units["x_m"]
     /// (2, 'm')
     fn frame(&self, py: Python<'_>) -> PyResult<Table> {
-        let rows = self.with(py, |journey| Ok(frame_rows(journey.simulation_mut())));
+        let rows = self.with_run(py, |journey| Ok(frame_rows(journey.simulation_mut())));
         rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
@@ -558,16 +572,16 @@ impl Simulation {
         number: u32,
         part: Option<u32>,
     ) -> PyResult<Py<PyAny>> {
-        let known = Kind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
-            let names: Vec<_> = Kind::ALL.iter().map(|kind| kind.name()).collect();
-            wrong(
+        let known = BodyKind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
+            let names: Vec<_> = BodyKind::ALL.iter().map(|kind| kind.name()).collect();
+            argument_error(
                 "kind",
                 format!("there is no kind `{kind}`"),
                 format!("one of {}", names.join(", ")),
             )
         })?;
-        let told = self.ask(py, |run| {
-            let told = run.inspect(Who::new(known, number, part));
+        let told = self.read(py, |run| {
+            let told = run.inspect(BodyId::new(known, number, part));
             told.and_then(|told| serde_json::to_value(told).ok()).unwrap_or_default()
         })?;
         to_python(py, &told)
@@ -588,15 +602,20 @@ impl Simulation {
     fn record(
         &self,
         py: Python<'_>,
-        tables: Option<Recorded>,
-        frames: Option<Whole>,
+        tables: Option<RecordArgument>,
+        frames: Option<WholeNumber>,
     ) -> PyResult<()> {
-        let Recorded(wanted) = tables.unwrap_or(Recorded(Some(Wanted::default())));
+        let RecordArgument(wanted) =
+            tables.unwrap_or(RecordArgument(Some(RowSelection::default())));
         let Some(wanted) = wanted else {
-            return Err(wrong("record", "rows that are kept are not dropped", "leave it out"));
+            return Err(argument_error(
+                "record",
+                "rows that are kept are not dropped",
+                "leave it out",
+            ));
         };
-        let wanted = Wanted { frames: frames.map(|Whole(frames)| frames), ..wanted };
-        self.with(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input(&e)))
+        let wanted = RowSelection { frames: frames.map(|WholeNumber(frames)| frames), ..wanted };
+        self.with_run(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input_error(&e)))
     }
 
     /// Takes the rows recorded since the last call: tables by name. Needs `record=True`, or `record` before.
@@ -606,14 +625,18 @@ impl Simulation {
     /// >>> len(sim.tables()["trajectories"])
     /// 20
     fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let rows = self.with(py, |journey| {
+        let rows = self.with_run(py, |journey| {
             let remedy = "make it with record=True; with `out` read its folder when it is closed";
             if !journey.keeps_rows() {
-                return Err(wrong("tables", "the rows of this run are not kept in memory", remedy));
+                return Err(argument_error(
+                    "tables",
+                    "the rows of this run are not kept in memory",
+                    remedy,
+                ));
             }
-            journey.take_rows().map_err(|e| error::record(&e))
+            journey.take_rows().map_err(|e| error::record_error(&e))
         })?;
-        tables(py, rows)
+        tables_dict(py, rows)
     }
 
     /// Runs on to cycle `until` (the planned end, by default) and hands the rows over as they come: an iterator that
@@ -628,25 +651,31 @@ impl Simulation {
     /// 80 80
     /// 100 40
     #[pyo3(
-        signature = (cycles=Whole(1024), until=None, *, decide=None, state=None),
+        signature = (cycles=WholeNumber(1024), until=None, *, decide=None, state=None),
         text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
     )]
     fn blocks(
         slf: Bound<'_, Self>,
-        cycles: Whole,
-        until: Option<Whole>,
+        cycles: WholeNumber,
+        until: Option<WholeNumber>,
         decide: Option<Py<PyAny>>,
         state: Option<Py<PyAny>>,
     ) -> PyResult<Blocks> {
         let (py, simulation) = (slf.py(), slf.get());
         if cycles.0 == 0 {
-            return Err(wrong("cycles", "a block of 0 cycles never ends", "give 1 or more"));
+            return Err(argument_error(
+                "cycles",
+                "a block of 0 cycles never ends",
+                "give 1 or more",
+            ));
         }
-        simulation.with(py, |journey| match journey.keeps_rows() {
+        simulation.with_run(py, |journey| match journey.keeps_rows() {
             true => Ok(()),
-            false => journey.keep_rows(&Wanted::default()).map_err(|e| error::input(&e)),
+            false => {
+                journey.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
+            }
         })?;
-        let until = simulation.end(until.map(|Whole(until)| until));
+        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
         // Functions keep their state from block to block, as from cycle to cycle.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
         let simulation = slf.into_any().unbind();
@@ -661,12 +690,12 @@ impl Simulation {
     /// >>> sim.close()["cycles"]
     /// 10
     fn close(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let signals = Signals::default();
+        let signals = SignalWatcher::default();
         let summary = py.detach(|| {
             let journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner).take();
             journey.map(|journey| journey.finish(&signals)).transpose()
         });
-        match summary.map_err(|e| error::session(&e))? {
+        match summary.map_err(|e| error::session_error(&e))? {
             None => Ok(py.None()),
             Some(summary) => to_python(py, &serde_json::to_value(&summary).unwrap_or_default()),
         }
@@ -683,14 +712,14 @@ impl Simulation {
 
     /// Returns the picture and the measurements, for notebooks.
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        shown(slf.as_any(), "simulation")
+        to_html(slf.as_any(), "simulation")
     }
 
     /// Returns the picture as PNG, for notebooks; None when it is closed.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyBytes>>> {
-        match self.still(py, NOTEBOOK_PX) {
+        match self.draw(py, NOTEBOOK_WIDTH_PX) {
             Ok((still, _)) => {
-                let bytes = still.to_png().map_err(|e| undrawn(&e))?;
+                let bytes = still.to_png().map_err(|e| draw_error(&e))?;
                 Ok(Some(PyBytes::new(py, &bytes)))
             }
             Err(raised) if raised.is_instance_of::<ClosedError>(py) => Ok(None),
@@ -707,7 +736,7 @@ impl Simulation {
     }
 }
 
-impl Deciding for Simulation {
+impl PolicyRun for Simulation {
     fn now(&self, py: Python<'_>) -> PyResult<Cycle> {
         self.cycle(py)
     }
@@ -716,40 +745,40 @@ impl Deciding for Simulation {
         self.is_over(py)
     }
 
-    fn plan(&self) -> Plan {
+    fn plan(&self) -> RunConfig {
         self.scenario.compiled.plan()
     }
 
-    fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<Numbered> {
-        self.named(Some(team))
+    fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<IndexedTeam> {
+        self.find_team(Some(team))
     }
 
-    fn ordered_teams(&self) -> Vec<Numbered> {
+    fn ordered_teams(&self) -> Vec<IndexedTeam> {
         let teams = self.teams.iter().cloned().enumerate();
-        teams.filter(|(_, team)| !team.ordered.is_empty()).collect()
+        teams.filter(|(_, team)| !team.action_spaces.is_empty()).collect()
     }
 
-    fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>> {
-        self.perceived(py, team.0, &team.1)
+    fn observed<'py>(&self, py: Python<'py>, team: &IndexedTeam) -> PyResult<Bound<'py, PyDict>> {
+        self.observations(py, team.0, &team.1)
     }
 
-    fn give(
+    fn give_order(
         &self,
         py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         team: &control::Team,
     ) -> PyResult<()> {
-        self.ordered(py, order, values, &team.agents, team)
+        self.order_agents(py, order, values, &team.agents, team)
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {
-        self.advance_towards(py, Goal::Further(1)).map(drop)
+        self.advance_to_goal(py, Goal::Further(1)).map(drop)
     }
 }
 
 /// The arguments of [`rebuild`].
-type Pickled<'py> = (Bundle, usize, Bound<'py, PyBytes>);
+type PickledArgs<'py> = (Bundle, usize, Bound<'py, PyBytes>);
 
 /// Returns a pickled simulation.
 #[pyfunction]
@@ -760,8 +789,8 @@ pub(crate) fn rebuild(
     checkpoint: Vec<u8>,
 ) -> PyResult<Simulation> {
     let (text, files) = scenario;
-    let scenario = Arc::new(Made::unpacked(py, Resolved { text, files })?);
-    let simulation = Simulation::at_start(py, scenario, workers, Keep::default())?;
+    let scenario = Arc::new(LoadedScenario::from_bundle(py, ResolvedScenario { text, files })?);
+    let simulation = Simulation::start(py, scenario, workers, OutputPaths::default())?;
     simulation.restore(py, checkpoint)?;
     Ok(simulation)
 }

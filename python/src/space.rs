@@ -1,13 +1,13 @@
 //! Teams of agents, and the spaces of their observations and orders.
 
-use crate::error::{self, wrong};
-use crate::json::list;
+use crate::error::{self, argument_error};
+use crate::json::to_list;
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
-use sidestep::kernel::control::{self, Bounds, CellsMut};
+use sidestep::kernel::control::{self, BufferMut, SpaceKind};
 use std::sync::Arc;
 
 /// One quantity of every agent of a team.
@@ -41,14 +41,14 @@ impl Space {
     /// ``"int64"`` or ``"float64"``, the type of its arrays.
     #[getter]
     fn dtype(&self) -> &'static str {
-        if self.0.is_whole() { "int64" } else { "float64" }
+        if self.0.is_integer() { "int64" } else { "float64" }
     }
 
     /// The names of the values of a choice; None for other quantities.
     #[getter]
     fn choices(&self) -> Option<Vec<String>> {
-        match &self.0.bounds {
-            Bounds::Choice(names) => Some(names.clone()),
+        match &self.0.kind {
+            SpaceKind::Discrete(names) => Some(names.clone()),
             _ => None,
         }
     }
@@ -56,20 +56,20 @@ impl Space {
     /// The least value.
     #[getter]
     fn low(&self) -> f64 {
-        match self.0.bounds {
-            Bounds::Choice(_) => 0.0,
-            Bounds::Whole { least, .. } => least as f64,
-            Bounds::Real { least, .. } => least,
+        match self.0.kind {
+            SpaceKind::Discrete(_) => 0.0,
+            SpaceKind::Integer { low, .. } => low as f64,
+            SpaceKind::Real { low, .. } => low,
         }
     }
 
     /// The greatest value.
     #[getter]
     fn high(&self) -> f64 {
-        match &self.0.bounds {
-            Bounds::Choice(names) => names.len() as f64 - 1.0,
-            &Bounds::Whole { most, .. } => most as f64,
-            &Bounds::Real { most, .. } => most,
+        match &self.0.kind {
+            SpaceKind::Discrete(names) => names.len() as f64 - 1.0,
+            &SpaceKind::Integer { high, .. } => high as f64,
+            &SpaceKind::Real { high, .. } => high,
         }
     }
 
@@ -86,7 +86,7 @@ impl Space {
     }
 
     fn __repr__(&self) -> String {
-        format!("Space({}, shape={:?}: {})", self.0.name, self.0.shape, self.0.words())
+        format!("Space({}, shape={:?}: {})", self.0.name, self.0.shape, self.0.describe())
     }
 }
 
@@ -117,13 +117,13 @@ impl Team {
     /// The spaces of their observations.
     #[getter]
     fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        list(py, self.0.observed.iter().cloned().map(Space))
+        to_list(py, self.0.observation_spaces.iter().cloned().map(Space))
     }
 
     /// The spaces of orders to them; empty for agents that decide for themselves.
     #[getter]
     fn ordered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        list(py, self.0.ordered.iter().cloned().map(Space))
+        to_list(py, self.0.action_spaces.iter().cloned().map(Space))
     }
 
     fn __len__(&self) -> usize {
@@ -134,20 +134,22 @@ impl Team {
         let names = |spaces: &[control::Space]| {
             spaces.iter().map(|space| space.name.as_str()).collect::<Vec<_>>().join(", ")
         };
-        let control::Team { name, agents, observed, ordered } = &*self.0;
-        let (n, observed, ordered) = (agents.len(), names(observed), names(ordered));
+        let control::Team { name, agents, observation_spaces, action_spaces } = &*self.0;
+        let n = agents.len();
+        let observed = names(observation_spaces);
+        let ordered = names(action_spaces);
         format!("Team({name}, {n} agents, observed: {observed}; ordered: {ordered})")
     }
 }
 
 /// Returns a team by number or name, the first one without either, with its number.
-pub(crate) fn named<'a>(
+pub(crate) fn find_team<'a>(
     teams: &'a [Arc<control::Team>],
     team: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(usize, &'a Arc<control::Team>)> {
-    let Some(team) = team else { return numbered(teams, 0) };
+    let Some(team) = team else { return team_at(teams, 0) };
     if let Ok(number) = team.extract::<usize>() {
-        return numbered(teams, number);
+        return team_at(teams, number);
     }
     let name: String = team.extract()?;
     let position = teams.iter().position(|team| team.name == name);
@@ -159,7 +161,7 @@ pub(crate) fn named<'a>(
 }
 
 /// Returns a team by number.
-pub(crate) fn numbered(
+pub(crate) fn team_at(
     teams: &[Arc<control::Team>],
     number: usize,
 ) -> PyResult<(usize, &Arc<control::Team>)> {
@@ -170,7 +172,7 @@ pub(crate) fn numbered(
 }
 
 /// Room for the observations of a team, one buffer for each of its spaces.
-pub(crate) struct Room(Vec<Buffer>);
+pub(crate) struct ObservationBuffers(Vec<Buffer>);
 
 enum Buffer {
     Whole(Vec<i64>),
@@ -178,27 +180,27 @@ enum Buffer {
 }
 
 impl Buffer {
-    fn cells(&mut self) -> CellsMut<'_> {
+    fn as_buffer_mut(&mut self) -> BufferMut<'_> {
         match self {
-            Self::Whole(room) => CellsMut::Whole(room),
-            Self::Real(room) => CellsMut::Real(room),
+            Self::Whole(room) => BufferMut::Integer(room),
+            Self::Real(room) => BufferMut::Real(room),
         }
     }
 }
 
-impl Room {
+impl ObservationBuffers {
     /// Returns room for the observations of `team`.
-    pub(crate) fn of(team: &control::Team) -> Self {
+    pub(crate) fn from_team(team: &control::Team) -> Self {
         let buffer = |space: &control::Space| {
             let n = team.agents.len() * space.width();
-            if space.is_whole() { Buffer::Whole(vec![0; n]) } else { Buffer::Real(vec![0.0; n]) }
+            if space.is_integer() { Buffer::Whole(vec![0; n]) } else { Buffer::Real(vec![0.0; n]) }
         };
-        Self(team.observed.iter().map(buffer).collect())
+        Self(team.observation_spaces.iter().map(buffer).collect())
     }
 
     /// Returns the room to write into.
-    pub(crate) fn cells(&mut self) -> Vec<CellsMut<'_>> {
-        self.0.iter_mut().map(Buffer::cells).collect()
+    pub(crate) fn buffers_mut(&mut self) -> Vec<BufferMut<'_>> {
+        self.0.iter_mut().map(Buffer::as_buffer_mut).collect()
     }
 
     /// Returns the written values as arrays of the shape (agents, ...), by name.
@@ -208,19 +210,21 @@ impl Room {
         team: &control::Team,
     ) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (space, buffer) in team.observed.iter().zip(self.0) {
+        for (space, buffer) in team.observation_spaces.iter().zip(self.0) {
             let shape: Vec<usize> =
                 [team.agents.len()].iter().chain(&space.shape).copied().collect();
             match buffer {
-                Buffer::Whole(values) => dict.set_item(&space.name, shaped(py, values, shape)?)?,
-                Buffer::Real(values) => dict.set_item(&space.name, shaped(py, values, shape)?)?,
+                Buffer::Whole(values) => {
+                    dict.set_item(&space.name, to_array(py, values, shape)?)?
+                }
+                Buffer::Real(values) => dict.set_item(&space.name, to_array(py, values, shape)?)?,
             }
         }
         Ok(dict)
     }
 }
 
-fn shaped<T: numpy::Element>(
+fn to_array<T: numpy::Element>(
     py: Python<'_>,
     values: Vec<T>,
     shape: Vec<usize>,
@@ -229,15 +233,15 @@ fn shaped<T: numpy::Element>(
 }
 
 /// Returns arrays for the observations of a team in many worlds, by name.
-pub(crate) fn room<'py>(
+pub(crate) fn zeroed_arrays<'py>(
     py: Python<'py>,
     team: &control::Team,
     worlds: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    for space in &team.observed {
+    for space in &team.observation_spaces {
         let shape = shape(space, team, worlds);
-        match space.is_whole() {
+        match space.is_integer() {
             true => dict.set_item(&space.name, PyArrayDyn::<i64>::zeros(py, shape, false))?,
             false => dict.set_item(&space.name, PyArrayDyn::<f64>::zeros(py, shape, false))?,
         }
@@ -250,16 +254,16 @@ fn shape(space: &control::Space, team: &control::Team, worlds: usize) -> Vec<usi
 }
 
 /// Arrays of a caller for the observations of many worlds.
-pub(crate) struct Lent<'py>(Vec<Array<'py>>);
+pub(crate) struct OutArrays<'py>(Vec<Array<'py>>);
 
 enum Array<'py> {
     Whole(PyReadwriteArrayDyn<'py, i64>),
     Real(PyReadwriteArrayDyn<'py, f64>),
 }
 
-impl<'py> Lent<'py> {
+impl<'py> OutArrays<'py> {
     /// Returns the arrays of `out`, if they are those that a team needs.
-    pub(crate) fn of(
+    pub(crate) fn from_dict(
         out: &Bound<'py, PyDict>,
         team: &control::Team,
         worlds: usize,
@@ -267,41 +271,41 @@ impl<'py> Lent<'py> {
         let one = |space: &control::Space| {
             let shape = shape(space, team, worlds);
             let array = out.get_item(&space.name)?;
-            let lent = array.and_then(|array| match space.is_whole() {
-                true => writable(&array, &shape).map(Array::Whole),
-                false => writable(&array, &shape).map(Array::Real),
+            let lent = array.and_then(|array| match space.is_integer() {
+                true => writable_array(&array, &shape).map(Array::Whole),
+                false => writable_array(&array, &shape).map(Array::Real),
             });
             lent.ok_or_else(|| {
                 let (name, dtype) =
-                    (&space.name, if space.is_whole() { "int64" } else { "float64" });
+                    (&space.name, if space.is_integer() { "int64" } else { "float64" });
                 let cause = "it is missing, in use, or another array than an earlier call returned";
                 let remedy = format!(
                     "give a writable array in C order of the shape {}, {dtype}",
-                    words(&shape)
+                    format_shape(&shape)
                 );
-                wrong(&format!("out.{name}"), cause, remedy)
+                argument_error(&format!("out.{name}"), cause, remedy)
             })
         };
-        team.observed.iter().map(one).collect::<PyResult<_>>().map(Self)
+        team.observation_spaces.iter().map(one).collect::<PyResult<_>>().map(Self)
     }
 
     /// Returns the room to write into.
-    pub(crate) fn cells(&mut self) -> PyResult<Vec<CellsMut<'_>>> {
-        self.0.iter_mut().map(Array::cells).collect()
+    pub(crate) fn buffers_mut(&mut self) -> PyResult<Vec<BufferMut<'_>>> {
+        self.0.iter_mut().map(Array::as_buffer_mut).collect()
     }
 }
 
 impl Array<'_> {
-    fn cells(&mut self) -> PyResult<CellsMut<'_>> {
+    fn as_buffer_mut(&mut self) -> PyResult<BufferMut<'_>> {
         Ok(match self {
-            Self::Whole(array) => CellsMut::Whole(array.as_slice_mut()?),
-            Self::Real(array) => CellsMut::Real(array.as_slice_mut()?),
+            Self::Whole(array) => BufferMut::Integer(array.as_slice_mut()?),
+            Self::Real(array) => BufferMut::Real(array.as_slice_mut()?),
         })
     }
 }
 
 /// Returns an array that can be written from front to back.
-fn writable<'py, T: numpy::Element>(
+fn writable_array<'py, T: numpy::Element>(
     array: &Bound<'py, PyAny>,
     shape: &[usize],
 ) -> Option<PyReadwriteArrayDyn<'py, T>> {
@@ -311,7 +315,7 @@ fn writable<'py, T: numpy::Element>(
 }
 
 /// Returns a shape in the notation of Python.
-fn words(shape: &[usize]) -> String {
+fn format_shape(shape: &[usize]) -> String {
     let numbers: Vec<_> = shape.iter().map(ToString::to_string).collect();
     format!("({})", numbers.join(", "))
 }

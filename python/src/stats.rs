@@ -1,20 +1,20 @@
 //! Statistics: intervals, pairs, and the stopping rule; a value that is not finite is missing.
 
-use crate::error::wrong;
+use crate::error::argument_error;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use sidestep::statistics::{self, Bootstrap, Interval, Next, Pairs, Sample, StoppingRule};
+use sidestep::statistics::{self, Bootstrap, Interval, Pairs, Sample, StopDecision, StoppingRule};
 
 /// The lower and upper ends of an interval.
-type Ends = Option<(f64, f64)>;
+type IntervalEnds = Option<(f64, f64)>;
 /// Values that come from Python.
-type Values<'py> = PyReadonlyArray1<'py, f64>;
+type PyValues<'py> = PyReadonlyArray1<'py, f64>;
 
 fn ends(interval: Interval) -> (f64, f64) {
     (interval.low, interval.high)
 }
 
-fn options(values: &Values<'_>) -> Vec<Option<f64>> {
+fn to_options(values: &PyValues<'_>) -> Vec<Option<f64>> {
     values.as_array().iter().map(|value| value.is_finite().then_some(*value)).collect()
 }
 
@@ -23,9 +23,9 @@ fn options(values: &Values<'_>) -> Vec<Option<f64>> {
 #[pyfunction]
 pub(crate) fn stats_mean(
     py: Python<'_>,
-    values: Values<'_>,
-) -> (Option<f64>, Option<f64>, Ends, Ends, usize, usize) {
-    let sample = Sample::of(options(&values));
+    values: PyValues<'_>,
+) -> (Option<f64>, Option<f64>, IntervalEnds, IntervalEnds, usize, usize) {
+    let sample = Sample::from_runs(to_options(&values));
     let bootstrap = py.detach(|| Bootstrap::default().mean(&sample.values));
     let (n, missing) = (sample.values.len(), sample.missing);
     (
@@ -43,7 +43,7 @@ pub(crate) fn stats_mean(
 pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64, f64))> {
     if successes > n {
         let cause = format!("{successes} of {n} cannot be");
-        return Err(wrong("successes", cause, "give at most as many as there are trials"));
+        return Err(argument_error("successes", cause, "give at most as many as there are trials"));
     }
     let wilson = statistics::wilson(successes as f64, n as f64);
     let exact = match n {
@@ -56,42 +56,49 @@ pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64,
 /// A quantile, its interval by order statistics and the coverage of that: the native part of
 /// `sidestep.stats.quantile`.
 #[pyfunction]
-pub(crate) fn stats_quantile(values: Values<'_>, q: f64) -> (Option<f64>, Ends, Option<f64>) {
-    let sorted = Sample::of(options(&values)).sorted();
+pub(crate) fn stats_quantile(
+    values: PyValues<'_>,
+    q: f64,
+) -> (Option<f64>, IntervalEnds, Option<f64>) {
+    let sorted = Sample::from_runs(to_options(&values)).sorted();
     let interval = statistics::quantile_interval(&sorted, q);
     let coverage = interval.map(|found| found.coverage);
     (statistics::percentile(&sorted, q), interval.map(|found| ends(found.interval)), coverage)
 }
 
 /// The outcome of two treatments of the same cases.
-type Compared = (
+type PairedResult = (
     (usize, usize, Option<f64>),
-    (Ends, Ends),
+    (IntervalEnds, IntervalEnds),
     (Option<f64>, Option<f64>),
     (usize, usize, usize),
-    (Option<f64>, Ends),
+    (Option<f64>, IntervalEnds),
 );
 
 /// Differences and ratios of pairs: the native part of `sidestep.stats.paired`.
 #[pyfunction]
-pub(crate) fn stats_paired(py: Python<'_>, a: Values<'_>, b: Values<'_>) -> PyResult<Compared> {
-    let (a, b) = (options(&a), options(&b));
+pub(crate) fn stats_paired(
+    py: Python<'_>,
+    a: PyValues<'_>,
+    b: PyValues<'_>,
+) -> PyResult<PairedResult> {
+    let (a, b) = (to_options(&a), to_options(&b));
     if a.len() != b.len() {
         let cause = format!("{} and {} values are no pairs", a.len(), b.len());
-        return Err(wrong(
+        return Err(argument_error(
             "paired",
             cause,
             "give two values for each case, NaN where one is missing",
         ));
     }
-    let pairs = Pairs::of(&a, &b);
+    let pairs = Pairs::from_columns(&a, &b);
     let bootstrap = py.detach(|| pairs.difference_bootstrap(&Bootstrap::default()));
     let ratio = pairs.ratio();
     Ok((
         (pairs.n(), pairs.incomplete(), pairs.difference()),
         (pairs.difference_interval().map(ends), bootstrap.map(ends)),
         (pairs.p_value(), pairs.sign_p_value()),
-        pairs.signs(),
+        pairs.sign_counts(),
         (ratio.map(|(ratio, _)| ratio), ratio.map(|(_, interval)| ends(interval))),
     ))
 }
@@ -105,10 +112,13 @@ pub(crate) fn stats_holm(p_values: Vec<Option<f64>>) -> Vec<Option<f64>> {
 /// The rank correlation of two quantities with its interval and p-value: the native part of
 /// `sidestep.stats.correlation`.
 #[pyfunction]
-pub(crate) fn stats_correlation(a: Values<'_>, b: Values<'_>) -> Option<(f64, Ends, usize)> {
+pub(crate) fn stats_correlation(
+    a: PyValues<'_>,
+    b: PyValues<'_>,
+) -> Option<(f64, IntervalEnds, usize)> {
     let pair = |(a, b): (Option<f64>, Option<f64>)| Some((a?, b?));
     let pairs: Vec<(f64, f64)> =
-        options(&a).into_iter().zip(options(&b)).filter_map(pair).collect();
+        to_options(&a).into_iter().zip(to_options(&b)).filter_map(pair).collect();
     let found = statistics::rank_correlation(&pairs)?;
     Some((found.value, found.interval.map(ends), pairs.len()))
 }
@@ -120,14 +130,14 @@ pub(crate) fn stats_next(
     half_width: f64,
     relative: bool,
     runs: (usize, usize),
-    columns: Vec<Values<'_>>,
+    columns: Vec<PyValues<'_>>,
 ) -> (usize, Option<&'static str>) {
     let (min_runs, max_runs) = runs;
     let rule = StoppingRule { half_width, relative, min_runs, max_runs };
-    let columns: Vec<Vec<Option<f64>>> = columns.iter().map(options).collect();
+    let columns: Vec<Vec<Option<f64>>> = columns.iter().map(to_options).collect();
     let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
-    match rule.next_of(&columns) {
-        Next::Run(runs) => (runs, None),
-        Next::Enough(runs, reason) => (runs, Some(reason.words())),
+    match rule.decide_columns(&columns) {
+        StopDecision::Run(runs) => (runs, None),
+        StopDecision::Enough(runs, reason) => (runs, Some(reason.describe())),
     }
 }

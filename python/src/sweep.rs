@@ -1,26 +1,28 @@
 //! Sweeps: the plan, the journal and the stopping rule of the command, with runs in threads or by a crew.
 
-use crate::error::{self, wrong};
+use crate::error::{self, argument_error};
 use crate::json::{to_python, to_toml};
-use crate::scenario::{Bundle, Made, made};
+use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
-use crate::watch::{Signals, attended};
+use crate::watch::{SignalWatcher, run_polling};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
-    Cell, Changes, Factor, Outcome, Plan, RunColumn, Setting, Sweep, Wanted,
+    BaselineSpec, Cell, Factor, Outcome, Plan, RunColumn, Setting, Sweep, SweepOverrides,
 };
-use sidestep::kernel::workers::available;
+use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
-use sidestep::scenario::{Resolved, Source};
+use sidestep::scenario::{ResolvedScenario, Source};
 use sidestep::worlds::WORLDS;
-use sidestep::worlds::airspace::scenario::Compiled;
+use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_papers::methods;
-use sidestep_session::sweep::{self, Crew, Deal, Ended, Engine, Folder, Taken, Task};
-use sidestep_session::{Error, Watcher, build};
+use sidestep_session::sweep::{
+    self, CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task,
+};
+use sidestep_session::{Error, Watcher, build_id};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
@@ -29,7 +31,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The changes of a sweep, as passed by `sidestep.sweep`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options<'py> {
+pub(crate) struct SweepOptions<'py> {
     vary: Option<Bound<'py, PyMapping>>,
     set: Option<Bound<'py, PyMapping>>,
     replicate: Option<u32>,
@@ -43,12 +45,12 @@ pub(crate) struct Options<'py> {
 }
 
 /// A requested sweep; the scenario from which it was made, if any, keeps its files.
-struct Asked {
+struct SweepRequest {
     sweep: Sweep,
-    _made: Option<Arc<Made>>,
+    _made: Option<Arc<LoadedScenario>>,
 }
 
-fn settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
+fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
     let Some(mapping) = mapping else { return Ok(Vec::new()) };
     let setting = |entry: Bound<'_, PyAny>| {
         let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
@@ -57,32 +59,32 @@ fn settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
     mapping.items()?.iter().map(setting).collect()
 }
 
-impl Options<'_> {
+impl SweepOptions<'_> {
     fn factors(&self) -> PyResult<Vec<Factor>> {
         let told = |key: &str| {
             let remedy = "give a list, such as {\"robots.count\": [10, 20]}; what does not vary belongs into `set`";
-            wrong("vary", format!("`{key}` has no list of values"), remedy)
+            argument_error("vary", format!("`{key}` has no list of values"), remedy)
         };
         let factor = |Setting { key, value }: Setting| match value {
             toml::Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
             _ => Err(told(&key)),
         };
-        settings(self.vary.as_ref())?.into_iter().map(factor).collect()
+        parse_settings(self.vary.as_ref())?.into_iter().map(factor).collect()
     }
 
-    fn changes(&self) -> PyResult<Changes> {
+    fn changes(&self) -> PyResult<SweepOverrides> {
         let until = |text: &String| {
             let remedy =
                 "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
-            text.parse().map_err(|cause: String| wrong("until", cause, remedy))
+            text.parse().map_err(|cause: String| argument_error("until", cause, remedy))
         };
         let is_asked = self.baseline.is_some() || self.baseline_name.is_some();
-        let wanted = Wanted {
+        let wanted = BaselineSpec {
             name: self.baseline_name.clone(),
-            settings: settings(self.baseline.as_ref())?,
+            settings: parse_settings(self.baseline.as_ref())?,
         };
-        Ok(Changes {
-            fixed: settings(self.set.as_ref())?,
+        Ok(SweepOverrides {
+            fixed: parse_settings(self.set.as_ref())?,
             factors: self.factors()?,
             until: self.until.as_ref().map(until).transpose()?,
             replicates: self.replicate,
@@ -95,38 +97,39 @@ impl Options<'_> {
     }
 
     /// Returns the sweep of a file, a dict or a scenario.
-    fn asked(&self, of: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        let (sweep, made) = of_any(of)?;
+    fn request(&self, of: &Bound<'_, PyAny>) -> PyResult<SweepRequest> {
+        let (sweep, made) = parse_any(of)?;
         if self.max_runs.is_some() && self.until.is_none() && sweep.until.is_none() {
             let cause = "it bounds the runs of a sweep that goes on until it is precise";
-            return Err(wrong("max_runs", cause, "give until=\"ci=0.05\" as well"));
+            return Err(argument_error("max_runs", cause, "give until=\"ci=0.05\" as well"));
         }
-        let sweep = sweep.changed(self.changes()?).map_err(|e| error::input(&e))?;
-        Ok(Asked { sweep, _made: made })
+        let sweep = sweep.with_overrides(self.changes()?).map_err(|e| error::input_error(&e))?;
+        Ok(SweepRequest { sweep, _made: made })
     }
 }
 
 /// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario in any form.
-fn of_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<Made>>)> {
+fn parse_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<LoadedScenario>>)> {
     if let Ok(path) = of.extract::<PathBuf>() {
-        return Ok((Sweep::read(&path).map_err(|e| error::input(&e))?, None));
+        return Ok((Sweep::read(&path).map_err(|e| error::input_error(&e))?, None));
     }
     if let Ok(mapping) = of.cast::<PyMapping>()
         && mapping.contains("scenario")?
     {
-        let mut table = crate::json::table(mapping, "")?;
+        let mut table = crate::json::to_toml_table(mapping, "")?;
         table.entry("format").or_insert(toml::Value::Integer(1));
-        let text = toml::to_string(&table)
-            .map_err(|e| wrong("sweep", e.to_string(), "give what a sweep file may hold"))?;
+        let text = toml::to_string(&table).map_err(|e| {
+            argument_error("sweep", e.to_string(), "give what a sweep file may hold")
+        })?;
         let source = Source::new("sweep", text, "");
-        return Ok((Sweep::parse(&source).map_err(|e| error::input_of_dict(&e))?, None));
+        return Ok((Sweep::parse(&source).map_err(|e| error::dict_input_error(&e))?, None));
     }
-    let made = made(of)?;
-    Ok((Sweep::of_source(made.source()?.clone()), Some(made)))
+    let made = load(of)?;
+    Ok((Sweep::from_source(made.source()?.clone()), Some(made)))
 }
 
 /// The outcome of a sweep.
-struct Came {
+struct SweepResult {
     results: Vec<RunColumn>,
     timings: Vec<RunColumn>,
     told: serde_json::Value,
@@ -139,37 +142,42 @@ fn run(
     out: Option<&PathBuf>,
     engine: Engine<'_>,
     watcher: &dyn Watcher,
-) -> Result<Option<Came>, Error> {
+) -> Result<Option<SweepResult>, Error> {
     let (folder, plan, ended);
     match out {
         Some(out) => {
-            let there = sweep::planned_or_there(WORLDS, sweep, out, engine.planners(), watcher)?;
-            ended = sweep::go_on(WORLDS, &there, engine, watcher)?;
+            let there =
+                sweep::open_or_create(WORLDS, sweep, out, engine.planning_workers(), watcher)?;
+            ended = sweep::run_remaining(WORLDS, &there, engine, watcher)?;
             plan = there.plan().clone();
             folder = Some(there);
         }
         None => {
-            (plan, ended) = sweep::in_memory(WORLDS, sweep, engine, watcher)?;
+            (plan, ended) = sweep::run_in_memory(WORLDS, sweep, engine, watcher)?;
             folder = None;
         }
     }
-    let Ended::Done(done) = ended else { return Ok(None) };
-    came(&plan, folder.as_ref(), &done).map(Some).map_err(Error::from)
+    let SweepEnd::Done(done) = ended else { return Ok(None) };
+    sweep_result(&plan, folder.as_ref(), &done).map(Some).map_err(Error::from)
 }
 
-fn came(plan: &Plan, folder: Option<&Folder>, done: &sweep::Done) -> Result<Came, InputError> {
+fn sweep_result(
+    plan: &Plan,
+    folder: Option<&Folder>,
+    done: &sweep::SweepResult,
+) -> Result<SweepResult, InputError> {
     let summary = plan.summary(&done.table)?;
     let own = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
-    Ok(Came {
+    Ok(SweepResult {
         results: own(done.table.results()),
         timings: own(done.table.timings()),
-        told: done.told(plan, folder, &summary),
+        told: done.to_json(plan, folder, &summary),
         world: plan.world.clone(),
     })
 }
 
 /// A crew that runs cells: a generator of Python that is driven from here.
-struct Others {
+struct PyExecutor {
     /// Called with the cells; returns a generator of requests and outcomes.
     begin: Py<PyAny>,
     at_once: usize,
@@ -177,14 +185,19 @@ struct Others {
 }
 
 /// A cell in the form used in Python: its number, variant, replicate and seed.
-type AsTuple = (u64, u32, u32, u64);
+type CellTuple = (u64, u32, u32, u64);
 
-impl Others {
+impl PyExecutor {
     /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes.
-    fn drive(&self, py: Python<'_>, deal: &Deal<'_>, take: &mut Taken<'_>) -> PyResult<()> {
+    fn drive(
+        &self,
+        py: Python<'_>,
+        deal: &CellBatch<'_>,
+        take: &mut OutcomeSink<'_>,
+    ) -> PyResult<()> {
         let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
-        let cells: Vec<AsTuple> = deal.cells().iter().map(tuple).collect();
-        let generator = self.begin.bind(py).call1((build(), cells))?;
+        let cells: Vec<CellTuple> = deal.cells().iter().map(tuple).collect();
+        let generator = self.begin.bind(py).call1((build_id(), cells))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -193,13 +206,13 @@ impl Others {
             };
             answer = py.None();
             if let Ok(variant) = yielded.extract::<u32>() {
-                let Resolved { text, files } =
-                    deal.scenario(variant).map_err(|e| error::input(&e))?;
+                let ResolvedScenario { text, files } =
+                    deal.scenario(variant).map_err(|e| error::input_error(&e))?;
                 answer = (text, files).into_pyobject(py)?.into_any().unbind();
                 continue;
             }
             for outcome in yielded.extract::<Vec<String>>()? {
-                take(read(&outcome)?).map_err(|e| error::session(&e))?;
+                take(read(&outcome)?).map_err(|e| error::session_error(&e))?;
             }
         }
     }
@@ -209,13 +222,13 @@ impl Others {
 fn read(text: &str) -> PyResult<Outcome> {
     let told = |e: serde_json::Error| {
         let remedy = "install the same build of sidestep wherever tasks run";
-        wrong("an outcome of a task", e.to_string(), remedy)
+        argument_error("an outcome of a task", e.to_string(), remedy)
     };
     serde_json::from_str(text).map_err(told)
 }
 
-impl Crew for Others {
-    fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error> {
+impl CellExecutor for PyExecutor {
+    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error> {
         Python::attach(|py| self.drive(py, deal, take)).map_err(|raised| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
             // The caller raises it; no code in between looks at the reason.
@@ -223,13 +236,13 @@ impl Crew for Others {
         })
     }
 
-    fn at_once(&self) -> usize {
+    fn parallelism(&self) -> usize {
         self.at_once
     }
 }
 
 /// Tables of results and of timings, and the summary.
-type Told<'py> = (Table, Table, Bound<'py, PyAny>);
+type SweepTables<'py> = (Table, Table, Bound<'py, PyAny>);
 
 /// Runs a sweep on threads, all processors if `workers` is 0, or by a crew: the native part of `sidestep.sweep`.
 #[pyfunction]
@@ -237,20 +250,20 @@ type Told<'py> = (Table, Table, Bound<'py, PyAny>);
 pub(crate) fn run_sweep<'py>(
     py: Python<'py>,
     sweep: &Bound<'py, PyAny>,
-    options: Options<'py>,
+    options: SweepOptions<'py>,
     out: Option<PathBuf>,
     workers: usize,
     begin: Option<Py<PyAny>>,
-) -> PyResult<Told<'py>> {
-    let workers = if workers == 0 { available() } else { workers };
-    let asked = options.asked(sweep)?;
+) -> PyResult<SweepTables<'py>> {
+    let workers = if workers == 0 { available_workers() } else { workers };
+    let asked = options.request(sweep)?;
     let (sweep, out) = (&asked.sweep, out.as_ref());
     let came = match begin {
-        None => attended(py, |watcher| run(sweep, out, Engine::Workers(workers), watcher))?,
+        None => run_polling(py, |watcher| run(sweep, out, Engine::Workers(workers), watcher))?,
         Some(begin) => {
-            let (signals, raised) = (Signals::default(), Mutex::default());
-            let others = Others { begin, at_once: workers, raised };
-            let came = py.detach(|| run(sweep, out, Engine::Crew(&others), &signals));
+            let (signals, raised) = (SignalWatcher::default(), Mutex::default());
+            let others = PyExecutor { begin, at_once: workers, raised };
+            let came = py.detach(|| run(sweep, out, Engine::Executor(&others), &signals));
             let raised = others.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
             raised.map_or(Ok(()), Err)?;
             signals.into_result()?;
@@ -259,9 +272,10 @@ pub(crate) fn run_sweep<'py>(
     };
     // A run is interrupted only by a signal, which is raised before.
     let came = came.and_then(|came| came.ok_or(Error::Interrupted));
-    let Came { results, timings, told, world } = came.map_err(|e| error::session(&e))?;
-    let results = Table::of_runs("results", results, &world)?;
-    let timings = Table::of_runs("timings", timings, &world)?;
+    let SweepResult { results, timings, told, world } =
+        came.map_err(|e| error::session_error(&e))?;
+    let results = Table::from_runs("results", results, &world)?;
+    let timings = Table::from_runs("timings", timings, &world)?;
     Ok((results, timings, to_python(py, &told)?.into_bound(py)))
 }
 
@@ -274,17 +288,17 @@ pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
-    cells: Vec<AsTuple>,
+    cells: Vec<CellTuple>,
 ) -> PyResult<Vec<String>> {
-    let resolved = |(variant, (text, files))| (variant, Resolved { text, files });
+    let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
     let cell = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
     let task = Task {
         build,
         scenarios: scenarios.into_iter().map(resolved).collect(),
         cells: cells.into_iter().map(cell).collect(),
     };
-    let outcomes = attended(py, |watcher| task.run(WORLDS, watcher))?;
-    let outcomes = outcomes.map_err(|e| error::session(&e))?;
+    let outcomes = run_polling(py, |watcher| task.run(WORLDS, watcher))?;
+    let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
     let text = |outcome: &Outcome| {
         serde_json::to_string(outcome)
             .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
@@ -297,8 +311,8 @@ pub(crate) fn run_task(
 /// Raises InputError when there is no sweep, or something in it cannot be read.
 #[pyfunction]
 pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Py<PyAny>> {
-    let status = py.detach(|| sweep::status(&Folder::open(&folder)?));
-    let status = status.map_err(|e: InputError| error::input(&e))?;
+    let status = py.detach(|| sweep::read_status(&Folder::open(&folder)?));
+    let status = status.map_err(|e: InputError| error::input_error(&e))?;
     to_python(py, &serde_json::to_value(&status).unwrap_or_default())
 }
 
@@ -312,31 +326,31 @@ pub(crate) fn compare_methods(
     seed: Option<u64>,
     workers: usize,
 ) -> PyResult<Py<PyAny>> {
-    let given = made(scenario)?;
+    let given = load(scenario)?;
     let source = given.source()?;
     let named = |name: &String| Method::ALL.into_iter().find(|m| m.name() == name);
     let method = |name: &String| {
         let known = Method::ALL.map(Method::name).join(", ");
-        let told = || wrong("methods", format!("there is no method `{name}`"), known);
+        let told = || argument_error("methods", format!("there is no method `{name}`"), known);
         named(name).ok_or_else(told)
     };
     let methods = methods.iter().map(method).collect::<PyResult<Vec<_>>>()?;
-    let Some(compiled) = given.compiled.as_any().downcast_ref::<Compiled>() else {
+    let Some(compiled) = given.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
         let cause = "methods of collision avoidance are of the world `airspace` alone";
-        return Err(wrong("scenario", cause, "give a scenario with world = \"airspace\""));
+        return Err(argument_error("scenario", cause, "give a scenario with world = \"airspace\""));
     };
     let seeds = methods::SeedSpan { first: seed.unwrap_or(compiled.seed), runs };
-    let workers = if workers == 0 { available() } else { workers };
-    let results = attended(py, |watcher| {
+    let workers = if workers == 0 { available_workers() } else { workers };
+    let results = run_polling(py, |watcher| {
         let heeded = watcher.interrupt();
         let run = || {
             let progress = &mut |_: &str, _: f64| ();
-            methods::compare_heeding(source, &methods, seeds, workers, progress, &heeded)
+            methods::compare_with_interrupt(source, &methods, seeds, workers, progress, &heeded)
         };
         catch_unwind(AssertUnwindSafe(run))
             .unwrap_or_else(|payload| resume_unless(payload, &heeded))
     })?;
-    let results = results.map_err(|e| error::input(&e))?;
+    let results = results.map_err(|e| error::input_error(&e))?;
     to_python(py, &json!({ "name": compiled.name, "seed": seeds.first, "methods": results }))
 }
 
@@ -345,7 +359,7 @@ fn resume_unless<T>(
     payload: Box<dyn Any + Send>,
     interrupt: &Interrupt,
 ) -> Result<Vec<T>, InputError> {
-    match interrupt.explains(payload.as_ref()) {
+    match interrupt.caused(payload.as_ref()) {
         true => Ok(Vec::new()),
         false => resume_unwind(payload),
     }

@@ -1,9 +1,9 @@
 //! Tables: rows as Arrow and NumPy arrays.
 
-use crate::arrays::Whole;
+use crate::arrays::WholeNumber;
 use crate::error;
-use crate::json::list;
-use crate::notebook::shown;
+use crate::json::to_list;
+use crate::notebook::to_html;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::{Float64Type, Int32Type, Int64Type, UInt32Type, UInt64Type};
@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
-use sidestep::scenario::{Meaning, told};
+use sidestep::scenario::{MetricInfo, metric_label};
 use sidestep::worlds::WORLDS;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -51,23 +51,27 @@ impl Table {
         let about = schema.about.iter().cloned().collect::<HashMap<_, _>>();
         let arrow = Arc::new(Schema::new_with_metadata(fields, about));
         let arrays = schema.columns.iter().zip(columns).map(|(spec, values)| array(spec, values));
-        let arrays = arrays.collect::<Result<Vec<_>, _>>().map_err(|e| bug(&e))?;
-        let batch = RecordBatch::try_new(arrow, arrays).map_err(|e| bug(&e))?;
+        let arrays = arrays.collect::<Result<Vec<_>, _>>().map_err(|e| arrow_error(&e))?;
+        let batch = RecordBatch::try_new(arrow, arrays).map_err(|e| arrow_error(&e))?;
         Ok(Self { schema, batch })
     }
 
     /// Returns a table of a sweep's runs; numbers are not copied.
-    pub(crate) fn of_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
-        let meanings = WORLDS.named(world).map_or(&[][..], |world| world.meanings());
+    pub(crate) fn from_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
+        let meanings = WORLDS.find(world).map_or(&[][..], |world| world.metric_infos());
         let spec = |column: &RunColumn| ColumnSpec {
             is_nullable: true,
-            ..ColumnSpec::new(&column.name, column.values.ty(), &meaning(column, meanings))
+            ..ColumnSpec::new(
+                &column.name,
+                column.values.ty(),
+                &column_description(column, meanings),
+            )
         };
         let schema = TableSchema::new(name, columns.iter().map(spec).collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())
     }
 
-    fn position(&self, name: &str) -> PyResult<usize> {
+    fn column_index(&self, name: &str) -> PyResult<usize> {
         let known = || {
             let names: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
             names.join(", ")
@@ -127,8 +131,8 @@ impl Table {
     /// The values of a column as a NumPy array. Missing numbers are NaN, and the array is float64 then; text and
     /// truth values are an array of objects, None where they are missing.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let position = self.position(name)?;
-        values(py, self.batch.column(position), self.schema.columns[position].ty)
+        let position = self.column_index(name)?;
+        to_numpy_column(py, self.batch.column(position), self.schema.columns[position].ty)
     }
 
     /// Returns the same rows with only these columns, in this order; nothing is copied.
@@ -139,8 +143,8 @@ impl Table {
     /// Table(trajectories, 10 rows: body, cycle)
     fn select(&self, columns: Vec<String>) -> PyResult<Self> {
         let places =
-            columns.iter().map(|name| self.position(name)).collect::<PyResult<Vec<_>>>()?;
-        let batch = self.batch.project(&places).map_err(|e| bug(&e))?;
+            columns.iter().map(|name| self.column_index(name)).collect::<PyResult<Vec<_>>>()?;
+        let batch = self.batch.project(&places).map_err(|e| arrow_error(&e))?;
         let specs = places.iter().map(|&k| self.schema.columns[k].clone()).collect();
         Ok(Self { schema: TableSchema { columns: specs, ..self.schema.clone() }, batch })
     }
@@ -160,20 +164,20 @@ impl Table {
 
     /// Returns the first rows, for notebooks.
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        shown(slf.as_any(), "table")
+        to_html(slf.as_any(), "table")
     }
 
     /// Returns the first rows as tuples of Python values; None where one is missing.
     ///
     /// >>> [row[:2] for row in table.head(2)]
     /// [(0, 0), (1, 0)]
-    #[pyo3(signature = (rows=Whole(5)), text_signature = "($self, rows=5)")]
-    fn head<'py>(&self, py: Python<'py>, rows: Whole) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+    #[pyo3(signature = (rows=WholeNumber(5)), text_signature = "($self, rows=5)")]
+    fn head<'py>(&self, py: Python<'py>, rows: WholeNumber) -> PyResult<Vec<Bound<'py, PyTuple>>> {
         let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));
         let first = self.batch.slice(0, rows);
         let mut columns = Vec::new();
         for (array, spec) in first.columns().iter().zip(&self.schema.columns) {
-            columns.push(plain(py, array, spec.ty)?);
+            columns.push(to_python_values(py, array, spec.ty)?);
         }
         let row = |k: usize| {
             let cells = columns.iter().map(|column: &Bound<'_, PyList>| column.get_item(k));
@@ -184,7 +188,8 @@ impl Table {
 
     /// The schema as an Arrow capsule.
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
-        let schema = FFI_ArrowSchema::try_from(&*self.batch.schema()).map_err(|e| bug(&e))?;
+        let schema =
+            FFI_ArrowSchema::try_from(&*self.batch.schema()).map_err(|e| arrow_error(&e))?;
         PyCapsule::new_with_value(py, schema, c"arrow_schema")
     }
 
@@ -205,7 +210,7 @@ impl Table {
 }
 
 /// Returns one sentence about a column of a table of runs.
-fn meaning(column: &RunColumn, meanings: &[Meaning]) -> String {
+fn column_description(column: &RunColumn, meanings: &[MetricInfo]) -> String {
     let words = match column.role {
         Role::Cell => "Number of the run.",
         Role::Variant => "Number of its variant.",
@@ -214,14 +219,14 @@ fn meaning(column: &RunColumn, meanings: &[Meaning]) -> String {
         }
         Role::Seed => "The seed.",
         Role::Parameter => "Value of this key in the scenario.",
-        Role::Metric => told(meanings, &column.name).meaning,
+        Role::Metric => metric_label(meanings, &column.name).meaning,
         Role::Digest => "Digest of the last state.",
         Role::Cost => "A time that the run took; it differs when the run is made again.",
     };
     words.to_string()
 }
 
-fn bug(error: &ArrowError) -> PyErr {
+fn arrow_error(error: &ArrowError) -> PyErr {
     error::RecordError::new_err(format!("this is a bug in sidestep: {error}"))
 }
 
@@ -276,25 +281,33 @@ where
 }
 
 /// Returns the cells of a column as Python values.
-fn plain<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyList>> {
+fn to_python_values<'py>(
+    py: Python<'py>,
+    array: &ArrayRef,
+    ty: ColumnType,
+) -> PyResult<Bound<'py, PyList>> {
     match ty {
-        ColumnType::U32 => list(py, array.as_primitive::<UInt32Type>()),
-        ColumnType::U64 => list(py, array.as_primitive::<UInt64Type>()),
-        ColumnType::I32 => list(py, array.as_primitive::<Int32Type>()),
-        ColumnType::I64 => list(py, array.as_primitive::<Int64Type>()),
-        ColumnType::F64 => list(py, array.as_primitive::<Float64Type>()),
-        ColumnType::Bool => list(py, array.as_boolean()),
-        ColumnType::Text => list(py, array.as_string::<i32>()),
+        ColumnType::U32 => to_list(py, array.as_primitive::<UInt32Type>()),
+        ColumnType::U64 => to_list(py, array.as_primitive::<UInt64Type>()),
+        ColumnType::I32 => to_list(py, array.as_primitive::<Int32Type>()),
+        ColumnType::I64 => to_list(py, array.as_primitive::<Int64Type>()),
+        ColumnType::F64 => to_list(py, array.as_primitive::<Float64Type>()),
+        ColumnType::Bool => to_list(py, array.as_boolean()),
+        ColumnType::Text => to_list(py, array.as_string::<i32>()),
         ColumnType::Label => {
             let labels = array.as_dictionary::<UInt32Type>();
             let names = labels.values().as_string::<i32>();
-            list(py, labels.keys().iter().map(|key| key.map(|key| names.value(key as usize))))
+            to_list(py, labels.keys().iter().map(|key| key.map(|key| names.value(key as usize))))
         }
     }
 }
 
 /// Returns a column for NumPy.
-fn values<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyAny>> {
+fn to_numpy_column<'py>(
+    py: Python<'py>,
+    array: &ArrayRef,
+    ty: ColumnType,
+) -> PyResult<Bound<'py, PyAny>> {
     match ty {
         ColumnType::U32 => to_numpy(array.as_primitive::<UInt32Type>(), py, f64::from),
         ColumnType::U64 => to_numpy(array.as_primitive::<UInt64Type>(), py, |value| value as f64),
@@ -303,7 +316,7 @@ fn values<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bo
         ColumnType::F64 => to_numpy(array.as_primitive::<Float64Type>(), py, |value| value),
         // As objects, so that they can be compared and used as a mask.
         ColumnType::Bool | ColumnType::Text | ColumnType::Label => {
-            py.import("numpy")?.call_method1("array", (plain(py, array, ty)?, "O"))
+            py.import("numpy")?.call_method1("array", (to_python_values(py, array, ty)?, "O"))
         }
     }
 }

@@ -9,25 +9,25 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Time after which a run is handed back, so that Python can be checked for signals: too short for users to notice.
-const A_WHILE: Duration = Duration::from_millis(50);
+const TIME_SLICE: Duration = Duration::from_millis(50);
 
 /// A watcher that stops a run between two cycles after a while. It does not call Python: the driver of the run holds
 /// its lock, and a signal handler may want that.
 #[derive(Debug, Default)]
-pub(crate) struct ForAWhile(OnceLock<Instant>);
+pub(crate) struct TimeSlice(OnceLock<Instant>);
 
-impl Watcher for ForAWhile {
-    fn go_on(&self) -> bool {
+impl Watcher for TimeSlice {
+    fn should_continue(&self) -> bool {
         // It is also asked before the first cycle, which is therefore done in any case.
-        self.0.get_or_init(Instant::now).elapsed() < A_WHILE
+        self.0.get_or_init(Instant::now).elapsed() < TIME_SLICE
     }
 }
 
 /// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may want.
 #[derive(Debug, Default)]
-pub(crate) struct Signals(Mutex<Option<PyErr>>);
+pub(crate) struct SignalWatcher(Mutex<Option<PyErr>>);
 
-impl Signals {
+impl SignalWatcher {
     /// Returns the exception of the signal, if there was one.
     pub(crate) fn into_result(self) -> PyResult<()> {
         let raised = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -35,8 +35,8 @@ impl Signals {
     }
 }
 
-impl Watcher for Signals {
-    fn go_on(&self) -> bool {
+impl Watcher for SignalWatcher {
+    fn should_continue(&self) -> bool {
         // Python reports a signal once.
         let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.is_none() {
@@ -57,25 +57,25 @@ impl Watcher for Signals {
 
 /// A watcher of work in other threads, which do not hear of signals: the calling one checks for them.
 #[derive(Debug, Default)]
-struct Attended {
-    signals: Signals,
+struct PolledWatcher {
+    signals: SignalWatcher,
     is_over: AtomicBool,
     interrupt: Interrupt,
 }
 
-impl Attended {
+impl PolledWatcher {
     /// Checks Python for signals; the first stops the work at once, even within a cycle: a half-done cycle is not
     /// kept.
-    fn look(&self) {
-        if !self.signals.go_on() {
+    fn check_signals(&self) {
+        if !self.signals.should_continue() {
             self.is_over.store(true, Ordering::Relaxed);
             self.interrupt.raise();
         }
     }
 }
 
-impl Watcher for Attended {
-    fn go_on(&self) -> bool {
+impl Watcher for PolledWatcher {
+    fn should_continue(&self) -> bool {
         !self.is_over.load(Ordering::Relaxed)
     }
 
@@ -89,14 +89,14 @@ impl Watcher for Attended {
 }
 
 /// Does work that heeds an interrupt; returns `None` if that was raised.
-pub(crate) fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
+pub(crate) fn catch_interrupt<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
     let heeded = || {
-        let _heeded = interrupt.heeded_here();
+        let _heeded = interrupt.attach();
         work()
     };
     match catch_unwind(AssertUnwindSafe(heeded)) {
         Ok(done) => Some(done),
-        Err(payload) if interrupt.explains(payload.as_ref()) => None,
+        Err(payload) if interrupt.caused(payload.as_ref()) => None,
         Err(payload) => resume_unwind(payload),
     }
 }
@@ -106,11 +106,11 @@ pub(crate) fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Opt
 ///
 /// # Errors
 /// The exception of a signal.
-pub(crate) fn interruptible<T: Send>(
+pub(crate) fn run_interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
-    let done = attended(py, |watcher| heeding(&watcher.interrupt(), work))?;
+    let done = run_polling(py, |watcher| catch_interrupt(&watcher.interrupt(), work))?;
     Ok(done.expect("only a signal interrupts it, and that has raised its exception"))
 }
 
@@ -118,11 +118,12 @@ pub(crate) fn interruptible<T: Send>(
 ///
 /// # Errors
 /// The exception of a signal.
-pub(crate) fn attended<T: Send>(
+pub(crate) fn run_polling<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&dyn Watcher) -> T + Send,
 ) -> PyResult<T> {
-    let watcher = Attended::default();
-    let done = py.detach(|| sidestep_session::attended(|| work(&watcher), || watcher.look()));
+    let watcher = PolledWatcher::default();
+    let done =
+        py.detach(|| sidestep_session::run_polling(|| work(&watcher), || watcher.check_signals()));
     watcher.signals.into_result().map(|()| done)
 }

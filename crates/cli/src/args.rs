@@ -1,7 +1,7 @@
 //! The command line: options of every command, and examples.
 
 use crate::commands::{Command, GROUPS};
-use crate::console::{Console, prose_columns, written};
+use crate::console::{Console, check_write, prose_columns};
 use crate::exit::ExitCode;
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -10,18 +10,18 @@ use std::fmt::Write;
 use std::io::Write as _;
 
 /// Display order of global options: after those of each command.
-const LAST: usize = 900;
+const GLOBAL_DISPLAY_ORDER: usize = 900;
 
 /// Simulate and compare decentralized motion of many agents that must not collide.
 #[derive(Debug, Parser)]
-#[command(name = "sidestep", version = sidestep_session::build(), after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "sidestep", version = sidestep_session::build_id(), after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// Print one JSON object to standard output and nothing else
-    #[arg(long, global = true, display_order = LAST)]
+    #[arg(long, global = true, display_order = GLOBAL_DISPLAY_ORDER)]
     pub(crate) json: bool,
 
     /// Show no progress bar, and print only the result: the digest of a run, the table of a sweep
-    #[arg(long, short, global = true, display_order = LAST)]
+    #[arg(long, short, global = true, display_order = GLOBAL_DISPLAY_ORDER)]
     pub(crate) quiet: bool,
 
     #[command(subcommand)]
@@ -39,16 +39,17 @@ Exit codes: 0 done, 1 the command failed or the answer is no, \
 
 impl Cli {
     /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
-    pub(crate) fn of_process() -> Self {
+    pub(crate) fn parse_process_args() -> Self {
         let words = without_help_of_help(std::env::args_os());
-        let matches = command().try_get_matches_from(words).unwrap_or_else(|error| end(&error));
-        Self::from_arg_matches(&matches).unwrap_or_else(|error| end(&error))
+        let matches =
+            command().try_get_matches_from(words).unwrap_or_else(|error| exit_with(&error));
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| exit_with(&error))
     }
 }
 
 /// Ends the process with help or with the error in its arguments.
-fn end(told: &clap::Error) -> ! {
-    let code = match written(told.print().and_then(|()| std::io::stdout().flush())) {
+fn exit_with(told: &clap::Error) -> ! {
+    let code = match check_write(told.print().and_then(|()| std::io::stdout().flush())) {
         Err(failure) if !told.use_stderr() => {
             Console::new(false, false).error(&failure);
             ExitCode::from(&failure) as i32
@@ -74,7 +75,7 @@ fn without_help_of_help(words: impl Iterator<Item = OsString>) -> Vec<OsString> 
 pub(crate) fn command() -> clap::Command {
     // Without a terminal, clap would take 100 columns.
     let command = Cli::command().term_width(prose_columns().into());
-    let listed = listed(&command);
+    let listed = command_list(&command);
     command.help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{listed}{}\n{{options}}{{after-help}}",
         heading("Options")
@@ -86,7 +87,7 @@ fn heading(words: &str) -> String {
     format!("{style}{words}:{style:#}")
 }
 
-fn listed(command: &clap::Command) -> String {
+fn command_list(command: &clap::Command) -> String {
     let style = *Styles::styled().get_literal();
     let mut text = String::new();
     for (group, names) in GROUPS {

@@ -7,11 +7,13 @@ use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 
-pub(crate) use sidestep::kernel::words::{LINE_COLS, aligned, fixed, grouped, wrapped};
-pub(crate) use sidestep_session::report::duration;
+pub(crate) use sidestep::kernel::text::{
+    LINE_COLS, align_pairs, format_fixed, group_thousands, wrap,
+};
+pub(crate) use sidestep_session::report::format_duration;
 
 /// Most columns of prose: longer lines are hard to read.
-const MOST_COLS: u16 = 100;
+const MAX_PROSE_COLS: u16 = 100;
 
 /// The destination of a command's output.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +37,7 @@ impl Console {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn result(
+    pub(crate) fn print_result(
         self,
         json: &impl Serialize,
         text: impl FnOnce() -> String,
@@ -47,17 +49,17 @@ impl Console {
         write_out(&format!("{object}\n"))
     }
 
-    /// Prints a result like [`Console::result`], with a shorter text if the console is quiet.
+    /// Prints a result like [`Console::print_result`], with a shorter text if the console is quiet.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn result_or_short(
+    pub(crate) fn print_result_or_short(
         self,
         json: &impl Serialize,
         short: impl FnOnce() -> String,
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
-        self.result(json, || if self.quiet { short() } else { text() })
+        self.print_result(json, || if self.quiet { short() } else { text() })
     }
 
     /// Prints a remark for people to standard error.
@@ -69,7 +71,7 @@ impl Console {
 
     /// Prints a warning: something is wrong, but the command goes on.
     pub(crate) fn warn(self, text: impl Display) {
-        let lines = wrapped(&format!("warning: {text}"), usize::from(prose_columns()));
+        let lines = wrap(&format!("warning: {text}"), usize::from(prose_columns()));
         let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
     }
 
@@ -81,7 +83,7 @@ impl Console {
 
 /// Returns the number of columns that text may take: those of the terminal; without one, as the variable
 /// `COLUMNS` says, or [`LINE_COLS`].
-pub(crate) fn columns() -> u16 {
+pub(crate) fn terminal_columns() -> u16 {
     let told = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
     let terminal = terminal_size::terminal_size().map(|(width, _)| width.0);
     terminal.or_else(told).unwrap_or(LINE_COLS as u16)
@@ -89,13 +91,13 @@ pub(crate) fn columns() -> u16 {
 
 /// Returns the number of columns that prose may take.
 pub(crate) fn prose_columns() -> u16 {
-    columns().min(MOST_COLS)
+    terminal_columns().min(MAX_PROSE_COLS)
 }
 
 /// Writes to standard output.
 fn write_out(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+    check_write(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
 }
 
 /// Returns whether standard output took the text that was written to it. A reader that has closed the pipe (`| head`)
@@ -103,12 +105,12 @@ fn write_out(text: &str) -> Result<(), Failure> {
 ///
 /// # Errors
 /// When it did not.
-pub(crate) fn written(result: io::Result<()>) -> Result<(), Failure> {
+pub(crate) fn check_write(result: io::Result<()>) -> Result<(), Failure> {
     match result {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
             let remedy =
                 "send it somewhere that takes it; files that the command has written are whole";
-            Err(Failure::stopped(format!("cannot write to standard output: {e}"), remedy))
+            Err(Failure::other(format!("cannot write to standard output: {e}"), remedy))
         }
         _ => Ok(()),
     }
@@ -116,7 +118,7 @@ pub(crate) fn written(result: io::Result<()>) -> Result<(), Failure> {
 
 /// Returns a table as text in columns, numbers aligned to the right: in several blocks, each with the
 /// first column, where it is wider than a line.
-pub(crate) fn in_columns(table: &Table) -> String {
+pub(crate) fn format_columns(table: &Table) -> String {
     let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
     let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();
     let lines: Vec<Vec<&str>> = std::iter::once(head).chain(rows).collect();
@@ -126,10 +128,10 @@ pub(crate) fn in_columns(table: &Table) -> String {
 }
 
 /// Columns between two columns of a table.
-const GAP: usize = 3;
+const COLUMN_GAP: usize = 3;
 
 /// Largest width of a first column that stands beside the others.
-const MOST_BESIDE: usize = 40;
+const MAX_FIRST_COLUMN_COLS: usize = 40;
 
 fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
     let width = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
@@ -138,11 +140,11 @@ fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
 
 /// Returns the columns beside the first of each block: as many as a line has room for.
 fn blocks(widths: &[usize]) -> Vec<Range<usize>> {
-    let first = widths.first().copied().filter(|w| *w <= MOST_BESIDE).unwrap_or(0);
+    let first = widths.first().copied().filter(|w| *w <= MAX_FIRST_COLUMN_COLS).unwrap_or(0);
     let mut blocks: Vec<Range<usize>> = Vec::new();
     let mut used = usize::MAX;
     for (k, width) in widths.iter().enumerate().skip(1) {
-        let more = GAP + width;
+        let more = COLUMN_GAP + width;
         match blocks.last_mut() {
             Some(block) if used.saturating_add(more) <= LINE_COLS => {
                 block.end = k + 1;
@@ -166,9 +168,9 @@ fn block_text(lines: &[Vec<&str>], block: &Range<usize>) -> String {
     let widths = widths(lines);
     let first = widths.first().copied().unwrap_or(0);
     let line = |line: &Vec<&str>| {
-        let cell = |k: usize| format!("{:GAP$}{:>width$}", "", line[k], width = widths[k]);
+        let cell = |k: usize| format!("{:COLUMN_GAP$}{:>width$}", "", line[k], width = widths[k]);
         let cells: String = block.clone().map(cell).collect();
-        match first <= MOST_BESIDE {
+        match first <= MAX_FIRST_COLUMN_COLS {
             true => format!("  {}\n", format!("{:<first$}{cells}", line[0]).trim_end()),
             false => format!("  {}\n  {}\n", line[0], cells.trim_end()),
         }
@@ -186,14 +188,14 @@ mod tests {
             std::iter::once("what").chain(heads.iter().map(String::as_str)).collect();
         let mut table = Table::new("t", "", &heads);
         let cells = (0..columns).map(|k| format!("{k}.5 [{k}.25, {k}.75]"));
-        table.row(std::iter::once(first.to_string()).chain(cells));
+        table.push_row(std::iter::once(first.to_string()).chain(cells));
         table
     }
 
     #[test]
     fn a_table_that_fits_is_one_block() {
         assert_eq!(
-            in_columns(&table("pc", 2)),
+            format_columns(&table("pc", 2)),
             "  what          heading 0          heading 1\n  pc     0.5 [0.25, 0.75]   1.5 [1.25, \
              1.75]\n"
         );
@@ -202,7 +204,7 @@ mod tests {
     #[test]
     fn no_line_of_a_wide_table_is_longer_than_80_columns_and_no_cell_is_lost() {
         for first in ["pc", &"a long name of a variant".repeat(3)] {
-            let text = in_columns(&table(first, 9));
+            let text = format_columns(&table(first, 9));
             assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
             assert!((0..9).all(|k| text.contains(&format!("{k}.5 [{k}.25"))), "{text}");
             assert_eq!(text.matches(first).count(), text.matches("what").count(), "{text}");

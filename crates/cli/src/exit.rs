@@ -27,8 +27,8 @@ impl From<&Failure> for ExitCode {
     fn from(failure: &Failure) -> Self {
         match failure {
             Failure::Input(_) => Self::WrongInput,
-            Failure::Interrupted | Failure::WithinACycle(_) => Self::Interrupted,
-            Failure::Record(_) | Failure::Draw(_) | Failure::Stopped { .. } => Self::Failed,
+            Failure::Interrupted | Failure::InterruptedInCycle(_) => Self::Interrupted,
+            Failure::Record(_) | Failure::Draw(_) | Failure::Other { .. } => Self::Failed,
         }
     }
 }

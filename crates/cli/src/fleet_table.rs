@@ -1,30 +1,30 @@
 //! The table of a fleet's nodes while they fly, in 80 columns.
 
 use crate::console::Console;
-use crate::progress::Bar;
-use sidestep_session::fleet::{FleetNow, NodeNow};
+use crate::progress::RunProgress;
+use sidestep_session::fleet::{FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::io::{IsTerminal, Write as _};
 use std::time::{Duration, Instant};
 
 /// Time between two tables where there is no terminal to draw one over the other.
-const BETWEEN: Duration = Duration::from_secs(5);
+const PRINT_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Lines of a terminal that a table leaves free.
 const FREE_LINES: usize = 4;
 
 /// A fleet on the terminal: a table, or a bar.
-pub(crate) struct Shown {
+pub(crate) struct FleetTable {
     console: Console,
     is_table: bool,
     is_terminal: bool,
-    bar: Option<Bar>,
+    bar: Option<RunProgress>,
     /// Number of lines of the table that stands there.
     lines: usize,
     next: Instant,
 }
 
-impl Shown {
+impl FleetTable {
     /// Shows a table, or only progress.
     pub(crate) fn new(console: Console, is_table: bool) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
@@ -32,16 +32,16 @@ impl Shown {
     }
 
     /// Shows the fleet as it is now.
-    pub(crate) fn show(&mut self, now: &FleetNow) {
+    pub(crate) fn update(&mut self, now: &FleetStatus) {
         if !self.is_table {
-            let new = || Bar::of_cycles(self.console, 0, now.cycles);
-            self.bar.get_or_insert_with(new).at(now.cycle);
+            let new = || RunProgress::for_cycles(self.console, 0, now.cycles);
+            self.bar.get_or_insert_with(new).set(now.cycle);
             return;
         }
         if !self.is_terminal && Instant::now() < self.next {
             return;
         }
-        self.next = Instant::now() + BETWEEN;
+        self.next = Instant::now() + PRINT_INTERVAL;
         let height =
             terminal_size::terminal_size().map_or(usize::MAX, |(_, height)| height.0.into());
         let text = table(now, height.saturating_sub(FREE_LINES));
@@ -64,12 +64,12 @@ impl Shown {
 }
 
 /// Returns the table of a fleet in `most_lines` lines at most: nodes in trouble come first where not all fit.
-fn table(now: &FleetNow, most_lines: usize) -> String {
-    let mut nodes: Vec<&NodeNow> = now.nodes.iter().collect();
+fn table(now: &FleetStatus, most_lines: usize) -> String {
+    let mut nodes: Vec<&NodeStatus> = now.nodes.iter().collect();
     let waits = usize::from(!now.waits_for.is_empty());
     let room = most_lines.saturating_sub(3 + waits).max(1);
     if nodes.len() > room {
-        nodes.sort_by_key(|node| (!is_missed(node), std::cmp::Reverse(node.late), node.agent));
+        nodes.sort_by_key(|node| (!is_lost(node), std::cmp::Reverse(node.late), node.agent));
     }
     let mut text = heading(now);
     let _ = writeln!(
@@ -86,7 +86,7 @@ fn table(now: &FleetNow, most_lines: usize) -> String {
     text
 }
 
-fn heading(now: &FleetNow) -> String {
+fn heading(now: &FleetStatus) -> String {
     if !now.has_begun {
         let there = now.nodes.iter().filter(|node| node.state != "awaited").count();
         return format!("{there} of {} nodes are there\n", now.nodes.len());
@@ -99,12 +99,12 @@ fn heading(now: &FleetNow) -> String {
         "cycle {} of {}{late}; talks within {p50} ms (half), {p99} ms (99 %)\n{}",
         now.cycle,
         now.cycles,
-        waits(now)
+        waiting_line(now)
     )
 }
 
 /// Returns a line that names the nodes the fleet waits for, if it does.
-fn waits(now: &FleetNow) -> String {
+fn waiting_line(now: &FleetStatus) -> String {
     match now.waits_for.as_slice() {
         [] => String::new(),
         [first] => format!("waits for {} {first}\n", now.noun),
@@ -113,11 +113,11 @@ fn waits(now: &FleetNow) -> String {
 }
 
 /// Returns whether nothing is heard of a node that was there.
-fn is_missed(node: &NodeNow) -> bool {
+fn is_lost(node: &NodeStatus) -> bool {
     ["gone", "silent"].contains(&&*node.state)
 }
 
-fn row(node: &NodeNow, all: usize) -> String {
+fn row(node: &NodeStatus, all: usize) -> String {
     let heard = format!("{}/{}", node.heard, all.saturating_sub(1));
     let silent = node.silent_s.map_or("-".into(), |s| format!("{s:.1} s"));
     format!(
@@ -137,8 +137,8 @@ fn row(node: &NodeNow, all: usize) -> String {
 mod tests {
     use super::*;
 
-    fn fleet(count: u32) -> FleetNow {
-        let node = |agent: u32| NodeNow {
+    fn fleet(count: u32) -> FleetStatus {
+        let node = |agent: u32| NodeStatus {
             agent,
             name: agent.to_string(),
             state: if agent == 7 { "gone" } else { "decide" }.into(),
@@ -150,11 +150,11 @@ mod tests {
             packets_per_s: 99_999.0,
             bytes_per_s: 12_345_678.9,
             silent_s: Some(123.4),
-            ..NodeNow::default()
+            ..NodeStatus::default()
         };
         let nodes = (0..count).map(node).collect();
         let times = (Some(0.5), Some(2000.0));
-        FleetNow {
+        FleetStatus {
             flown_s: 0.0,
             cycle: 123_456,
             cycles: 1_000_000,
@@ -187,7 +187,7 @@ mod tests {
             (names(&["0.3"]), "waits for connector 0.3"),
             (names(&["0.3", "0.4", "1.0"]), "waits for connector 0.3, and 2 more"),
         ] {
-            let now = FleetNow { waits_for, noun: noun.clone(), ..fleet(50) };
+            let now = FleetStatus { waits_for, noun: noun.clone(), ..fleet(50) };
             let text = table(&now, 10);
             let lines: Vec<&str> = text.lines().collect();
             assert_eq!((lines.len(), lines[1]), (10, line), "{text}");

@@ -3,8 +3,8 @@
 use crate::exit::Failure;
 use crate::interrupt;
 use crate::link;
-use sidestep_server::Screen;
-use sidestep_session::fleet::{Failed, Job, Tls, Told, WatchJob};
+use sidestep_server::FleetFeed;
+use sidestep_session::fleet::{Job, JobError, LinkMessage, Tls, WatchJob};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
@@ -12,11 +12,11 @@ use std::thread::sleep;
 use std::time::Duration;
 
 /// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
-const PATIENCE_S: f64 = 10.0;
+const FLEET_TIMEOUT_S: f64 = 10.0;
 
 /// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to
 /// end shows its last view for a second.
-const AGAIN: Duration = Duration::from_secs(2);
+const RECONNECT_DELAY: Duration = Duration::from_secs(2);
 
 /// Returns whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
 pub(crate) fn is_endpoint(named: &Path) -> bool {
@@ -29,7 +29,7 @@ pub(crate) fn is_endpoint(named: &Path) -> bool {
 }
 
 /// Divides the named things into files and endpoints of fleets.
-pub(crate) fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+pub(crate) fn split_endpoints(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     let (fleets, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
         named.iter().partition(|path| is_endpoint(path));
     let fleets = fleets.into_iter().map(|path| path.display().to_string()).collect();
@@ -40,52 +40,52 @@ pub(crate) fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
 ///
 /// # Errors
 /// When the program that carries the network is not there, or the fleet does not answer.
-pub(crate) fn watch(endpoint: &str, tls: Option<Tls>) -> Result<Arc<Screen>, Failure> {
+pub(crate) fn start_watching(endpoint: &str, tls: Option<Tls>) -> Result<Arc<FleetFeed>, Failure> {
     let job = Job::Watch(WatchJob {
-        build: sidestep_session::build().into(),
+        build: sidestep_session::build_id().into(),
         connect: vec![endpoint.to_string()],
         tls,
-        patience_s: PATIENCE_S,
+        patience_s: FLEET_TIMEOUT_S,
     });
     let (began, begins) = channel();
     let endpoint = endpoint.to_string();
-    std::thread::spawn(move || hear(&job, &endpoint, &began));
+    std::thread::spawn(move || watch_fleets(&job, &endpoint, &began));
     // It says how it began, or why it did not, in any case.
     begins.recv().unwrap_or(Err(Failure::Interrupted))
 }
 
 /// Puts the news of one fleet after the other that flies there on a screen, until the command is interrupted.
-fn hear(job: &Job, endpoint: &str, began: &Sender<Result<Arc<Screen>, Failure>>) {
+fn watch_fleets(job: &Job, endpoint: &str, began: &Sender<Result<Arc<FleetFeed>, Failure>>) {
     let mut screen = None;
-    while !interrupt::requested() {
-        match (hear_one(job, endpoint, began, &mut screen), &screen) {
+    while !interrupt::is_requested() {
+        match (watch_fleet(job, endpoint, began, &mut screen), &screen) {
             (Err(failure), Some(screen)) => {
-                let Failed { cause, remedy, .. } = Failed::from(&failure);
-                screen.lose(&cause, &remedy);
+                let JobError { cause, remedy, .. } = JobError::from(&failure);
+                screen.mark_lost(&cause, &remedy);
             }
             (Err(failure), None) => return drop(began.send(Err(failure))),
             (Ok(()), _) => {}
         }
-        sleep(AGAIN);
+        sleep(RECONNECT_DELAY);
     }
 }
 
 /// Puts the news of a fleet on a screen, until it is over or gone.
-fn hear_one(
+fn watch_fleet(
     job: &Job,
     endpoint: &str,
-    began: &Sender<Result<Arc<Screen>, Failure>>,
-    screen: &mut Option<Arc<Screen>>,
+    began: &Sender<Result<Arc<FleetFeed>, Failure>>,
+    screen: &mut Option<Arc<FleetFeed>>,
 ) -> Result<(), Failure> {
-    link::run(job, |told| match (told, &*screen) {
-        (Told::Scene(staged), None) => {
-            let made = Arc::new(Screen::new(endpoint.to_string(), *staged));
+    link::run_job(job, |told| match (told, &*screen) {
+        (LinkMessage::Scene(staged), None) => {
+            let made = Arc::new(FleetFeed::new(endpoint.to_string(), *staged));
             // The waiting thread is there until it has an answer.
             let _ = began.send(Ok(made.clone()));
             *screen = Some(made);
         }
-        (Told::Scene(staged), Some(screen)) => screen.begin(*staged),
-        (Told::Seen(seen), Some(screen)) => screen.show(*seen),
+        (LinkMessage::Scene(staged), Some(screen)) => screen.restart(*staged),
+        (LinkMessage::Seen(seen), Some(screen)) => screen.publish(*seen),
         // Said of other jobs, or by the end of this one.
         _ => {}
     })
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn endpoints_are_told_from_files() {
         let named = ["tcp/127.0.0.1:7600", "tls/host:1", "a.toml", "tcp/a", "tcp/a/b:1", "tcp/:1"];
-        let (files, fleets) = divided(&named.map(PathBuf::from));
+        let (files, fleets) = split_endpoints(&named.map(PathBuf::from));
         assert_eq!(fleets, ["tcp/127.0.0.1:7600", "tls/host:1"]);
         assert_eq!(files.len(), 4);
     }

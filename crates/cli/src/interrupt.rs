@@ -1,7 +1,7 @@
 //! Ctrl-C: the first one asks the run to stop in good order, the second one ends the process.
 //!
 //! Good order is between two cycles. A run that has not come to the end of its cycle after
-//! [`PATIENCE`] leaves it half done; its recording continues from the last checkpoint.
+//! [`CYCLE_TIMEOUT`] leaves it half done; its recording continues from the last checkpoint.
 
 use crate::exit::{ExitCode, Failure};
 use sidestep::kernel::Interrupt;
@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Time that a cycle has to come to its end.
-const PATIENCE: Duration = Duration::from_secs(1);
+const CYCLE_TIMEOUT: Duration = Duration::from_secs(1);
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static LISTENING: AtomicBool = AtomicBool::new(false);
-static WITHIN_A_CYCLE: OnceLock<Interrupt> = OnceLock::new();
+static CYCLE_INTERRUPT: OnceLock<Interrupt> = OnceLock::new();
 
 /// Makes Ctrl-C (and a termination signal) a request to stop, instead of the end of the process.
 ///
@@ -24,41 +24,41 @@ pub(crate) fn listen() -> Result<(), Failure> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
     }
-    catch(|| {
+    set_handler(|| {
         if REQUESTED.swap(true, Ordering::Relaxed) {
             std::process::exit(ExitCode::Interrupted as i32);
         }
         // A thread of its own, so that the next signal is heard meanwhile.
         std::thread::spawn(|| {
-            std::thread::sleep(PATIENCE);
-            within_a_cycle().raise();
+            std::thread::sleep(CYCLE_TIMEOUT);
+            cycle_interrupt().raise();
         });
     })
 }
 
 /// Returns the interrupt at which runs look within their cycles.
-pub(crate) fn within_a_cycle() -> Interrupt {
-    WITHIN_A_CYCLE.get_or_init(Interrupt::default).clone()
+pub(crate) fn cycle_interrupt() -> Interrupt {
+    CYCLE_INTERRUPT.get_or_init(Interrupt::default).clone()
 }
 
 /// Makes Ctrl-C (and a termination signal) end the process after `cleanup`.
 ///
 /// # Errors
 /// When the system does not allow signals to be caught.
-pub(crate) fn end_with(cleanup: impl Fn() + Send + 'static) -> Result<(), Failure> {
-    catch(move || {
+pub(crate) fn on_interrupt(cleanup: impl Fn() + Send + 'static) -> Result<(), Failure> {
+    set_handler(move || {
         cleanup();
         std::process::exit(ExitCode::Interrupted as i32);
     })
 }
 
-fn catch(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
+fn set_handler(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     ctrlc::set_handler(handler).map_err(|e| {
-        Failure::stopped(format!("cannot listen for Ctrl-C: {e}"), "run it in another terminal")
+        Failure::other(format!("cannot listen for Ctrl-C: {e}"), "run it in another terminal")
     })
 }
 
 /// Returns whether the run was asked to stop.
-pub(crate) fn requested() -> bool {
+pub(crate) fn is_requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }

@@ -17,18 +17,18 @@
 mod args;
 mod commands;
 mod console;
+mod console_watcher;
 mod exit;
 mod fleet_table;
 mod fleet_watch;
+mod foxglove;
 mod interrupt;
 mod link;
-mod pages;
-mod plan;
 mod progress;
 mod report;
+mod report_files;
+mod scenario_args;
 mod sweep;
-mod viewers;
-mod watch;
 
 use exit::ExitCode;
 use sidestep::kernel::Digest;
@@ -51,14 +51,14 @@ fn worlds() -> Worlds {
 pub fn main_with(own: Behaviours) -> std::process::ExitCode {
     // Results follow from the added code, of which the program itself is all there is to see.
     let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
-    sidestep_session::adds_code(&Digest::of(&program).to_string());
+    sidestep_session::register_added_code(&Digest::hash_bytes(&program).to_string());
     OWN_WORLDS.get_or_init(|| with_behaviours(own));
     main()
 }
 
 /// Runs the command that the arguments of this process ask for.
 pub fn main() -> std::process::ExitCode {
-    let cli = args::Cli::of_process();
+    let cli = args::Cli::parse_process_args();
     let console = console::Console::new(cli.json, cli.quiet);
     match commands::execute(cli.command, &console) {
         Ok(code) => code.into(),

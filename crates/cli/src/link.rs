@@ -4,7 +4,9 @@ use crate::exit::Failure;
 use crate::interrupt;
 use clap::Args;
 use sidestep::kernel::InputError;
-use sidestep_session::fleet::{Common, Failed, Flown, Job, PROGRAM, Tls, Told};
+use sidestep_session::fleet::{
+    CommonSettings, Job, JobError, JobScenario, LINK_PROGRAM, LinkMessage, Tls,
+};
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
@@ -12,16 +14,16 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 /// Variable with the path of the program, for users who have it elsewhere.
-const VARIABLE: &str = "SIDESTEP_LINK";
+const PATH_VARIABLE: &str = "SIDESTEP_LINK";
 
 /// Time between two looks at whether to end.
-const LOOK: Duration = Duration::from_millis(50);
+const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Options of the server and of nodes.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LinkArgs {
     /// Timeout: seconds of silence after which a node or the server is taken to be gone
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = parse_seconds)]
     lease: f64,
 
     /// Serve metrics in Prometheus format at this address, e.g. 127.0.0.1:9100
@@ -57,17 +59,17 @@ pub(crate) struct TlsArgs {
 }
 
 /// Parses a time in seconds, from 0.1 to a day.
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_seconds(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s));
     number.ok_or_else(|| "give seconds from 0.1 to 86400".into())
 }
 
 impl LinkArgs {
     /// Returns the settings for a scenario.
-    pub(crate) fn common(&self, file: PathBuf, overrides: Vec<String>) -> Common {
-        let build = sidestep_session::build().into();
-        Common {
-            flown: Flown { file, overrides, build },
+    pub(crate) fn common_settings(&self, file: PathBuf, overrides: Vec<String>) -> CommonSettings {
+        let build = sidestep_session::build_id().into();
+        CommonSettings {
+            flown: JobScenario { file, overrides, build },
             tls: self.tls.files(),
             lease_s: self.lease,
             metrics: self.metrics.clone(),
@@ -96,9 +98,9 @@ impl TlsArgs {
 }
 
 /// Returns the program: as the variable says, beside this one, or on the path.
-pub(crate) fn find() -> Result<PathBuf, InputError> {
-    let named = std::env::var_os(VARIABLE).map(PathBuf::from);
-    let file = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
+pub(crate) fn find_program() -> Result<PathBuf, InputError> {
+    let named = std::env::var_os(PATH_VARIABLE).map(PathBuf::from);
+    let file = format!("{LINK_PROGRAM}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().map(|own| own.with_file_name(&file));
     let path = std::env::var_os("PATH").unwrap_or_default();
     let on_path = std::env::split_paths(&path).map(|folder| folder.join(&file));
@@ -110,9 +112,9 @@ pub(crate) fn find() -> Result<PathBuf, InputError> {
         let cause = "it is not there; it alone carries the network, so it is a program of its own";
         let remedy = format!(
             "get it with `cargo install --path crates/link`, or build it beside sidestep with \
-             `cargo build --release -p {PROGRAM}`; {VARIABLE} may name its path"
+             `cargo build --release -p {LINK_PROGRAM}`; {PATH_VARIABLE} may name its path"
         );
-        InputError::new(PROGRAM, cause, remedy)
+        InputError::new(LINK_PROGRAM, cause, remedy)
     })
 }
 
@@ -120,49 +122,49 @@ pub(crate) fn find() -> Result<PathBuf, InputError> {
 ///
 /// # Errors
 /// When it is not there, cannot do it, or ends before it is done.
-pub(crate) fn run(job: &Job, mut take: impl FnMut(Told)) -> Result<(), Failure> {
+pub(crate) fn run_job(job: &Job, mut take: impl FnMut(LinkMessage)) -> Result<(), Failure> {
     interrupt::listen()?;
-    let job = line(job)?;
-    let mut child = start()?;
-    let told = listen(&mut child);
+    let job = job_line(job)?;
+    let mut child = spawn_program()?;
+    let told = receive_messages(&mut child);
     let mut stdin = child.stdin.take();
-    say(stdin.as_mut(), &job);
+    send_job(stdin.as_mut(), &job);
     let mut failed = None;
     loop {
-        match told.recv_timeout(LOOK) {
-            Ok(Told::Failed(why)) => failed = Some(why),
+        match told.recv_timeout(STOP_POLL_INTERVAL) {
+            Ok(LinkMessage::Failed(why)) => failed = Some(why),
             Ok(told) => take(told),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
-        if interrupt::requested() {
+        if interrupt::is_requested() {
             // The program ends when its standard input is closed.
             drop(stdin.take());
         }
     }
-    let status = child.wait().map_err(|e| cannot_start(&e))?;
-    ending(status, failed)
+    let status = child.wait().map_err(|e| cannot_start_error(&e))?;
+    exit_result(status, failed)
 }
 
-fn start() -> Result<Child, Failure> {
-    let mut command = Command::new(find()?);
+fn spawn_program() -> Result<Child, Failure> {
+    let mut command = Command::new(find_program()?);
     command.stdin(Stdio::piped()).stdout(Stdio::piped());
     // Ctrl-C in a terminal comes to this process, which asks the program to end.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    command.spawn().map_err(|e| cannot_start(&e))
+    command.spawn().map_err(|e| cannot_start_error(&e))
 }
 
-fn cannot_start(error: &std::io::Error) -> Failure {
-    let remedy = format!("see whether it can be executed: {PROGRAM} --version");
-    Failure::stopped(format!("cannot start {PROGRAM}: {error}"), remedy)
+fn cannot_start_error(error: &std::io::Error) -> Failure {
+    let remedy = format!("see whether it can be executed: {LINK_PROGRAM} --version");
+    Failure::other(format!("cannot start {LINK_PROGRAM}: {error}"), remedy)
 }
 
 /// Returns the job as a line of text.
 ///
 /// # Errors
 /// When a path in it is no text: the program could not find it.
-fn line(job: &Job) -> Result<String, InputError> {
+fn job_line(job: &Job) -> Result<String, InputError> {
     let text = serde_json::to_string(job).map_err(|e| {
         let remedy =
             "name scenario, folder and certificates in UTF-8: the job is handed over as text";
@@ -172,14 +174,14 @@ fn line(job: &Job) -> Result<String, InputError> {
 }
 
 /// Hands over the job. A program that has ended at once says why by itself.
-fn say(stdin: Option<&mut ChildStdin>, line: &str) {
+fn send_job(stdin: Option<&mut ChildStdin>, line: &str) {
     if let Some(stdin) = stdin {
         let _ = stdin.write_all(line.as_bytes()).and_then(|()| stdin.flush());
     }
 }
 
 /// Returns the messages of the program as they come.
-fn listen(child: &mut Child) -> Receiver<Told> {
+fn receive_messages(child: &mut Child) -> Receiver<LinkMessage> {
     let (sender, told) = channel();
     let out = child.stdout.take();
     std::thread::spawn(move || {
@@ -196,15 +198,15 @@ fn listen(child: &mut Child) -> Receiver<Told> {
     told
 }
 
-fn ending(status: ExitStatus, failed: Option<Failed>) -> Result<(), Failure> {
+fn exit_result(status: ExitStatus, failed: Option<JobError>) -> Result<(), Failure> {
     match failed {
         Some(failed) => Err(failed.into_error()),
         None if status.success() => Ok(()),
-        None if interrupt::requested() => Err(Failure::Interrupted),
+        None if interrupt::is_requested() => Err(Failure::Interrupted),
         None => {
             let remedy = "its nodes end by themselves; a folder of --out continues with `sidestep resume DIR`";
-            Err(Failure::stopped(
-                format!("{PROGRAM} has ended before it was done ({status})"),
+            Err(Failure::other(
+                format!("{LINK_PROGRAM} has ended before it was done ({status})"),
                 remedy,
             ))
         }

@@ -4,16 +4,16 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use sidestep::kernel::Cycle;
 use std::fmt::Write;
 
-use crate::console::{Console, grouped};
+use crate::console::{Console, group_thousands};
 
 /// The progress bar of a run, or of many.
 #[derive(Debug)]
-pub(crate) struct Bar(ProgressBar);
+pub(crate) struct RunProgress(ProgressBar);
 
-impl Bar {
+impl RunProgress {
     /// Returns a bar from cycle `from` to `until`; hidden if the console shows no progress.
-    pub(crate) fn of_cycles(console: Console, from: Cycle, until: Cycle) -> Self {
-        let bar = bar(console, until);
+    pub(crate) fn for_cycles(console: Console, from: Cycle, until: Cycle) -> Self {
+        let bar = new_bar(console, until);
         bar.set_style(style());
         bar.set_position(from);
         // The rate counts this process alone, not the cycles of an earlier one.
@@ -23,8 +23,8 @@ impl Bar {
     }
 
     /// Returns a bar of `all` runs, `before` of which were done earlier.
-    pub(crate) fn of_runs(console: Console, before: u64, all: u64) -> Self {
-        let bar = bar(console, all);
+    pub(crate) fn for_runs(console: Console, before: u64, all: u64) -> Self {
+        let bar = new_bar(console, all);
         bar.set_style(
             ProgressStyle::with_template("{bar:30} {pos} of {len} runs  {eta} left")
                 .unwrap_or_else(|_| ProgressStyle::default_bar()),
@@ -36,7 +36,7 @@ impl Bar {
     }
 
     /// Shows that `done` cycles (or runs) are done.
-    pub(crate) fn at(&self, done: u64) {
+    pub(crate) fn set(&self, done: u64) {
         self.0.set_position(done);
     }
 
@@ -47,7 +47,7 @@ impl Bar {
 }
 
 /// Returns a bar that is hidden if the console shows no progress.
-fn bar(console: Console, length: u64) -> ProgressBar {
+fn new_bar(console: Console, length: u64) -> ProgressBar {
     let shown = console.shows_progress();
     let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     ProgressBar::with_draw_target(Some(length), target)
@@ -55,22 +55,22 @@ fn bar(console: Console, length: u64) -> ProgressBar {
 
 /// The progress bar of work in several stages.
 #[derive(Debug)]
-pub(crate) struct Stages(ProgressBar);
+pub(crate) struct StageProgress(ProgressBar);
 
-/// Number of steps of the bar of [`Stages`].
+/// Number of steps of the bar of [`StageProgress`].
 const STEPS: f64 = 1000.0;
 
-impl Stages {
+impl StageProgress {
     /// Returns a bar at its start; hidden if the console shows no progress.
     pub(crate) fn new(console: Console) -> Self {
-        let bar = bar(console, STEPS as u64);
+        let bar = new_bar(console, STEPS as u64);
         let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self(bar)
     }
 
     /// Shows the name of the stage, and the share of all work that is done (0 to 1).
-    pub(crate) fn at(&self, what: &str, share: f64) {
+    pub(crate) fn set(&self, what: &str, share: f64) {
         self.0.set_position((STEPS * share) as u64);
         self.0.set_message(what.to_string());
     }
@@ -83,10 +83,11 @@ impl Stages {
 
 fn style() -> ProgressStyle {
     let position = |s: &ProgressState, w: &mut dyn Write| {
-        let _ = write!(w, "{} of {}", grouped(s.pos()), grouped(s.len().unwrap_or(0)));
+        let _ =
+            write!(w, "{} of {}", group_thousands(s.pos()), group_thousands(s.len().unwrap_or(0)));
     };
     let rate = |s: &ProgressState, w: &mut dyn Write| {
-        let _ = write!(w, "{}", grouped(s.per_sec() as u64));
+        let _ = write!(w, "{}", group_thousands(s.per_sec() as u64));
     };
     ProgressStyle::with_template("{bar:30} {cycles} cycles  {rate} cycles/s  {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar())

@@ -1,26 +1,26 @@
 //! The summary of a run as text.
 
-use crate::console::{aligned, duration, grouped};
-use sidestep::kernel::words::line;
-use sidestep::kernel::world::Decides;
-use sidestep_session::{Phases, Status, Summary};
+use crate::console::{align_pairs, format_duration, group_thousands};
+use sidestep::kernel::text::key_value;
+use sidestep::kernel::world::DecisionMode;
+use sidestep_session::{Phases, RunStatus, Summary};
 
 /// Returns the summary as text for people.
-pub(crate) fn text(summary: &Summary) -> String {
+pub(crate) fn summary_text(summary: &Summary) -> String {
     let mut lines = vec![
-        line(&format!("{}s", summary.agent), grouped(summary.agents as u64)),
-        line("cycles", cycles_words(summary)),
+        key_value(&format!("{}s", summary.agent), group_thousands(summary.agents as u64)),
+        key_value("cycles", cycles_text(summary)),
     ];
     lines.extend(summary.outcome.iter().cloned());
     lines.extend(summary.file_lines.iter().cloned());
     if summary.cycles_timed > 0 {
-        lines.push(line("speed", speed(summary)));
-        lines.push(line("time", phases_words(&summary.phases_s)));
+        lines.push(key_value("speed", speed(summary)));
+        lines.push(key_value("time", phases_text(&summary.phases_s)));
     }
-    lines.push(line("digest", summary.digest.clone()));
-    lines.extend(summary.folder.as_ref().map(|f| line("results", f.display().to_string())));
-    lines.extend(summary.mcap.as_ref().map(|f| line("viewers", f.display().to_string())));
-    format!("{}\n{}", heading(summary), aligned(&lines))
+    lines.push(key_value("digest", summary.digest.clone()));
+    lines.extend(summary.folder.as_ref().map(|f| key_value("results", f.display().to_string())));
+    lines.extend(summary.mcap.as_ref().map(|f| key_value("viewers", f.display().to_string())));
+    format!("{}\n{}", heading(summary), align_pairs(&lines))
 }
 
 fn heading(summary: &Summary) -> String {
@@ -28,12 +28,12 @@ fn heading(summary: &Summary) -> String {
     format!("{name}, seed {}", summary.seed)
 }
 
-fn cycles_words(summary: &Summary) -> String {
-    let done = grouped(summary.cycles);
+fn cycles_text(summary: &Summary) -> String {
+    let done = group_thousands(summary.cycles);
     match summary.status {
-        Status::Complete => done,
-        Status::Incomplete => {
-            format!("{done} of {}: INCOMPLETE", grouped(summary.cycles_planned))
+        RunStatus::Complete => done,
+        RunStatus::Incomplete => {
+            format!("{done} of {}: INCOMPLETE", group_thousands(summary.cycles_planned))
         }
     }
 }
@@ -42,10 +42,10 @@ fn speed(summary: &Summary) -> String {
     let per_second = summary.cycles_timed as f64 / summary.wall_s.max(1e-9);
     format!(
         "{} for {} cycles ({}/s); {} {}-cycles per CPU second on {} worker{}",
-        duration(summary.wall_s),
-        grouped(summary.cycles_timed),
-        grouped(per_second as u64),
-        rate(summary.agent_cycles_per_cpu_s),
+        format_duration(summary.wall_s),
+        group_thousands(summary.cycles_timed),
+        group_thousands(per_second as u64),
+        format_rate(summary.agent_cycles_per_cpu_s),
         summary.agent,
         summary.workers,
         if summary.workers == 1 { "" } else { "s" },
@@ -53,10 +53,10 @@ fn speed(summary: &Summary) -> String {
 }
 
 /// Returns the share of time of every phase, as text.
-fn phases_words(phases_s: &Phases) -> String {
+fn phases_text(phases_s: &Phases) -> String {
     let [first, last] = match phases_s.decides {
-        Decides::Alone => ["perceive, decide and claim", "act"],
-        Decides::Together => ["perceive and claim", "decide and act"],
+        DecisionMode::Independent => ["perceive, decide and claim", "act"],
+        DecisionMode::Joint => ["perceive and claim", "decide and act"],
     };
     let phases = [
         (first, phases_s.claim),
@@ -70,9 +70,9 @@ fn phases_words(phases_s: &Phases) -> String {
 }
 
 /// Formats a rate with as many digits as it needs.
-fn rate(per_second: f64) -> String {
+fn format_rate(per_second: f64) -> String {
     match per_second < 1e5 {
-        true => grouped(per_second as u64),
+        true => group_thousands(per_second as u64),
         false => format!("{:.2} million", per_second / 1e6),
     }
 }

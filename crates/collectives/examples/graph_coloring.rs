@@ -6,7 +6,8 @@
 //! cost 1. Countries only ever learn from the cost of their own color.
 
 use sidestep_collectives::{
-    Choice, Estimator, Game, Order, PairwiseGame, Settings, Stop, Update, Utility, optimize,
+    Choice, Estimator, Game, OptimizerConfig, PairwiseGame, StopCriterion, Update, UpdateOrder,
+    Utility, optimize,
 };
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -23,13 +24,13 @@ fn main() {
         let same = |k: usize| f64::from(u8::from(k / COLORS.len() == k % COLORS.len()));
         game.add_pair(a, b, (0..COLORS.len() * COLORS.len()).map(same).collect());
     }
-    let settings = Settings {
+    let settings = OptimizerConfig {
         estimator: Estimator::Sampled { block: 30, ageing: 0.5 },
         update: Update::NearestNewton { step: 0.3 },
-        order: Order::Sequence,
+        order: UpdateOrder::Sequence,
         utility: Utility::Private,
         cooling: 0.95,
-        stop: Stop { threshold: 1e-3, calm_rounds: 3, max_rounds: 500 },
+        stop: StopCriterion { threshold: 1e-3, calm_rounds: 3, max_rounds: 500 },
         choice: Choice::Argmax,
     };
     let streams = Streams::new(Seed(1));

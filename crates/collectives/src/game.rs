@@ -28,34 +28,34 @@ pub trait Game {
 pub struct PairwiseGame {
     strategies: Vec<usize>,
     own: Vec<Vec<f64>>,
-    pairs: Vec<Pair>,
+    pairs: Vec<PairCosts>,
     /// Indices of each player's pairs.
     of_player: Vec<Vec<usize>>,
 }
 
 /// The costs of the joint strategies of two players.
 #[derive(Debug, Clone)]
-struct Pair {
+struct PairCosts {
     a: usize,
     b: usize,
     /// The joint cost of two strategies: a row per strategy of `a`.
-    given_a: Table,
+    given_a: CostTable,
     /// The same with a row per strategy of `b`.
-    given_b: Table,
+    given_b: CostTable,
     /// The same divided into the parts of `a` and of `b`: `parts[x_a * strategies_b + x_b]`.
     parts: Vec<[f64; 2]>,
 }
 
 /// The costs of one player's strategies, a row per strategy of another.
 #[derive(Debug, Clone)]
-struct Table {
+struct CostTable {
     width: usize,
     costs: Vec<f64>,
     /// Rows with any cost that is not 0, in increasing order.
     rows: Vec<usize>,
 }
 
-impl Table {
+impl CostTable {
     fn new(width: usize, costs: Vec<f64>) -> Self {
         let costly = costs.chunks_exact(width).map(|row| row.iter().any(|cost| *cost != 0.0));
         let rows = costly.enumerate().filter_map(|(row, costly)| costly.then_some(row)).collect();
@@ -67,7 +67,7 @@ impl Table {
     }
 
     /// Adds the expected costs if rows have the probabilities `q`.
-    fn expect(&self, q: &[f64], expected: &mut [f64]) {
+    fn add_expected_costs(&self, q: &[f64], expected: &mut [f64]) {
         for &row in &self.rows {
             let p = q[row];
             expected.iter_mut().zip(self.row(row)).for_each(|(sum, cost)| *sum += cost * p);
@@ -96,7 +96,7 @@ impl PairwiseGame {
     /// # Panics
     /// When `a` is `b`, one of them does not exist, or the list has another length.
     pub fn add_pair(&mut self, a: usize, b: usize, costs: Vec<f64>) {
-        self.add_pair_in_parts(a, b, costs.into_iter().map(|cost| [cost, 0.0]).collect());
+        self.add_split_pair(a, b, costs.into_iter().map(|cost| [cost, 0.0]).collect());
     }
 
     /// Adds a pair of which each player bears a part: `parts[x_a][x_b]` are those of `a` and `b`.
@@ -106,7 +106,7 @@ impl PairwiseGame {
     ///
     /// # Panics
     /// The same as for [`PairwiseGame::add_pair`].
-    pub fn add_pair_in_parts(&mut self, a: usize, b: usize, parts: Vec<[f64; 2]>) {
+    pub fn add_split_pair(&mut self, a: usize, b: usize, parts: Vec<[f64; 2]>) {
         assert!(a != b, "a pair is two players");
         assert_eq!(
             parts.len(),
@@ -118,16 +118,16 @@ impl PairwiseGame {
             let [rows, width] = [self.strategies[a], self.strategies[b]];
             let cost = |[of_a, of_b]: &[f64; 2]| of_a + of_b;
             let column = |x: usize| parts[x..].iter().step_by(width).map(cost);
-            let given_a = Table::new(width, parts.iter().map(cost).collect());
-            let given_b = Table::new(rows, (0..width).flat_map(column).collect());
-            self.pairs.push(Pair { a, b, given_a, given_b, parts });
-            self.enlist(a, b, index);
-            self.enlist(b, a, index);
+            let given_a = CostTable::new(width, parts.iter().map(cost).collect());
+            let given_b = CostTable::new(rows, (0..width).flat_map(column).collect());
+            self.pairs.push(PairCosts { a, b, given_a, given_b, parts });
+            self.index_pair(a, b, index);
+            self.index_pair(b, a, index);
         }
     }
 
     /// Adds a pair to a player's list, which is sorted by the number of the other player.
-    fn enlist(&mut self, player: usize, other: usize, index: usize) {
+    fn index_pair(&mut self, player: usize, other: usize, index: usize) {
         let pairs = &self.pairs;
         let of_player = &mut self.of_player[player];
         let place = of_player.partition_point(|&k| pairs[k].a + pairs[k].b - player < other);
@@ -135,10 +135,10 @@ impl PairwiseGame {
     }
 
     /// Returns the part of a joint move's cost that a player bears.
-    pub fn part(&self, joint: &[usize], player: usize) -> f64 {
+    pub fn player_cost(&self, joint: &[usize], player: usize) -> f64 {
         let own = self.own[player][joint[player]];
         self.of_player[player].iter().fold(own, |sum, &index| {
-            let Pair { a, b, parts, .. } = &self.pairs[index];
+            let PairCosts { a, b, parts, .. } = &self.pairs[index];
             let parts = parts[joint[*a] * self.strategies[*b] + joint[*b]];
             sum + parts[usize::from(*b == player)]
         })
@@ -146,21 +146,21 @@ impl PairwiseGame {
 
     /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
     /// strategies of player `i`), where the others play `q`: the closed form of eq. 3.
-    pub fn expect(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
+    pub fn expected_costs(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
         for &index in &self.of_player[player] {
-            let Pair { a, b, given_a, given_b, .. } = &self.pairs[index];
+            let PairCosts { a, b, given_a, given_b, .. } = &self.pairs[index];
             if *a == player {
-                given_b.expect(&q[*b], expected);
+                given_b.add_expected_costs(&q[*b], expected);
             } else {
-                given_a.expect(&q[*a], expected);
+                given_a.add_expected_costs(&q[*a], expected);
             }
         }
     }
 
     fn pair_cost(&self, index: usize, joint: &[usize]) -> f64 {
-        let Pair { a, b, given_a, .. } = &self.pairs[index];
+        let PairCosts { a, b, given_a, .. } = &self.pairs[index];
         given_a.row(joint[*a])[joint[*b]]
     }
 }
@@ -171,7 +171,7 @@ impl Game for PairwiseGame {
     }
 
     fn cost(&self, joint: &[usize]) -> f64 {
-        (0..self.strategies.len()).fold(0.0, |sum, player| sum + self.part(joint, player))
+        (0..self.strategies.len()).fold(0.0, |sum, player| sum + self.player_cost(joint, player))
     }
 
     fn private_cost(&self, joint: &[usize], player: usize) -> f64 {
@@ -229,7 +229,7 @@ pub(super) mod tests {
             }).collect();
             for player in 0..sizes.len() {
                 let mut closed = Vec::new();
-                game.expect(player, &q, &mut closed);
+                game.expected_costs(player, &q, &mut closed);
                 let mut enumerated = vec![0.0; sizes[player]];
                 for joint in joints(&sizes) {
                     let others = (0..sizes.len()).filter(|&j| j != player);

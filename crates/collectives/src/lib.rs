@@ -35,5 +35,7 @@ mod optimize;
 mod player;
 
 pub use game::{Game, PairwiseGame};
-pub use optimize::{Estimator, Order, Outcome, Settings, Stop, optimize};
+pub use optimize::{
+    Estimator, OptimizeResult, OptimizerConfig, StopCriterion, UpdateOrder, optimize,
+};
 pub use player::{Choice, Player, Update, Utility};

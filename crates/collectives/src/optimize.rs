@@ -24,7 +24,7 @@ pub enum Estimator {
 /// The order in which the players update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Order {
+pub enum UpdateOrder {
     /// All at once, on the distributions of the round before.
     #[default]
     Parallel,
@@ -34,26 +34,26 @@ pub enum Order {
 
 /// The settings of an optimization.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub struct OptimizerConfig {
     /// The estimator of expectations.
     pub estimator: Estimator,
     /// The update of the distributions.
     pub update: Update,
     /// The order of the updates.
-    pub order: Order,
+    pub order: UpdateOrder,
     /// The cost that players learn from.
     pub utility: Utility,
     /// Factor on the temperature after each round, in (0, 1].
     pub cooling: f64,
     /// The stopping rule.
-    pub stop: Stop,
+    pub stop: StopCriterion,
     /// The choice of final strategies from the distributions.
     pub choice: Choice,
 }
 
 /// The rule by which an optimization stops.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stop {
+pub struct StopCriterion {
     /// The largest change of a probability in a calm round.
     pub threshold: f64,
     /// The number of calm rounds in a row that counts as converged.
@@ -62,17 +62,17 @@ pub struct Stop {
     pub max_rounds: u32,
 }
 
-impl Stop {
+impl StopCriterion {
     /// Counts calm rounds: returns the number in a row after a round in which probabilities moved
     /// by at most `change`.
-    pub fn calm(&self, so_far: u32, change: f64) -> u32 {
+    pub fn count_calm_rounds(&self, so_far: u32, change: f64) -> u32 {
         if change <= self.threshold { so_far + 1 } else { 0 }
     }
 }
 
 /// The outcome of an optimization.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct OptimizeResult {
     /// The chosen strategy of each player.
     pub joint: Vec<usize>,
     /// The final distributions.
@@ -93,30 +93,30 @@ pub struct Outcome {
 /// When the estimator is exact and the game is not a sum over pairs.
 pub fn optimize(
     game: &impl Game,
-    settings: &Settings,
+    settings: &OptimizerConfig,
     uniform: impl Fn(usize, u64) -> f64,
-) -> Outcome {
-    let mut table = RoundTable::new(game, settings, uniform);
+) -> OptimizeResult {
+    let mut table = OptimizerState::new(game, settings, uniform);
     let (mut rounds, mut calm) = (0, 0);
     while calm < settings.stop.calm_rounds && rounds < settings.stop.max_rounds {
         let change = match settings.estimator {
-            Estimator::Sampled { block, ageing } => table.sampled_round(block, ageing),
-            Estimator::Exact => table.exact_round(),
+            Estimator::Sampled { block, ageing } => table.run_sampled_round(block, ageing),
+            Estimator::Exact => table.run_exact_round(),
         };
-        calm = settings.stop.calm(calm, change);
+        calm = settings.stop.count_calm_rounds(calm, change);
         rounds += 1;
     }
     let joint = table.final_joint();
     let converged = calm >= settings.stop.calm_rounds;
     let expected = table.players.iter().map(|p| p.expected().to_vec()).collect();
     let q = table.players.into_iter().map(|p| p.q).collect();
-    Outcome { joint, q, expected, rounds, converged }
+    OptimizeResult { joint, q, expected, rounds, converged }
 }
 
 /// All players and their samples during an optimization.
-struct RoundTable<'g, G, U> {
+struct OptimizerState<'g, G, U> {
     game: &'g G,
-    settings: &'g Settings,
+    settings: &'g OptimizerConfig,
     uniform: U,
     players: Vec<Player>,
     /// The distributions that the players see.
@@ -125,24 +125,24 @@ struct RoundTable<'g, G, U> {
     drawn: u64,
 }
 
-impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
-    fn new(game: &'g G, settings: &'g Settings, uniform: U) -> Self {
+impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
+    fn new(game: &'g G, settings: &'g OptimizerConfig, uniform: U) -> Self {
         let players: Vec<Player> = game.strategies().iter().map(|&n| Player::new(n)).collect();
         let q = players.iter().map(|p| p.q.clone()).collect();
         Self { game, settings, uniform, players, q, drawn: 0 }
     }
 
     /// Runs a round with exact expectations; returns the largest change of a probability.
-    fn exact_round(&mut self) -> f64 {
+    fn run_exact_round(&mut self) -> f64 {
         let game = self.game.as_pairwise().expect("exact expectations need a sum over pairs");
         let mut change: f64 = 0.0;
         for i in 0..self.players.len() {
-            interrupt::look();
+            interrupt::check();
             let player = &mut self.players[i];
-            player.know(|expected| game.expect(i, &self.q, expected));
+            player.set_expected(|expected| game.expected_costs(i, &self.q, expected));
             change = change.max(player.update(self.settings.update, self.settings.cooling));
             // In sequence, the players after this one see its new distribution.
-            if self.settings.order == Order::Sequence {
+            if self.settings.order == UpdateOrder::Sequence {
                 self.q[i].clone_from(&player.q);
             }
         }
@@ -153,34 +153,34 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
     /// Runs a round with a block of joint samples, sample `k` of all players being joint move `k`.
     /// In sequence, each player draws a new block with those before it. Returns the largest change
     /// of a probability.
-    fn sampled_round(&mut self, block: usize, ageing: f64) -> f64 {
-        let mut samples = self.draw_block(block);
+    fn run_sampled_round(&mut self, block: usize, ageing: f64) -> f64 {
+        let mut samples = self.sample_block(block);
         let mut change: f64 = 0.0;
         for i in 0..self.players.len() {
             let costs: Vec<f64> = (0..block).map(|k| self.sample_cost(&samples, k, i)).collect();
             let player = &mut self.players[i];
             player.learn(&samples[i], &costs, ageing);
             change = change.max(player.update(self.settings.update, self.settings.cooling));
-            if self.settings.order == Order::Sequence {
-                samples = self.draw_block(block);
+            if self.settings.order == UpdateOrder::Sequence {
+                samples = self.sample_block(block);
             }
         }
         change
     }
 
     /// Draws the next `block` samples of each player.
-    fn draw_block(&mut self, block: usize) -> Vec<Vec<usize>> {
+    fn sample_block(&mut self, block: usize) -> Vec<Vec<usize>> {
         let from = self.drawn;
         self.drawn += block as u64;
         let uniform = &self.uniform;
         let of = |(i, player): (usize, &Player)| {
-            (from..from + block as u64).map(|k| player.draw(uniform(i, k))).collect()
+            (from..from + block as u64).map(|k| player.sample(uniform(i, k))).collect()
         };
         self.players.iter().enumerate().map(of).collect()
     }
 
     fn sample_cost(&self, samples: &[Vec<usize>], k: usize, player: usize) -> f64 {
-        interrupt::look();
+        interrupt::check();
         let joint: Vec<usize> = samples.iter().map(|of_player| of_player[k]).collect();
         match self.settings.utility {
             Utility::Joint => self.game.cost(&joint),
@@ -204,13 +204,13 @@ mod tests {
     use sidestep_kernel::math;
     use sidestep_kernel::stream::{Purpose, Streams};
 
-    const EXACT: Settings = Settings {
+    const EXACT: OptimizerConfig = OptimizerConfig {
         estimator: Estimator::Exact,
         update: Update::NearestNewton { step: 0.5 },
-        order: Order::Sequence,
+        order: UpdateOrder::Sequence,
         utility: Utility::Joint,
         cooling: 0.8,
-        stop: Stop { threshold: 1e-3, calm_rounds: 3, max_rounds: 200 },
+        stop: StopCriterion { threshold: 1e-3, calm_rounds: 3, max_rounds: 200 },
         choice: Choice::Argmax,
     };
 
@@ -234,9 +234,10 @@ mod tests {
         let sampled = Estimator::Sampled { block: 20, ageing: 0.7 };
         for estimator in [Estimator::Exact, sampled] {
             for update in [Update::NearestNewton { step: 0.5 }, Update::Brouwer { step: 0.5 }] {
-                for order in [Order::Parallel, Order::Sequence] {
+                for order in [UpdateOrder::Parallel, UpdateOrder::Sequence] {
                     for utility in [Utility::Joint, Utility::Private] {
-                        let settings = Settings { estimator, update, order, utility, ..EXACT };
+                        let settings =
+                            OptimizerConfig { estimator, update, order, utility, ..EXACT };
                         let outcome = optimize(&easy(), &settings, uniform(3));
                         assert_eq!(outcome.joint, [1, 1, 1], "{settings:?}");
                         assert!(outcome.converged, "{settings:?}");
@@ -263,8 +264,8 @@ mod tests {
 
     #[test]
     fn rounds_that_run_out_are_told() {
-        let stop = Stop { max_rounds: 2, ..EXACT.stop };
-        let outcome = optimize(&easy(), &Settings { stop, ..EXACT }, uniform(1));
+        let stop = StopCriterion { max_rounds: 2, ..EXACT.stop };
+        let outcome = optimize(&easy(), &OptimizerConfig { stop, ..EXACT }, uniform(1));
         assert_eq!((outcome.rounds, outcome.converged), (2, false));
     }
 
@@ -277,12 +278,12 @@ mod tests {
         let game = game(&sizes, &costs);
         let q: Vec<Vec<f64>> = sizes.iter().map(|&n| vec![1.0 / n as f64; n]).collect();
         let mut exact = Vec::new();
-        game.expect(0, &q, &mut exact);
+        game.expected_costs(0, &q, &mut exact);
         let rms = |block: usize| {
             let mut squares = 0.0;
             for seed in 0..64 {
                 let players: Vec<Player> = sizes.iter().map(|&n| Player::new(n)).collect();
-                let draw = |i: usize, k: usize| players[i].draw(uniform(100 + seed)(i, k as u64));
+                let draw = |i: usize, k: usize| players[i].sample(uniform(100 + seed)(i, k as u64));
                 let samples: Vec<usize> = (0..block).map(|k| draw(0, k)).collect();
                 let cost = |k: usize| {
                     let joint: Vec<usize> = (0..sizes.len()).map(|i| draw(i, k)).collect();

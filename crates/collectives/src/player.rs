@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
 /// The least probability, above 0 so that every strategy may return.
-const LEAST: f64 = 1e-9;
+const MIN_PROBABILITY: f64 = 1e-9;
 /// The lowest temperature, as a share of the costs' scale.
-const COLDEST: f64 = 1e-12;
+const MIN_TEMPERATURE_FRACTION: f64 = 1e-12;
 
 /// The step of a distribution toward the minimum of eq. 7.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,7 +75,7 @@ impl Player {
 
     /// Returns whether it can be a player with this number of strategies: one that comes from
     /// elsewhere, such as over a network, may be anything.
-    pub fn is_of(&self, strategies: usize) -> bool {
+    pub fn has_strategies(&self, strategies: usize) -> bool {
         let Self { q, temperature, sums, counts, expected } = self;
         let is_distribution =
             q.iter().all(|p| (0.0..=1.0).contains(p)) && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
@@ -91,7 +91,7 @@ impl Player {
     }
 
     /// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
-    pub fn draw(&self, u: f64) -> usize {
+    pub fn sample(&self, u: f64) -> usize {
         let mut cumulated = 0.0;
         let below = |p: &f64| {
             cumulated += p;
@@ -101,10 +101,10 @@ impl Player {
         self.q.iter().position(below).unwrap_or(self.q.len() - 1)
     }
 
-    /// Returns the final strategy; `u` as in [`Player::draw`].
+    /// Returns the final strategy; `u` as in [`Player::sample`].
     pub fn choose(&self, choice: Choice, u: f64) -> usize {
         match choice {
-            Choice::Draw => self.draw(u),
+            Choice::Draw => self.sample(u),
             Choice::Argmax => {
                 let better =
                     |best: usize, x: usize| if self.q[x] > self.q[best] { x } else { best };
@@ -122,14 +122,15 @@ impl Player {
             self.sums[x] += cost;
             self.counts[x] += 1.0;
         }
-        let mean = self.sums.iter().sum::<f64>() / self.counts.iter().sum::<f64>().max(LEAST);
+        let mean =
+            self.sums.iter().sum::<f64>() / self.counts.iter().sum::<f64>().max(MIN_PROBABILITY);
         self.expected.clear();
         let each = self.sums.iter().zip(&self.counts);
         self.expected.extend(each.map(|(sum, n)| if *n > 0.0 { sum / n } else { mean }));
     }
 
     /// Sets `E[G | x]` to known values, which `write` fills in.
-    pub fn know(&mut self, write: impl FnOnce(&mut Vec<f64>)) {
+    pub fn set_expected(&mut self, write: impl FnOnce(&mut Vec<f64>)) {
         write(&mut self.expected);
     }
 
@@ -153,7 +154,7 @@ impl Player {
             // All costs are equal, so no strategy is better than another.
             return 0.0;
         }
-        let t = self.temperature.max(COLDEST * (low.abs().max(high.abs()) + 1.0));
+        let t = self.temperature.max(MIN_TEMPERATURE_FRACTION * (low.abs().max(high.abs()) + 1.0));
         let change = match update {
             Update::NearestNewton { step } => self.newton(step, t),
             Update::Brouwer { step } => self.brouwer(step, t, low),
@@ -168,20 +169,21 @@ impl Player {
         let entropy = -self.q.iter().zip(&new).map(|(q, ln)| q * ln).sum::<f64>();
         for ((new, q), expected) in new.iter_mut().zip(&self.q).zip(&self.expected) {
             let force = (expected - mean) / t + entropy + *new;
-            *new = (q - step * q * force).max(LEAST);
+            *new = (q - step * q * force).max(MIN_PROBABILITY);
         }
-        self.settle(&new)
+        self.replace_distribution(&new)
     }
 
     fn brouwer(&mut self, step: f64, t: f64, low: f64) -> f64 {
         let weights: Vec<f64> = self.expected.iter().map(|e| math::exp((low - e) / t)).collect();
         let sum: f64 = weights.iter().sum();
-        let toward = |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(LEAST);
+        let toward =
+            |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(MIN_PROBABILITY);
         let new: Vec<f64> = self.q.iter().zip(&weights).map(toward).collect();
-        self.settle(&new)
+        self.replace_distribution(&new)
     }
 
-    fn settle(&mut self, new: &[f64]) -> f64 {
+    fn replace_distribution(&mut self, new: &[f64]) -> f64 {
         let sum: f64 = new.iter().sum();
         let mut change: f64 = 0.0;
         for (q, new) in self.q.iter_mut().zip(new) {
@@ -208,7 +210,7 @@ mod tests {
             for update in BOTH {
                 let mut player = Player::new(costs.len());
                 for _ in 0..rounds {
-                    player.know(|e| e.clone_from(&costs));
+                    player.set_expected(|e| e.clone_from(&costs));
                     player.update(update, 0.8);
                     prop_assert!((player.q.iter().sum::<f64>() - 1.0).abs() < 1e-9);
                     prop_assert!(player.q.iter().all(|q| *q > 0.0 && q.is_finite()));
@@ -240,7 +242,7 @@ mod tests {
         for update in BOTH {
             let mut player = Player::new(costs.len());
             for _ in 0..200 {
-                player.know(|e| *e = costs.to_vec());
+                player.set_expected(|e| *e = costs.to_vec());
                 player.update(update, 1.0);
             }
             // Rounding of the costs, in units of their spread.
@@ -271,7 +273,8 @@ mod tests {
     fn draws_follow_the_distribution() {
         let mut player = Player::new(3);
         player.q = vec![0.25, 0.5, 0.25];
-        let drawn: Vec<usize> = [0.0, 0.24, 0.25, 0.74, 0.75, 0.999].map(|u| player.draw(u)).into();
+        let drawn: Vec<usize> =
+            [0.0, 0.24, 0.25, 0.74, 0.75, 0.999].map(|u| player.sample(u)).into();
         assert_eq!(drawn, [0, 0, 1, 1, 2, 2]);
         assert_eq!(player.choose(Choice::Argmax, 0.9), 1);
     }

@@ -51,7 +51,7 @@ pub struct Claim {
 impl Claim {
     /// Adds the figure that the paper states.
     #[must_use]
-    pub fn with_papers_figure(self, figure: &'static str) -> Self {
+    pub fn with_paper_figure(self, figure: &'static str) -> Self {
         Self { papers_figure: Some(figure), ..self }
     }
 }
@@ -62,7 +62,7 @@ pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
 }
 
 /// Summarizes the verdicts on all claims in a sentence, by the words that stand at the claims.
-pub fn tally(claims: &[Claim]) -> String {
+pub fn verdict_summary(claims: &[Claim]) -> String {
     let told = |verdict: &Verdict| format!("{} {}", count(claims, *verdict), verdict.name());
     let judged: Vec<String> =
         Verdict::ALL.iter().filter(|v| **v != Verdict::Setting).map(told).collect();
@@ -75,7 +75,7 @@ pub fn tally(claims: &[Claim]) -> String {
 }
 
 /// Words on how to read a list of claims.
-pub const NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
+pub const READING_NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
                         95 %, and fewer than 5 runs decide nothing but a counterexample. `held`: each \
                         comparison of the claim is on its side of the threshold. `refuted`: one is \
                         on the other side (of several by Holm's correction), or a run breaks what \
@@ -98,7 +98,7 @@ mod tests {
         };
         let mut claims: Vec<Claim> = Verdict::ALL.map(claim).into();
         claims.push(claim(Verdict::Undecided));
-        let told = tally(&claims);
+        let told = verdict_summary(&claims);
         assert_eq!(
             told,
             "Of 5 claims: 1 held, 1 refuted, 2 undecided, 1 lost. Not counted: 1 setting."
@@ -107,6 +107,6 @@ mod tests {
             let word = serde_json::to_value(verdict).expect("a word");
             assert_eq!(word, verdict.name(), "JSON says the same");
         }
-        assert_eq!(tally(&[]), "Of 0 claims: 0 held, 0 refuted, 0 undecided, 0 lost.");
+        assert_eq!(verdict_summary(&[]), "Of 0 claims: 0 held, 0 refuted, 0 undecided, 0 lost.");
     }
 }

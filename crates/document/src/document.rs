@@ -45,7 +45,7 @@ pub enum Block {
 pub struct Experiment {
     /// Its name.
     pub title: &'static str,
-    /// Its setup, and the effect to look for. Marked as [`Text::marked`] reads it.
+    /// Its setup, and the effect to look for. Marked as [`Text::from_markup`] reads it.
     pub about: &'static str,
     /// Its figures.
     pub figures: Vec<Figure>,
@@ -95,7 +95,7 @@ pub enum Span {
 impl Text {
     /// Reads marks: `` `code` `` and `**strong**`. A mark that is not closed is plain text. Use
     /// this only for words of our own; foreign text stays plain through `Text::from`.
-    pub fn marked(text: &str) -> Self {
+    pub fn from_markup(text: &str) -> Self {
         let mut spans = Vec::new();
         let mut rest = text;
         while let Some((before, inside, mark, after)) = next_mark(rest) {
@@ -117,13 +117,13 @@ impl Text {
 
     /// Appends more text.
     #[must_use]
-    pub fn and(mut self, more: impl Into<Text>) -> Self {
+    pub fn append(mut self, more: impl Into<Text>) -> Self {
         self.0.extend(more.into().0);
         self
     }
 
     /// Returns the words without their marks.
-    pub fn words(&self) -> String {
+    pub fn plain_text(&self) -> String {
         let words = |span: &Span| match span {
             Span::Plain(text) | Span::Code(text) | Span::Strong(text) => text.clone(),
         };
@@ -200,8 +200,8 @@ impl Document {
 
     /// Appends a section about an experiment.
     pub fn experiment(&mut self, of: Experiment) -> &mut Self {
-        self.section(of.title).paragraph(Text::marked(of.about));
-        self.figures(of.figures.into_iter().map(Figure::with_intervals_told)).tables(of.tables)
+        self.section(of.title).paragraph(Text::from_markup(of.about));
+        self.figures(of.figures.into_iter().map(Figure::with_interval_note)).tables(of.tables)
     }
 
     /// Appends tables.
@@ -224,14 +224,14 @@ impl Document {
 }
 
 /// The words above a report of little weight.
-const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
+const QUICK_RUN_WARNING: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
                              too few runs to measure anything; without `--quick` it is measured.";
 
 /// Returns the start of a paper's report: its lead, and the claims before all else.
-pub fn of_paper(title: &str, lead: String, quick: bool, claims: &[Claim]) -> Document {
+pub fn paper_document(title: &str, lead: String, quick: bool, claims: &[Claim]) -> Document {
     let mut document = Document::new(title, lead);
     if quick {
-        document.warning(Text::marked(REHEARSAL));
+        document.warning(Text::from_markup(QUICK_RUN_WARNING));
     }
     document.section("Claims").push(Block::Claims(claims.to_vec()));
     document
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn marks_become_spans_and_a_mark_alone_stays_a_character() {
         let plain = |text: &str| Span::Plain(text.into());
-        let text = Text::marked("a `b**` and **c**, 2 ** 3 and `");
+        let text = Text::from_markup("a `b**` and **c**, 2 ** 3 and `");
         let spans = vec![
             plain("a "),
             Span::Code("b**".into()),
@@ -253,9 +253,9 @@ mod tests {
             plain(", 2 ** 3 and `"),
         ];
         assert_eq!(text, Text(spans));
-        assert_eq!(text.words(), "a b** and c, 2 ** 3 and `");
-        assert_eq!(Text::marked("````").words(), "````");
-        assert_eq!(Text::marked(""), Text::default());
+        assert_eq!(text.plain_text(), "a b** and c, 2 ** 3 and `");
+        assert_eq!(Text::from_markup("````").plain_text(), "````");
+        assert_eq!(Text::from_markup(""), Text::default());
     }
 
     #[test]

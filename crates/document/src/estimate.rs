@@ -26,7 +26,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// Returns the mean of those runs that have a value.
-    pub fn of(values: impl IntoIterator<Item = Option<f64>>) -> Self {
+    pub fn from_values(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.into_iter().flatten().filter(|v| v.is_finite()).collect();
         let (mean, interval) = (mean(&values), mean_interval(&values));
         Self { mean, interval, n: values.len(), uncut: interval, is_factor: false }
@@ -35,9 +35,9 @@ impl Estimate {
     /// Returns the geometric mean of those factors that are there and above 0, with the interval
     /// of the mean of their logarithms: so no end of it is below 0, and the inverse of all factors
     /// has the inverse interval.
-    pub fn of_factors(values: impl IntoIterator<Item = Option<f64>>) -> Self {
+    pub fn from_factors(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let logarithm = |factor: f64| (factor > 0.0).then(|| factor.ln());
-        let of = Self::of(values.into_iter().map(|factor| factor.and_then(logarithm)));
+        let of = Self::from_values(values.into_iter().map(|factor| factor.and_then(logarithm)));
         let factors = |i: Interval| Interval { low: i.low.exp(), high: i.high.exp() };
         let (mean, interval) = (of.mean.map(f64::exp), of.interval.map(factors));
         Self { mean, interval, uncut: interval, is_factor: true, ..of }
@@ -46,21 +46,21 @@ impl Estimate {
     /// Returns the same estimate of a quantity that is never below `low` nor above `high`, and so neither is an end of
     /// its interval.
     #[must_use]
-    pub fn within(self, low: f64, high: f64) -> Self {
+    pub fn clamped(self, low: f64, high: f64) -> Self {
         let cut = |i: Interval| Interval { low: i.low.max(low), high: i.high.min(high) };
         Self { interval: self.interval.map(cut), ..self }
     }
 
     /// Returns the mean of `a[i] - b[i]` over the pairs in which both have a value: two treatments
     /// of the same case, so that effects of the case itself cancel.
-    pub fn paired(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
-        Self::of(a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)))
+    pub fn paired_difference(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
+        Self::from_values(a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)))
     }
 
     /// Returns the geometric mean of `a[i] / b[i]` over the pairs in which both are above 0.
-    pub fn ratio(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
+    pub fn geometric_ratio(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         let quotient = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
-        Self::of_factors(a.iter().zip(b).map(quotient))
+        Self::from_factors(a.iter().zip(b).map(quotient))
     }
 
     /// Returns the two-sided p-value of Student's test that the mean is `value`; `None` with fewer
@@ -86,19 +86,19 @@ impl Estimate {
     }
 
     /// Returns the mean, or 0 without values; for figures.
-    pub fn or_zero(&self) -> f64 {
+    pub fn mean_or_zero(&self) -> f64 {
         self.mean.unwrap_or(0.0)
     }
 
     /// Returns a point of a figure at `x`, if there is a mean.
     pub fn point(&self, x: f64) -> Option<Point> {
         let interval = self.interval.map(|i| (i.low, i.high));
-        self.mean.map(|y| Point::new(x, y).with_interval(interval).of_runs(self.n))
+        self.mean.map(|y| Point::new(x, y).with_interval(interval).with_runs(self.n))
     }
 }
 
 /// Returns a number with just enough digits.
-pub fn short(value: f64) -> String {
+pub fn format_short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
         a if a >= 100.0 => format!("{value:.0}"),
@@ -112,9 +112,9 @@ pub fn short(value: f64) -> String {
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(mean) = self.mean else { return f.write_str("-") };
-        f.write_str(&short(mean))?;
+        f.write_str(&format_short(mean))?;
         if let Some(Interval { low, high }) = self.interval {
-            write!(f, " [{}, {}]", short(low), short(high))?;
+            write!(f, " [{}, {}]", format_short(low), format_short(high))?;
         }
         write!(f, " n={}", self.n)
     }
@@ -128,16 +128,19 @@ mod tests {
     fn only_pairs_with_both_values_count() {
         let a = [Some(3.0), None, Some(8.0), Some(5.0)];
         let b = [Some(2.0), Some(9.0), Some(7.0), Some(4.0)];
-        let difference = Estimate::paired(&a, &b);
+        let difference = Estimate::paired_difference(&a, &b);
         assert_eq!((difference.mean, difference.n), (Some(1.0), 3));
         assert!(difference.is_above(0.5) && !difference.is_above(1.0));
-        assert_eq!(Estimate::ratio(&[Some(1.0), Some(1.0)], &[Some(0.0), Some(2.0)]).n, 1);
+        assert_eq!(
+            Estimate::geometric_ratio(&[Some(1.0), Some(1.0)], &[Some(0.0), Some(2.0)]).n,
+            1
+        );
     }
 
     #[test]
     fn an_interval_of_a_share_ends_at_its_bounds_and_tests_as_before() {
-        let shares = Estimate::of([100.0, 100.0, 90.0].map(Some));
-        let within = shares.within(0.0, 100.0);
+        let shares = Estimate::from_values([100.0, 100.0, 90.0].map(Some));
+        let within = shares.clamped(0.0, 100.0);
         assert!(shares.interval.unwrap().high > 100.0 && within.interval.unwrap().high == 100.0);
         assert_eq!(within.interval.unwrap().low, shares.interval.unwrap().low);
         assert_eq!((within.mean, within.p_value(80.0)), (shares.mean, shares.p_value(80.0)));
@@ -146,22 +149,22 @@ mod tests {
     #[test]
     fn an_interval_of_a_ratio_is_never_negative_and_that_of_the_inverse_is_its_inverse() {
         let (a, b) = ([1.0, 40.0].map(Some), [10.0, 1.0].map(Some));
-        let (there, back) = (Estimate::ratio(&a, &b), Estimate::ratio(&b, &a));
+        let (there, back) = (Estimate::geometric_ratio(&a, &b), Estimate::geometric_ratio(&b, &a));
         let (i, j) = (there.interval.unwrap(), back.interval.unwrap());
         assert!(i.low > 0.0 && (there.mean.unwrap() - 2.0).abs() < 1e-12, "{there}");
         assert!((i.low * j.high - 1.0).abs() < 1e-9 && (i.high * j.low - 1.0).abs() < 1e-9);
         assert!(there.p_value(1.0) > Some(0.05) && there.p_value(0.0) == Some(0.0));
-        let twice = Estimate::ratio(&[2.0, 2.2, 1.9].map(Some), &[1.0; 3].map(Some));
+        let twice = Estimate::geometric_ratio(&[2.0, 2.2, 1.9].map(Some), &[1.0; 3].map(Some));
         assert!(twice.p_value(1.0) < Some(0.05) && twice.is_above(1.0));
-        assert_eq!(Estimate::ratio(&a[..1], &b[..1]).p_value(1.0), None);
+        assert_eq!(Estimate::geometric_ratio(&a[..1], &b[..1]).p_value(1.0), None);
     }
 
     #[test]
     fn an_estimate_prints_interval_and_number_of_runs() {
-        let four = Estimate::of([1.0, 2.0, 3.0, 4.0].map(Some));
+        let four = Estimate::from_values([1.0, 2.0, 3.0, 4.0].map(Some));
         assert_eq!(four.to_string(), "2.50 [0.446, 4.55] n=4");
-        assert_eq!(Estimate::of([Some(2.0)]).to_string(), "2.00 n=1");
-        assert_eq!(Estimate::of([]).to_string(), "-");
-        assert!(!Estimate::of([Some(2.0)]).is_above(0.0), "one run proves nothing");
+        assert_eq!(Estimate::from_values([Some(2.0)]).to_string(), "2.00 n=1");
+        assert_eq!(Estimate::from_values([]).to_string(), "-");
+        assert!(!Estimate::from_values([Some(2.0)]).is_above(0.0), "one run proves nothing");
     }
 }

@@ -77,7 +77,7 @@ impl Figure {
 
     /// Adds a note on its intervals: those that an [`Estimate`](super::Estimate) gives.
     #[must_use]
-    pub fn with_intervals_told(mut self) -> Self {
+    pub fn with_interval_note(mut self) -> Self {
         if self.note.is_empty() && self.has_intervals() {
             self.note = "Error bars are 95 % intervals of the mean.".into();
         }
@@ -99,7 +99,7 @@ impl Point {
 
     /// Adds the number of runs behind the value.
     #[must_use]
-    pub fn of_runs(self, n: usize) -> Self {
+    pub fn with_runs(self, n: usize) -> Self {
         Self { n: Some(n), ..self }
     }
 }
@@ -143,7 +143,7 @@ impl Table {
     }
 
     /// Appends a row; cells that are missing stay empty.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub fn push_row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
 

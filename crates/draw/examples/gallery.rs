@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
 use sidestep_draw::{
-    Axis, Bar, BarChart, BarSeries, DrawError, Options, Plot, Point, Series, Style, draw, to_png,
+    Axis, Bar, BarChart, BarSeries, DrawError, PictureOptions, Plot, Point, Series, Style, draw,
+    to_png,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Occupancy, Plane, Pose, Scenery, Shape, Trail, Who,
+    Body, BodyId, BodyKind, Condition, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery,
+    Shape, Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -53,19 +55,19 @@ fn corridor() -> Result<String, DrawError> {
         '?' => Occupancy::Unknown,
         _ => Occupancy::Free,
     };
-    let floor = Floor {
+    let floor = OccupancyGrid {
         width: 34,
         height: 14,
         box_m: 1.0,
-        plane: Plane::default(),
+        plane: Isometry2::default(),
         boxes: PLAN.iter().rev().flat_map(|line| line.chars().map(occupancy)).collect(),
     };
     let body = |kind, number, (x, y): (f64, f64), (width, height): (f64, f64)| {
-        let pose = Pose::at([x, y, 0.0]);
+        let pose = Pose::from_position([x, y, 0.0]);
         Body::new(kind, number, pose, Shape::Cuboid { size_m: [width, height, 0.1] })
     };
     let door = |number, at: (f64, f64), width, open| {
-        body(Kind::Door, number, at, (width, 1.0)).when(open, Condition::Open)
+        body(BodyKind::Door, number, at, (width, 1.0)).with_state_if(open, Condition::Open)
     };
     let ways = [
         &[(3.0, 12.0), (3.0, 11.0), (6.0, 7.0), (21.0, 7.0), (26.0, 8.0), (26.0, 3.0)][..],
@@ -74,18 +76,18 @@ fn corridor() -> Result<String, DrawError> {
     ];
     let way = |way: &[(f64, f64)]| (0..).zip(way.iter().map(|&(x, y)| [x, y, 0.0])).collect();
     let trail = |(k, places): (u32, &&[(f64, f64)])| Trail {
-        of: Who::new(Kind::Robot, k, None),
-        way: way(places),
+        of: BodyId::new(BodyKind::Robot, k, None),
+        points: way(places),
     };
     let robot = |(k, places): (u32, &&[(f64, f64)])| {
-        body(Kind::Robot, k, places[places.len() - 1], (2.0, 2.0))
+        body(BodyKind::Robot, k, places[places.len() - 1], (2.0, 2.0))
     };
     let others = [
         door(3, (5.0, 8.5), 2.0, true),
         door(4, (17.0, 8.5), 2.0, false),
         door(5, (16.5, 4.5), 3.0, false),
-        body(Kind::Person, 6, (9.5, 2.5), (1.0, 1.0)),
-        body(Kind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
+        body(BodyKind::Person, 6, (9.5, 2.5), (1.0, 1.0)),
+        body(BodyKind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
     ];
     let bodies = (0..).zip(&ways).map(robot).chain(others).collect();
     let scenery = Scenery {
@@ -98,7 +100,7 @@ fn corridor() -> Result<String, DrawError> {
     };
     let frame = Frame { bodies, ..Frame::default() };
     let trails: Vec<Trail> = (0..).zip(&ways).map(trail).collect();
-    draw(&scenery, &frame, &trails, &Options::page(&scenery, "Made-up places."))
+    draw(&scenery, &frame, &trails, &PictureOptions::page(&scenery, "Made-up places."))
 }
 
 const WORKERS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];

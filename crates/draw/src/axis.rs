@@ -7,7 +7,7 @@ use crate::ticks::{Ticks, nice_step};
 
 /// Largest number that counts as a value: no measurement is larger, and spans between larger
 /// numbers would overflow.
-const MOST: f64 = 1e100;
+const MAX_MAGNITUDE: f64 = 1e100;
 
 /// A numeric axis: its label, its scale and, unless the data decide, its range and ticks.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,8 +50,8 @@ impl Axis {
     }
 
     /// Returns whether a value has a place on this axis at all.
-    pub(crate) fn holds(&self, value: f64) -> bool {
-        value.abs() <= MOST && (!self.log || value >= 1.0 / MOST)
+    pub(crate) fn contains(&self, value: f64) -> bool {
+        value.abs() <= MAX_MAGNITUDE && (!self.log || value >= 1.0 / MAX_MAGNITUDE)
     }
 
     /// Fixes the range, given the smallest and largest of the `values` that have a place on the
@@ -60,26 +60,26 @@ impl Axis {
         &self,
         values: impl Iterator<Item = f64>,
         most: usize,
-    ) -> Result<Fitted, DrawError> {
+    ) -> Result<FittedAxis, DrawError> {
         let ticks: Vec<f64> =
-            self.ticks.iter().flatten().copied().filter(|v| self.holds(*v)).collect();
-        let values = values.chain(ticks.iter().copied()).filter(|v| self.holds(*v));
+            self.ticks.iter().flatten().copied().filter(|v| self.contains(*v)).collect();
+        let values = values.chain(ticks.iter().copied()).filter(|v| self.contains(*v));
         let (low, high) = match self.range {
             Some(range) => self.checked(range)?,
             None => self.round_out(extent(values), most),
         };
         let ticks = match (&self.ticks, self.log) {
-            (Some(_), _) => Ticks::at(&ticks),
+            (Some(_), _) => Ticks::from_values(&ticks),
             (None, true) => Ticks::log(low, high, most),
             (None, false) => Ticks::linear(low, high, most),
         };
-        Ok(Fitted { log: self.log, low, high, ticks: inside(ticks, low, high) })
+        Ok(FittedAxis { log: self.log, low, high, ticks: clip_ticks(ticks, low, high) })
     }
 
     fn checked(&self, (low, high): (f64, f64)) -> Result<(f64, f64), DrawError> {
         let what = "axis range";
         for value in [low, high] {
-            if !self.holds(value) {
+            if !self.contains(value) {
                 return Err(DrawError::Value {
                     what,
                     value,
@@ -122,10 +122,10 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
 /// Returns an extent that is more than one point.
 fn widened((low, high): (f64, f64)) -> (f64, f64) {
     let size = low.abs().max(high.abs());
-    if high - low > 1e-9 * size && high - low > 1.0 / MOST {
+    if high - low > 1e-9 * size && high - low > 1.0 / MAX_MAGNITUDE {
         return (low, high);
     }
-    let margin = if size > 1.0 / MOST { 0.1 * size } else { 0.5 };
+    let margin = if size > 1.0 / MAX_MAGNITUDE { 0.1 * size } else { 0.5 };
     (low - margin, high + margin)
 }
 
@@ -148,7 +148,7 @@ fn round_log((low, high): (f64, f64)) -> (f64, f64) {
     if below < above { (below, above) } else { (below / 2.0, above * 2.0) }
 }
 
-fn inside(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
+fn clip_ticks(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
     let slack = 1e-9 * (high - low);
     let keep = |v: f64| v >= low - slack && v <= high + slack;
     ticks.major.retain(|(v, _)| keep(*v));
@@ -158,16 +158,16 @@ fn inside(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
 
 /// An axis with a known range, but not yet a place in the picture.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fitted {
+pub(crate) struct FittedAxis {
     pub(crate) log: bool,
     pub(crate) low: f64,
     pub(crate) high: f64,
     pub(crate) ticks: Ticks,
 }
 
-impl Fitted {
+impl FittedAxis {
     /// Lays the range's low end at pixel `from` and its high end at pixel `to`.
-    pub(crate) fn between(&self, from: f64, to: f64) -> Scale {
+    pub(crate) fn scale_between(&self, from: f64, to: f64) -> Scale {
         let (low, high) = (self.transform(self.low), self.transform(self.high));
         Scale {
             log: self.log,
@@ -205,7 +205,7 @@ impl Scale {
     /// Returns the pixel of `value`; values that a log axis cannot hold lie at its low end. Far
     /// outside the picture distances are limited to 100 000 px, which a clip hides.
     pub(crate) fn px(&self, value: f64) -> f64 {
-        let value = if self.log { log10(value.max(1.0 / MOST)) } else { value };
+        let value = if self.log { log10(value.max(1.0 / MAX_MAGNITUDE)) } else { value };
         let offset = (value - self.low) * self.per_unit;
         self.from + offset.clamp(-1e5, 1e5)
     }
@@ -268,10 +268,10 @@ mod tests {
     #[test]
     fn values_map_to_pixels_linearly_or_by_logarithm() {
         let linear = Axis::linear("a").range(0.0, 10.0).fit([].into_iter(), 5).unwrap();
-        assert_eq!(linear.between(100.0, 0.0).px(2.5), 75.0);
+        assert_eq!(linear.scale_between(100.0, 0.0).px(2.5), 75.0);
         let log = Axis::log("a").range(1.0, 100.0).fit([].into_iter(), 5).unwrap();
-        assert_eq!(log.between(0.0, 200.0).px(10.0), 100.0);
-        assert_eq!(log.between(0.0, 200.0).base_px(), 0.0);
-        assert!(log.between(0.0, 200.0).px(0.0).is_finite());
+        assert_eq!(log.scale_between(0.0, 200.0).px(10.0), 100.0);
+        assert_eq!(log.scale_between(0.0, 200.0).base_px(), 0.0);
+        assert!(log.scale_between(0.0, 200.0).px(0.0).is_finite());
     }
 }

@@ -4,7 +4,9 @@
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Plane, Pose, Scenery, Shape, Trail, Who};
+use sidestep_kernel::view::{
+    Body, BodyId, BodyKind, Frame, Isometry2, OccupancyGrid, Pose, Scenery, Shape, Trail,
+};
 
 use crate::raster::parse;
 use crate::testing::{ball, moment, open, plane};
@@ -72,8 +74,8 @@ fn crowded_bars() -> BarChart {
         .series(BarSeries::new("only", (0..14).map(bar).collect()))
 }
 
-fn options(style: Style, scenery: &Scenery) -> Options {
-    Options { style, ..Options::page(scenery, "Small print.") }
+fn options(style: Style, scenery: &Scenery) -> PictureOptions {
+    PictureOptions { style, ..PictureOptions::page(scenery, "Small print.") }
 }
 
 fn map(width: u32, height: u32) -> String {
@@ -84,19 +86,20 @@ fn map(width: u32, height: u32) -> String {
 /// Draws chains, and robots that have met in one corner.
 fn bodies(dimensions: u8, n: u32, style: Style) -> String {
     let at = |k: u32| [0, 1, 2].map(|i| f64::from(k) * (1.0 - 0.3 * f64::from(i)));
-    let still = |k| ball(Kind::Obstacle, k, at(k), 0.3).moving([f64::from(k % 2); 3]);
-    let name = |k| (Kind::Connector, k, format!("a chain with a long name {k}"));
+    let still = |k| ball(BodyKind::Obstacle, k, at(k), 0.3).with_velocity([f64::from(k % 2); 3]);
+    let name = |k| (BodyKind::Connector, k, format!("a chain with a long name {k}"));
     let scenery = Scenery {
         bodies: (0..n).map(still).collect(),
         names: (0..n).map(name).collect(),
         ..open(dimensions)
     };
-    let chain =
-        |k: u32| (0..=k).map(move |part| ball(Kind::Connector, k, at(part), 0.2).part(part));
+    let chain = |k: u32| {
+        (0..=k).map(move |part| ball(BodyKind::Connector, k, at(part), 0.2).with_part(part))
+    };
     let frame = moment((0..n).flat_map(chain).collect());
     let trail = |k: u32| Trail {
-        of: Who::new(Kind::Connector, k, Some(0)),
-        way: (0..20).map(|cycle| (cycle, at(k + cycle as u32))).collect(),
+        of: BodyId::new(BodyKind::Connector, k, Some(0)),
+        points: (0..20).map(|cycle| (cycle, at(k + cycle as u32))).collect(),
     };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
     draw(&scenery, &frame, &trails, &options(style, &scenery)).unwrap()
@@ -106,12 +109,14 @@ fn bodies(dimensions: u8, n: u32, style: Style) -> String {
 fn meeting(dimensions: u8, n: u32, apart_m: f64) -> String {
     let dart = Shape::Dart { length_m: 500.0, width_m: 300.0 };
     let at = |k: u32| [apart_m * f64::from(k % 4), apart_m * f64::from(k / 4), 3000.0];
-    let airplane = |k| Body::new(Kind::Airplane, k, Pose::at(at(k)), dart.clone());
-    let zone = |k| ball(Kind::Zone, k, at(k), 2000.0);
+    let airplane = |k| Body::new(BodyKind::Airplane, k, Pose::from_position(at(k)), dart.clone());
+    let zone = |k| ball(BodyKind::Zone, k, at(k), 2000.0);
     let frame = moment((0..n).flat_map(|k| [airplane(k), zone(k)]).collect());
     let from = |k: u32| [30_000.0 - 900.0 * f64::from(k), 20_000.0 * f64::from(k % 2), 3000.0];
-    let trail =
-        |k| Trail { of: Who::new(Kind::Airplane, k, None), way: vec![(0, from(k)), (90, at(k))] };
+    let trail = |k| Trail {
+        of: BodyId::new(BodyKind::Airplane, k, None),
+        points: vec![(0, from(k)), (90, at(k))],
+    };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
     let scenery = open(dimensions);
     draw(&scenery, &frame, &trails, &options(Style::MAP, &scenery)).unwrap()
@@ -183,14 +188,14 @@ fn lists_that_do_not_match_are_refused() {
         |result: Result<String, DrawError>| matches!(result, Err(DrawError::Length { .. }));
     let bars = BarChart::new("", ["a", "b"]).series(BarSeries::new("", vec![Bar::new(1.0)]));
     assert!(length(bars.to_svg(&Style::CHART)));
-    let picture = |floor: Floor| {
+    let picture = |floor: OccupancyGrid| {
         let scenery = Scenery { floor: Some(floor), ..open(2) };
         draw(&scenery, &Frame::default(), &[], &options(Style::MAP, &scenery))
     };
-    let floor = |width, height| Floor { width, height, ..plane(2, 2).floor.unwrap() };
+    let floor = |width, height| OccupancyGrid { width, height, ..plane(2, 2).floor.unwrap() };
     assert!(picture(floor(2, 2)).is_ok());
     assert!(length(picture(floor(2, 3))));
-    assert!(picture(Floor { boxes: vec![], ..floor(0, 0) }).is_err());
+    assert!(picture(OccupancyGrid { boxes: vec![], ..floor(0, 0) }).is_err());
     assert!(matches!(picture(floor(u32::MAX, u32::MAX)), Err(DrawError::TooLarge { .. })));
 }
 
@@ -252,19 +257,19 @@ proptest! {
         (box_m, width) in (number(), 1u32..20),
     ) {
         let kinds = [
-            (Kind::Robot, Shape::Cuboid { size_m: [side_m, radius_m, 1.0] }),
-            (Kind::Zone, Shape::Cylinder { radius_m, height_m: side_m }),
-            (Kind::Connector, Shape::Sphere { radius_m }),
-            (Kind::Rods, Shape::Line { points_m: points.clone(), thickness_m: side_m }),
-            (Kind::Airplane, Shape::Dart { length_m: radius_m, width_m: side_m }),
-            (Kind::Obstacle, Shape::Cuboid { size_m: [side_m; 3] }),
+            (BodyKind::Robot, Shape::Cuboid { size_m: [side_m, radius_m, 1.0] }),
+            (BodyKind::Zone, Shape::Cylinder { radius_m, height_m: side_m }),
+            (BodyKind::Connector, Shape::Sphere { radius_m }),
+            (BodyKind::Rods, Shape::Line { points_m: points.clone(), thickness_m: side_m }),
+            (BodyKind::Airplane, Shape::Dart { length_m: radius_m, width_m: side_m }),
+            (BodyKind::Obstacle, Shape::Cuboid { size_m: [side_m; 3] }),
         ];
-        let body = |(k, (kind, shape)): (usize, (Kind, Shape))| {
+        let body = |(k, (kind, shape)): (usize, (BodyKind, Shape))| {
             let pose = Pose { at_m: points[k % 3], turn };
-            Body::new(kind, k as u32, pose, shape).moving([speed; 3])
+            Body::new(kind, k as u32, pose, shape).with_velocity([speed; 3])
         };
         let bodies: Vec<Body> = kinds.into_iter().enumerate().map(body).collect();
-        let floor = Floor { box_m, plane: Plane { origin_m: [speed, 0.0], yaw_rad: 0.0 }, ..plane(width, 3).floor.unwrap() };
+        let floor = OccupancyGrid { box_m, plane: Isometry2 { origin_m: [speed, 0.0], yaw_rad: 0.0 }, ..plane(width, 3).floor.unwrap() };
         let scenery = Scenery {
             floor: has_floor.then_some(floor),
             bodies: bodies.clone(),
@@ -272,8 +277,8 @@ proptest! {
         };
         let way = |k: usize| (0..).zip(points.iter().skip(k).copied()).collect();
         let trails = [
-            Trail { of: Who::new(Kind::Robot, 0, None), way: way(0) },
-            Trail { of: Who::new(Kind::Connector, 2, None), way: way(1) },
+            Trail { of: BodyId::new(BodyKind::Robot, 0, None), points: way(0) },
+            Trail { of: BodyId::new(BodyKind::Connector, 2, None), points: way(1) },
         ];
         let drawn = draw(&scenery, &moment(bodies), &trails, &options(Style::MAP, &scenery));
         if let Ok(svg) = drawn {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::style::{FAINT_INK, INK};
-use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Rect, Svg, SvgNumber, TextStyle};
 use crate::text::{self, Weight};
 use sidestep_kernel::math::hypot;
 
@@ -30,7 +30,7 @@ impl Marker {
         let rim = format!(r##"fill="{color}" stroke="#FFFFFF" stroke-width="0.8""##);
         let polygon = |corners: &[(f64, f64)]| {
             let at = |(dx, dy): &(f64, f64)| {
-                format!("{} {}", Num(x + dx * radius), Num(y + dy * radius))
+                format!("{} {}", SvgNumber(x + dx * radius), SvgNumber(y + dy * radius))
             };
             format!("M{}Z", corners.iter().map(at).collect::<Vec<_>>().join("L"))
         };
@@ -65,19 +65,19 @@ const CROSS: [(f64, f64); 12] = [
 ];
 
 /// A color in SVG notation.
-pub(crate) type Paint = Cow<'static, str>;
+pub(crate) type SvgColor = Cow<'static, str>;
 
 /// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Symbol {
+pub(crate) enum LegendSymbol {
     /// A stretch of line, perhaps with its marker, and its dashes as an attribute.
-    Line { color: Paint, marker: Option<Marker>, dash: &'static str },
+    Line { color: SvgColor, marker: Option<Marker>, dash: &'static str },
     /// A marker alone.
-    Marker { color: Paint, marker: Marker },
+    Marker { color: SvgColor, marker: Marker },
     /// The dashes of a reference line.
     Dashes { color: &'static str },
     /// A filled box.
-    Swatch { fill: Paint, rim: Paint, opacity: f64 },
+    Swatch { fill: SvgColor, rim: SvgColor, opacity: f64 },
     /// The mark at a track's start.
     Ring,
     /// The mark of a leader.
@@ -86,13 +86,13 @@ pub(crate) enum Symbol {
 
 /// An entry of a legend.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
-    pub(crate) symbol: Symbol,
+pub(crate) struct LegendEntry {
+    pub(crate) symbol: LegendSymbol,
     pub(crate) label: String,
 }
 
-impl Entry {
-    pub(crate) fn new(symbol: Symbol, label: impl Into<String>) -> Self {
+impl LegendEntry {
+    pub(crate) fn new(symbol: LegendSymbol, label: impl Into<String>) -> Self {
         Self { symbol, label: label.into() }
     }
 }
@@ -101,13 +101,13 @@ impl Entry {
 #[derive(Debug)]
 pub(crate) struct Legend {
     /// Left edge and row of each entry.
-    placed: Vec<(f64, usize, Entry)>,
+    placed: Vec<(f64, usize, LegendEntry)>,
     font_px: f64,
 }
 
 impl Legend {
     /// Flows `entries` into rows at most `room_px` wide. Entries without a label are left out.
-    pub(crate) fn lay_out(entries: Vec<Entry>, font_px: f64, room_px: f64) -> Self {
+    pub(crate) fn new(entries: Vec<LegendEntry>, font_px: f64, room_px: f64) -> Self {
         let (mut x, mut row) = (0.0, 0);
         let mut placed = Vec::new();
         for mut entry in entries.into_iter().filter(|entry| !entry.label.trim().is_empty()) {
@@ -135,7 +135,7 @@ impl Legend {
 
     /// Draws the legend with its upper left corner at `(left, top)`.
     pub(crate) fn draw(&self, svg: &mut Svg, left: f64, top: f64) {
-        let look = TextLook::new(self.font_px, Anchor::Start);
+        let look = TextStyle::new(self.font_px, Anchor::Start);
         for (x, row, entry) in &self.placed {
             let middle = top + (*row as f64 + 0.5) * self.row_px();
             self.draw_symbol(svg, &entry.symbol, left + x, middle);
@@ -145,20 +145,22 @@ impl Legend {
     }
 
     /// Draws `symbol` two letters wide, its left end at `x`.
-    fn draw_symbol(&self, svg: &mut Svg, symbol: &Symbol, x: f64, y: f64) {
+    fn draw_symbol(&self, svg: &mut Svg, symbol: &LegendSymbol, x: f64, y: f64) {
         let size = self.font_px;
         let (end, center) = ((x + 2.0 * size, y), (x + size, y));
         match symbol {
-            Symbol::Line { color, marker, dash } => {
+            LegendSymbol::Line { color, marker, dash } => {
                 let look = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
                 svg.line((x, y), end, look);
                 if let Some(marker) = marker {
                     marker.draw(svg, center, 0.32 * size, color);
                 }
             }
-            Symbol::Marker { color, marker } => marker.draw(svg, center, 0.32 * size, color),
-            Symbol::Dashes { color } => svg.line((x, y), end, dashes(color)),
-            Symbol::Swatch { fill, rim, opacity } => {
+            LegendSymbol::Marker { color, marker } => marker.draw(svg, center, 0.32 * size, color),
+            LegendSymbol::Dashes { color } => {
+                svg.line((x, y), end, reference_line_attributes(color))
+            }
+            LegendSymbol::Swatch { fill, rim, opacity } => {
                 let half = 0.45 * size;
                 let swatch = Rect {
                     x: center.0 - 2.0 * half,
@@ -171,14 +173,14 @@ impl Legend {
                     format_args!(r#"fill="{fill}" fill-opacity="{opacity}" stroke="{rim}""#),
                 );
             }
-            Symbol::Leader => leader_mark(svg, center, 0.36 * size, FAINT_INK),
-            Symbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
+            LegendSymbol::Leader => leader_mark(svg, center, 0.36 * size, FAINT_INK),
+            LegendSymbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
         }
     }
 }
 
 /// Returns the look of a reference line.
-pub(crate) fn dashes(color: &str) -> String {
+pub(crate) fn reference_line_attributes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
 
@@ -208,8 +210,8 @@ pub(crate) fn arrowhead(
     let far = hypot(x - from.0, y - from.1);
     let (ux, uy) = (head_px * (x - from.0) / far, head_px * (y - from.1) / far);
     let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
-    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (Num(x), Num(y)));
-    let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", Num(x), Num(y));
+    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (SvgNumber(x), SvgNumber(y)));
+    let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", SvgNumber(x), SvgNumber(y));
     let rim = r##"stroke="#FFFFFF" stroke-width="0.6""##;
     svg.path(&data, format_args!(r#"class="direction" fill="{color}" {rim}"#));
 }
@@ -224,7 +226,7 @@ pub(crate) fn paragraph(
     svg: &mut Svg,
     lines: &[String],
     (x, top): (f64, f64),
-    look: &TextLook<'_>,
+    look: &TextStyle<'_>,
 ) -> f64 {
     let line_px = look.size_px * 1.35;
     for (row, line) in lines.iter().enumerate() {
@@ -234,11 +236,11 @@ pub(crate) fn paragraph(
 }
 
 /// Returns the look of a picture's title.
-pub(crate) fn title_look(size_px: f64) -> TextLook<'static> {
-    TextLook { weight: Weight::Bold, fill: INK, ..TextLook::new(size_px, Anchor::Start) }
+pub(crate) fn title_style(size_px: f64) -> TextStyle<'static> {
+    TextStyle { weight: Weight::Bold, fill: INK, ..TextStyle::new(size_px, Anchor::Start) }
 }
 
 /// Returns the look of small print.
-pub(crate) fn faint(size_px: f64) -> TextLook<'static> {
-    TextLook { fill: FAINT_INK, ..TextLook::new(size_px, Anchor::Start) }
+pub(crate) fn small_print_style(size_px: f64) -> TextStyle<'static> {
+    TextStyle { fill: FAINT_INK, ..TextStyle::new(size_px, Anchor::Start) }
 }

@@ -2,7 +2,7 @@
 //! and PNG bytes out.
 //!
 //! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`]); [`to_png`] rasterizes
-//! exactly that SVG, and a [`Film`] does so repeatedly. The crate reads no files, asks for no system font and knows
+//! exactly that SVG, and a [`AnimationRenderer`] does so repeatedly. The crate reads no files, asks for no system font and knows
 //! no world: of a run it sees scenery, frames and trails (`sidestep_kernel::view`).
 //!
 //! The same input gives the same bytes, for any fonts and locale of the machine: numbers are
@@ -28,10 +28,10 @@
 //! # Ok::<(), sidestep_draw::DrawError>(())
 //! ```
 
+mod animation;
 mod axis;
 mod chart;
 mod error;
-mod film;
 #[cfg(test)]
 mod layout_tests;
 mod legend;
@@ -44,11 +44,11 @@ mod testing;
 mod text;
 mod ticks;
 
+pub use animation::{AnimationFrame, AnimationRenderer};
 pub use axis::Axis;
 pub use chart::bars::{Bar, BarChart, BarSeries};
 pub use chart::plot::{Mark, Plot, Point, Series};
 pub use error::DrawError;
-pub use film::{Film, Still};
-pub use picture::{Options, describe, draw, worth_a_trail};
+pub use picture::{PictureOptions, bodies_with_trails, describe, draw};
 pub use raster::to_png;
 pub use style::{Style, series_colors};

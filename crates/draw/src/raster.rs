@@ -7,7 +7,7 @@ use crate::error::DrawError;
 use crate::text;
 
 /// Longest side of a PNG in pixels: 256 MiB of pixels.
-const MOST_PX: u32 = 8192;
+const MAX_PNG_PX: u32 = 8192;
 
 /// Rasterizes an SVG picture so that its longer side is `max_px` pixels.
 ///
@@ -20,8 +20,8 @@ const MOST_PX: u32 = 8192;
 /// is 0 or above 8192.
 pub fn to_png(svg: &str, max_px: u32) -> Result<Vec<u8>, DrawError> {
     DrawError::positive("PNG size in px", f64::from(max_px))?;
-    if max_px > MOST_PX {
-        let (found, limit) = (u64::from(max_px), u64::from(MOST_PX));
+    if max_px > MAX_PNG_PX {
+        let (found, limit) = (u64::from(max_px), u64::from(MAX_PNG_PX));
         return Err(DrawError::TooLarge { what: "PNG size in px", found, limit });
     }
     let tree = parse(svg)?;
@@ -35,7 +35,7 @@ pub fn to_png(svg: &str, max_px: u32) -> Result<Vec<u8>, DrawError> {
 
 /// Returns a side's length in whole pixels, never 0 and never above the limit.
 fn side(length_px: f32) -> u32 {
-    (length_px.round() as u32).clamp(1, MOST_PX)
+    (length_px.round() as u32).clamp(1, MAX_PNG_PX)
 }
 
 pub(crate) fn parse(svg: &str) -> Result<Tree, DrawError> {

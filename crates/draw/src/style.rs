@@ -1,16 +1,16 @@
 //! Sizes and colors that all pictures share.
 
 use crate::error::DrawError;
-use sidestep_kernel::view::{COLORS, Color};
+use sidestep_kernel::view::{BODY_COLORS, Color};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of colors of series.
-const SERIES: usize = COLORS.len() + 1;
+const SERIES_COLOR_COUNT: usize = BODY_COLORS.len() + 1;
 
 /// Returns the colors of series in SVG notation, those of bodies and black: Okabe and Ito's palette without its
 /// yellow, which is unreadable on white; distinct for every common color blindness.
 pub fn series_colors() -> Vec<String> {
-    (0..SERIES).map(series_color).collect()
+    (0..SERIES_COLOR_COUNT).map(series_color).collect()
 }
 
 /// Text and axes.
@@ -23,7 +23,7 @@ pub(crate) const GRID: &str = "#E4E4E4";
 /// Returns the color of the series (or track) with this number; colors repeat after seven.
 pub(crate) fn series_color(index: usize) -> String {
     const BLACK: Color = [0; 3];
-    hex(COLORS.get(index % SERIES).copied().unwrap_or(BLACK))
+    hex(BODY_COLORS.get(index % SERIES_COLOR_COUNT).copied().unwrap_or(BLACK))
 }
 
 /// Dashes of lines, as attributes: the first time through the colors they have none.
@@ -36,13 +36,13 @@ const DASHES: [&str; 4] = [
 
 /// Returns the dashes of the line of a series, which differ where colors repeat.
 pub(crate) fn series_dash(index: usize) -> &'static str {
-    DASHES[index / SERIES % DASHES.len()]
+    DASHES[index / SERIES_COLOR_COUNT % DASHES.len()]
 }
 
 /// Returns the dashes of the ways of bodies with these numbers, which differ where colors repeat.
 pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str> {
-    let color = |number: u32| number as usize % COLORS.len();
-    let mut times = [0; COLORS.len()];
+    let color = |number: u32| number as usize % BODY_COLORS.len();
+    let mut times = [0; BODY_COLORS.len()];
     let dash = |&number: &u32| {
         let time = &mut times[color(number)];
         *time += 1;
@@ -54,7 +54,7 @@ pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str
 /// Returns the opacity of the bars of a series, and the color of their rim: bars of one color differ in
 /// both.
 pub(crate) fn series_fill(index: usize) -> (f64, &'static str) {
-    match index / SERIES {
+    match index / SERIES_COLOR_COUNT {
         0 => (1.0, "none"),
         1 => (0.5, INK),
         _ => (0.15, INK),
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn series_have_the_colors_of_bodies_and_black() {
         let colors = series_colors();
-        assert_eq!(colors[..COLORS.len()], COLORS.map(hex));
+        assert_eq!(colors[..BODY_COLORS.len()], BODY_COLORS.map(hex));
         assert_eq!((colors.len(), &*colors[6]), (7, "#000000"));
         assert_eq!([0, 7, 8].map(series_color), ["#0072B2", "#0072B2", "#D55E00"]);
     }

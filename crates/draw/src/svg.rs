@@ -8,9 +8,9 @@ use crate::text::{FAMILIES, Weight};
 /// A number with at most two decimals and no trailing zeros, so that bytes are few and equal on
 /// every machine. Non-finite values become 0; no picture depends on them.
 #[derive(Clone, Copy)]
-pub(crate) struct Num(pub(crate) f64);
+pub(crate) struct SvgNumber(pub(crate) f64);
 
-impl Display for Num {
+impl Display for SvgNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let hundredths = (self.0 * 100.0).round();
         let value = if hundredths.is_finite() { hundredths / 100.0 } else { 0.0 };
@@ -58,7 +58,7 @@ pub(crate) enum Anchor {
 
 /// The look of a text.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TextLook<'a> {
+pub(crate) struct TextStyle<'a> {
     pub(crate) size_px: f64,
     pub(crate) anchor: Anchor,
     pub(crate) weight: Weight,
@@ -69,7 +69,7 @@ pub(crate) struct TextLook<'a> {
     pub(crate) halo: bool,
 }
 
-impl TextLook<'_> {
+impl TextStyle<'_> {
     /// Returns regular dark text of this size.
     pub(crate) fn new(size_px: f64, anchor: Anchor) -> Self {
         Self { size_px, anchor, weight: Weight::Regular, fill: INK, upward: false, halo: false }
@@ -89,39 +89,41 @@ pub(crate) struct Svg {
 
 impl Svg {
     /// Writes raw SVG; `fmt::Write` into a `String` cannot fail.
-    pub(crate) fn raw(&mut self, element: impl Display) {
+    pub(crate) fn push_raw(&mut self, element: impl Display) {
         let _ = writeln!(self.body, "{element}");
     }
 
     /// Writes a rectangle with the attributes `look`.
     pub(crate) fn rect(&mut self, r: Rect, look: impl Display) {
         let Rect { x, y, width, height } = r;
-        let (x, y, width, height) = (Num(x), Num(y), Num(width), Num(height));
-        self.raw(format_args!(
+        let (x, y, width, height) =
+            (SvgNumber(x), SvgNumber(y), SvgNumber(width), SvgNumber(height));
+        self.push_raw(format_args!(
             r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" {look}/>"#
         ));
     }
 
     /// Writes a straight line with the attributes `look`.
     pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), look: impl Display) {
-        let (x1, y1, x2, y2) = (Num(from.0), Num(from.1), Num(to.0), Num(to.1));
-        self.raw(format_args!(r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {look}/>"#));
+        let (x1, y1, x2, y2) =
+            (SvgNumber(from.0), SvgNumber(from.1), SvgNumber(to.0), SvgNumber(to.1));
+        self.push_raw(format_args!(r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {look}/>"#));
     }
 
     /// Writes a path with the path data `data`.
     pub(crate) fn path(&mut self, data: &str, look: impl Display) {
-        self.raw(format_args!(r#"<path d="{data}" {look}/>"#));
+        self.push_raw(format_args!(r#"<path d="{data}" {look}/>"#));
     }
 
     /// Writes a circle around `center`.
     pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, look: impl Display) {
-        let (x, y, r) = (Num(center.0), Num(center.1), Num(radius));
-        self.raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {look}/>"#));
+        let (x, y, r) = (SvgNumber(center.0), SvgNumber(center.1), SvgNumber(radius));
+        self.push_raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {look}/>"#));
     }
 
     /// Writes `text` with its baseline at `y`.
-    pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextLook<'_>) {
-        let (x, y, size) = (Num(x), Num(y), Num(look.size_px));
+    pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextStyle<'_>) {
+        let (x, y, size) = (SvgNumber(x), SvgNumber(y), SvgNumber(look.size_px));
         // Ink is the default fill of the document.
         let fill =
             if look.fill == INK { String::new() } else { format!(r#" fill="{}""#, look.fill) };
@@ -137,9 +139,9 @@ impl Svg {
         } else {
             String::new()
         };
-        self.raw(format_args!(
+        self.push_raw(format_args!(
             r#"<text x="{x}" y="{y}" font-size="{size}"{fill}{anchor}{weight}{halo}{turn}>{}</text>"#,
-            Escaped(text)
+            EscapedText(text)
         ));
     }
 
@@ -149,15 +151,21 @@ impl Svg {
     /// pictures may stand in one HTML page.
     pub(crate) fn open_clip(&mut self, window: Rect) {
         let Rect { x, y, width, height } = window;
-        let id = format!("clip_{}_{}_{}_{}", Num(x), Num(y), Num(width), Num(height));
-        self.raw(format_args!(r#"<clipPath id="{id}">"#));
+        let id = format!(
+            "clip_{}_{}_{}_{}",
+            SvgNumber(x),
+            SvgNumber(y),
+            SvgNumber(width),
+            SvgNumber(height)
+        );
+        self.push_raw(format_args!(r#"<clipPath id="{id}">"#));
         self.rect(window, "");
-        self.raw(format_args!(r#"</clipPath><g clip-path="url(#{id})">"#));
+        self.push_raw(format_args!(r#"</clipPath><g clip-path="url(#{id})">"#));
     }
 
     /// Closes the innermost group.
     pub(crate) fn close_group(&mut self) {
-        self.raw("</g>");
+        self.push_raw("</g>");
     }
 
     /// Returns the whole document on a white ground; `title` is read by screen readers.
@@ -167,17 +175,17 @@ impl Svg {
     }
 
     /// Returns the whole document without a ground, to be drawn over another picture.
-    pub(crate) fn finish_clear(self, width_px: f64, height_px: f64) -> String {
+    pub(crate) fn finish_transparent(self, width_px: f64, height_px: f64) -> String {
         self.document((width_px, height_px), "", "")
     }
 
     fn document(self, (width_px, height_px): (f64, f64), title: &str, ground: &str) -> String {
-        let (width, height) = (Num(width_px.ceil()), Num(height_px.ceil()));
+        let (width, height) = (SvgNumber(width_px.ceil()), SvgNumber(height_px.ceil()));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
              viewBox=\"0 0 {width} {height}\" fill=\"{INK}\" font-family=\"{FAMILIES}\" role=\"img\">\n\
              <title>{}</title>\n{ground}\n{}</svg>\n",
-            Escaped(title),
+            EscapedText(title),
             self.body
         )
     }
@@ -187,9 +195,9 @@ const HALO: &str =
     r##" stroke="#FFFFFF" stroke-width="3" stroke-linejoin="round" paint-order="stroke""##;
 
 /// Text as XML character data; characters that XML 1.0 forbids become the replacement character.
-struct Escaped<'a>(&'a str);
+struct EscapedText<'a>(&'a str);
 
-impl Display for Escaped<'_> {
+impl Display for EscapedText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for c in self.0.chars() {
             match c {
@@ -211,7 +219,7 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_never_nan() {
-        let shown = |v| Num(v).to_string();
+        let shown = |v| SvgNumber(v).to_string();
         assert_eq!(shown(1.0), "1");
         assert_eq!(shown(1.005), "1");
         assert_eq!(shown(-0.001), "0");
@@ -223,7 +231,7 @@ mod tests {
     #[test]
     fn any_text_is_well_formed_xml() {
         let mut svg = Svg::default();
-        svg.text(1.0, 2.0, "a<b & \u{0} \"c\"\u{ffff}", &TextLook::new(12.0, Anchor::Start));
+        svg.text(1.0, 2.0, "a<b & \u{0} \"c\"\u{ffff}", &TextStyle::new(12.0, Anchor::Start));
         let svg = svg.finish(10.0, 10.0, "</svg>");
         let options = resvg::usvg::Options::default();
         assert!(resvg::usvg::Tree::from_str(&svg, &options).is_ok(), "{svg}");

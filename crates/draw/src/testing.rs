@@ -1,13 +1,13 @@
 //! Small sceneries for tests.
 
 use sidestep_kernel::view::{
-    Body, Floor, Frame, Kind, Occupancy, Place, Plane, Pose, Scenery, Shape,
+    Body, BodyKind, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery, Shape, Vec3,
 };
 
 /// Returns an empty floor of boxes of 1 m.
 pub(crate) fn plane(width: u32, height: u32) -> Scenery {
     let boxes = vec![Occupancy::Free; (width * height) as usize];
-    let floor = Floor { width, height, box_m: 1.0, plane: Plane::default(), boxes };
+    let floor = OccupancyGrid { width, height, box_m: 1.0, plane: Isometry2::default(), boxes };
     Scenery { floor: Some(floor), ..open(2) }
 }
 
@@ -17,8 +17,8 @@ pub(crate) fn open(dimensions: u8) -> Scenery {
     Scenery { name, dimensions, cycle_s: 1.0, floor: None, bodies: vec![], names: vec![] }
 }
 
-pub(crate) fn ball(kind: Kind, number: u32, at_m: Place, radius_m: f64) -> Body {
-    Body::new(kind, number, Pose::at(at_m), Shape::Sphere { radius_m })
+pub(crate) fn ball(kind: BodyKind, number: u32, at_m: Vec3, radius_m: f64) -> Body {
+    Body::new(kind, number, Pose::from_position(at_m), Shape::Sphere { radius_m })
 }
 
 pub(crate) fn moment(bodies: Vec<Body>) -> Frame {

@@ -13,8 +13,8 @@ pub(crate) struct Ticks {
 
 impl Ticks {
     /// Returns labeled marks at exactly these values.
-    pub(crate) fn at(places: &[f64]) -> Self {
-        let round_trips = |digits: &usize| places.iter().all(|v| shown_exactly(*v, *digits));
+    pub(crate) fn from_values(places: &[f64]) -> Self {
+        let round_trips = |digits: &usize| places.iter().all(|v| is_exact(*v, *digits));
         let digits = (0..6).find(round_trips).unwrap_or(6);
         Self { major: places.iter().map(|&v| (v, label(v, digits))).collect(), minor: vec![] }
     }
@@ -33,7 +33,7 @@ impl Ticks {
     /// Returns marks at the powers of ten, and unlabeled ones at their multiples; if there is room
     /// for more labels, also labeled ones at 2 and 5 times the powers of ten.
     pub(crate) fn log(low: f64, high: f64, most: usize) -> Self {
-        let span = Decades { low, high };
+        let span = DecadeRange { low, high };
         for multiples in [&[1u8, 2, 5][..], &[1, 3], &[1]] {
             let marks = span.multiples(multiples, 1);
             if (2..=most.max(2)).contains(&marks.len()) {
@@ -50,24 +50,24 @@ impl Ticks {
     }
 
     /// Returns the width of the widest label, measured by `width_px`.
-    pub(crate) fn widest_px(&self, width_px: impl Fn(&str) -> f64) -> f64 {
+    pub(crate) fn max_label_px(&self, width_px: impl Fn(&str) -> f64) -> f64 {
         self.major.iter().map(|(_, label)| width_px(label)).fold(0.0, f64::max)
     }
 }
 
 /// Spacing of labels: a label that would touch the one before it is not written.
-pub(crate) struct Spacing {
+pub(crate) struct LabelSpacing {
     free_from: f64,
 }
 
-impl Spacing {
+impl LabelSpacing {
     pub(crate) fn new() -> Self {
         Self { free_from: f64::NEG_INFINITY }
     }
 
     /// Returns whether a label `length_px` long around `center_px` has room; if so, that room is taken.
     /// Labels come in rising order.
-    pub(crate) fn admits(&mut self, center_px: f64, length_px: f64) -> bool {
+    pub(crate) fn try_place(&mut self, center_px: f64, length_px: f64) -> bool {
         let fits = center_px - length_px / 2.0 >= self.free_from;
         if fits {
             self.free_from = center_px + length_px / 2.0;
@@ -77,12 +77,12 @@ impl Spacing {
 }
 
 /// A range of positive numbers.
-struct Decades {
+struct DecadeRange {
     low: f64,
     high: f64,
 }
 
-impl Decades {
+impl DecadeRange {
     /// Returns `digits` times every `stride`-th power of ten within the range.
     fn multiples(&self, digits: &[u8], stride: i32) -> Vec<f64> {
         let first = floor(log10(self.low)) as i32;
@@ -142,12 +142,12 @@ pub(crate) fn label(value: f64, digits: usize) -> String {
     let number = format!("{:.digits$}", value.abs());
     let (whole, rest) = number.split_at(number.find('.').unwrap_or(number.len()));
     // Four digits are read at a glance.
-    let whole = if whole.len() > 4 { grouped(whole) } else { whole.into() };
+    let whole = if whole.len() > 4 { group_thousands(whole) } else { whole.into() };
     minus(&format!("{}{whole}{rest}", if value < 0.0 { "-" } else { "" }))
 }
 
 /// Returns the digits of a number with its thousands separated by spaces: `1 234 567`.
-pub(crate) fn grouped(digits: &str) -> String {
+pub(crate) fn group_thousands(digits: &str) -> String {
     let mut grouped = String::new();
     for (k, digit) in digits.chars().enumerate() {
         if k > 0 && (digits.len() - k).is_multiple_of(3) {
@@ -197,7 +197,7 @@ fn superscript(exponent: i32) -> String {
     exponent.to_string().chars().map(raise).collect()
 }
 
-fn shown_exactly(value: f64, digits: usize) -> bool {
+fn is_exact(value: f64, digits: usize) -> bool {
     format!("{value:.digits$}").parse() == Ok(value)
 }
 
@@ -223,7 +223,7 @@ mod tests {
         assert_eq!(last(4000.0).as_deref(), Some("4000"));
         assert_eq!(last(300_000.0).as_deref(), Some("200 000"));
         assert_eq!(label(-12_345.5, 1), "−12 345.5");
-        let digits = ["0", "123", "1234", "123456", "1234567"].map(grouped);
+        let digits = ["0", "123", "1234", "123456", "1234567"].map(group_thousands);
         assert_eq!(digits, ["0", "123", "1 234", "123 456", "1 234 567"]);
     }
 
@@ -238,8 +238,8 @@ mod tests {
 
     #[test]
     fn given_ticks_show_all_their_digits_and_no_more() {
-        assert_eq!(labels(&Ticks::at(&[1.0, 2.0, 8.0])), ["1", "2", "8"]);
-        assert_eq!(labels(&Ticks::at(&[0.25, 0.5])), ["0.25", "0.50"]);
+        assert_eq!(labels(&Ticks::from_values(&[1.0, 2.0, 8.0])), ["1", "2", "8"]);
+        assert_eq!(labels(&Ticks::from_values(&[0.25, 0.5])), ["0.25", "0.50"]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sidestep_kernel::InputError;
 
-use super::rows::{Legend, MAX_TEXT_BYTES, Source, map_from_top};
+use super::char_map::{Legend, MAX_TEXT_BYTES, SourceText, map_from_top};
 use sidestep_map::{Cell, GridMap};
 use sidestep_scenario::file::read_text;
 
@@ -52,7 +52,7 @@ pub fn parse_within(
     art: Range<usize>,
     box_size_m: f64,
 ) -> Result<GridMap, InputError> {
-    let source = Source { place, text: document };
+    let source = SourceText { place, text: document };
     let art = &document[art];
     let body = art.strip_prefix("\r\n").or(art.strip_prefix('\n')).unwrap_or(art);
     let body = body.trim_end_matches(['\r', '\n']);

@@ -10,23 +10,23 @@
 
 use std::path::Path;
 
-use super::table::{MAX_TEXT_BYTES, Word, data_lines, words};
+use super::table::{MAX_TEXT_BYTES, Token, data_lines, tokens};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
 /// Number of beams per scan above which a count is taken for damage.
-const BEAMS_MAX: u32 = 100_000;
+const MAX_BEAMS: u32 = 100_000;
 /// Maximum number of words of a message that are read: those of the longest scan, and more.
-const WORDS_MAX: usize = BEAMS_MAX as usize + 32;
+const MAX_TOKENS: usize = MAX_BEAMS as usize + 32;
 
 /// A pose in the world: x and y in m, heading in rad.
-pub type Pose = [f64; 3];
+pub type PoseXyTheta = [f64; 3];
 
 /// A corrected log: scans, and the odometry between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectedLog {
     /// Odometry before the first scan.
-    pub odometry_before: Vec<Pose>,
+    pub odometry_before: Vec<PoseXyTheta>,
     /// The scans with the odometry that follows each.
     pub scans: Vec<Scan>,
 }
@@ -39,9 +39,9 @@ pub struct Scan {
     /// Number of beams.
     pub n_beams: u32,
     /// Corrected pose.
-    pub pose: Pose,
+    pub pose: PoseXyTheta,
     /// Poses according to odometry after this scan, starting at [`Scan::pose`].
-    pub odometry: Vec<Pose>,
+    pub odometry: Vec<PoseXyTheta>,
 }
 
 /// Reads a log.
@@ -59,7 +59,7 @@ pub fn read(path: &Path) -> Result<CorrectedLog, InputError> {
 pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
     let mut log = CorrectedLog { odometry_before: Vec::new(), scans: Vec::new() };
     for (line, content) in data_lines(text) {
-        let message: Vec<Word> = words(line, content).take(WORDS_MAX).collect();
+        let message: Vec<Token> = tokens(line, content).take(MAX_TOKENS).collect();
         match message[0].text {
             "ODOM" => {
                 let pose = parse_odometry(place, &message)?;
@@ -82,20 +82,20 @@ pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
     Ok(log)
 }
 
-fn parse_odometry(place: &str, message: &[Word]) -> Result<Pose, InputError> {
-    require_words(place, message, 10)?;
+fn parse_odometry(place: &str, message: &[Token]) -> Result<PoseXyTheta, InputError> {
+    require_tokens(place, message, 10)?;
     parse_pose(place, &message[1..4])
 }
 
-fn parse_scan(place: &str, message: &[Word]) -> Result<Scan, InputError> {
-    require_words(place, message, 2)?;
+fn parse_scan(place: &str, message: &[Token]) -> Result<Scan, InputError> {
+    require_tokens(place, message, 2)?;
     let n_beams = message[1].integer(&place)?;
-    if n_beams > BEAMS_MAX {
-        let cause = format!("{n_beams} beams are more than {BEAMS_MAX}");
+    if n_beams > MAX_BEAMS {
+        let cause = format!("{n_beams} beams are more than {MAX_BEAMS}");
         return Err(message[1].error(&place, cause, "restore the beam count"));
     }
     let first = 2 + n_beams as usize;
-    require_words(place, message, first + 9)?;
+    require_tokens(place, message, first + 9)?;
     // Checked, although the scan keeps only their number, so that damage is found.
     for range in &message[2..first] {
         range.number(&place)?;
@@ -108,12 +108,12 @@ fn parse_scan(place: &str, message: &[Word]) -> Result<Scan, InputError> {
     })
 }
 
-fn parse_pose(place: &str, found: &[Word]) -> Result<Pose, InputError> {
+fn parse_pose(place: &str, found: &[Token]) -> Result<PoseXyTheta, InputError> {
     Ok([found[0].number(&place)?, found[1].number(&place)?, found[2].number(&place)?])
 }
 
 /// Messages may be longer than documented (later programs append fields), never shorter.
-fn require_words(place: &str, message: &[Word], n: usize) -> Result<(), InputError> {
+fn require_tokens(place: &str, message: &[Token], n: usize) -> Result<(), InputError> {
     if message.len() >= n {
         return Ok(());
     }

@@ -9,6 +9,7 @@ pub mod ascii;
 pub mod bag;
 pub mod bluesky;
 pub mod carmen;
+mod char_map;
 mod extension;
 pub mod image;
 pub mod local_plane;
@@ -17,9 +18,8 @@ mod map_yaml;
 pub mod movingai;
 pub mod mrclam;
 mod pixel_map;
+mod raycast;
 pub mod rosmap;
-mod rows;
-mod sight;
 pub mod stage;
 pub mod stl;
 pub mod table;
@@ -31,6 +31,6 @@ mod xml;
 #[cfg(test)]
 mod shared_data;
 
-pub use map_file::{AsBoxes, map_file, pixel_map};
+pub use map_file::{GridOptions, load_map, load_pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
-pub use sight::Sight;
+pub use raycast::RayHit;

@@ -33,14 +33,14 @@ pub struct LocalPlane {
 
 impl LocalPlane {
     /// Creates the plane around `center`.
-    pub fn about(center: LatLon) -> Self {
+    pub fn centered_at(center: LatLon) -> Self {
         let east_scale = math::cos(center.lat_deg.to_radians()).max(MIN_COSINE);
         Self { center, east_scale }
     }
 
     /// Creates the plane around the [`center`] of `positions`, where there are any.
-    pub fn about_all(positions: impl IntoIterator<Item = LatLon>) -> Option<Self> {
-        center(positions).map(Self::about)
+    pub fn from_positions(positions: impl IntoIterator<Item = LatLon>) -> Option<Self> {
+        center(positions).map(Self::centered_at)
     }
 
     /// Returns the place at the origin.
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_degree_north_is_111_km_and_one_east_shrinks_with_latitude() {
-        let plane = LocalPlane::about(at(60.0, 4.0));
+        let plane = LocalPlane::centered_at(at(60.0, 4.0));
         let [east, north] = plane.to_plane_m(at(61.0, 5.0));
         assert!((north - 111_194.9).abs() < 0.1, "{north}");
         assert!((east - 111_194.9 / 2.0).abs() < 0.1, "{east}");
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn there_and_back_is_the_same_place_even_across_the_date_line() {
         for center in [at(47.0, 8.0), at(-33.0, 179.9), at(0.0, -180.0)] {
-            let plane = LocalPlane::about(center);
+            let plane = LocalPlane::centered_at(center);
             for point in [[0.0, 0.0], [30_000.0, -70_000.0], [-90_000.0, 10.0]] {
                 let back = plane.to_plane_m(plane.to_lat_lon(point));
                 assert!((back[0] - point[0]).abs() < 1e-3, "{back:?}");
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_center_of_two_places_on_both_sides_of_the_date_line_is_on_it() {
-        let plane = LocalPlane::about_all([at(0.0, 179.5), at(0.0, -179.5)]).unwrap();
+        let plane = LocalPlane::from_positions([at(0.0, 179.5), at(0.0, -179.5)]).unwrap();
         assert!((plane.center().lon_deg.abs() - 180.0).abs() < 1e-9);
         let [east, _] = plane.to_plane_m(at(0.0, -179.5));
         assert!((east - 55_597.5).abs() < 0.1, "{east}");
@@ -147,7 +147,7 @@ mod tests {
     fn the_error_of_the_plane_is_the_documented_one() {
         let north_deg = 100_000.0 / 111_194.9;
         for (lat_deg, fraction) in [(0.0, 0.000_13), (30.0, 0.0092), (52.0, 0.0206)] {
-            let plane = LocalPlane::about(at(lat_deg, 10.0));
+            let plane = LocalPlane::centered_at(at(lat_deg, 10.0));
             let (a, b) = (at(lat_deg + north_deg, 10.0), at(lat_deg + north_deg, 10.1));
             let length = plane.to_plane_m(b)[0] - plane.to_plane_m(a)[0];
             let excess = length / great_circle_m(a, b) - 1.0;

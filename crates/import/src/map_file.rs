@@ -10,7 +10,7 @@ use sidestep_map::{GridMap, UnknownPolicy};
 
 /// The way in which a file becomes boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AsBoxes {
+pub struct GridOptions {
     /// Side of a box in meters.
     pub box_size_m: f64,
     /// Side of a pixel in meters. A plain image needs it; that of a ROS map has to be the same.
@@ -28,10 +28,10 @@ pub struct AsBoxes {
 /// # Errors
 /// When the extension is another one, a resolution is missing or contradicts the file, and those of
 /// [`rosmap::load`] with [`PixelMap::to_boxes`], [`movingai::load_map`], [`ascii::load`].
-pub fn map_file(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
-    let map = match pixel_map(path, boxes.resolution_m)? {
+pub fn load_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
+    let map = match load_pixel_map(path, boxes.resolution_m)? {
         Some(pixels) => pixels.to_boxes(boxes.box_size_m, boxes.unknown)?,
-        None => character_map(path, boxes)?,
+        None => load_char_map(path, boxes)?,
     };
     Ok(map.with_unknown(boxes.unknown))
 }
@@ -39,11 +39,16 @@ pub fn map_file(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
 /// Reads the file at `path` if it is a map of pixels: a ROS map or a plain image.
 ///
 /// # Errors
-/// Those of [`map_file`].
-pub fn pixel_map(path: &Path, resolution_m: Option<f64>) -> Result<Option<PixelMap>, InputError> {
+/// Those of [`load_map`].
+pub fn load_pixel_map(
+    path: &Path,
+    resolution_m: Option<f64>,
+) -> Result<Option<PixelMap>, InputError> {
     match (extension(path).as_str(), resolution_m) {
         ("yaml" | "yml", None) => rosmap::load(path).map(Some),
-        ("yaml" | "yml", Some(said_m)) => agreeing(path, rosmap::load(path)?, said_m).map(Some),
+        ("yaml" | "yml", Some(said_m)) => {
+            check_resolution(path, rosmap::load(path)?, said_m).map(Some)
+        }
         ("png" | "pgm", Some(resolution_m)) => rosmap::load_image(path, resolution_m).map(Some),
         ("png" | "pgm", None) => {
             let cause = "an image does not say how large its pixels are";
@@ -55,7 +60,7 @@ pub fn pixel_map(path: &Path, resolution_m: Option<f64>) -> Result<Option<PixelM
     }
 }
 
-fn agreeing(path: &Path, pixels: PixelMap, said_m: f64) -> Result<PixelMap, InputError> {
+fn check_resolution(path: &Path, pixels: PixelMap, said_m: f64) -> Result<PixelMap, InputError> {
     let own_m = pixels.resolution_m();
     if (own_m - said_m).abs() <= 1e-9 * own_m {
         return Ok(pixels);
@@ -64,10 +69,10 @@ fn agreeing(path: &Path, pixels: PixelMap, said_m: f64) -> Result<PixelMap, Inpu
     Err(InputError::new(path.display(), cause, "leave the resolution out: the file says it"))
 }
 
-fn character_map(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
+fn load_char_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
     let extension = extension(path);
     if !["map", "txt"].contains(&extension.as_str()) {
-        return Err(not_read(path));
+        return Err(unknown_map_format(path));
     }
     if boxes.resolution_m.is_some() {
         let cause = "a character is a box: there are no pixels";
@@ -79,7 +84,7 @@ fn character_map(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
     }
 }
 
-fn not_read(path: &Path) -> InputError {
+fn unknown_map_format(path: &Path) -> InputError {
     InputError::new(
         path.display(),
         "the file name does not say which kind of map this is",
@@ -97,25 +102,26 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("written");
-        map_file(&path, BOXES)
+        load_map(&path, BOXES)
     }
 
-    const BOXES: AsBoxes =
-        AsBoxes { box_size_m: 0.5, resolution_m: None, unknown: UnknownPolicy::Free };
+    const BOXES: GridOptions =
+        GridOptions { box_size_m: 0.5, resolution_m: None, unknown: UnknownPolicy::Free };
 
     #[test]
     fn an_image_is_a_map_once_it_is_said_how_large_its_pixels_are() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("plan.pgm");
         std::fs::write(&path, "P2 2 2 255 0 255 255 205").expect("written");
-        let boxes = AsBoxes { resolution_m: Some(0.5), unknown: UnknownPolicy::Keep, ..BOXES };
-        let map = map_file(&path, boxes).expect("read");
+        let boxes = GridOptions { resolution_m: Some(0.5), unknown: UnknownPolicy::Keep, ..BOXES };
+        let map = load_map(&path, boxes).expect("read");
         // The last line of an image is south, where maps begin.
         assert_eq!(map.cells(), [Cell::Free, Cell::Unknown, Cell::Wall, Cell::Free]);
         assert_eq!(map.plane.origin_m, [0.0, 0.0]);
-        let error = map_file(&path, BOXES).expect_err("no resolution");
+        let error = load_map(&path, BOXES).expect_err("no resolution");
         assert!(error.remedy().contains("--resolution"), "{error}");
-        let error = map_file(&path, AsBoxes { resolution_m: Some(0.0), ..BOXES }).expect_err("0 m");
+        let error =
+            load_map(&path, GridOptions { resolution_m: Some(0.0), ..BOXES }).expect_err("0 m");
         assert!(error.to_string().contains("0 m"), "{error}");
     }
 
@@ -128,7 +134,7 @@ mod tests {
                     occupied_thresh: 0.65\nfree_thresh: 0.196\n";
         std::fs::write(place("a.yaml"), yaml).expect("written");
         std::fs::write(place("a.txt"), "..\n").expect("written");
-        let read = |name, m| map_file(&place(name), AsBoxes { resolution_m: Some(m), ..BOXES });
+        let read = |name, m| load_map(&place(name), GridOptions { resolution_m: Some(m), ..BOXES });
         assert!(read("a.yaml", 0.5).is_ok());
         assert!(read("a.yaml", 0.25).expect_err("other").to_string().contains("not 0.25 m"));
         assert!(read("a.txt", 0.5).expect_err("boxes").to_string().contains("no pixels"));

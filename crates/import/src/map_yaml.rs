@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::Plane;
+use sidestep_kernel::view::Isometry2;
 use sidestep_map::Cell;
 
 /// The maximum size of the YAML file in bytes; the keys take 150 bytes.
@@ -19,25 +19,25 @@ const MAX_YAW_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
 /// The content of the YAML file.
 #[derive(Debug, PartialEq)]
-pub(super) struct Metadata {
+pub(super) struct MapMetadata {
     /// The path of an image file that exists.
     pub(super) image: PathBuf,
     /// Side of a pixel in meters, positive.
     pub(super) resolution_m: f64,
     /// The lower-left corner of the image in the world, and the turn of the image about it.
-    pub(super) plane: Plane,
+    pub(super) plane: Isometry2,
     /// The conversion of pixels into cells.
-    pub(super) reading: Reading,
+    pub(super) reading: OccupancyRule,
 }
 
-impl Metadata {
+impl MapMetadata {
     /// Parses `text`; the image's path is relative to `folder`.
     pub(super) fn parse(place: &str, text: &str, folder: &Path) -> Result<Self, InputError> {
         let document = Document::parse(place, text)?;
         Ok(Self {
             resolution_m: document.resolution_m()?,
             plane: document.plane()?,
-            reading: document.reading()?,
+            reading: document.occupancy_rule()?,
             image: document.image(folder)?,
         })
     }
@@ -52,7 +52,7 @@ struct Document<'a> {
 
 impl<'a> Document<'a> {
     fn parse(place: &'a str, text: &'a str) -> Result<Self, InputError> {
-        check_lines(place, text)?;
+        check_line_lengths(place, text)?;
         let documents =
             MarkedYaml::load_from_str(text).map_err(|error| malformed(place, text, &error))?;
         match documents.into_iter().next() {
@@ -72,7 +72,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn plane(&self) -> Result<Plane, InputError> {
+    fn plane(&self) -> Result<Isometry2, InputError> {
         let value = self.value("origin")?;
         let Some([x, y, yaw]) = value.data.as_sequence().map(Vec::as_slice) else {
             let remedy = "write `origin: [x, y, yaw]` in meters and radians";
@@ -89,10 +89,10 @@ impl<'a> Document<'a> {
             ));
         }
         // A zero with a minus sign is a zero.
-        Ok(Plane { origin_m, yaw_rad: yaw_rad + 0.0 })
+        Ok(Isometry2 { origin_m, yaw_rad: yaw_rad + 0.0 })
     }
 
-    fn reading(&self) -> Result<Reading, InputError> {
+    fn occupancy_rule(&self) -> Result<OccupancyRule, InputError> {
         let (occupied_thresh, _) = self.threshold("occupied_thresh")?;
         let (free_thresh, free_value) = self.threshold("free_thresh")?;
         if free_thresh > occupied_thresh {
@@ -101,7 +101,7 @@ impl<'a> Document<'a> {
             return Err(self.error(free_value, cause, remedy));
         }
         let (mode, negate) = (self.mode()?, self.negate()?);
-        Ok(Reading { mode, negate, occupied_thresh, free_thresh })
+        Ok(OccupancyRule { mode, negate, occupied_thresh, free_thresh })
     }
 
     fn threshold(&self, key: &str) -> Result<(f64, &MarkedYaml<'a>), InputError> {
@@ -115,14 +115,14 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn mode(&self) -> Result<Mode, InputError> {
+    fn mode(&self) -> Result<MapMode, InputError> {
         let Some(value) = self.root.data.as_mapping_get("mode") else {
-            return Ok(Mode::Trinary);
+            return Ok(MapMode::Trinary);
         };
         match value.data.as_str() {
-            Some("trinary") => Ok(Mode::Trinary),
-            Some("scale") => Ok(Mode::Scale),
-            Some("raw") => Ok(Mode::Raw),
+            Some("trinary") => Ok(MapMode::Trinary),
+            Some("scale") => Ok(MapMode::Scale),
+            Some("raw") => Ok(MapMode::Raw),
             _ => Err(self.error(value, "not a mode", "write trinary, scale or raw")),
         }
     }
@@ -167,7 +167,7 @@ impl<'a> Document<'a> {
 
     fn error(&self, value: &MarkedYaml<'a>, cause: impl Into<String>, remedy: &str) -> InputError {
         let offset = byte_offset(self.text, value.span.start.index());
-        InputError::new(self.place, cause, remedy).in_text(self.text, offset)
+        InputError::new(self.place, cause, remedy).with_offset(self.text, offset)
     }
 }
 
@@ -186,19 +186,19 @@ fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-fn check_lines(place: &str, text: &str) -> Result<(), InputError> {
+fn check_line_lengths(place: &str, text: &str) -> Result<(), InputError> {
     match text.lines().position(|line| line.len() > MAX_LINE_BYTES) {
         None => Ok(()),
         Some(line) => {
             let cause = format!("a line of more than {MAX_LINE_BYTES} bytes");
-            Err(InputError::new(place, cause, KEYS).at(line + 1, MAX_LINE_BYTES + 1))
+            Err(InputError::new(place, cause, KEYS).with_position(line + 1, MAX_LINE_BYTES + 1))
         }
     }
 }
 
 fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
     InputError::new(place, format!("is not YAML: {}", error.info()), KEYS)
-        .in_text(text, byte_offset(text, error.marker().index()))
+        .with_offset(text, byte_offset(text, error.marker().index()))
 }
 
 /// Returns the byte offset of the character number `index`.
@@ -208,7 +208,7 @@ fn byte_offset(text: &str, index: usize) -> usize {
 
 /// The meaning of a pixel's brightness; see [`super::rosmap`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Mode {
+pub(super) enum MapMode {
     Trinary,
     Scale,
     Raw,
@@ -216,23 +216,23 @@ pub(super) enum Mode {
 
 /// The rule by which a brightness is read as a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reading {
-    pub(super) mode: Mode,
+pub(super) struct OccupancyRule {
+    pub(super) mode: MapMode,
     pub(super) negate: bool,
     pub(super) occupied_thresh: f64,
     pub(super) free_thresh: f64,
 }
 
-impl Reading {
+impl OccupancyRule {
     /// The reading of most ROS maps, and of images without a YAML file.
-    pub(super) const USUAL: Self =
-        Self { mode: Mode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
+    pub(super) const DEFAULT: Self =
+        Self { mode: MapMode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
 
     pub(super) fn cell(&self, brightness: f64) -> Cell {
         let shade = if self.negate { brightness } else { 255.0 - brightness };
         match self.mode {
-            Mode::Trinary | Mode::Scale => self.occupancy_cell(shade / 255.0),
-            Mode::Raw => self.raw_cell(255.0 - shade),
+            MapMode::Trinary | MapMode::Scale => self.occupancy_cell(shade / 255.0),
+            MapMode::Raw => self.raw_cell(255.0 - shade),
         }
     }
 
@@ -269,13 +269,13 @@ free_thresh: 0.196
 ";
 
     /// The metadata of `text`, with this crate's sources for images.
-    fn parse(text: &str) -> Result<Metadata, InputError> {
+    fn parse(text: &str) -> Result<MapMetadata, InputError> {
         let text = text.replace("map.rs", "map_yaml.rs");
-        Metadata::parse("m.yaml", &text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+        MapMetadata::parse("m.yaml", &text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
     }
 
     /// The metadata of the usual file with one piece of it replaced.
-    fn with(old: &str, new: &str) -> Result<Metadata, InputError> {
+    fn with(old: &str, new: &str) -> Result<MapMetadata, InputError> {
         assert!(YAML.contains(old), "{old}");
         parse(&YAML.replace(old, new))
     }
@@ -287,11 +287,11 @@ free_thresh: 0.196
     #[test]
     fn the_six_keys_are_read_and_the_mode_is_trinary() {
         let meta = parse(YAML).expect("read");
-        let plane = Plane { origin_m: [-1.5, 2.0], yaw_rad: 0.0 };
+        let plane = Isometry2 { origin_m: [-1.5, 2.0], yaw_rad: 0.0 };
         assert_eq!((meta.resolution_m, meta.plane), (0.05, plane));
         assert!(meta.image.ends_with("src/map_yaml.rs"));
-        let expected = Reading {
-            mode: Mode::Trinary,
+        let expected = OccupancyRule {
+            mode: MapMode::Trinary,
             negate: false,
             occupied_thresh: 0.65,
             free_thresh: 0.196,
@@ -320,9 +320,9 @@ free_thresh: 0.196
         let mode = |name: &str| {
             with("negate: 0", &format!("mode: {name}\nnegate: 0")).map(|meta| meta.reading.mode)
         };
-        assert_eq!(mode("trinary"), Ok(Mode::Trinary));
-        assert_eq!(mode("scale"), Ok(Mode::Scale));
-        assert_eq!(mode("'raw'"), Ok(Mode::Raw));
+        assert_eq!(mode("trinary"), Ok(MapMode::Trinary));
+        assert_eq!(mode("scale"), Ok(MapMode::Scale));
+        assert_eq!(mode("'raw'"), Ok(MapMode::Raw));
         assert_eq!(mode("Binary").expect_err("no mode").position(), Some((4, 7)));
     }
 

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use sidestep_kernel::InputError;
 
-use super::rows::{Legend, Line, MAX_TEXT_BYTES, Source, map_from_top};
+use super::char_map::{Legend, Line, MAX_TEXT_BYTES, SourceText, map_from_top};
 use sidestep_map::{Cell, GridMap, check_box_count};
 use sidestep_scenario::file::read_text;
 
@@ -52,7 +52,8 @@ impl ScenRow {
     /// # Errors
     /// When the map has a different size, or the start or the goal is not free.
     pub fn check_against(&self, place: &str, map: &GridMap) -> Result<(), InputError> {
-        let error = |cause, remedy| Err(InputError::new(place, cause, remedy).at(self.line, 1));
+        let error =
+            |cause, remedy| Err(InputError::new(place, cause, remedy).with_position(self.line, 1));
         if (self.width, self.height) != (map.width(), map.height()) {
             let (w, h) = (map.width(), map.height());
             let made_for = format!("{} x {}", self.width, self.height);
@@ -84,7 +85,7 @@ pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
 /// When the header or a character is wrong, or rows are missing, too many, or not as wide as the
 /// header says.
 pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, InputError> {
-    let source = Source { place, text };
+    let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
     let (width, height) = header(source, &mut lines)?;
     let (width, height) = (width as usize, height as usize);
@@ -94,20 +95,20 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, In
     }
     if cells.len() < width * height {
         let cause = format!("the map ends after {} rows, not {height}", cells.len() / width);
-        return Err(source.error(text.len(), cause, ROWS));
+        return Err(source.error(text.len(), cause, ROWS_REMEDY));
     }
     if let Some(line) = lines.find(|line| !line.text.trim().is_empty()) {
         let cause = format!("text behind the {height} rows of the map");
-        return Err(source.error(line.offset, cause, ROWS));
+        return Err(source.error(line.offset, cause, ROWS_REMEDY));
     }
     map_from_top(place, &cells, width, box_size_m)
 }
 
-const ROWS: &str = "give as many rows as `height` says";
+const ROWS_REMEDY: &str = "give as many rows as `height` says";
 
 /// Reads the header up to and including `map`; returns the map's width and height.
 fn header<'a>(
-    source: Source<'_>,
+    source: SourceText<'_>,
     lines: &mut impl Iterator<Item = Line<'a>>,
 ) -> Result<(u32, u32), InputError> {
     let (mut is_octile, mut width, mut height) = (false, None, None);
@@ -118,29 +119,36 @@ fn header<'a>(
             (Some("width"), Some(n), None) if width.is_none() => width = Some(size(source, n)?),
             (Some("height"), Some(n), None) if height.is_none() => height = Some(size(source, n)?),
             (Some("map"), None, None) => return finish_header(source, line, width.zip(height)),
-            _ => return Err(source.error(line.offset, "not a line of a map's header", HEADER)),
+            _ => {
+                return Err(source.error(
+                    line.offset,
+                    "not a line of a map's header",
+                    HEADER_REMEDY,
+                ));
+            }
         }
     }
-    Err(source.error(source.text.len(), "the header has no line `map`", HEADER))
+    Err(source.error(source.text.len(), "the header has no line `map`", HEADER_REMEDY))
 }
 
-const HEADER: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
+const HEADER_REMEDY: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
 
 /// Reads the word `word` of the text as a number.
-fn size(source: Source<'_>, word: &str) -> Result<u64, InputError> {
+fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
     word.parse().map_err(|_| {
         let cause = format!("`{word}` is not a whole number");
-        source.error(source.offset_of(word), cause, HEADER)
+        source.error(source.offset_of(word), cause, HEADER_REMEDY)
     })
 }
 
 fn finish_header(
-    source: Source<'_>,
+    source: SourceText<'_>,
     line: Line<'_>,
     size: Option<(u64, u64)>,
 ) -> Result<(u32, u32), InputError> {
-    let (width, height) =
-        size.ok_or_else(|| source.error(line.offset, "the header lacks the map's size", HEADER))?;
+    let (width, height) = size.ok_or_else(|| {
+        source.error(line.offset, "the header lacks the map's size", HEADER_REMEDY)
+    })?;
     check_box_count(source.place, width, height)
 }
 
@@ -158,7 +166,7 @@ pub fn load_scen(path: &Path) -> Result<Vec<ScenRow>, InputError> {
 /// When the first line is not `version 1`, or a row does not have nine fields between tabs, a field
 /// is not a number, or a start or goal is outside the map.
 pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
-    let source = Source { place, text };
+    let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
     let is_version_1 = |line: Line<'_>| {
         let mut words = line.text.split_whitespace();
@@ -175,7 +183,7 @@ pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
         .collect()
 }
 
-fn scen_row(source: Source<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, InputError> {
+fn scen_row(source: SourceText<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, InputError> {
     let mut fields = Fields { source, line: text, offset: text.offset, next: Some(text.text) };
     let bucket = fields.number("the bucket")?;
     let map = fields.text("the map's name")?.0.to_owned();
@@ -189,7 +197,7 @@ fn scen_row(source: Source<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, 
 
 /// The fields of a row, in order.
 struct Fields<'a> {
-    source: Source<'a>,
+    source: SourceText<'a>,
     line: Line<'a>,
     /// The byte offset of the rest of the row in the text.
     offset: usize,
@@ -197,7 +205,7 @@ struct Fields<'a> {
     next: Option<&'a str>,
 }
 
-const FIELDS: &str = "write bucket, map, width, height, start x, start y, goal x, goal y and \
+const FIELDS_REMEDY: &str = "write bucket, map, width, height, start x, start y, goal x, goal y and \
                       optimal length, with a tab between each two";
 
 impl<'a> Fields<'a> {
@@ -206,7 +214,7 @@ impl<'a> Fields<'a> {
         let offset = self.offset;
         let rest = self.next.ok_or_else(|| {
             let end = self.line.offset + self.line.text.len();
-            self.source.error(end, format!("the row ends before {name}"), FIELDS)
+            self.source.error(end, format!("the row ends before {name}"), FIELDS_REMEDY)
         })?;
         let (field, next) = match rest.split_once('\t') {
             Some((field, next)) => (field, Some(next)),
@@ -221,7 +229,7 @@ impl<'a> Fields<'a> {
         let (field, offset) = self.text(name)?;
         field.trim().parse().map_err(|_| {
             let cause = format!("`{}`, {name}, is not such a number", field.escape_debug());
-            self.source.error(offset, cause, FIELDS)
+            self.source.error(offset, cause, FIELDS_REMEDY)
         })
     }
 
@@ -249,7 +257,7 @@ impl<'a> Fields<'a> {
     fn finish(&self) -> Result<(), InputError> {
         match self.next {
             Some(rest) if !rest.trim().is_empty() => {
-                Err(self.source.error(self.offset, "a tenth field", FIELDS))
+                Err(self.source.error(self.offset, "a tenth field", FIELDS_REMEDY))
             }
             _ => Ok(()),
         }

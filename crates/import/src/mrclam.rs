@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use super::table::{MAX_TEXT_BYTES, Word, find_file, rows};
+use super::table::{MAX_TEXT_BYTES, Token, find_file, rows};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
@@ -31,16 +31,16 @@ pub struct Dataset {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RobotLog {
     /// Motion capture, sorted by time.
-    pub truth: Vec<TruePose>,
+    pub truth: Vec<StampedPose2>,
     /// Velocity commands, in the order of the file.
-    pub commands: Vec<Command>,
+    pub commands: Vec<VelocityCommand>,
     /// Barcode readings, in the order of the file.
     pub measurements: Vec<Measurement>,
 }
 
 /// A pose from motion capture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TruePose {
+pub struct StampedPose2 {
     /// Time in s.
     pub t_secs: f64,
     /// Position in the world, in meters.
@@ -51,7 +51,7 @@ pub struct TruePose {
 
 /// A velocity command, in force until the next one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct VelocityCommand {
     /// Time in s.
     pub t_secs: f64,
     /// Forward velocity, in m/s.
@@ -119,7 +119,7 @@ fn parse_barcodes(place: &str, text: &str) -> Result<BTreeMap<u32, u32>, InputEr
     for row in rows(&place, text) {
         let [subject, barcode] = row?;
         let earlier = barcodes.insert(barcode.integer(&place)?, subject.integer(&place)?);
-        refuse_second(&place, earlier.is_some(), &barcode)?;
+        check_unique(&place, earlier.is_some(), &barcode)?;
     }
     Ok(barcodes)
 }
@@ -130,12 +130,12 @@ fn parse_landmarks(place: &str, text: &str) -> Result<BTreeMap<u32, [f64; 2]>, I
         let [subject, x, y, _, _] = row?;
         let position_m = [x.number(&place)?, y.number(&place)?];
         let earlier = landmarks.insert(subject.integer(&place)?, position_m);
-        refuse_second(&place, earlier.is_some(), &subject)?;
+        check_unique(&place, earlier.is_some(), &subject)?;
     }
     Ok(landmarks)
 }
 
-fn refuse_second(place: &dyn fmt::Display, twice: bool, word: &Word) -> Result<(), InputError> {
+fn check_unique(place: &dyn fmt::Display, twice: bool, word: &Token) -> Result<(), InputError> {
     if !twice {
         return Ok(());
     }
@@ -143,24 +143,24 @@ fn refuse_second(place: &dyn fmt::Display, twice: bool, word: &Word) -> Result<(
 }
 
 /// Parses motion capture; sorted here, because poses are looked up by time.
-fn parse_truth(place: &str, text: &str) -> Result<Vec<TruePose>, InputError> {
-    let parse = |row: Result<[Word; 4], InputError>| {
+fn parse_truth(place: &str, text: &str) -> Result<Vec<StampedPose2>, InputError> {
+    let parse = |row: Result<[Token; 4], InputError>| {
         let [t, x, y, heading] = row?;
-        Ok(TruePose {
+        Ok(StampedPose2 {
             t_secs: t.number(&place)?,
             position_m: [x.number(&place)?, y.number(&place)?],
             heading_rad: heading.number(&place)?,
         })
     };
-    let mut truth: Vec<TruePose> = rows(&place, text).map(parse).collect::<Result<_, _>>()?;
+    let mut truth: Vec<StampedPose2> = rows(&place, text).map(parse).collect::<Result<_, _>>()?;
     truth.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
     Ok(truth)
 }
 
-fn parse_commands(place: &str, text: &str) -> Result<Vec<Command>, InputError> {
-    let parse = |row: Result<[Word; 3], InputError>| {
+fn parse_commands(place: &str, text: &str) -> Result<Vec<VelocityCommand>, InputError> {
+    let parse = |row: Result<[Token; 3], InputError>| {
         let [t, forward, turn] = row?;
-        Ok(Command {
+        Ok(VelocityCommand {
             t_secs: t.number(&place)?,
             forward_mps: forward.number(&place)?,
             turn_radps: turn.number(&place)?,
@@ -170,7 +170,7 @@ fn parse_commands(place: &str, text: &str) -> Result<Vec<Command>, InputError> {
 }
 
 fn parse_measurements(place: &str, text: &str) -> Result<Vec<Measurement>, InputError> {
-    let parse = |row: Result<[Word; 4], InputError>| {
+    let parse = |row: Result<[Token; 4], InputError>| {
         let [t, barcode, range, bearing] = row?;
         Ok(Measurement {
             t_secs: t.number(&place)?,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::Plane;
+use sidestep_kernel::view::Isometry2;
 
 use sidestep_map::{Cell, CellCounts, GridMap, UnknownPolicy, check_box_count, check_box_size};
 
@@ -17,7 +17,7 @@ pub struct PixelMap {
     width: u32,
     height: u32,
     resolution_m: f64,
-    plane: Plane,
+    plane: Isometry2,
     /// Row by row from the bottom; length `width * height`.
     pixels: Vec<Cell>,
 }
@@ -33,7 +33,7 @@ impl PixelMap {
         width: u32,
         height: u32,
         resolution_m: f64,
-        plane: Plane,
+        plane: Isometry2,
         pixels: Vec<Cell>,
     ) -> Self {
         assert_eq!(pixels.len(), width as usize * height as usize, "one cell per pixel");
@@ -57,7 +57,7 @@ impl PixelMap {
     }
 
     /// The place of the lower-left corner in the world, and the turn of the image about it.
-    pub fn plane(&self) -> Plane {
+    pub fn plane(&self) -> Isometry2 {
         self.plane
     }
 
@@ -68,7 +68,7 @@ impl PixelMap {
 
     /// Returns the number of pixels of each type.
     pub fn counts(&self) -> CellCounts {
-        CellCounts::of(&self.pixels)
+        CellCounts::from_cells(&self.pixels)
     }
 
     /// Returns the map in boxes with a side of `box_size_m` meters, counted from the lower-left
@@ -85,7 +85,7 @@ impl PixelMap {
     /// When `box_size_m` is not a positive number or makes more boxes than
     /// [`MAX_BOXES`](sidestep_map::MAX_BOXES).
     pub fn to_boxes(&self, box_size_m: f64, unknown: UnknownPolicy) -> Result<GridMap, InputError> {
-        let axis = |pixels| Axis { pixels, resolution_m: self.resolution_m, box_size_m };
+        let axis = |pixels| AxisAlignment { pixels, resolution_m: self.resolution_m, box_size_m };
         let (x, y) = (axis(self.width), axis(self.height));
         check_box_size(box_size_m)?;
         let (width, height) = check_box_count("box_size_m", x.boxes(), y.boxes())?;
@@ -93,13 +93,13 @@ impl PixelMap {
         let mut cells = Vec::with_capacity(width as usize * height as usize);
         for row in 0..height {
             let rows = y.pixels_of(row);
-            cells.extend(columns.iter().map(|cols| unknown.apply(self.whole(cols, &rows))));
+            cells.extend(columns.iter().map(|cols| unknown.apply(self.merged_cell(cols, &rows))));
         }
         Ok(GridMap::new(width, height, box_size_m, cells).with_plane(self.plane))
     }
 
     /// Returns the cell of a box of these pixels.
-    fn whole(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
+    fn merged_cell(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
         let mut whole = Cell::Free;
         for row in rows.clone() {
             let start = row * self.width as usize;
@@ -117,21 +117,21 @@ impl PixelMap {
 
 /// The alignment of boxes with pixels, along one axis.
 #[derive(Clone, Copy)]
-struct Axis {
+struct AxisAlignment {
     /// Number of pixels, at least 1 where a method is called.
     pixels: u32,
     resolution_m: f64,
     box_size_m: f64,
 }
 
-impl Axis {
+impl AxisAlignment {
     /// Returns the box that holds the center of a pixel. Saturates far above any allowed size.
-    fn box_of(self, pixel: u32) -> u64 {
+    fn box_at(self, pixel: u32) -> u64 {
         ((f64::from(pixel) + 0.5) * self.resolution_m / self.box_size_m).floor() as u64
     }
 
     /// Returns the pixel around the center of a box.
-    fn pixel_around(self, index: u32) -> u32 {
+    fn center_pixel(self, index: u32) -> u32 {
         let pixel = ((f64::from(index) + 0.5) * self.box_size_m / self.resolution_m).floor();
         (pixel as u32).min(self.pixels - 1)
     }
@@ -141,7 +141,7 @@ impl Axis {
         let Some(last) = self.pixels.checked_sub(1) else { return 0 };
         let length = f64::from(self.pixels) * self.resolution_m / self.box_size_m;
         let with_center_on_map = (length - 0.5).ceil() as u64;
-        with_center_on_map.max(self.box_of(last).saturating_add(1))
+        with_center_on_map.max(self.box_at(last).saturating_add(1))
     }
 
     /// Returns the pixels that make up a box; at least one.
@@ -151,7 +151,7 @@ impl Axis {
         if first < end {
             return first as usize..end as usize;
         }
-        let pixel = self.pixel_around(index) as usize;
+        let pixel = self.center_pixel(index) as usize;
         pixel..pixel + 1
     }
 
@@ -162,7 +162,7 @@ impl Axis {
         let (mut low, mut high) = (0, self.pixels);
         while low < high {
             let middle = low + (high - low) / 2;
-            if self.box_of(middle) < index {
+            if self.box_at(middle) < index {
                 low = middle + 1;
             } else {
                 high = middle;
@@ -178,8 +178,8 @@ mod tests {
     use Cell::{Free, Unknown, Wall};
     use proptest::{num, prelude::*};
 
-    fn at(origin_m: [f64; 2]) -> Plane {
-        Plane { origin_m, yaw_rad: 0.0 }
+    fn at(origin_m: [f64; 2]) -> Isometry2 {
+        Isometry2 { origin_m, yaw_rad: 0.0 }
     }
 
     fn row(pixels: &[Cell], resolution_m: f64) -> PixelMap {
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn boxes_keep_the_plane_the_size_and_the_rows_from_the_bottom() {
-        let plane = Plane { origin_m: [-3.0, 4.0], yaw_rad: 3.0 };
+        let plane = Isometry2 { origin_m: [-3.0, 4.0], yaw_rad: 3.0 };
         let map = PixelMap::new(1, 2, 0.5, plane, vec![Wall, Free]);
         let boxes = map.to_boxes(0.5, UnknownPolicy::Wall).expect("boxes");
         assert_eq!((boxes.plane, boxes.box_size_m), (plane, 0.5));
@@ -240,7 +240,7 @@ mod tests {
         for wrong in [0.0, -0.5, f64::NAN, f64::INFINITY, 1e-9, f64::MIN_POSITIVE] {
             assert!(map.to_boxes(wrong, UnknownPolicy::Wall).is_err(), "{wrong}");
         }
-        let empty = PixelMap::new(0, 0, 0.5, Plane::default(), Vec::new());
+        let empty = PixelMap::new(0, 0, 0.5, Isometry2::default(), Vec::new());
         assert!(empty.to_boxes(0.5, UnknownPolicy::Wall).is_err());
     }
 
@@ -255,7 +255,7 @@ mod tests {
         ) {
             let cell = |i: u32| [Free, Wall, Unknown][(seed.rotate_right(i) % 3) as usize];
             let pixels: Vec<_> = (0..width * height).map(cell).collect();
-            let map = PixelMap::new(width, height, resolution_m, Plane::default(), pixels);
+            let map = PixelMap::new(width, height, resolution_m, Isometry2::default(), pixels);
             if let Ok(boxes) = map.to_boxes(box_size_m, UnknownPolicy::Keep) {
                 prop_assert_eq!(map.counts().wall > 0, boxes.count(Wall) > 0);
                 prop_assert!(map.counts().free > 0 || boxes.count(Free) == 0);

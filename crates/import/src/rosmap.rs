@@ -19,12 +19,12 @@
 use std::path::Path;
 
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::Plane;
+use sidestep_kernel::view::Isometry2;
 
 use super::PixelMap;
 use super::extension;
 use super::image::Bitmap;
-use super::map_yaml::{MAX_YAML_BYTES, Metadata, Reading};
+use super::map_yaml::{MAX_YAML_BYTES, MapMetadata, OccupancyRule};
 use sidestep_scenario::file::read_text;
 
 /// Reads the map with its YAML file at `path`. YAML file and image may be packed with gzip; an
@@ -37,9 +37,9 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     extension::check(path, "a map of ROS", &["yaml", "yml"])?;
     let place = path.display().to_string();
     let text = read_text(path, MAX_YAML_BYTES)?;
-    let meta = Metadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
+    let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
-    Ok(pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
+    Ok(to_pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
 }
 
 /// Reads a plain image as `map_server` would with its usual thresholds: the corner in the southwest is
@@ -54,11 +54,16 @@ pub fn load_image(path: &Path, resolution_m: f64) -> Result<PixelMap, InputError
         return Err(InputError::new(path.display(), cause, remedy));
     }
     let image = Bitmap::load(path)?;
-    let plane = Plane { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
-    Ok(pixel_map(resolution_m, plane, Reading::USUAL, &image))
+    let plane = Isometry2 { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
+    Ok(to_pixel_map(resolution_m, plane, OccupancyRule::DEFAULT, &image))
 }
 
-fn pixel_map(resolution_m: f64, plane: Plane, reading: Reading, image: &Bitmap) -> PixelMap {
+fn to_pixel_map(
+    resolution_m: f64,
+    plane: Isometry2,
+    reading: OccupancyRule,
+    image: &Bitmap,
+) -> PixelMap {
     let from_top = image.map_brightness(|brightness| reading.cell(brightness));
     let from_bottom = from_top.rchunks(image.width() as usize).flatten().copied().collect();
     PixelMap::new(image.width(), image.height(), resolution_m, plane, from_bottom)
@@ -68,49 +73,49 @@ fn pixel_map(resolution_m: f64, plane: Plane, reading: Reading, image: &Bitmap) 
 mod tests {
     use std::path::PathBuf;
 
-    use super::super::map_yaml::Mode;
+    use super::super::map_yaml::MapMode;
     use super::*;
     use Cell::{Free, Unknown, Wall};
     use sidestep_map::Cell;
 
-    const READING: Reading = Reading::USUAL;
+    const READING: OccupancyRule = OccupancyRule::DEFAULT;
 
-    fn cells(reading: Reading, brightnesses: &[f64]) -> Vec<Cell> {
+    fn cells(reading: OccupancyRule, brightnesses: &[f64]) -> Vec<Cell> {
         brightnesses.iter().map(|&brightness| reading.cell(brightness)).collect()
     }
 
     #[test]
     fn dark_is_occupied_light_is_free_and_205_is_unknown_by_a_hair() {
         assert_eq!(cells(READING, &[0.0, 205.0, 206.0, 255.0]), [Wall, Unknown, Free, Free]);
-        let lenient = Reading { free_thresh: 0.25, ..READING };
+        let lenient = OccupancyRule { free_thresh: 0.25, ..READING };
         assert_eq!(cells(lenient, &[205.0]), [Free]);
     }
 
     #[test]
     fn both_thresholds_are_strict() {
-        let reading = Reading { occupied_thresh: 0.6, free_thresh: 0.2, ..READING };
+        let reading = OccupancyRule { occupied_thresh: 0.6, free_thresh: 0.2, ..READING };
         assert_eq!(cells(reading, &[102.0, 101.0, 204.0, 205.0]), [Unknown, Wall, Unknown, Free]);
     }
 
     #[test]
     fn negate_turns_dark_and_light_around() {
-        let reading = Reading { negate: true, ..READING };
+        let reading = OccupancyRule { negate: true, ..READING };
         assert_eq!(cells(reading, &[0.0, 50.0, 255.0]), [Free, Unknown, Wall]);
     }
 
     #[test]
     fn the_shades_of_scale_are_unknown() {
-        let reading = Reading { mode: Mode::Scale, ..READING };
+        let reading = OccupancyRule { mode: MapMode::Scale, ..READING };
         assert_eq!(cells(reading, &[0.0, 128.0, 255.0]), [Wall, Unknown, Free]);
     }
 
     #[test]
     fn raw_values_are_percent_and_unknown_above_100() {
-        let reading = Reading { mode: Mode::Raw, ..READING };
+        let reading = OccupancyRule { mode: MapMode::Raw, ..READING };
         let values = [0.0, 19.0, 20.0, 65.0, 66.0, 100.0, 101.0, 255.0];
         let expected = [Free, Free, Unknown, Unknown, Wall, Wall, Unknown, Unknown];
         assert_eq!(cells(reading, &values), expected);
-        let negated = Reading { negate: true, ..reading };
+        let negated = OccupancyRule { negate: true, ..reading };
         assert_eq!(cells(negated, &[255.0, 155.0, 0.0]), [Free, Wall, Unknown]);
     }
 

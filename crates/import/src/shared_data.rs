@@ -65,9 +65,9 @@ fn check_boxes(name: &str, boxes: &GridMap, expected: &Value) {
     assert_eq!(components.sizes().len(), number(expected, "free_components"), "{name}");
     assert_eq!(components.largest_size(), number(expected, "largest_free"), "{name}");
     let from = numbers(&expected["bfs_from"]);
-    let distances = Distances::to_nearest(&FreeSpace::of_map(boxes), 1, &[(from[0], from[1])]);
+    let distances = Distances::to_nearest(&FreeSpace::from_map(boxes), 1, &[(from[0], from[1])]);
     assert_eq!(
-        distances.max().map(|max| max as usize),
+        distances.max_steps().map(|max| max as usize),
         Some(number(expected, "bfs_max")),
         "{name}"
     );
@@ -102,7 +102,7 @@ fn every_movingai_scenario_has_the_expected_lengths() {
         assert_eq!(rows.len(), number(&expected, "rows"), "{name}");
         let map = movingai::load_map(&path.with_file_name(&rows[0].map), 1.0).expect(&name);
         assert_eq!(rows.iter().find_map(|row| row.check_against(&name, &map).err()), None);
-        let free = FreeSpace::of_map(&map);
+        let free = FreeSpace::from_map(&map);
         let checked = &rows[..number(&expected, "checked")];
         let matching = |rows: &[movingai::ScenRow]| {
             rows.iter().filter(|row| has_octile_length(&free, row)).count()

@@ -11,14 +11,14 @@ use std::path::Path;
 /// The maximum size of a mesh in bytes after unpacking: some 10 times the largest known.
 const MAX_MESH_BYTES: u64 = 1 << 28;
 /// Bytes before the first triangle, and of each.
-const HEAD: usize = 84;
-const TRIANGLE: usize = 50;
+const HEADER_BYTES: usize = 84;
+const TRIANGLE_BYTES: usize = 50;
 
 /// Returns the lowest and the highest coordinates of a mesh, in its own unit.
 ///
 /// # Errors
 /// When the file cannot be read, is cut short, or has no vertex with finite coordinates.
-pub fn bounds(path: &Path) -> Result<[[f64; 3]; 2], InputError> {
+pub fn read_bounds(path: &Path) -> Result<[[f64; 3]; 2], InputError> {
     let bytes = read_bytes(path, MAX_MESH_BYTES)?;
     parse(&path.display().to_string(), &bytes)
 }
@@ -26,38 +26,38 @@ pub fn bounds(path: &Path) -> Result<[[f64; 3]; 2], InputError> {
 /// Returns the lowest and the highest coordinates of the mesh in `bytes`; errors call it `place`.
 ///
 /// # Errors
-/// Those of [`bounds`], except for reading.
+/// Those of [`read_bounds`], except for reading.
 pub fn parse(place: &str, bytes: &[u8]) -> Result<[[f64; 3]; 2], InputError> {
     let vertices = match binary(bytes) {
         Some(vertices) => vertices,
-        None => ascii(bytes).ok_or_else(|| wrong(place, "is no STL mesh, or cut short"))?,
+        None => ascii(bytes).ok_or_else(|| invalid_mesh(place, "is no STL mesh, or cut short"))?,
     };
     let mut found: Option<[[f64; 3]; 2]> = None;
     for vertex in vertices {
         if !vertex.iter().all(|x| x.abs() <= 1e9) {
-            return Err(wrong(place, "has a vertex that is no place"));
+            return Err(invalid_mesh(place, "has a vertex that is no place"));
         }
         let [low, high] = found.unwrap_or([vertex; 2]);
         let each = |of: fn(f64, f64) -> f64, a: [f64; 3]| [0, 1, 2].map(|i| of(a[i], vertex[i]));
         found = Some([each(f64::min, low), each(f64::max, high)]);
     }
-    found.ok_or_else(|| wrong(place, "has no triangles"))
+    found.ok_or_else(|| invalid_mesh(place, "has no triangles"))
 }
 
-fn wrong(place: &str, cause: &str) -> InputError {
+fn invalid_mesh(place: &str, cause: &str) -> InputError {
     InputError::new(place, cause, "save the mesh again as binary or ASCII STL")
 }
 
 /// Reads a binary mesh; none if its size is not that of its triangles. Some begin with the word
 /// `solid` like ASCII ones, so that only the size tells.
 fn binary(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
-    let count = u32::from_le_bytes(bytes.get(80..HEAD)?.try_into().ok()?) as usize;
-    if bytes.len() != count.checked_mul(TRIANGLE)?.checked_add(HEAD)? {
+    let count = u32::from_le_bytes(bytes.get(80..HEADER_BYTES)?.try_into().ok()?) as usize;
+    if bytes.len() != count.checked_mul(TRIANGLE_BYTES)?.checked_add(HEADER_BYTES)? {
         return None;
     }
     let number = |at: &[u8]| f64::from(f32::from_le_bytes([at[0], at[1], at[2], at[3]]));
     let vertex = |at: &[u8]| [number(at), number(&at[4..]), number(&at[8..])];
-    let triangles = bytes[HEAD..].chunks_exact(TRIANGLE);
+    let triangles = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES);
     Some(triangles.flat_map(|t| [vertex(&t[12..]), vertex(&t[24..]), vertex(&t[36..])]).collect())
 }
 

@@ -29,7 +29,7 @@ pub const MAX_CSV_BYTES: u64 = 1 << 28;
 
 /// One word of a text, with its position.
 #[derive(Debug, Clone, Copy)]
-pub struct Word<'a> {
+pub struct Token<'a> {
     /// The word without the blanks around it.
     pub text: &'a str,
     /// Line, from 1.
@@ -38,10 +38,10 @@ pub struct Word<'a> {
     pub column: usize,
 }
 
-impl Word<'_> {
+impl Token<'_> {
     /// Creates an error that points at this word.
     pub fn error(&self, place: &dyn fmt::Display, cause: String, remedy: &str) -> InputError {
-        InputError::new(place, cause, remedy).at(self.line, self.column)
+        InputError::new(place, cause, remedy).with_position(self.line, self.column)
     }
 
     /// Reads the word as a finite number.
@@ -80,10 +80,10 @@ fn shorten(text: &str) -> &str {
 }
 
 /// Returns the words of line number `line`, separated by blanks or tabs.
-pub fn words(line: usize, text: &str) -> impl Iterator<Item = Word<'_>> {
+pub fn tokens(line: usize, text: &str) -> impl Iterator<Item = Token<'_>> {
     text.split_ascii_whitespace().map(move |word| {
         let offset = word.as_ptr() as usize - text.as_ptr() as usize;
-        Word { text: word, line, column: text[..offset].chars().count() + 1 }
+        Token { text: word, line, column: text[..offset].chars().count() + 1 }
     })
 }
 
@@ -103,15 +103,16 @@ pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 pub fn rows<'a, const N: usize>(
     place: &dyn fmt::Display,
     text: &'a str,
-) -> impl Iterator<Item = Result<[Word<'a>; N], InputError>> {
+) -> impl Iterator<Item = Result<[Token<'a>; N], InputError>> {
     data_lines(text).map(move |(line, content)| {
         // One word more than wanted is enough to detect that there are too many.
-        let found: Vec<Word> = words(line, content).take(N + 1).collect();
+        let found: Vec<Token> = tokens(line, content).take(N + 1).collect();
         let wrong = found.get(N).or(found.last()).map_or(1, |word| word.column);
         let count = if found.len() > N { "more" } else { "fewer" };
         found.try_into().map_err(|_| {
             let cause = format!("the line has {count} columns than {N}");
-            InputError::new(place, cause, "restore the file; comments start with #").at(line, wrong)
+            InputError::new(place, cause, "restore the file; comments start with #")
+                .with_position(line, wrong)
         })
     })
 }
@@ -208,10 +209,13 @@ impl CsvTable {
         let is_wanted = |name: &&str| names.contains(name);
         let found: Vec<&str> = self.header.iter().map(String::as_str).collect();
         let (known, other): (Vec<&str>, Vec<&str>) = found.into_iter().partition(is_wanted);
-        let cause =
-            format!("the header lacks {}; it has {}", listed(&missing), has(&known, &other));
+        let cause = format!(
+            "the header lacks {}; it has {}",
+            quote_names(&missing),
+            describe_columns(&known, &other)
+        );
         let remedy = "rename the columns that mean these, or add them";
-        Err(InputError::new(&self.place, cause, remedy).at(self.header_line, 1))
+        Err(InputError::new(&self.place, cause, remedy).with_position(self.header_line, 1))
     }
 
     /// Returns the rows, in the order of the file.
@@ -232,12 +236,12 @@ impl<'a> CsvRow<'a> {
     ///
     /// # Panics
     /// When the header has no such column.
-    pub fn field(&self, index: usize) -> Word<'a> {
+    pub fn field(&self, index: usize) -> Token<'a> {
         assert!(index < self.table.header.len(), "a column of the header");
         // Quotes and trimmed blanks are not kept, so the column may be off by these.
         let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
         let line = self.table.lines[self.index] as usize;
-        Word { text: self.text(index), line, column: before + 1 }
+        Token { text: self.text(index), line, column: before + 1 }
     }
 
     fn text(&self, index: usize) -> &'a str {
@@ -248,22 +252,22 @@ impl<'a> CsvRow<'a> {
 }
 
 /// Largest number of columns that an error lists; a table without a header may have very many.
-const LISTED_MAX: usize = 16;
+const MAX_LISTED: usize = 16;
 
 /// Returns the columns of a header as an error lists them: those that are right, then the others.
-fn has(known: &[&str], other: &[&str]) -> String {
+fn describe_columns(known: &[&str], other: &[&str]) -> String {
     match (known, other) {
-        (known, []) => listed(known),
-        ([], other) => format!("none of those wanted, but {}", listed(other)),
-        (known, other) => format!("{}, and others: {}", listed(known), listed(other)),
+        (known, []) => quote_names(known),
+        ([], other) => format!("none of those wanted, but {}", quote_names(other)),
+        (known, other) => format!("{}, and others: {}", quote_names(known), quote_names(other)),
     }
 }
 
 /// Returns names as an error lists them.
-fn listed(names: &[&str]) -> String {
-    let quoted = names.iter().take(LISTED_MAX).map(|name| format!("`{}`", shorten(name)));
+fn quote_names(names: &[&str]) -> String {
+    let quoted = names.iter().take(MAX_LISTED).map(|name| format!("`{}`", shorten(name)));
     let text = quoted.collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(LISTED_MAX) {
+    match names.len().saturating_sub(MAX_LISTED) {
         0 if names.is_empty() => "nothing else".into(),
         0 => text,
         more => format!("{text} and {more} more"),
@@ -286,7 +290,8 @@ fn csv_error(place: &dyn fmt::Display, text: &str, error: &csv::Error) -> InputE
         }
         _ => error.to_string(),
     };
-    InputError::new(place, cause, "give every row one field per column of the header").at(line, 1)
+    InputError::new(place, cause, "give every row one field per column of the header")
+        .with_position(line, 1)
 }
 
 #[cfg(test)]
@@ -308,9 +313,9 @@ mod tests {
         let error = parsed[1].as_ref().unwrap()[1].number(&"f.dat").unwrap_err();
         assert_eq!(error.position(), Some((2, 4)));
         for word in ["nan", "inf", "1e999", "", "-"] {
-            assert!(Word { text: word, line: 1, column: 1 }.number(&"f").is_err(), "{word}");
+            assert!(Token { text: word, line: 1, column: 1 }.number(&"f").is_err(), "{word}");
         }
-        assert!(Word { text: "-1", line: 1, column: 1 }.integer(&"f").is_err());
+        assert!(Token { text: "-1", line: 1, column: 1 }.integer(&"f").is_err());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::local_plane::{LatLon, LocalPlane};
-use super::table::{CsvRow, CsvTable, Word};
+use super::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::{InputError, math};
 use std::ops::RangeInclusive;
 
@@ -73,17 +73,17 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
 const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
 
 /// The longest time in s between the first row and the last one, in time: no recording takes 30 years.
-const LONGEST_S: f64 = 1e9;
+const MAX_DURATION_S: f64 = 1e9;
 
 /// The range of altitudes, in ft.
 const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
 
 /// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong. Airplanes of the simulator
 /// are bounded by it as well, so that one that is too fast is reported at its own row.
-pub const FASTEST_M_S: f64 = 1e6;
+pub const MAX_SPEED_M_S: f64 = 1e6;
 
 /// The indices of the columns.
-struct Columns<'a> {
+struct ColumnIndices<'a> {
     place: &'a str,
     time: usize,
     icao24: usize,
@@ -96,7 +96,7 @@ struct Columns<'a> {
     vertical_speed: Option<usize>,
 }
 
-impl<'a> Columns<'a> {
+impl<'a> ColumnIndices<'a> {
     fn find(table: &'a CsvTable) -> Result<Self, InputError> {
         let names = ["time_s", "icao24", "lat_deg", "lon_deg", "alt_ft", "gs_kt", "track_deg"];
         let [time, icao24, lat, lon, altitude, ground_speed, track] = table.columns(names)?;
@@ -120,18 +120,18 @@ impl<'a> Columns<'a> {
         Ok(Sample {
             time_s: self.time_s(row.field(self.time))?,
             position: LatLon {
-                lat_deg: self.within(row.field(self.lat), -90.0..=90.0)?,
-                lon_deg: self.within(row.field(self.lon), -180.0..=180.0)?,
+                lat_deg: self.number_in(row.field(self.lat), -90.0..=90.0)?,
+                lon_deg: self.number_in(row.field(self.lon), -180.0..=180.0)?,
             },
-            altitude_ft: self.within(row.field(self.altitude), ALTITUDES_FT)?,
-            ground_speed_kt: self.within(row.field(self.ground_speed), 0.0..=10_000.0)?,
+            altitude_ft: self.number_in(row.field(self.altitude), ALTITUDES_FT)?,
+            ground_speed_kt: self.number_in(row.field(self.ground_speed), 0.0..=10_000.0)?,
             // 360 is north, as is 0.
-            track_deg: self.within(row.field(self.track), 0.0..=360.0)? % 360.0,
+            track_deg: self.number_in(row.field(self.track), 0.0..=360.0)? % 360.0,
             vertical_speed_fpm: vertical_speed.map(|word| word.number(&self.place)).transpose()?,
         })
     }
 
-    fn time_s(&self, word: Word) -> Result<f64, InputError> {
+    fn time_s(&self, word: Token) -> Result<f64, InputError> {
         let value = word.number(&self.place)?;
         if TIMES_S.contains(&value) {
             return Ok(value);
@@ -140,7 +140,7 @@ impl<'a> Columns<'a> {
         Err(word.error(&self.place, cause, "give seconds; divide milliseconds by 1000"))
     }
 
-    fn within(&self, word: Word, range: RangeInclusive<f64>) -> Result<f64, InputError> {
+    fn number_in(&self, word: Token, range: RangeInclusive<f64>) -> Result<f64, InputError> {
         let value = word.number(&self.place)?;
         if range.contains(&value) {
             return Ok(value);
@@ -160,26 +160,27 @@ impl<'a> Columns<'a> {
 }
 
 /// A track that is being read, with the words of the times of its samples.
-struct Draft<'t> {
+struct TrackBuilder<'t> {
     track: Track,
-    times: Vec<Word<'t>>,
+    times: Vec<Token<'t>>,
 }
 
 fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
-    let columns = Columns::find(table)?;
-    let mut by_aircraft: BTreeMap<&str, Draft<'_>> = BTreeMap::new();
+    let columns = ColumnIndices::find(table)?;
+    let mut by_aircraft: BTreeMap<&str, TrackBuilder<'_>> = BTreeMap::new();
     let mut rows = 0;
     for row in table.rows() {
         rows += 1;
         let icao24 = columns.icao24(row)?;
-        let Draft { track, times } = by_aircraft.entry(icao24).or_insert_with(|| draft(icao24));
+        let TrackBuilder { track, times } =
+            by_aircraft.entry(icao24).or_insert_with(|| new_builder(icao24));
         if let (Some(column), "") = (columns.callsign, track.callsign.as_str()) {
             row.field(column).text.clone_into(&mut track.callsign);
         }
         track.samples.push(columns.sample(row)?);
         times.push(row.field(columns.time));
     }
-    let mut drafts: Vec<Draft<'_>> = by_aircraft.into_values().collect();
+    let mut drafts: Vec<TrackBuilder<'_>> = by_aircraft.into_values().collect();
     let repeated_rows = drafts.iter_mut().map(sort_by_time).sum();
     check_times(columns.place, &drafts)?;
     check_speeds(columns.place, &drafts)?;
@@ -187,16 +188,16 @@ fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
     Ok(RecordedTraffic { tracks, rows, repeated_rows })
 }
 
-fn draft<'t>(icao24: &str) -> Draft<'t> {
+fn new_builder<'t>(icao24: &str) -> TrackBuilder<'t> {
     let track = Track { icao24: icao24.to_owned(), callsign: String::new(), samples: Vec::new() };
-    Draft { track, times: Vec::new() }
+    TrackBuilder { track, times: Vec::new() }
 }
 
 /// Sorts the samples; of several at one instant the first is kept. Returns how many were removed.
-fn sort_by_time(draft: &mut Draft<'_>) -> usize {
+fn sort_by_time(draft: &mut TrackBuilder<'_>) -> usize {
     let (samples, times) = (&mut draft.track.samples, &mut draft.times);
     let before = samples.len();
-    let mut both: Vec<(Sample, Word<'_>)> = samples.drain(..).zip(times.drain(..)).collect();
+    let mut both: Vec<(Sample, Token<'_>)> = samples.drain(..).zip(times.drain(..)).collect();
     both.sort_by(|(a, _), (b, _)| a.time_s.total_cmp(&b.time_s));
     both.dedup_by_key(|(sample, _)| sample.time_s);
     (*samples, *times) = both.into_iter().unzip();
@@ -204,35 +205,36 @@ fn sort_by_time(draft: &mut Draft<'_>) -> usize {
 }
 
 /// Refuses rows that are a lifetime later than the first.
-fn check_times(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
+fn check_times(place: &str, drafts: &[TrackBuilder<'_>]) -> Result<(), InputError> {
     let all = || drafts.iter().flat_map(|draft| draft.track.samples.iter().zip(&draft.times));
     let first_s = all().map(|(sample, _)| sample.time_s).fold(f64::INFINITY, f64::min);
-    let Some((late, word)) = all().find(|(sample, _)| sample.time_s - first_s > LONGEST_S) else {
+    let Some((late, word)) = all().find(|(sample, _)| sample.time_s - first_s > MAX_DURATION_S)
+    else {
         return Ok(());
     };
     let cause = format!("{:?} s after the first row of the table", late.time_s - first_s);
     let remedy =
-        format!("restore the time of one of the two: up to {LONGEST_S:e} s are between them");
+        format!("restore the time of one of the two: up to {MAX_DURATION_S:e} s are between them");
     Err(word.error(&place, cause, &remedy))
 }
 
 /// Refuses rows with a place that nothing reaches from the one before, on the plane that is flown.
-fn check_speeds(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
+fn check_speeds(place: &str, drafts: &[TrackBuilder<'_>]) -> Result<(), InputError> {
     let samples = drafts.iter().flat_map(|draft| &draft.track.samples);
-    let Some(plane) = LocalPlane::about_all(samples.map(|sample| sample.position)) else {
+    let Some(plane) = LocalPlane::from_positions(samples.map(|sample| sample.position)) else {
         return Ok(());
     };
-    for Draft { track, times } in drafts {
+    for TrackBuilder { track, times } in drafts {
         for (pair, word) in track.samples.windows(2).zip(&times[1..]) {
             let [from, to] = [pair[0], pair[1]].map(|sample| plane.to_plane_m(sample.position));
             let (m, s) =
                 (math::hypot(to[0] - from[0], to[1] - from[1]), pair[1].time_s - pair[0].time_s);
-            if m / s >= FASTEST_M_S {
+            if m / s >= MAX_SPEED_M_S {
                 let icao24 = &track.icao24;
                 let cause =
                     format!("{icao24} flies {:.0} km in {s} s, from its row before", m / 1e3);
                 let remedy = format!(
-                    "restore its place or its time, or delete the row: nothing flies {FASTEST_M_S:e} m/s"
+                    "restore its place or its time, or delete the row: nothing flies {MAX_SPEED_M_S:e} m/s"
                 );
                 return Err(word.error(&place, cause, &remedy));
             }

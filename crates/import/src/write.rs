@@ -1,6 +1,6 @@
 //! Maps written in the format of `map_server`, so that a run can store the maps that it saw.
 
-use sidestep_kernel::view::Plane;
+use sidestep_kernel::view::Isometry2;
 use sidestep_map::Cell;
 
 /// Name of the image to which [`map_files`] refers.
@@ -10,10 +10,10 @@ const IMAGE: &str = "map.pgm";
 pub fn map_files(
     [width, height]: [u32; 2],
     resolution_m: f64,
-    plane: Plane,
+    plane: Isometry2,
     cells: &[Cell],
 ) -> [(&'static str, Vec<u8>); 2] {
-    let Plane { origin_m: [x_m, y_m], yaw_rad } = plane;
+    let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = plane;
     let yaml = format!(
         "# The map as the simulation saw it.\nimage: {IMAGE}\nresolution: {resolution_m:?}\n\
          origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
@@ -41,25 +41,24 @@ pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::AsBoxes;
-    use crate::map_file;
+    use crate::GridOptions;
     use sidestep_map::{GridMap, UnknownPolicy};
 
     #[test]
     fn the_map_comes_back_as_it_was() {
         let cells = vec![Cell::Free, Cell::Wall, Cell::Unknown, Cell::Free, Cell::Free, Cell::Wall];
         let map = GridMap::new(3, 2, 0.1 + 0.2, cells)
-            .with_plane(Plane { origin_m: [-1.5, 1e-7], yaw_rad: 0.1 + 0.2 });
+            .with_plane(Isometry2 { origin_m: [-1.5, 1e-7], yaw_rad: 0.1 + 0.2 });
         let folder = tempfile::tempdir().expect("a folder");
         for (name, bytes) in map_files([3, 2], map.box_size_m, map.plane, map.cells()) {
             std::fs::write(folder.path().join(name), bytes).expect("written");
         }
-        let as_boxes = AsBoxes {
+        let as_boxes = GridOptions {
             box_size_m: map.box_size_m,
             resolution_m: None,
             unknown: UnknownPolicy::Keep,
         };
-        let back = map_file(&folder.path().join("map.yaml"), as_boxes);
+        let back = crate::load_map(&folder.path().join("map.yaml"), as_boxes);
         assert_eq!(back, Ok(map));
     }
 }

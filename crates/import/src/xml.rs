@@ -67,7 +67,7 @@ fn malformed(place: &str, text: &str, error: &roxmltree::Error) -> InputError {
         Error::UnclosedRootNode | Error::UnexpectedEndOfStream => text.trim_end().len(),
         other => offset_of(text, other.pos()),
     };
-    InputError::new(place, cause, remedy).in_text(text, offset)
+    InputError::new(place, cause, remedy).with_offset(text, offset)
 }
 
 /// Returns the byte offset of a position that is given by line and column, the column in
@@ -127,20 +127,20 @@ impl<'a> Element<'a> {
     /// Returns its direct child called `name`, which must exist.
     pub(super) fn required_child(self, name: &'a str) -> Result<Element<'a>, InputError> {
         self.child(name)?.ok_or_else(|| {
-            let cause = format!("<{}> lacks <{name}>", self.described());
+            let cause = format!("<{}> lacks <{name}>", self.description());
             self.error(cause, format!("add <{name} .../>"))
         })
     }
 
     /// Returns the value of an attribute, if it exists.
-    pub(super) fn attribute(self, name: &str) -> Option<Value<'a>> {
-        self.node.attribute_node(name).map(|attribute| Value { element: self, attribute })
+    pub(super) fn attribute(self, name: &str) -> Option<XmlAttribute<'a>> {
+        self.node.attribute_node(name).map(|attribute| XmlAttribute { element: self, attribute })
     }
 
     /// Returns the value of an attribute that must exist and not be empty.
-    pub(super) fn required(self, name: &str) -> Result<Value<'a>, InputError> {
+    pub(super) fn required(self, name: &str) -> Result<XmlAttribute<'a>, InputError> {
         let value = self.attribute(name).ok_or_else(|| {
-            let cause = format!("<{}> has no `{name}`", self.described());
+            let cause = format!("<{}> has no `{name}`", self.description());
             self.error(cause, format!("write {name}=\"...\" into it"))
         })?;
         if value.text().is_empty() {
@@ -150,18 +150,18 @@ impl<'a> Element<'a> {
     }
 
     /// Returns all attributes.
-    pub(super) fn attributes(self) -> impl Iterator<Item = Value<'a>> {
-        self.node.attributes().map(move |attribute| Value { element: self, attribute })
+    pub(super) fn attributes(self) -> impl Iterator<Item = XmlAttribute<'a>> {
+        self.node.attributes().map(move |attribute| XmlAttribute { element: self, attribute })
     }
 
     /// Creates an error at the start of the element.
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let offset = self.node.range().start;
-        InputError::new(self.file.place, cause, remedy).in_text(self.file.text, offset)
+        InputError::new(self.file.place, cause, remedy).with_offset(self.file.text, offset)
     }
 
     /// Returns the element's name, and the attribute that identifies it.
-    fn described(&self) -> String {
+    fn description(&self) -> String {
         match self.node.attribute("name") {
             Some(name) => format!("{} name=\"{name}\"", self.name()),
             None => self.name().into(),
@@ -171,12 +171,12 @@ impl<'a> Element<'a> {
 
 /// The value of an attribute.
 #[derive(Clone, Copy)]
-pub(super) struct Value<'a> {
+pub(super) struct XmlAttribute<'a> {
     element: Element<'a>,
     attribute: Attribute<'a, 'a>,
 }
 
-impl<'a> Value<'a> {
+impl<'a> XmlAttribute<'a> {
     /// Returns the text between the quotation marks, without blanks around it.
     pub(super) fn text(&self) -> &'a str {
         self.attribute.value().trim()
@@ -209,7 +209,7 @@ impl<'a> Value<'a> {
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let file = self.element.file;
         let offset = self.attribute.range_value().start;
-        InputError::new(file.place, cause, remedy).in_text(file.text, offset)
+        InputError::new(file.place, cause, remedy).with_offset(file.text, offset)
     }
 }
 

@@ -13,40 +13,40 @@
 mod error;
 mod world;
 
-use crate::control::{CellsMut, OrderError, Orders, Space, Team};
+use crate::control::{BufferMut, OrderError, Orders, Space, Team};
 use crate::digest::Digest;
 use crate::error::InputError;
 use crate::simulation::Simulation;
 use crate::units::Cycle;
-use crate::workers::Waiting;
+use crate::workers::ThreadPool;
 pub use error::BatchError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use world::{Extent, World};
+use world::{BatchWorld, BufferLayout};
 
 /// Makes a simulation at its start from a seed.
-pub type Start = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
+pub type SimulationFactory = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
 
 /// Many simulations of one scenario.
 pub struct Batch {
-    shared: Arc<Shared>,
-    crew: Waiting,
+    shared: Arc<SharedWorlds>,
+    pool: ThreadPool,
     /// The teams of each world, which are equal.
     teams: Arc<[Team]>,
     /// Orders that wait for the next cycle.
-    orders: Vec<Noted>,
+    orders: Vec<QueuedOrder>,
 }
 
-struct Shared {
-    start: Arc<Start>,
-    worlds: Vec<Mutex<World>>,
+struct SharedWorlds {
+    start: Arc<SimulationFactory>,
+    worlds: Vec<Mutex<BatchWorld>>,
     /// Whether a world may have an error, so that usually none has to be asked.
     is_wrong: AtomicBool,
 }
 
 /// An order to all agents of a team in all worlds.
 #[derive(Debug, Clone)]
-struct Noted {
+struct QueuedOrder {
     team: usize,
     order: String,
     values: Vec<f64>,
@@ -57,22 +57,29 @@ impl Batch {
     ///
     /// # Errors
     /// When there are no seeds, or a world cannot start.
-    pub fn new(start: Arc<Start>, seeds: &[u64], workers: usize) -> Result<Self, BatchError> {
+    pub fn new(
+        start: Arc<SimulationFactory>,
+        seeds: &[u64],
+        workers: usize,
+    ) -> Result<Self, BatchError> {
         if seeds.is_empty() {
             return Err(BatchError::Empty);
         }
-        let world = |&seed: &u64| Mutex::new(World::new(seed));
+        let world = |&seed: &u64| Mutex::new(BatchWorld::new(seed));
         let worlds = seeds.iter().map(world).collect();
-        let shared = Arc::new(Shared { start, worlds, is_wrong: AtomicBool::new(false) });
+        let shared = Arc::new(SharedWorlds { start, worlds, is_wrong: AtomicBool::new(false) });
         // More workers than worlds would have nothing to do.
-        let (crew, orders) = (Waiting::new(workers.min(seeds.len())), Vec::new());
-        let mut batch = Self { shared, crew, teams: Arc::default(), orders };
-        batch.each(|world, index, shared| world.restart(index, world.seed, &*shared.start, None));
-        batch.told()?;
+        let (crew, orders) = (ThreadPool::new(workers.min(seeds.len())), Vec::new());
+        let mut batch = Self { shared, pool: crew, teams: Arc::default(), orders };
+        batch.for_each_world(|world, index, shared| {
+            world.restart(index, world.seed, &*shared.start, None)
+        });
+        batch.check_errors()?;
         let first = batch.world(0);
         let teams: Arc<[Team]> = first.run.as_ref().map_or(&[][..], |run| run.teams()).into();
         drop(first);
-        let differs = |world: &World| world.run.as_ref().is_some_and(|run| *run.teams() != *teams);
+        let differs =
+            |world: &BatchWorld| world.run.as_ref().is_some_and(|run| *run.teams() != *teams);
         if let Some(world) = (1..batch.len()).find(|&k| differs(&batch.world(k))) {
             return Err(BatchError::Shape { world });
         }
@@ -88,7 +95,7 @@ impl Batch {
 
     /// Number of workers: as many as requested, but at most one for each world.
     pub fn workers(&self) -> usize {
-        self.crew.workers()
+        self.pool.workers()
     }
 
     /// The teams of each world.
@@ -114,14 +121,14 @@ impl Batch {
         };
         if width * self.len() != values.len() {
             let (worlds, what, found) = (self.len(), "rows of values", values.len());
-            return Err(BatchError::Worlds { worlds, what, found });
+            return Err(BatchError::Count { worlds, what, found });
         }
         match width {
             0 => check((0, &[][..]))?,
             width => values.chunks(width).enumerate().try_for_each(check)?,
         }
         drop(first);
-        self.orders.push(Noted { team, order: order.into(), values });
+        self.orders.push(QueuedOrder { team, order: order.into(), values });
         Ok(())
     }
 
@@ -133,14 +140,14 @@ impl Batch {
     /// done their cycles then.
     pub fn advance(&mut self, cycles: u64, mask: Option<&[bool]>) -> Result<(), BatchError> {
         self.check_count(mask.map(<[bool]>::len), "truth values")?;
-        self.told()?;
+        self.check_errors()?;
         let orders = std::mem::take(&mut self.orders);
         let (n, teams) = (self.len(), Arc::clone(&self.teams));
         let mask = mask.map(<[bool]>::to_vec);
-        self.each(move |world, index, _| {
+        self.for_each_world(move |world, index, _| {
             if mask.as_ref().is_none_or(|mask| mask[index]) {
-                world.guarded(index, |run| {
-                    for Noted { team, order, values } in &orders {
+                world.with_run(index, |run| {
+                    for QueuedOrder { team, order, values } in &orders {
                         let width = values.len() / n;
                         let values = &values[index * width..(index + 1) * width];
                         let agents = &teams[*team].agents;
@@ -153,7 +160,7 @@ impl Batch {
                 });
             }
         });
-        self.told()
+        self.check_errors()
     }
 
     /// Writes what the agents of a team observe in all worlds: one room for each of its spaces, with the values
@@ -161,37 +168,38 @@ impl Batch {
     ///
     /// # Errors
     /// When there is no such team, or the room has another shape; or a world has broken off.
-    pub fn observe(&mut self, team: usize, room: &mut [CellsMut<'_>]) -> Result<(), BatchError> {
-        self.told()?;
+    pub fn observe(&mut self, team: usize, room: &mut [BufferMut<'_>]) -> Result<(), BatchError> {
+        self.check_errors()?;
         let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
         let lengths: Vec<usize> =
-            its.observed.iter().map(|space| its.agents.len() * space.width()).collect();
-        self.check_room(team, &lengths, room)?;
+            its.observation_spaces.iter().map(|space| its.agents.len() * space.width()).collect();
+        self.check_buffers(team, &lengths, room)?;
         let n = self.len();
         let shared = Arc::clone(&self.shared);
         // The calling thread writes into the caller's room; the others write beside it, because as far as the
         // compiler knows they may outlive the borrowed room.
         let own = |index: usize| {
             let mut world = shared.world(index);
-            let parts = &mut part(room, &lengths, index);
-            world.guarded(index, |run| run.observe(team, parts));
-            shared.note(&world);
+            let parts = &mut world_slice(room, &lengths, index);
+            world.with_run(index, |run| run.observe(team, parts));
+            shared.record_error(&world);
         };
         let theirs = Arc::clone(&self.shared);
         let extent = |(space, &length): (&Space, &usize)| {
-            let is_whole = space.is_whole();
-            Extent { is_whole, length }
+            let is_whole = space.is_integer();
+            BufferLayout { is_integer: is_whole, length }
         };
-        let spaces: Vec<Extent> = its.observed.iter().zip(&lengths).map(extent).collect();
-        self.crew.run(
+        let spaces: Vec<BufferLayout> =
+            its.observation_spaces.iter().zip(&lengths).map(extent).collect();
+        self.pool.run(
             n,
             own,
-            Arc::new(move |index| theirs.world(index).look(index, team, &spaces)),
+            Arc::new(move |index| theirs.world(index).observe(index, team, &spaces)),
         );
         for index in 0..n {
-            self.world(index).hand_over(&mut part(room, &lengths, index));
+            self.world(index).copy_observations(&mut world_slice(room, &lengths, index));
         }
-        self.told()
+        self.check_errors()
     }
 
     /// Starts anew the worlds that have a seed here; waiting orders are dropped.
@@ -202,7 +210,7 @@ impl Batch {
         self.check_count(Some(seeds.len()), "seeds")?;
         self.orders.clear();
         let (wanted, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
-        self.each(move |world, index, shared| {
+        self.for_each_world(move |world, index, shared| {
             if let Some(seed) = wanted[index] {
                 world.restart(index, seed, &*shared.start, Some(&teams));
             }
@@ -222,7 +230,7 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn cycles(&self) -> Result<Vec<Cycle>, BatchError> {
-        self.ask(|run| run.cycle())
+        self.query(|run| run.cycle())
     }
 
     /// Returns whether nothing can happen anymore, for each world.
@@ -230,7 +238,7 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn is_over(&self) -> Result<Vec<bool>, BatchError> {
-        self.ask(|run| run.is_over())
+        self.query(|run| run.is_over())
     }
 
     /// Returns the digest of each world; waiting orders are not in it.
@@ -238,39 +246,42 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn digests(&self) -> Result<Vec<Digest>, BatchError> {
-        self.ask(|run| run.digest())
+        self.query(|run| run.digest())
     }
 
     /// Returns the result of a function for each world.
     ///
     /// # Errors
     /// When a world has broken off.
-    pub fn ask<T>(&self, of: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
+    pub fn query<T>(&self, of: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
         let answer = |k| {
             let world = self.world(k);
-            world.run.as_deref().map(&of).ok_or_else(|| world.unfit(k))
+            world.run.as_deref().map(&of).ok_or_else(|| world.no_run_error(k))
         };
         (0..self.len()).map(answer).collect()
     }
 
-    fn world(&self, index: usize) -> MutexGuard<'_, World> {
+    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
         self.shared.world(index)
     }
 
     /// Does some work in each world, on all workers.
-    fn each(&mut self, work: impl Fn(&mut World, usize, &Shared) + Send + Sync + 'static) {
+    fn for_each_world(
+        &mut self,
+        work: impl Fn(&mut BatchWorld, usize, &SharedWorlds) + Send + Sync + 'static,
+    ) {
         let (n, shared) = (self.len(), Arc::clone(&self.shared));
         let work = Arc::new(move |k: usize| {
             let mut world = shared.world(k);
             work(&mut world, k, &shared);
-            shared.note(&world);
+            shared.record_error(&world);
         });
         let theirs = Arc::clone(&work);
-        self.crew.run(n, |k| work(k), theirs);
+        self.pool.run(n, |k| work(k), theirs);
     }
 
     /// Returns the error of the first world that has one. Those of broken worlds stay.
-    fn told(&self) -> Result<(), BatchError> {
+    fn check_errors(&self) -> Result<(), BatchError> {
         match self.shared.is_wrong.load(Ordering::Relaxed) {
             true => self.first_error(|_, _| true).map_or(Ok(()), Err),
             false => Ok(()),
@@ -300,29 +311,30 @@ impl Batch {
     fn check_count(&self, found: Option<usize>, what: &'static str) -> Result<(), BatchError> {
         let worlds = self.len();
         let wrong = found.filter(|&found| found != worlds);
-        wrong.map_or(Ok(()), |found| Err(BatchError::Worlds { worlds, what, found }))
+        wrong.map_or(Ok(()), |found| Err(BatchError::Count { worlds, what, found }))
     }
 
     /// Checks that there is exactly the room that a team's observations in all worlds need.
-    fn check_room(
+    fn check_buffers(
         &self,
         team: usize,
         lengths: &[usize],
-        room: &[CellsMut<'_>],
+        room: &[BufferMut<'_>],
     ) -> Result<(), OrderError> {
-        let (observed, n) = (&self.teams[team].observed, self.len());
+        let (observed, n) = (&self.teams[team].observation_spaces, self.len());
         let fits = room.len() == lengths.len()
             && room.iter().zip(observed).zip(lengths).all(|((room, space), &length)| {
-                room.len() == n * length && space.is_whole() == matches!(room, CellsMut::Whole(_))
+                room.len() == n * length
+                    && space.is_integer() == matches!(room, BufferMut::Integer(_))
             });
         if fits {
             return Ok(());
         }
         let expected = observed.iter().zip(lengths).map(|(space, length)| {
-            let sort = if space.is_whole() { "whole" } else { "real" };
+            let sort = if space.is_integer() { "whole" } else { "real" };
             format!("{} of {n} x {length} {sort} values", space.name)
         });
-        Err(OrderError::Room { expected: expected.collect::<Vec<_>>().join(", ") })
+        Err(OrderError::BufferShape { expected: expected.collect::<Vec<_>>().join(", ") })
     }
 }
 
@@ -332,14 +344,14 @@ impl std::fmt::Debug for Batch {
     }
 }
 
-impl Shared {
+impl SharedWorlds {
     /// A world that panicked no longer has a run, so nothing that it left behind is read.
-    fn world(&self, index: usize) -> MutexGuard<'_, World> {
+    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
         self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes whether a world has an error; the end of a call is a barrier.
-    fn note(&self, world: &World) {
+    fn record_error(&self, world: &BatchWorld) {
         if world.error.is_some() {
             self.is_wrong.store(true, Ordering::Relaxed);
         }
@@ -347,11 +359,15 @@ impl Shared {
 }
 
 /// Returns one world's part of the room for all worlds.
-fn part<'a>(room: &'a mut [CellsMut<'_>], lengths: &[usize], index: usize) -> Vec<CellsMut<'a>> {
+fn world_slice<'a>(
+    room: &'a mut [BufferMut<'_>],
+    lengths: &[usize],
+    index: usize,
+) -> Vec<BufferMut<'a>> {
     let range = |length: usize| index * length..(index + 1) * length;
-    let one = |(room, &length): (&'a mut CellsMut<'_>, &usize)| match room {
-        CellsMut::Whole(room) => CellsMut::Whole(&mut room[range(length)]),
-        CellsMut::Real(room) => CellsMut::Real(&mut room[range(length)]),
+    let one = |(room, &length): (&'a mut BufferMut<'_>, &usize)| match room {
+        BufferMut::Integer(room) => BufferMut::Integer(&mut room[range(length)]),
+        BufferMut::Real(room) => BufferMut::Real(&mut room[range(length)]),
     };
     room.iter_mut().zip(lengths).map(one).collect()
 }

@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 const MAGIC: &[u8; 8] = b"SIDESTEP";
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
-pub const FORMAT: u32 = 2;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// The program, world, scenario and cycle that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    /// [`FORMAT`] of the writer.
+    /// [`FORMAT_VERSION`] of the writer.
     pub format: u32,
     /// Version of the program that wrote it; results may differ between versions.
     pub program_version: String,
@@ -34,9 +34,9 @@ impl Header {
     /// # Errors
     /// When it is not; the error names the first difference.
     pub fn check_origin(&self, expected: &Self) -> Result<(), CheckpointError> {
-        belongs("version", &self.program_version, &expected.program_version)?;
-        belongs("world", &self.world, &expected.world)?;
-        belongs("scenario", &hex(&self.scenario), &hex(&expected.scenario))
+        check_match("version", &self.program_version, &expected.program_version)?;
+        check_match("world", &self.world, &expected.world)?;
+        check_match("scenario", &hex(&self.scenario), &hex(&expected.scenario))
     }
 }
 
@@ -51,7 +51,7 @@ pub enum CheckpointError {
     #[error("the checkpoint is damaged: its checksum does not fit")]
     Damaged,
     /// Written with another layout.
-    #[error("the checkpoint has format {found}, this program reads format {FORMAT}")]
+    #[error("the checkpoint has format {found}, this program reads format {FORMAT_VERSION}")]
     Format {
         /// The format that was found.
         found: u32,
@@ -76,7 +76,7 @@ pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes = postcard::to_extend(header, bytes).expect("a header is plain data");
     bytes = postcard::to_extend(state, bytes).expect("a state is plain data");
-    let checksum = Digest::of(&bytes);
+    let checksum = Digest::hash_bytes(&bytes);
     bytes.extend_from_slice(checksum.as_bytes());
     bytes
 }
@@ -108,20 +108,20 @@ fn split(bytes: &[u8]) -> Result<(Header, &[u8]), CheckpointError> {
     let body = bytes.strip_prefix(MAGIC).ok_or(CheckpointError::NotACheckpoint)?;
     let (_, checksum) = bytes.split_last_chunk::<16>().ok_or(CheckpointError::Damaged)?;
     let whole = &bytes[..bytes.len() - 16];
-    if body.len() < 16 || Digest::of(whole).as_bytes() != checksum {
+    if body.len() < 16 || Digest::hash_bytes(whole).as_bytes() != checksum {
         return Err(CheckpointError::Damaged);
     }
     let body = &body[..body.len() - 16];
     // The format is read on its own, because the rest of another layout cannot be decoded.
     let (found, _): (u32, _) =
         postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)?;
-    if found != FORMAT {
+    if found != FORMAT_VERSION {
         return Err(CheckpointError::Format { found });
     }
     postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)
 }
 
-fn belongs(what: &'static str, found: &str, expected: &str) -> Result<(), CheckpointError> {
+fn check_match(what: &'static str, found: &str, expected: &str) -> Result<(), CheckpointError> {
     if found == expected {
         return Ok(());
     }
@@ -139,7 +139,7 @@ mod tests {
 
     fn header() -> Header {
         Header {
-            format: FORMAT,
+            format: FORMAT_VERSION,
             program_version: "1.2.3".into(),
             world: "toy".into(),
             scenario: [7; 16],

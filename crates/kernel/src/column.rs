@@ -8,7 +8,7 @@
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering::Relaxed};
 
 /// A plain value that fits into an atomic.
-pub trait Word: Copy + Default + Send + Sync + 'static {
+pub trait AtomicValue: Copy + Default + Send + Sync + 'static {
     /// The atomic that holds it.
     type Cell: Send + Sync;
     /// Returns a cell with this value.
@@ -21,7 +21,7 @@ pub trait Word: Copy + Default + Send + Sync + 'static {
 
 macro_rules! word {
     ($($t:ty, $atomic:ty;)*) => {$(
-        impl Word for $t {
+        impl AtomicValue for $t {
             type Cell = $atomic;
             #[inline(always)]
             fn cell(self) -> $atomic { <$atomic>::new(self) }
@@ -34,7 +34,7 @@ macro_rules! word {
 }
 word! { u8, AtomicU8; u16, AtomicU16; u32, AtomicU32; u64, AtomicU64; }
 
-impl Word for f64 {
+impl AtomicValue for f64 {
     type Cell = AtomicU64;
     #[inline(always)]
     fn cell(self) -> AtomicU64 {
@@ -51,35 +51,35 @@ impl Word for f64 {
 }
 
 /// A value that is kept as a number which stands for it.
-pub trait Coded: Copy + Default + Send + Sync + 'static {
+pub trait Packed: Copy + Default + Send + Sync + 'static {
     /// The number.
-    type Code: Word;
+    type Bits: AtomicValue;
     /// Returns the number that stands for this value.
-    fn code(self) -> Self::Code;
+    fn to_bits(self) -> Self::Bits;
     /// Returns the value that a number stands for.
-    fn of_code(code: Self::Code) -> Self;
+    fn from_bits(code: Self::Bits) -> Self;
 }
 
-impl<T: Coded> Word for T {
-    type Cell = <T::Code as Word>::Cell;
+impl<T: Packed> AtomicValue for T {
+    type Cell = <T::Bits as AtomicValue>::Cell;
     #[inline(always)]
     fn cell(self) -> Self::Cell {
-        self.code().cell()
+        self.to_bits().cell()
     }
     #[inline(always)]
     fn load(cell: &Self::Cell) -> Self {
-        Self::of_code(T::Code::load(cell))
+        Self::from_bits(T::Bits::load(cell))
     }
     #[inline(always)]
     fn store(cell: &Self::Cell, value: Self) {
-        T::Code::store(cell, value.code());
+        T::Bits::store(cell, value.to_bits());
     }
 }
 
 /// One value that workers share; see the module.
-pub struct Shared<T: Word>(T::Cell);
+pub struct AtomicCell<T: AtomicValue>(T::Cell);
 
-impl<T: Word> Shared<T> {
+impl<T: AtomicValue> AtomicCell<T> {
     /// A cell that holds `value`.
     #[inline(always)]
     pub fn new(value: T) -> Self {
@@ -99,37 +99,37 @@ impl<T: Word> Shared<T> {
     }
 }
 
-impl Shared<u32> {
+impl AtomicCell<u32> {
     /// Raises the value to `value` if it is smaller; several writers of a phase may do so, because
     /// the outcome is the same in every order.
     #[inline]
-    pub fn raise(&self, value: u32) {
+    pub fn raise_to(&self, value: u32) {
         self.0.fetch_max(value, Relaxed);
     }
 }
 
-impl<T: Word> Clone for Shared<T> {
+impl<T: AtomicValue> Clone for AtomicCell<T> {
     fn clone(&self) -> Self {
         Self::new(self.get())
     }
 }
 
-impl<T: Word> Default for Shared<T> {
+impl<T: AtomicValue> Default for AtomicCell<T> {
     fn default() -> Self {
         Self::new(T::default())
     }
 }
 
-impl<T: Word + std::fmt::Debug> std::fmt::Debug for Shared<T> {
+impl<T: AtomicValue + std::fmt::Debug> std::fmt::Debug for AtomicCell<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.get().fmt(f)
     }
 }
 
 /// One value per slot, shared by the workers.
-pub struct Column<T: Word>(Box<[T::Cell]>);
+pub struct Column<T: AtomicValue>(Box<[T::Cell]>);
 
-impl<T: Word> Column<T> {
+impl<T: AtomicValue> Column<T> {
     /// Creates `n` slots that hold `value`.
     pub fn filled(n: usize, value: T) -> Self {
         (0..n).map(|_| value).collect()
@@ -174,19 +174,19 @@ impl<T: Word> Column<T> {
     }
 }
 
-impl<T: Word> FromIterator<T> for Column<T> {
+impl<T: AtomicValue> FromIterator<T> for Column<T> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         Self(values.into_iter().map(T::cell).collect())
     }
 }
 
-impl<T: Word> Clone for Column<T> {
+impl<T: AtomicValue> Clone for Column<T> {
     fn clone(&self) -> Self {
         self.iter().collect()
     }
 }
 
-impl<T: Word + std::fmt::Debug> std::fmt::Debug for Column<T> {
+impl<T: AtomicValue + std::fmt::Debug> std::fmt::Debug for Column<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_list().entries(self.iter()).finish()
     }

@@ -14,7 +14,7 @@ const NONE: Slot = Slot::MAX;
 
 /// The conflict groups of one cycle over slots `0..n`.
 #[derive(Debug)]
-pub struct Groups {
+pub struct ConflictGroups {
     /// Toward the leader; a leader points at itself.
     parent: Column<Slot>,
     /// Last slot that became a child of this one.
@@ -23,7 +23,7 @@ pub struct Groups {
     next_sibling: Column<Slot>,
 }
 
-impl Groups {
+impl ConflictGroups {
     /// Creates groups of one slot each, for `n` slots.
     pub fn new(n: usize) -> Self {
         Self {
@@ -82,7 +82,7 @@ impl Groups {
 
     /// Returns whether a leader is the only member of its group.
     #[inline]
-    pub fn is_alone(&self, slot: Slot) -> bool {
+    pub fn is_singleton(&self, slot: Slot) -> bool {
         self.first_child.get(slot as usize) == NONE && self.is_leader(slot)
     }
 
@@ -116,12 +116,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn partition(n: usize, groups: &Groups) -> Vec<Vec<Slot>> {
+    fn partition(n: usize, groups: &ConflictGroups) -> Vec<Vec<Slot>> {
         let mut all = Vec::new();
         for slot in (0..n as Slot).filter(|&s| groups.is_leader(s)) {
             let mut members = Vec::new();
             groups.members(slot, &mut members);
-            assert_eq!(groups.is_alone(slot), members.len() == 1);
+            assert_eq!(groups.is_singleton(slot), members.len() == 1);
             members.sort_unstable();
             assert_eq!(members[0], slot, "the leader is the smallest member");
             all.push(members);
@@ -149,7 +149,7 @@ mod tests {
     proptest! {
         #[test]
         fn groups_are_the_connected_components(edges in prop::collection::vec((0usize..40, 0usize..40), 0..60)) {
-            let groups = Groups::new(40);
+            let groups = ConflictGroups::new(40);
             for &(a, b) in &edges {
                 groups.join(a as Slot, b as Slot);
             }
@@ -158,7 +158,7 @@ mod tests {
 
         #[test]
         fn joining_from_two_threads_gives_the_same_groups(edges in prop::collection::vec((0usize..300, 0usize..300), 0..400)) {
-            let groups = Groups::new(300);
+            let groups = ConflictGroups::new(300);
             std::thread::scope(|scope| {
                 for part in 0..2 {
                     let (groups, edges) = (&groups, &edges);
@@ -175,9 +175,9 @@ mod tests {
 
     #[test]
     fn reset_takes_a_group_apart() {
-        let groups = Groups::new(3);
+        let groups = ConflictGroups::new(3);
         groups.join(0, 2);
         (0..3).for_each(|s| groups.reset(s));
-        assert!((0..3).all(|s| groups.is_alone(s)));
+        assert!((0..3).all(|s| groups.is_singleton(s)));
     }
 }

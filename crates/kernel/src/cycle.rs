@@ -12,13 +12,13 @@
 //! but a lock or an atomic exchange per claimed box. Here claims are plain stores and joining is a
 //! pass of its own, at the price of one more barrier per cycle.
 
-use crate::conflict::Groups;
+use crate::conflict::ConflictGroups;
 use crate::interrupt::{self, Interrupt};
-use crate::plan::GroupSizes;
 use crate::ports::Clock;
+use crate::run_config::GroupSizes;
 use crate::units::{Cycle, Slot};
-use crate::workers::{Team, Worker};
-use crate::world::{Auction, Phases, Turn};
+use crate::workers::{Worker, WorkerTeam};
+use crate::world::{Auction, PhaseContext, Phases};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -45,16 +45,16 @@ impl PhaseTimes {
 
 /// One worker's share of a run: the world's scratch and the kernel's own.
 #[derive(Debug)]
-pub struct Mate<S> {
+pub struct WorkerState<S> {
     /// The world's scratch.
     pub scratch: S,
     /// The kernel's own.
-    pub tally: Tally,
+    pub stats: WorkerStats,
 }
 
 /// A worker's group sizes, processor time and buffers.
 #[derive(Debug, Default)]
-pub struct Tally {
+pub struct WorkerStats {
     /// Conflict groups seen.
     pub groups: GroupSizes,
     /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
@@ -69,33 +69,33 @@ pub struct Tally {
 
 /// The number of first calls of a single cycle that are all measured, and of later calls per measured one: reading
 /// the processor time is a system call, and small worlds that get orders from cycle to cycle take not much longer.
-const MEASURED_SINGLE: u64 = 64;
-const SINGLE_PER_MEASURED: u64 = 16;
+const MEASURED_FIRST_CALLS: u64 = 64;
+const CALLS_PER_MEASUREMENT: u64 = 16;
 
-impl Tally {
+impl WorkerStats {
     /// Returns the number of calls for which the processor time of the next one stands; 0 if it is not measured.
-    fn weight(&mut self, cycles: u64) -> u64 {
+    fn measurement_weight(&mut self, cycles: u64) -> u64 {
         if cycles > 1 {
             return 1;
         }
         self.single += 1;
         match self.single {
-            ..=MEASURED_SINGLE => 1,
-            k if k.is_multiple_of(SINGLE_PER_MEASURED) => SINGLE_PER_MEASURED,
+            ..=MEASURED_FIRST_CALLS => 1,
+            k if k.is_multiple_of(CALLS_PER_MEASUREMENT) => CALLS_PER_MEASUREMENT,
             _ => 0,
         }
     }
 }
 
-impl<S> Mate<S> {
+impl<S> WorkerState<S> {
     /// Creates a worker that has done nothing yet.
     pub fn new(scratch: S) -> Self {
-        Self { scratch, tally: Tally::default() }
+        Self { scratch, stats: WorkerStats::default() }
     }
 }
 
 /// The workers of an engine. A worker holds its lock while it works, so it never waits for one.
-pub(crate) type Crew<S> = [Mutex<Mate<S>>];
+pub(crate) type WorkerStates<S> = [Mutex<WorkerState<S>>];
 
 /// An onlooker between the cycles of a run, on the calling thread, while all workers wait.
 ///
@@ -118,7 +118,7 @@ pub trait Observer<W: Phases> {
 
 /// The scratches of all workers, while these wait.
 #[derive(Debug)]
-pub struct Scratches<'a, S>(&'a Crew<S>);
+pub struct Scratches<'a, S>(&'a WorkerStates<S>);
 
 impl<S> Scratches<'_, S> {
     /// Calls `take` for the scratch of each worker. The share of each worker differs from run to
@@ -135,7 +135,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Cycles in a row that are run without a change of workers.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stretch {
+pub(crate) struct Segment {
     /// The first cycle.
     pub(crate) from: Cycle,
     /// The maximum number of cycles.
@@ -144,9 +144,9 @@ pub(crate) struct Stretch {
     pub(crate) limit_ns: u64,
 }
 
-/// The result of a [`Stretch`].
+/// The result of a [`Segment`].
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Ran {
+pub(crate) struct SegmentTiming {
     /// Cycles done, at least 1.
     pub(crate) cycles: u64,
     /// Their time in nanoseconds, including the start of the threads and the observer.
@@ -160,12 +160,12 @@ pub(crate) struct Ran {
 }
 
 /// The parts of an engine that run a stretch.
-pub(crate) struct Parts<'a, S, C> {
-    pub(crate) groups: &'a Groups,
+pub(crate) struct EngineParts<'a, S, C> {
+    pub(crate) groups: &'a ConflictGroups,
     /// One worker per element.
-    pub(crate) crew: &'a Crew<S>,
+    pub(crate) crew: &'a WorkerStates<S>,
     /// The threads of the crew, where it has several workers.
-    pub(crate) team: Option<&'a mut Team>,
+    pub(crate) team: Option<&'a mut WorkerTeam>,
     pub(crate) clock: &'a C,
     pub(crate) interrupt: &'a Interrupt,
 }
@@ -176,11 +176,11 @@ pub(crate) struct Parts<'a, S, C> {
 pub(crate) fn advance<W: Phases, C: Clock>(
     world: &W,
     state: &W::State,
-    parts: Parts<'_, W::Scratch, C>,
-    stretch: Stretch,
+    parts: EngineParts<'_, W::Scratch, C>,
+    stretch: Segment,
     mut observer: Option<&mut dyn Observer<W>>,
-) -> Ran {
-    let Parts { groups, crew, team, clock, interrupt } = parts;
+) -> SegmentTiming {
+    let EngineParts { groups, crew, team, clock, interrupt } = parts;
     let started_ns = clock.now_ns();
     if let Some(observer) = &mut observer {
         observer.before_cycle(stretch.from, state);
@@ -188,30 +188,31 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
     let shared =
-        Shared { world, state, groups, crew, clock, interrupt, stretch, is_observed, stop };
+        SegmentContext { world, state, groups, crew, clock, interrupt, stretch, is_observed, stop };
     // The observer's own time belongs to no phase.
     let mark_ns = if is_observed { clock.now_ns() } else { started_ns };
-    let mut lead = Lead { clock, observer, started_ns, mark_ns, ran: Ran::default() };
+    let mut lead =
+        LeaderState { clock, observer, started_ns, mark_ns, ran: SegmentTiming::default() };
     match team {
-        None => shared.work(&Worker::ALONE, Some(&mut lead)),
+        None => shared.run(&Worker::ALONE, Some(&mut lead)),
         Some(team) => team.run(
             &mut vec![(); crew.len()],
-            |worker, ()| shared.work(worker, Some(&mut lead)),
-            |worker, ()| shared.work::<C>(worker, None),
+            |worker, ()| shared.run(worker, Some(&mut lead)),
+            |worker, ()| shared.run::<C>(worker, None),
         ),
     }
-    Ran { took_ns: clock.now_ns() - started_ns, ..lead.ran }
+    SegmentTiming { took_ns: clock.now_ns() - started_ns, ..lead.ran }
 }
 
 /// The data of a stretch that all workers share.
-struct Shared<'a, W: Phases> {
+struct SegmentContext<'a, W: Phases> {
     world: &'a W,
     state: &'a W::State,
-    groups: &'a Groups,
-    crew: &'a Crew<W::Scratch>,
+    groups: &'a ConflictGroups,
+    crew: &'a WorkerStates<W::Scratch>,
     clock: &'a dyn Clock,
     interrupt: &'a Interrupt,
-    stretch: Stretch,
+    stretch: Segment,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
     /// read it after that barrier.
@@ -219,16 +220,16 @@ struct Shared<'a, W: Phases> {
 }
 
 /// The part of worker 0 alone: it reads the clock, calls the observer, and ends the stretch.
-struct Lead<'a, 'b, W: Phases, C> {
+struct LeaderState<'a, 'b, W: Phases, C> {
     clock: &'a C,
     observer: Option<&'a mut (dyn Observer<W> + 'b)>,
     started_ns: u64,
     /// Clock reading at the start of the present phase, in nanoseconds.
     mark_ns: u64,
-    ran: Ran,
+    ran: SegmentTiming,
 }
 
-impl<W: Phases, C: Clock> Lead<'_, '_, W, C> {
+impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
     /// Adds the time since the last call to one phase.
     fn end_phase(&mut self, phase: impl FnOnce(&mut PhaseTimes) -> &mut u64) {
         let now_ns = self.clock.now_ns();
@@ -237,7 +238,7 @@ impl<W: Phases, C: Clock> Lead<'_, '_, W, C> {
     }
 
     /// Counts a cycle, and returns whether the stretch ends with it.
-    fn count(&mut self, stretch: Stretch) -> bool {
+    fn count_cycle(&mut self, stretch: Segment) -> bool {
         let since_ns = self.mark_ns - self.started_ns;
         self.ran.cycles += 1;
         if self.ran.cycles == 1 {
@@ -247,24 +248,28 @@ impl<W: Phases, C: Clock> Lead<'_, '_, W, C> {
     }
 }
 
-impl<W: Phases> Shared<'_, W> {
+impl<W: Phases> SegmentContext<'_, W> {
     /// One worker's part of the stretch.
-    fn work<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut Lead<'_, '_, W, C>>) {
-        let weight = lock(&self.crew[worker.index()]).tally.weight(self.stretch.cycles);
+    fn run<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut LeaderState<'_, '_, W, C>>) {
+        let weight = lock(&self.crew[worker.index()]).stats.measurement_weight(self.stretch.cycles);
         let began_ns = if weight > 0 { self.clock.thread_cpu_ns() } else { 0 };
-        let _heeded = self.interrupt.heeded_here();
-        self.all_cycles(worker, lead);
+        let _heeded = self.interrupt.attach();
+        self.run_cycles(worker, lead);
         if weight > 0 {
             let took_ns = self.clock.thread_cpu_ns() - began_ns;
-            lock(&self.crew[worker.index()]).tally.cpu_ns += weight * took_ns;
+            lock(&self.crew[worker.index()]).stats.cpu_ns += weight * took_ns;
         }
     }
 
-    fn all_cycles<C: Clock>(&self, worker: &Worker<'_>, mut lead: Option<&mut Lead<'_, '_, W, C>>) {
+    fn run_cycles<C: Clock>(
+        &self,
+        worker: &Worker<'_>,
+        mut lead: Option<&mut LeaderState<'_, '_, W, C>>,
+    ) {
         let mut held = None;
         for now in self.stretch.from.. {
             let mate = held.get_or_insert_with(|| lock(&self.crew[worker.index()]));
-            self.one_cycle(worker, mate, now, lead.as_deref_mut());
+            self.run_cycle(worker, mate, now, lead.as_deref_mut());
             if self.is_observed {
                 // The observer locks the scratches of all workers, so each releases its own first.
                 held = None;
@@ -276,7 +281,7 @@ impl<W: Phases> Shared<'_, W> {
             if let Some(lead) = &mut lead
                 // `observe` has counted the cycle already.
                 && !self.is_observed
-                && lead.count(self.stretch)
+                && lead.count_cycle(self.stretch)
             {
                 self.stop.store(true, Ordering::Relaxed);
             }
@@ -294,9 +299,9 @@ impl<W: Phases> Shared<'_, W> {
     }
 
     /// Lets the observer look at the cycle that is done and, if there is one, at the next.
-    fn observe<C: Clock>(&self, now: Cycle, lead: &mut Lead<'_, '_, W, C>) {
+    fn observe<C: Clock>(&self, now: Cycle, lead: &mut LeaderState<'_, '_, W, C>) {
         lead.end_phase(|times| &mut times.act_ns);
-        let is_last = lead.count(self.stretch);
+        let is_last = lead.count_cycle(self.stretch);
         let Some(observer) = &mut lead.observer else { return };
         lead.ran.is_ended = observer.after_cycle(now, self.state, Scratches(self.crew)).is_break();
         if is_last || lead.ran.is_ended {
@@ -311,20 +316,20 @@ impl<W: Phases> Shared<'_, W> {
     /// Runs all phases of one cycle; the effects of the last one are visible after the next
     /// barrier.
     #[inline]
-    fn one_cycle<C: Clock>(
+    fn run_cycle<C: Clock>(
         &self,
         worker: &Worker<'_>,
-        mate: &mut Mate<W::Scratch>,
+        mate: &mut WorkerState<W::Scratch>,
         now: Cycle,
-        mut lead: Option<&mut Lead<'_, '_, W, C>>,
+        mut lead: Option<&mut LeaderState<'_, '_, W, C>>,
     ) {
         let &Self { world, state, groups, clock, stretch, .. } = self;
-        let Mate { scratch, tally } = mate;
+        let WorkerState { scratch, stats: tally } = mate;
         let pool = 3 * (now - stretch.from);
-        let turn = &mut Turn { world, state, now, clock, scratch };
+        let turn = &mut PhaseContext { world, state, now, clock, scratch };
         let n = world.bodies(state);
         worker.for_each_chunk(pool, n, |bodies| {
-            interrupt::look();
+            interrupt::check();
             bodies.clone().for_each(|body| groups.reset(body as Slot));
             W::claim(turn, bodies);
         });
@@ -333,7 +338,7 @@ impl<W: Phases> Shared<'_, W> {
             lead.end_phase(|times| &mut times.claim_ns);
         }
         worker.for_each_chunk(pool + 1, n, |bodies| {
-            interrupt::look();
+            interrupt::check();
             W::join(turn, bodies, groups);
         });
         worker.barrier();
@@ -342,13 +347,13 @@ impl<W: Phases> Shared<'_, W> {
         }
         let auction = world.auction();
         worker.for_each_chunk(pool + 2, n, |bodies| {
-            interrupt::look();
+            interrupt::check();
             bodies.for_each(|body| {
-                act_as_leader(turn, groups, tally, auction.is_some(), body as Slot);
+                act_if_leader(turn, groups, tally, auction.is_some(), body as Slot);
             });
         });
         if let Some(auction) = auction {
-            hold_auction(auction, turn, &mut tally.pending, worker);
+            run_auction(auction, turn, &mut tally.pending, worker);
         }
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.act_ns);
@@ -358,10 +363,10 @@ impl<W: Phases> Shared<'_, W> {
 
 /// Lets the group of `body` act if `body` leads one.
 #[inline]
-fn act_as_leader<W: Phases>(
-    turn: &mut Turn<'_, W>,
-    groups: &Groups,
-    own: &mut Tally,
+fn act_if_leader<W: Phases>(
+    turn: &mut PhaseContext<'_, W>,
+    groups: &ConflictGroups,
+    own: &mut WorkerStats,
     by_auction: bool,
     body: Slot,
 ) {
@@ -369,7 +374,7 @@ fn act_as_leader<W: Phases>(
         return;
     }
     // A body without a conflict needs neither a list of members nor an auction.
-    if groups.is_alone(body) {
+    if groups.is_singleton(body) {
         own.groups.counts[0] += 1;
         return W::act(turn, &mut [body]);
     }
@@ -386,14 +391,14 @@ fn act_as_leader<W: Phases>(
 
 /// Holds rounds of bidding until every body in conflict has acted. A group's bodies are all in
 /// one worker's list, so the groups spread over the workers.
-fn hold_auction<W: Phases>(
+fn run_auction<W: Phases>(
     auction: &dyn Auction<W>,
-    turn: &mut Turn<'_, W>,
+    turn: &mut PhaseContext<'_, W>,
     pending: &mut Vec<Slot>,
     worker: &Worker<'_>,
 ) {
     while worker.any(!pending.is_empty()) {
-        interrupt::look();
+        interrupt::check();
         for &body in &*pending {
             auction.bid(turn, body);
         }
@@ -410,10 +415,10 @@ mod tests {
 
     #[test]
     fn measured_calls_stand_for_all() {
-        let mut tally = Tally::default();
-        let weights: Vec<u64> = (0..64 + 1600).map(|_| tally.weight(1)).collect();
+        let mut tally = WorkerStats::default();
+        let weights: Vec<u64> = (0..64 + 1600).map(|_| tally.measurement_weight(1)).collect();
         assert_eq!(weights.iter().sum::<u64>(), 64 + 1600);
         assert_eq!(weights.iter().filter(|&&weight| weight > 0).count(), 64 + 100);
-        assert!([2, 100].map(|cycles| tally.weight(cycles)) == [1, 1]);
+        assert!([2, 100].map(|cycles| tally.measurement_weight(cycles)) == [1, 1]);
     }
 }

@@ -12,9 +12,9 @@ pub struct Digest([u8; 16]);
 
 impl Digest {
     /// Returns the digest of one piece of text or bytes.
-    pub fn of(bytes: &[u8]) -> Self {
+    pub fn hash_bytes(bytes: &[u8]) -> Self {
         let mut hasher = Hasher::default();
-        hasher.bytes(bytes);
+        hasher.write_bytes(bytes);
         hasher.finish()
     }
 
@@ -46,7 +46,7 @@ pub struct Hasher {
 
 impl Hasher {
     /// Adds bytes without their length; add the length first where it may vary.
-    pub fn bytes(&mut self, bytes: &[u8]) {
+    pub fn write_bytes(&mut self, bytes: &[u8]) {
         self.buffer.extend_from_slice(bytes);
         if self.buffer.len() >= 1 << 16 {
             self.inner.update(&self.buffer);
@@ -55,23 +55,23 @@ impl Hasher {
     }
 
     /// Adds a byte.
-    pub fn u8(&mut self, value: u8) {
-        self.bytes(&[value]);
+    pub fn write_u8(&mut self, value: u8) {
+        self.write_bytes(&[value]);
     }
 
     /// Adds a 32-bit word.
-    pub fn u32(&mut self, value: u32) {
-        self.bytes(&value.to_le_bytes());
+    pub fn write_u32(&mut self, value: u32) {
+        self.write_bytes(&value.to_le_bytes());
     }
 
     /// Adds a 64-bit word.
-    pub fn u64(&mut self, value: u64) {
-        self.bytes(&value.to_le_bytes());
+    pub fn write_u64(&mut self, value: u64) {
+        self.write_bytes(&value.to_le_bytes());
     }
 
     /// Adds a float by its bits; the two zeros count as one, because they compare equal.
-    pub fn f64(&mut self, value: f64) {
-        self.u64((value + 0.0).to_bits());
+    pub fn write_f64(&mut self, value: f64) {
+        self.write_u64((value + 0.0).to_bits());
     }
 
     /// Returns the digest of everything that was added.
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn the_digest_is_blake3_and_prints_as_hex() {
         // First 16 bytes of the published BLAKE3 test vector for the empty input.
-        assert_eq!(Digest::of(b"").to_string(), "af1349b9f5f9a1a6a0404dea36dcc949");
+        assert_eq!(Digest::hash_bytes(b"").to_string(), "af1349b9f5f9a1a6a0404dea36dcc949");
     }
 
     #[test]
@@ -98,11 +98,11 @@ mod tests {
         let mut a = Hasher::default();
         let mut b = Hasher::default();
         for i in 0..40_000u64 {
-            a.u64(i);
-            i.to_le_bytes().iter().for_each(|&x| b.u8(x));
+            a.write_u64(i);
+            i.to_le_bytes().iter().for_each(|&x| b.write_u8(x));
         }
-        a.f64(0.0);
-        b.f64(-0.0);
+        a.write_f64(0.0);
+        b.write_f64(-0.0);
         assert_eq!(a.finish(), b.finish());
     }
 }

@@ -57,9 +57,9 @@ pub fn check_row(row: &[f64]) -> Result<(), RowError> {
 ///
 /// 1 is represented exactly (the event always happens), everything else within 2^-32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Chance(u64);
+pub struct Bernoulli(u64);
 
-impl Chance {
+impl Bernoulli {
     /// Returns the chance `p`, clamped to [0, 1].
     pub fn new(p: f64) -> Self {
         Self((p.clamp(0.0, 1.0) * (1u64 << 32) as f64).round() as u64)
@@ -67,7 +67,7 @@ impl Chance {
 
     /// Returns whether the event happens for the uniform word `u`.
     #[inline]
-    pub fn happens(self, u: u32) -> bool {
+    pub fn sample(self, u: u32) -> bool {
         u64::from(u) < self.0
     }
 }
@@ -152,8 +152,8 @@ mod tests {
     fn certain_and_impossible_are_exact() {
         let certain = Categorical::new(&[0.0, 1.0, 0.0]).expect("a row");
         assert_eq!([certain.sample(0), certain.sample(u32::MAX)], [1, 1]);
-        assert!(Chance::new(1.0).happens(u32::MAX));
-        assert!(!Chance::new(0.0).happens(0));
+        assert!(Bernoulli::new(1.0).sample(u32::MAX));
+        assert!(!Bernoulli::new(0.0).sample(0));
     }
 
     proptest! {
@@ -184,7 +184,7 @@ mod tests {
         let mut draws = streams.draws(1, 2, Purpose(3));
         let row = Categorical::new(&[0.1, 0.2, 0.3, 0.4]).expect("a row");
         let drawn: Vec<usize> = (0..8).map(|_| row.sample(draws.next_u32())).collect();
-        let below: Vec<u32> = (0..8).map(|_| draws.below(10)).collect();
+        let below: Vec<u32> = (0..8).map(|_| draws.uniform_below(10)).collect();
         let normals: Vec<u64> = (0..2).map(|_| normal(&mut draws).to_bits()).collect();
         assert_eq!(format!("{drawn:?} {below:?} {normals:x?}"), GOLDEN);
     }

@@ -1,24 +1,26 @@
 //! Runs a world for many cycles: the crew, the groups, and the choice of the number of workers.
 //!
 //! A cycle that is too small to share out runs on one worker alone. The engine measures instead of
-//! guessing, see `Pace`. Results do not depend on its choice.
+//! guessing, see `Autotuner`. Results do not depend on its choice.
 
-use crate::conflict::Groups;
-use crate::cycle::{Mate, Observer, Parts, PhaseTimes, Ran, Stretch, advance, lock};
+use crate::conflict::ConflictGroups;
+use crate::cycle::{
+    EngineParts, Observer, PhaseTimes, Segment, SegmentTiming, WorkerState, advance, lock,
+};
 use crate::interrupt::Interrupt;
 use crate::ports::Clock;
 use crate::units::Cycle;
-use crate::workers::Team;
+use crate::workers::WorkerTeam;
 use crate::world::Phases;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Bodies are rearranged after at least this many cycles, because they have not gone far by then,
 /// and sorting is below 1 % of the work.
-const ARRANGE_EVERY: u64 = 64;
+const ARRANGE_INTERVAL_CYCLES: u64 = 64;
 
 /// Cycles in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Span {
+pub struct CycleRange {
     /// The first cycle.
     pub from: Cycle,
     /// Their number.
@@ -28,13 +30,13 @@ pub struct Span {
 /// Runs a world with as many workers as asked for, and keeps their shared data.
 #[derive(Debug)]
 pub struct Engine<W: Phases> {
-    groups: Groups,
+    groups: ConflictGroups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
-    crew: Vec<Mutex<Mate<W::Scratch>>>,
+    crew: Vec<Mutex<WorkerState<W::Scratch>>>,
     /// Barrier and cursors of all workers, created when they first work together.
-    team: Option<Team>,
-    pace: Pace,
+    team: Option<WorkerTeam>,
+    autotuner: Autotuner,
     times: PhaseTimes,
     interrupt: Interrupt,
 }
@@ -42,35 +44,35 @@ pub struct Engine<W: Phases> {
 impl<W: Phases> Engine<W> {
     /// Creates an engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
-        let mate = || Mutex::new(Mate::new(world.scratch()));
+        let mate = || Mutex::new(WorkerState::new(world.scratch()));
         Self {
-            groups: Groups::new(bodies),
-            since_arranged: ARRANGE_EVERY,
+            groups: ConflictGroups::new(bodies),
+            since_arranged: ARRANGE_INTERVAL_CYCLES,
             crew: (0..workers.max(1)).map(|_| mate()).collect(),
             team: None,
-            pace: Pace::default(),
+            autotuner: Autotuner::default(),
             times: PhaseTimes::default(),
             interrupt: Interrupt::default(),
         }
     }
 
     /// Leaves a cycle half done when `interrupt` is raised.
-    pub fn heed(&mut self, interrupt: Interrupt) {
+    pub fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = interrupt;
     }
 
     /// Uses all workers from now on, even where one would be faster; for tests and benchmarks.
-    pub fn share_always(&mut self) {
-        self.pace.share_always = true;
+    pub fn force_parallel(&mut self) {
+        self.autotuner.force_parallel = true;
     }
 
     /// Returns the workers, for reading their results.
-    pub fn crew(&self) -> impl Iterator<Item = MutexGuard<'_, Mate<W::Scratch>>> {
+    pub fn worker_states(&self) -> impl Iterator<Item = MutexGuard<'_, WorkerState<W::Scratch>>> {
         self.crew.iter().map(lock)
     }
 
     /// Returns the workers, for taking over their results.
-    pub fn crew_mut(&mut self) -> impl Iterator<Item = &mut Mate<W::Scratch>> {
+    pub fn worker_states_mut(&mut self) -> impl Iterator<Item = &mut WorkerState<W::Scratch>> {
         self.crew.iter_mut().map(|mate| mate.get_mut().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -86,18 +88,24 @@ impl<W: Phases> Engine<W> {
 
     /// Runs the cycles of a span, for worlds that need no look in between: events carry
     /// their cycle, and wait in the scratches.
-    pub fn advance(&mut self, world: &W, state: &mut W::State, span: Span, clock: &impl Clock) {
+    pub fn advance(
+        &mut self,
+        world: &W,
+        state: &mut W::State,
+        span: CycleRange,
+        clock: &impl Clock,
+    ) {
         self.run(world, state, span, clock, None);
     }
 
     /// Runs the cycles of a span, and returns how many: fewer where `observer`,
     /// which is called between all cycles, has ended the run. One call with many cycles is cheaper
     /// than many calls, because every call starts the threads anew.
-    pub fn advance_observed(
+    pub fn advance_with_observer(
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: Span,
+        span: CycleRange,
         clock: &impl Clock,
         observer: &mut dyn Observer<W>,
     ) -> u64 {
@@ -108,23 +116,23 @@ impl<W: Phases> Engine<W> {
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: Span,
+        span: CycleRange,
         clock: &impl Clock,
         mut observer: Option<&mut dyn Observer<W>>,
     ) -> u64 {
-        let Span { from, cycles } = span;
+        let CycleRange { from, cycles } = span;
         let mut done = 0;
         while done < cycles {
-            if self.since_arranged >= ARRANGE_EVERY {
+            if self.since_arranged >= ARRANGE_INTERVAL_CYCLES {
                 world.arrange(state);
                 self.since_arranged = 0;
             }
-            let plan = self.pace.plan(self.crew.len());
+            let plan = self.autotuner.segment_options(self.crew.len());
             let stretch =
-                Stretch { from: from + done, cycles: cycles - done, limit_ns: plan.limit_ns };
+                Segment { from: from + done, cycles: cycles - done, limit_ns: plan.limit_ns };
             let observer = observer.as_mut().map(|observer| &mut **observer as _);
-            let ran = self.stretch(world, state, plan.workers, stretch, clock, observer);
-            self.pace.note(plan, &ran);
+            let ran = self.run_segment(world, state, plan.workers, stretch, clock, observer);
+            self.autotuner.record(plan, &ran);
             self.times.add(ran.times);
             self.since_arranged += ran.cycles;
             done += ran.cycles;
@@ -135,64 +143,64 @@ impl<W: Phases> Engine<W> {
         done
     }
 
-    fn stretch(
+    fn run_segment(
         &mut self,
         world: &W,
         state: &W::State,
         workers: usize,
-        stretch: Stretch,
+        stretch: Segment,
         clock: &impl Clock,
         observer: Option<&mut dyn Observer<W>>,
-    ) -> Ran {
+    ) -> SegmentTiming {
         let crew = &self.crew[..workers];
-        let team = (workers > 1).then(|| self.team.get_or_insert_with(|| Team::new(workers)));
+        let team = (workers > 1).then(|| self.team.get_or_insert_with(|| WorkerTeam::new(workers)));
         let (groups, interrupt) = (&self.groups, &self.interrupt);
-        let parts = Parts { groups, crew, team, clock, interrupt };
+        let parts = EngineParts { groups, crew, team, clock, interrupt };
         advance(world, state, parts, stretch, observer)
     }
 }
 
 /// Approximate duration of a stretch with one worker.
-const ALONE_NS: u64 = 5_000_000;
+const SERIAL_SEGMENT_NS: u64 = 5_000_000;
 /// Duration of a stretch with all workers: starting their threads is below 1 % of it.
-const TEAM_NS: u64 = 20_000_000;
-/// Duration of a look at the other way, or that of `LOOK_CYCLES` cycles with one worker where that
+const PARALLEL_SEGMENT_NS: u64 = 20_000_000;
+/// Duration of a look at the other way, or that of `PROBE_CYCLES` cycles with one worker where that
 /// is longer: the first cycle says little, because a thread is started in it and caches are cold.
-const LOOK_NS: u64 = 1_000_000;
-const LOOK_CYCLES: f64 = 2.0;
+const PROBE_NS: u64 = 1_000_000;
+const PROBE_CYCLES: f64 = 2.0;
 
 /// A cycle of less work than this is never shared out, because three barriers cost about 1 us where
 /// every worker has a processor of its own, and 100 times that where not.
-const SMALLEST_NS: f64 = 10_000.0;
+const MIN_PARALLEL_CYCLE_NS: f64 = 10_000.0;
 /// A cycle of more work than this is tried with all workers from the start, because runs have
 /// hundreds of cycles and a look takes two or three.
-const LARGE_NS: f64 = 1_000_000.0;
+const EAGER_PROBE_CYCLE_NS: f64 = 1_000_000.0;
 
 /// All workers are chosen only if a cycle takes them less than this share of one worker's time.
-const WORTHWHILE: f64 = 0.9;
+const MAX_PARALLEL_COST_FRACTION: f64 = 0.9;
 
 /// Time before the first look, and between looks that may be worth it.
-const SHORTEST_WAIT_NS: f64 = 64e6;
+const MIN_PROBE_WAIT_NS: f64 = 64e6;
 /// Longest time between looks that were not worth it; each of these waits is twice as long as the
 /// one before.
-const LONGEST_WAIT_NS: f64 = 5e9;
+const MAX_PROBE_WAIT_NS: f64 = 5e9;
 /// A look is followed by at least this many times its own duration without one.
-const WAIT_PER_COST: f64 = 64.0;
+const PROBE_WAIT_FACTOR: f64 = 64.0;
 
 /// Weight of the newest stretch in the estimated cost of a cycle.
-const NEWEST: f64 = 0.25;
+const EMA_WEIGHT: f64 = 0.25;
 
 /// Decides by measurement whether one worker or all run the next stretch.
 ///
 /// It keeps to the faster of the two, its favorite, and looks at the other now and then. However
 /// costly the other is (with a barrier on processors that are busy with other work, a thousand
-/// times as much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time: a look ends after
-/// [`LOOK_NS`] or [`LOOK_CYCLES`], and its own cost determines when the next is due. A look that
-/// finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a change is
+/// times as much), looking takes at most 1 part in [`PROBE_WAIT_FACTOR`] of the time: a look ends after
+/// [`PROBE_NS`] or [`PROBE_CYCLES`], and its own cost determines when the next is due. A look that
+/// finds nothing doubles the wait for the next, up to [`MAX_PROBE_WAIT_NS`], so that a change is
 /// still noticed. Only a look can make all workers the favorite, so an old measurement never does;
 /// one worker takes over as soon as all are slower.
 #[derive(Debug)]
-struct Pace {
+struct Autotuner {
     /// Nanoseconds per cycle with one worker and with all; `None` where not measured yet.
     alone_ns: Option<f64>,
     team_ns: Option<f64>,
@@ -200,100 +208,105 @@ struct Pace {
     /// Nanoseconds since the last look, and until the next.
     since_ns: f64,
     wait_ns: f64,
-    share_always: bool,
+    force_parallel: bool,
 }
 
 /// The way in which the next stretch runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Plan {
+struct SegmentOptions {
     workers: usize,
     limit_ns: u64,
     /// Whether this is a look at the other way, not the favorite.
-    is_look: bool,
+    is_probe: bool,
 }
 
-impl Default for Pace {
+impl Default for Autotuner {
     fn default() -> Self {
         Self {
             alone_ns: None,
             team_ns: None,
             favors_team: false,
             since_ns: 0.0,
-            wait_ns: SHORTEST_WAIT_NS,
-            share_always: false,
+            wait_ns: MIN_PROBE_WAIT_NS,
+            force_parallel: false,
         }
     }
 }
 
-impl Pace {
-    fn plan(&self, crew: usize) -> Plan {
-        if self.share_always {
-            return Plan { workers: crew, limit_ns: TEAM_NS, is_look: false };
+impl Autotuner {
+    fn segment_options(&self, crew: usize) -> SegmentOptions {
+        if self.force_parallel {
+            return SegmentOptions {
+                workers: crew,
+                limit_ns: PARALLEL_SEGMENT_NS,
+                is_probe: false,
+            };
         }
-        let is_look = crew > 1 && self.is_look_due();
+        let is_look = crew > 1 && self.is_probe_due();
         let with_all = self.favors_team != is_look;
         let limit_ns = match (is_look, with_all) {
-            (true, _) => LOOK_NS.max((LOOK_CYCLES * self.alone_ns.unwrap_or(0.0)) as u64),
-            (false, true) => TEAM_NS,
-            (false, false) => ALONE_NS,
+            (true, _) => PROBE_NS.max((PROBE_CYCLES * self.alone_ns.unwrap_or(0.0)) as u64),
+            (false, true) => PARALLEL_SEGMENT_NS,
+            (false, false) => SERIAL_SEGMENT_NS,
         };
-        Plan { workers: if with_all { crew } else { 1 }, limit_ns, is_look }
+        SegmentOptions { workers: if with_all { crew } else { 1 }, limit_ns, is_probe: is_look }
     }
 
-    fn is_look_due(&self) -> bool {
+    fn is_probe_due(&self) -> bool {
         let Some(alone_ns) = self.alone_ns else { return false };
-        if !self.favors_team && alone_ns < SMALLEST_NS {
+        if !self.favors_team && alone_ns < MIN_PARALLEL_CYCLE_NS {
             return false;
         }
         let is_first = self.team_ns.is_none();
-        self.since_ns >= self.wait_ns || (is_first && alone_ns >= LARGE_NS)
+        self.since_ns >= self.wait_ns || (is_first && alone_ns >= EAGER_PROBE_CYCLE_NS)
     }
 
-    fn note(&mut self, plan: Plan, ran: &Ran) {
+    fn record(&mut self, plan: SegmentOptions, ran: &SegmentTiming) {
         let took_ns = ran.took_ns as f64;
-        let with_all = self.favors_team != plan.is_look;
+        let with_all = self.favors_team != plan.is_probe;
         let measured = if with_all { &mut self.team_ns } else { &mut self.alone_ns };
-        if plan.is_look {
+        if plan.is_probe {
             // An old measurement says nothing about the present load, so the look replaces it.
             *measured = Some(per_cycle_ns(ran, ran.cycles > 1));
             self.since_ns = 0.0;
-            self.choose_after_look(took_ns);
+            self.choose_after_probe(took_ns);
         } else {
             let newest = per_cycle_ns(ran, false);
-            *measured = Some(measured.map_or(newest, |old| old + NEWEST * (newest - old)));
+            *measured = Some(measured.map_or(newest, |old| old + EMA_WEIGHT * (newest - old)));
             self.since_ns += took_ns;
-            self.give_up_team(ran);
+            self.fall_back_to_one(ran);
         }
     }
 
-    fn choose_after_look(&mut self, took_ns: f64) {
+    fn choose_after_probe(&mut self, took_ns: f64) {
         let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
         // In doubt the favorite stays: all workers must be clearly faster to replace one.
-        let bar_ns = if self.favors_team { alone_ns } else { WORTHWHILE * alone_ns };
+        let bar_ns =
+            if self.favors_team { alone_ns } else { MAX_PARALLEL_COST_FRACTION * alone_ns };
         let favored_team = std::mem::replace(&mut self.favors_team, team_ns < bar_ns);
         self.wait_ns = if favored_team == self.favors_team {
-            (2.0 * self.wait_ns).min(LONGEST_WAIT_NS)
+            (2.0 * self.wait_ns).min(MAX_PROBE_WAIT_NS)
         } else {
-            SHORTEST_WAIT_NS
+            MIN_PROBE_WAIT_NS
         };
-        self.wait_ns = self.wait_ns.max(WAIT_PER_COST * took_ns);
+        self.wait_ns = self.wait_ns.max(PROBE_WAIT_FACTOR * took_ns);
     }
 
     /// Goes back to one worker where all have become slower; the loss counts like that of a look.
-    fn give_up_team(&mut self, ran: &Ran) {
+    fn fall_back_to_one(&mut self, ran: &SegmentTiming) {
         let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
         if self.favors_team && team_ns > alone_ns {
             let lost_ns = ran.took_ns as f64 - ran.cycles as f64 * alone_ns;
             self.favors_team = false;
             self.since_ns = 0.0;
-            self.wait_ns = SHORTEST_WAIT_NS.max(WAIT_PER_COST * lost_ns);
+            self.wait_ns = MIN_PROBE_WAIT_NS.max(PROBE_WAIT_FACTOR * lost_ns);
         }
     }
 }
 
 /// Nanoseconds per cycle, without the first one if it is to be left out: threads were started in
 /// it, and caches were cold.
-fn per_cycle_ns(ran: &Ran, without_first: bool) -> f64 {
+fn per_cycle_ns(ran: &SegmentTiming, without_first: bool) -> f64 {
     let (took_ns, cycles) = if without_first {
         (ran.took_ns - ran.first_ns, ran.cycles - 1)
     } else {
@@ -308,7 +321,7 @@ mod tests {
     use crate::cycle::Scratches;
     use crate::ports::ManualClock;
     use crate::units::Slot;
-    use crate::world::Turn;
+    use crate::world::PhaseContext;
     use std::ops::{ControlFlow, Range};
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -317,7 +330,7 @@ mod tests {
     /// A pace on a machine with cycles of a known duration.
     #[derive(Default)]
     struct Trial {
-        pace: Pace,
+        pace: Autotuner,
         /// More for the first cycle of all workers: threads are started.
         start_ns: u64,
         now_ns: u64,
@@ -331,19 +344,19 @@ mod tests {
         fn run(&mut self, time_ns: u64, cycle_ns: [u64; 2]) -> &mut Self {
             let until_ns = self.now_ns + time_ns;
             while self.now_ns < until_ns {
-                let plan = self.pace.plan(2);
+                let plan = self.pace.segment_options(2);
                 let cycle_ns = cycle_ns[usize::from(plan.workers > 1)];
                 let start_ns = if plan.workers > 1 { self.start_ns } else { 0 };
                 let cycles = plan.limit_ns.saturating_sub(start_ns).div_ceil(cycle_ns).max(1);
                 let took_ns = start_ns + cycles * cycle_ns;
                 let first_ns = start_ns + cycle_ns;
-                let ran = Ran { cycles, took_ns, first_ns, ..Ran::default() };
-                if plan.is_look {
+                let ran = SegmentTiming { cycles, took_ns, first_ns, ..SegmentTiming::default() };
+                if plan.is_probe {
                     self.looks_at_ns.push(self.now_ns);
                     self.looking_ns += took_ns;
                 }
                 self.with_all_ns += if plan.workers > 1 { took_ns } else { 0 };
-                self.pace.note(plan, &ran);
+                self.pace.record(plan, &ran);
                 self.now_ns += took_ns;
             }
             self
@@ -402,7 +415,7 @@ mod tests {
         trial.run(100 * SECOND_NS, [100_000, 500_000]);
         let waits: Vec<u64> = trial.looks_at_ns.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(waits.len() > 10, "{waits:?}");
-        let longest = LONGEST_WAIT_NS as u64;
+        let longest = MAX_PROBE_WAIT_NS as u64;
         let grows = |w: &[u64]| 2 * w[1] > 3 * w[0] || w[1].abs_diff(longest) < longest / 50;
         assert!(waits.windows(2).all(grows), "{waits:?}");
     }
@@ -419,7 +432,7 @@ mod tests {
         let mut trial = Trial::default();
         trial.run(60 * SECOND_NS, [100_000, 2_000_000]);
         assert!(!trial.pace.favors_team);
-        trial.run(2 * LONGEST_WAIT_NS as u64, [100_000, 55_000]);
+        trial.run(2 * MAX_PROBE_WAIT_NS as u64, [100_000, 55_000]);
         assert!(trial.pace.favors_team, "the other work has ended");
         trial.run(20 * SECOND_NS, [100_000, 55_000]);
         trial.run(SECOND_NS / 10, [100_000, 100_000_000]);
@@ -435,7 +448,7 @@ mod tests {
         let mut trial = Trial::default();
         // Looks are promising, and everything after them is slow.
         for _ in 0..300 {
-            while !trial.pace.plan(2).is_look {
+            while !trial.pace.segment_options(2).is_probe {
                 trial.run(1, [100_000, 400_000]);
             }
             trial.run(1, [100_000, 50_000]);
@@ -468,16 +481,16 @@ mod tests {
             state.0.len()
         }
 
-        fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+        fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
             for body in bodies {
                 turn.state.0[body].fetch_add(1, Relaxed);
                 turn.scratch.push((turn.now, body));
             }
         }
 
-        fn join(_: &mut Turn<'_, Self>, _: Range<usize>, _: &Groups) {}
+        fn join(_: &mut PhaseContext<'_, Self>, _: Range<usize>, _: &ConflictGroups) {}
 
-        fn act(_: &mut Turn<'_, Self>, _: &mut [Slot]) {}
+        fn act(_: &mut PhaseContext<'_, Self>, _: &mut [Slot]) {}
     }
 
     fn ticks(n: usize) -> Ticks {
@@ -490,12 +503,12 @@ mod tests {
         let world = Ticking { clock: &clock, alone_ns: 20_000, helper_ns: 20_000_000 };
         let (mut state, cycles) = (ticks(3), 200_000);
         let mut engine = Engine::new(&world, 3, 2);
-        engine.advance(&world, &mut state, Span { from: 0, cycles }, &clock);
+        engine.advance(&world, &mut state, CycleRange { from: 0, cycles }, &clock);
         assert!(engine.team.is_some(), "it was looked at");
         let took_ns = clock.now_ns() as f64;
         let alone_ns = (cycles * world.alone_ns) as f64;
         assert!(took_ns <= 1.02 * alone_ns, "{took_ns} against {alone_ns}");
-        engine.crew_mut().for_each(|mate| mate.scratch.clear());
+        engine.worker_states_mut().for_each(|mate| mate.scratch.clear());
         assert!(state.0.iter().all(|n| n.load(Relaxed) == cycles));
     }
 
@@ -504,7 +517,7 @@ mod tests {
         let clock = ManualClock::default();
         let world = Ticking { clock: &clock, alone_ns: 5_000, helper_ns: 1 };
         let mut engine = Engine::new(&world, 3, 2);
-        engine.advance(&world, &mut ticks(3), Span { from: 0, cycles: 200_000 }, &clock);
+        engine.advance(&world, &mut ticks(3), CycleRange { from: 0, cycles: 200_000 }, &clock);
         assert!(engine.team.is_none());
     }
 
@@ -543,11 +556,12 @@ mod tests {
         let world = Ticking { clock: &clock, alone_ns: 400_000, helper_ns: 400_000 };
         for workers in [1, 2, 3] {
             let mut engine = Engine::new(&world, 5, workers);
-            engine.share_always();
+            engine.force_parallel();
             let (mut state, mut notes) = (ticks(5), Notes { last: 149, ..Notes::default() });
             for (from, cycles) in [(0, 1), (1, 99), (100, 1000)] {
-                let span = Span { from, cycles };
-                let done = engine.advance_observed(&world, &mut state, span, &clock, &mut notes);
+                let span = CycleRange { from, cycles };
+                let done =
+                    engine.advance_with_observer(&world, &mut state, span, &clock, &mut notes);
                 assert_eq!(done, cycles.min(150 - from));
             }
             assert_eq!(notes.began, (0..150).map(|now| (now, now)).collect::<Vec<_>>());

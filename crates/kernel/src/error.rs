@@ -14,7 +14,7 @@ use std::ops::Range;
 pub struct InputError {
     place: String,
     /// The position, in a box like the key, because errors travel in results by value.
-    position: Option<Box<Position>>,
+    position: Option<Box<TextPosition>>,
     key: Option<Box<str>>,
     cause: String,
     remedy: String,
@@ -22,7 +22,7 @@ pub struct InputError {
 
 /// A place in a text file; lines and columns count from 1, columns in characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Position {
+struct TextPosition {
     line: usize,
     column: usize,
     /// Line and column after the wrong part, where it is known.
@@ -49,29 +49,29 @@ impl InputError {
 
     /// Adds line and column (both from 1).
     #[must_use]
-    pub fn at(mut self, line: usize, column: usize) -> Self {
-        self.position = Some(Box::new(Position { line, column, end: None, text: None }));
+    pub fn with_position(mut self, line: usize, column: usize) -> Self {
+        self.position = Some(Box::new(TextPosition { line, column, end: None, text: None }));
         self
     }
 
     /// Adds line and column of the byte at `offset` in `text`, and quotes that line.
     #[must_use]
-    pub fn in_text(mut self, text: &str, offset: usize) -> Self {
+    pub fn with_offset(mut self, text: &str, offset: usize) -> Self {
         let offset = boundary(text, offset);
         let (line, column) = line_and_column(text, offset);
         let start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
         let quoted = text[start..].lines().next().unwrap_or("").to_string();
         let text = Some(quoted);
-        self.position = Some(Box::new(Position { line, column, end: None, text }));
+        self.position = Some(Box::new(TextPosition { line, column, end: None, text }));
         self
     }
 
     /// Adds line and column of the bytes `span` of `text` and of their end, and quotes the first
     /// line.
     #[must_use]
-    pub fn over(self, text: &str, span: Range<usize>) -> Self {
+    pub fn with_span(self, text: &str, span: Range<usize>) -> Self {
         let end = line_and_column(text, boundary(text, span.end.max(span.start)));
-        let mut error = self.in_text(text, span.start);
+        let mut error = self.with_offset(text, span.start);
         if let Some(position) = &mut error.position {
             position.end = Some(end);
         }
@@ -123,7 +123,8 @@ impl fmt::Display for InputError {
             write!(f, ":{}:{}", p.line, p.column)?;
         }
         write!(f, ": {}", self.cause)?;
-        if let Some(Position { line, column, text: Some(text), .. }) = self.position.as_deref() {
+        if let Some(TextPosition { line, column, text: Some(text), .. }) = self.position.as_deref()
+        {
             let number = line.to_string();
             let shown = text.replace('\t', " ");
             write!(
@@ -164,7 +165,7 @@ mod tests {
     #[test]
     fn an_error_quotes_the_line_and_points_at_the_column() {
         let text = "a = 1\nbb = 2\n";
-        let error = InputError::new("x.toml", "bad value", "write 3").in_text(text, 11);
+        let error = InputError::new("x.toml", "bad value", "write 3").with_offset(text, 11);
         assert_eq!(error.position(), Some((2, 6)));
         assert_eq!(
             error.to_string(),
@@ -175,8 +176,8 @@ mod tests {
     #[test]
     fn a_span_adds_the_end_and_a_key_the_key_and_neither_changes_what_is_displayed() {
         let text = "a = [\n  1,\n]\n";
-        let plain = InputError::new("x.toml", "c", "r").in_text(text, 4);
-        let spanned = InputError::new("x.toml", "c", "r").over(text, 4..12).with_key("a");
+        let plain = InputError::new("x.toml", "c", "r").with_offset(text, 4);
+        let spanned = InputError::new("x.toml", "c", "r").with_span(text, 4..12).with_key("a");
         assert_eq!((spanned.position(), spanned.end()), (Some((1, 5)), Some((3, 2))));
         assert_eq!((spanned.key(), plain.key(), plain.end()), (Some("a"), None, None));
         assert_eq!(spanned.to_string(), plain.to_string());
@@ -185,8 +186,8 @@ mod tests {
     #[test]
     fn an_offset_behind_the_end_or_inside_a_character_is_no_panic() {
         let text = "é";
-        assert_eq!(InputError::new("f", "c", "r").in_text(text, 1).position(), Some((1, 1)));
-        assert_eq!(InputError::new("f", "c", "r").in_text(text, 99).position(), Some((1, 2)));
-        assert_eq!(InputError::new("f", "c", "r").over(text, 1..99).end(), Some((1, 2)));
+        assert_eq!(InputError::new("f", "c", "r").with_offset(text, 1).position(), Some((1, 1)));
+        assert_eq!(InputError::new("f", "c", "r").with_offset(text, 99).position(), Some((1, 2)));
+        assert_eq!(InputError::new("f", "c", "r").with_span(text, 1..99).end(), Some((1, 2)));
     }
 }

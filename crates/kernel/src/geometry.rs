@@ -28,13 +28,13 @@ pub fn scaled<const D: usize>(a: Point<D>, k: f64) -> Point<D> {
 
 /// The point `a + k u`.
 #[inline]
-pub fn along<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
+pub fn add_scaled<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] + u[i] * k)
 }
 
 /// The point at the fraction `part` of the way from `a` to `b`.
 #[inline]
-pub fn between<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
+pub fn lerp<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
 
@@ -56,7 +56,7 @@ pub fn norm<const D: usize>(a: Point<D>) -> f64 {
 
 /// Square of the length of a vector.
 #[inline]
-pub fn norm2<const D: usize>(a: Point<D>) -> f64 {
+pub fn norm_squared<const D: usize>(a: Point<D>) -> f64 {
     dot(a, a)
 }
 
@@ -73,26 +73,26 @@ pub fn is_finite<const D: usize>(a: &Point<D>) -> bool {
 
 /// The vector of length 1 in the direction of `a`; `None` where `a` is zero.
 #[inline]
-pub fn unit<const D: usize>(a: Point<D>) -> Option<Point<D>> {
+pub fn normalized<const D: usize>(a: Point<D>) -> Option<Point<D>> {
     let length = norm(a);
     (length > 0.0).then(|| scaled(a, 1.0 / length))
 }
 
 /// The component of `a` perpendicular to the unit vector `axis`.
 #[inline]
-pub fn across<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
+pub fn rejection<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
     sub(a, scaled(axis, dot(a, axis)))
 }
 
 /// The point reached from `from` toward `to` after at most `step_m` meters.
-pub fn toward<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
+pub fn move_toward<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
     let far_m = distance(from, to);
-    if far_m <= step_m { to } else { along(from, sub(to, from), step_m / far_m) }
+    if far_m <= step_m { to } else { add_scaled(from, sub(to, from), step_m / far_m) }
 }
 
 /// A point in another number of dimensions: further coordinates are left out, missing ones are 0.
 #[inline]
-pub fn in_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
+pub fn with_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
     std::array::from_fn(|i| if i < D { p[i] } else { 0.0 })
 }
 
@@ -109,7 +109,7 @@ pub fn perpendicular<const D: usize>(u: Point<D>) -> Point<D> {
     }
     let axis = (0..D).min_by(|&i, &j| u[i].abs().total_cmp(&u[j].abs())).unwrap_or(0);
     let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
-    unit(along(e, u, -u[axis])).unwrap_or(e)
+    normalized(add_scaled(e, u, -u[axis])).unwrap_or(e)
 }
 
 /// Signed area of the parallelogram of two plane vectors: positive where `b` is left of `a`.
@@ -145,7 +145,7 @@ pub fn nearest_on_segment<const D: usize>(p: Point<D>, a: Point<D>, b: Point<D>)
     } else if part >= length2 {
         b
     } else {
-        along(a, d, part / length2)
+        add_scaled(a, d, part / length2)
     }
 }
 
@@ -161,20 +161,20 @@ mod tests {
 
     #[test]
     fn a_step_never_goes_beyond_its_goal() {
-        assert_eq!(toward([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
-        assert_eq!(toward([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
-        assert_eq!(toward([1.0], [1.0], 0.0), [1.0]);
+        assert_eq!(move_toward([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
+        assert_eq!(move_toward([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
+        assert_eq!(move_toward([1.0], [1.0], 0.0), [1.0]);
     }
 
     #[test]
     fn points_get_as_many_coordinates_as_asked_for() {
-        assert_eq!(in_dimensions::<2, 3>([1.0, 2.0]), [1.0, 2.0, 0.0]);
-        assert_eq!(in_dimensions::<3, 2>([1.0, 2.0, 3.0]), [1.0, 2.0]);
+        assert_eq!(with_dimensions::<2, 3>([1.0, 2.0]), [1.0, 2.0, 0.0]);
+        assert_eq!(with_dimensions::<3, 2>([1.0, 2.0, 3.0]), [1.0, 2.0]);
     }
 
     #[test]
     fn axes_make_a_right_handed_frame() {
         assert_eq!(cross([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
-        assert_eq!(across([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]), [1.0, 2.0, 0.0]);
+        assert_eq!(rejection([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]), [1.0, 2.0, 0.0]);
     }
 }

@@ -2,19 +2,19 @@
 
 use crate::checkpoint::{self, CheckpointError, Header};
 use crate::control::{
-    self, CellsMut, ControlBook, ControlRow, OrderBook, OrderError, OrderRow, Orders, Team, Teams,
+    self, BufferMut, ControlLog, ControlRow, OrderError, OrderLog, OrderRow, Orders, Team, Teams,
 };
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
-use crate::engine::{Engine, Span};
+use crate::engine::{CycleRange, Engine};
 use crate::interrupt::Interrupt;
-use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
+use crate::run_config::{GroupSizes, RunConfig, RunStats};
 use crate::simulation::Simulation;
+use crate::text::{Description, KeyValues};
 use crate::units::{Cycle, EntityId};
-use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
-use crate::words::{Lines, Said};
-use crate::world::{Decides, World};
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use crate::world::{DecisionMode, World};
 use serde_json::Value;
 use std::fmt;
 use std::ops::ControlFlow;
@@ -23,11 +23,11 @@ use std::sync::Arc;
 /// A run of a world.
 pub struct Run<W: World> {
     world: Arc<W>,
-    plan: Plan,
+    config: RunConfig,
     /// Digest of the scenario's text, to which checkpoints belong.
     scenario: [u8; 16],
     state: W::State,
-    books: W::Books,
+    collector: W::Collector,
     engine: Engine<W>,
     /// Conflict groups up to the checkpoint from which the run was resumed.
     groups_before: GroupSizes,
@@ -37,15 +37,15 @@ pub struct Run<W: World> {
     records: bool,
     teams: Arc<Teams>,
     /// Orders to be given when the run reaches their cycles.
-    ahead: OrderBook,
+    order_log: OrderLog,
     /// Controls to be handed over likewise.
-    controls: ControlBook,
+    control_log: ControlLog,
     /// The last cycle for which that was done.
-    obeyed: Option<Cycle>,
+    last_applied: Option<Cycle>,
     /// Orders that were given and wait to be recorded.
-    given: RowBuffer<OrderRow>,
+    order_rows: RowBuffer<OrderRow>,
     /// Controls that were handed over and wait to be recorded.
-    handed: RowBuffer<ControlRow>,
+    control_rows: RowBuffer<ControlRow>,
 }
 
 impl<W: World> Run<W> {
@@ -53,42 +53,42 @@ impl<W: World> Run<W> {
     /// `scenario` is the resolved scenario's text.
     pub fn new(
         world: Arc<W>,
-        plan: Plan,
+        plan: RunConfig,
         state: W::State,
-        books: W::Books,
+        books: W::Collector,
         scenario: &str,
         workers: usize,
     ) -> Self {
         let engine = Engine::new(&*world, world.bodies(&state), workers);
-        let scenario = *Digest::of(scenario.as_bytes()).as_bytes();
+        let scenario = *Digest::hash_bytes(scenario.as_bytes()).as_bytes();
         let clock = SystemClock::default();
         let groups_before = GroupSizes::default();
         let (cycle, records) = (0, false);
         let teams = world.teams();
-        let (ahead, given) = (OrderBook::default(), RowBuffer::default());
+        let (ahead, given) = (OrderLog::default(), RowBuffer::default());
         Self {
             world,
-            plan,
+            config: plan,
             scenario,
             state,
-            books,
+            collector: books,
             engine,
             groups_before,
             cycle,
             clock,
             records,
             teams,
-            ahead,
-            controls: ControlBook::default(),
-            obeyed: None,
-            given,
-            handed: RowBuffer::default(),
+            order_log: ahead,
+            control_log: ControlLog::default(),
+            last_applied: None,
+            order_rows: given,
+            control_rows: RowBuffer::default(),
         }
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
-    pub fn share_always(&mut self) {
-        self.engine.share_always();
+    pub fn force_parallel(&mut self) {
+        self.engine.force_parallel();
     }
 
     /// The world.
@@ -102,18 +102,18 @@ impl<W: World> Run<W> {
     }
 
     /// The sums, rows and events that are kept beside the state.
-    pub fn books(&self) -> &W::Books {
-        &self.books
+    pub fn collector(&self) -> &W::Collector {
+        &self.collector
     }
 
     /// Returns the content that a checkpoint of the present state would have.
-    pub fn saved(&self) -> W::Saved {
-        self.world.save(&self.state, &self.books, self.cycle)
+    pub fn snapshot(&self) -> W::Snapshot {
+        self.world.save(&self.state, &self.collector, self.cycle)
     }
 
     /// Returns the measurements of the run so far.
     pub fn metrics(&self) -> W::Metrics {
-        self.world.metrics(&self.state, &self.books, self.cycle, &self.effort())
+        self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
     }
 
     /// Bytes on the heap of the engine, which grow with the bodies.
@@ -122,18 +122,18 @@ impl<W: World> Run<W> {
     }
 
     /// Returns the conflict groups since the start of the run, and the processor time of all workers.
-    pub fn effort(&self) -> Effort {
-        let mut effort = Effort { groups: self.groups_before, cpu_ns: 0 };
-        for mate in self.engine.crew() {
-            effort.groups.merge(&mate.tally.groups);
-            effort.cpu_ns += mate.tally.cpu_ns;
+    pub fn stats(&self) -> RunStats {
+        let mut effort = RunStats { groups: self.groups_before, cpu_ns: 0 };
+        for mate in self.engine.worker_states() {
+            effort.groups.merge(&mate.stats.groups);
+            effort.cpu_ns += mate.stats.cpu_ns;
         }
         effort
     }
 
     fn header(&self) -> Header {
         Header {
-            format: checkpoint::FORMAT,
+            format: checkpoint::FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").into(),
             world: W::NAME.into(),
             scenario: self.scenario,
@@ -142,32 +142,32 @@ impl<W: World> Run<W> {
     }
 
     /// Takes over the results of all workers.
-    fn gather(&mut self) {
-        let Self { world, books, engine, .. } = self;
-        engine.crew_mut().for_each(|mate| world.gather(books, &mut mate.scratch));
-        world.book(books);
+    fn collect(&mut self) {
+        let Self { world, collector: books, engine, .. } = self;
+        engine.worker_states_mut().for_each(|mate| world.collect(books, &mut mate.scratch));
+        world.commit(books);
     }
 
     /// Number of cycles that may run before rows must be handed over.
-    fn room(&self) -> u64 {
-        let room = self.world.room(&self.state, &self.books, self.cycle);
+    fn cycles_until_flush(&self) -> u64 {
+        let room = self.world.cycles_until_flush(&self.state, &self.collector, self.cycle);
         // Orders come from outside of cycles, so one more cycle never makes it worse.
-        if self.given.is_full() || self.handed.is_full() { room.min(1) } else { room }
+        if self.order_rows.is_full() || self.control_rows.is_full() { room.min(1) } else { room }
     }
 
     /// Runs up to `cycles` cycles in which no order is ahead.
-    fn stretch(&mut self, cycles: u64) -> u64 {
-        let cycles = cycles.min(self.room());
-        let Self { world, state, books, engine, clock, .. } = self;
-        let span = Span { from: self.cycle, cycles };
-        let done = match W::LOOKS_EACH_CYCLE {
+    fn run_segment(&mut self, cycles: u64) -> u64 {
+        let cycles = cycles.min(self.cycles_until_flush());
+        let Self { world, state, collector: books, engine, clock, .. } = self;
+        let span = CycleRange { from: self.cycle, cycles };
+        let done = match W::OBSERVES_EACH_CYCLE {
             false => {
                 engine.advance(world, state, span, clock);
                 cycles
             }
             true => {
-                let mut onlooker = Onlooker { world: &**world, books };
-                engine.advance_observed(world, state, span, clock, &mut onlooker)
+                let mut onlooker = WorldObserver { world: &**world, books };
+                engine.advance_with_observer(world, state, span, clock, &mut onlooker)
             }
         };
         self.cycle += done;
@@ -175,18 +175,18 @@ impl<W: World> Run<W> {
     }
 
     /// Gives an order, or refuses it as a whole.
-    fn give(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        self.examine(orders)?;
+    fn apply_orders(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.check_orders(orders)?;
         let Self { world, state, teams, .. } = self;
-        teams.each(orders, |order| {
+        teams.for_each_order(orders, |order| {
             world.order(state, order);
             Ok(())
         })?;
-        if self.given.is_kept() {
+        if self.order_rows.is_enabled() {
             let names = self.teams.order_names();
             let name = names.iter().position(|name| name == orders.order).unwrap_or(0) as u32;
-            let (cycle, given) = (self.cycle, &mut self.given);
-            self.teams.each(orders, |order| {
+            let (cycle, given) = (self.cycle, &mut self.order_rows);
+            self.teams.for_each_order(orders, |order| {
                 let row = |(part, &value): (u32, &f64)| {
                     let (agent, order) = (order.agent, name);
                     OrderRow { cycle, agent, order, part, value }
@@ -199,47 +199,47 @@ impl<W: World> Run<W> {
     }
 
     /// Refuses orders that cannot be obeyed.
-    fn examine(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        self.teams.each(orders, |order| {
+    fn check_orders(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.teams.for_each_order(orders, |order| {
             self.world.check_order(order).map_err(|cause| {
                 let who = format!("{} {}", self.teams.noun(), order.agent);
                 let order = orders.order.into();
-                OrderError::Senseless { order, who, cause }
+                OrderError::Invalid { order, who, cause }
             })
         })
     }
 
     /// Gives the orders that are ahead for the present cycle, and hands over the controls.
-    fn obey(&mut self) {
-        if self.obeyed.replace(self.cycle) == Some(self.cycle) {
+    fn apply_due(&mut self) {
+        if self.last_applied.replace(self.cycle) == Some(self.cycle) {
             return;
         }
-        let ahead = std::mem::take(&mut self.ahead);
+        let ahead = std::mem::take(&mut self.order_log);
         for orders in ahead.due(self.cycle) {
-            self.give(&orders).expect("`follow` has checked it");
+            self.apply_orders(&orders).expect("`follow` has checked it");
         }
-        self.ahead = ahead;
-        let controls = std::mem::take(&mut self.controls);
-        if let Some(handed) = controls.of(self.cycle) {
+        self.order_log = ahead;
+        let controls = std::mem::take(&mut self.control_log);
+        if let Some(handed) = controls.get(self.cycle) {
             // A control that can no longer be carried out is skipped. The run then differs, and its digest shows it.
-            let taken = self.hand_over(handed);
+            let taken = self.submit_controls(handed);
             if taken.is_err() {
-                let _ = self.hand_over(&[]);
+                let _ = self.submit_controls(&[]);
             }
         }
-        self.controls = controls;
+        self.control_log = controls;
     }
 
     /// Returns the first cycle after the present one before which orders are given or controls handed over.
-    fn next_given(&self) -> Option<Cycle> {
-        let orders = self.ahead.next_after(self.cycle);
-        orders.into_iter().chain(self.controls.next_after(self.cycle)).min()
+    fn next_due(&self) -> Option<Cycle> {
+        let orders = self.order_log.next_after(self.cycle);
+        orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
     }
 
     /// Sets up all workers for gathering the rows and events that are now wanted.
     fn prepare(&mut self) {
-        let Self { world, books, engine, .. } = self;
-        engine.crew_mut().for_each(|mate| world.prepare(books, &mut mate.scratch));
+        let Self { world, collector: books, engine, .. } = self;
+        engine.worker_states_mut().for_each(|mate| world.prepare(books, &mut mate.scratch));
     }
 }
 
@@ -250,12 +250,12 @@ impl<W: World> fmt::Debug for Run<W> {
 }
 
 /// An observer between cycles, for worlds that ask for one.
-struct Onlooker<'a, W: World> {
+struct WorldObserver<'a, W: World> {
     world: &'a W,
-    books: &'a mut W::Books,
+    books: &'a mut W::Collector,
 }
 
-impl<W: World> Observer<W> for Onlooker<'_, W> {
+impl<W: World> Observer<W> for WorldObserver<'_, W> {
     fn before_cycle(&mut self, now: Cycle, state: &W::State) {
         self.world.before_cycle(state, self.books, now);
     }
@@ -266,9 +266,9 @@ impl<W: World> Observer<W> for Onlooker<'_, W> {
         state: &W::State,
         mut scratches: Scratches<'_, W::Scratch>,
     ) -> ControlFlow<()> {
-        scratches.for_each(|scratch| self.world.gather(self.books, scratch));
-        self.world.book(self.books);
-        let is_full = self.world.room(state, self.books, now + 1) == 0;
+        scratches.for_each(|scratch| self.world.collect(self.books, scratch));
+        self.world.commit(self.books);
+        let is_full = self.world.cycles_until_flush(state, self.books, now + 1) == 0;
         match is_full || self.world.is_over(state) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
@@ -285,12 +285,12 @@ impl<W: World> Simulation for Run<W> {
         W::AGENT
     }
 
-    fn decides(&self) -> Decides {
-        W::DECIDES
+    fn decision_mode(&self) -> DecisionMode {
+        W::DECISION_MODE
     }
 
-    fn plan(&self) -> &Plan {
-        &self.plan
+    fn config(&self) -> &RunConfig {
+        &self.config
     }
 
     fn cycle(&self) -> Cycle {
@@ -308,10 +308,10 @@ impl<W: World> Simulation for Run<W> {
     fn advance(&mut self, cycles: u64) -> u64 {
         let mut done = 0;
         while done < cycles {
-            self.obey();
-            let next = self.next_given();
+            self.apply_due();
+            let next = self.next_due();
             let wanted = next.map_or(cycles - done, |next| (next - self.cycle).min(cycles - done));
-            let made = self.stretch(wanted);
+            let made = self.run_segment(wanted);
             done += made;
             if made < wanted {
                 break;
@@ -320,8 +320,8 @@ impl<W: World> Simulation for Run<W> {
         done
     }
 
-    fn heed(&mut self, interrupt: Interrupt) {
-        self.engine.heed(interrupt);
+    fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.engine.set_interrupt(interrupt);
     }
 
     fn digest(&self) -> Digest {
@@ -329,35 +329,35 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn checkpoint(&self) -> Vec<u8> {
-        checkpoint::encode(&self.header(), &(self.effort().groups, self.saved()))
+        checkpoint::encode(&self.header(), &(self.stats().groups, self.snapshot()))
     }
 
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
         let (cycle, (groups, saved)) = checkpoint::decode(checkpoint, &self.header())?;
-        self.state = self.world.restore(saved, &mut self.books)?;
+        self.state = self.world.restore(saved, &mut self.collector)?;
         self.groups_before = groups;
-        self.engine.crew_mut().for_each(|mate| mate.tally.groups = GroupSizes::default());
+        self.engine.worker_states_mut().for_each(|mate| mate.stats.groups = GroupSizes::default());
         self.cycle = cycle;
-        self.obeyed = None;
+        self.last_applied = None;
         Ok(())
     }
 
-    fn begin_recording(&mut self) {
+    fn start_recording(&mut self) {
         self.records = true;
-        self.world.begin_recording(&mut self.state, &mut self.books, self.cycle);
-        if self.teams.take_orders() {
-            self.given.begin(Some(control::table(self.teams.order_names().to_vec())));
+        self.world.start_recording(&mut self.state, &mut self.collector, self.cycle);
+        if self.teams.accept_orders() {
+            self.order_rows.start(Some(control::orders_table(self.teams.order_names().to_vec())));
         }
-        if self.world.keeps_controls(&self.books) {
-            self.handed.begin(Some(control::controls_table()));
+        if self.world.records_controls(&self.collector) {
+            self.control_rows.start(Some(control::controls_table()));
         }
         self.prepare();
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
-        let mut schemas = self.world.schemas(&self.books);
-        schemas.extend(self.given.schema());
-        schemas.extend(self.handed.schema());
+        let mut schemas = self.world.schemas(&self.collector);
+        schemas.extend(self.order_rows.schema());
+        schemas.extend(self.control_rows.schema());
         schemas
     }
 
@@ -365,80 +365,83 @@ impl<W: World> Simulation for Run<W> {
         // Rows of past cycles are lost: an empty recording would hide that.
         if !self.records {
             let cause = "no rows were kept; call `begin_recording` before the first `advance`";
-            return Err(RecordError::new(format!("the recording of `{}`", self.plan.name), cause));
+            return Err(RecordError::new(
+                format!("the recording of `{}`", self.config.name),
+                cause,
+            ));
         }
-        self.gather();
-        self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)?;
+        self.collect();
+        self.world.record(&mut self.state, &mut self.collector, self.cycle, recorder)?;
         // These tables follow those of the world.
-        let blocks = [self.given.take(), self.handed.take()].into_iter().flatten();
-        let mut tables = self.world.schemas(&self.books).len()..;
+        let blocks = [self.order_rows.take(), self.control_rows.take()].into_iter().flatten();
+        let mut tables = self.world.schemas(&self.collector).len()..;
         blocks.zip(&mut tables).try_for_each(|(block, table)| recorder.append(table, &block))
     }
 
     fn scenery(&self) -> Scenery {
-        self.world.scenery(&self.plan.name)
+        self.world.scenery(&self.config.name)
     }
 
-    fn watch(&mut self) {
-        self.world.watch(&mut self.books);
+    fn enable_events(&mut self) {
+        self.world.enable_events(&mut self.collector);
         self.prepare();
     }
 
-    fn watch_odometry(&mut self) {
-        self.world.watch_odometry(&mut self.books);
+    fn enable_odometry(&mut self) {
+        self.world.enable_odometry(&mut self.collector);
         self.prepare();
     }
 
-    fn frame(&mut self, look: Look) -> Frame {
-        self.gather();
-        self.world.frame(&self.state, &mut self.books, self.cycle, look)
+    fn frame(&mut self, look: FrameOptions) -> Frame {
+        self.collect();
+        self.world.frame(&self.state, &mut self.collector, self.cycle, look)
     }
 
-    fn inspect(&self, who: Who) -> Option<Inspection> {
-        self.world.inspect(&self.state, &self.books, self.cycle, who)
+    fn inspect(&self, who: BodyId) -> Option<Inspection> {
+        self.world.inspect(&self.state, &self.collector, self.cycle, who)
     }
 
     fn teams(&self) -> &[Team] {
         self.teams.all()
     }
 
-    fn observe(&self, team: usize, room: &mut [CellsMut<'_>]) -> Result<(), OrderError> {
-        self.teams.check_room(team, room)?;
+    fn observe(&self, team: usize, room: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
+        self.teams.check_buffers(team, room)?;
         self.world.observe(&self.state, self.cycle, team, room);
         Ok(())
     }
 
     fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        self.examine(orders)
+        self.check_orders(orders)
     }
 
     fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        self.give(orders)
+        self.apply_orders(orders)
     }
 
-    fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
-        orders.iter().try_for_each(|(_, orders)| self.examine(&orders))?;
-        (self.ahead, self.obeyed) = (orders, None);
+    fn replay_orders(&mut self, orders: OrderLog) -> Result<(), OrderError> {
+        orders.iter().try_for_each(|(_, orders)| self.check_orders(&orders))?;
+        (self.order_log, self.last_applied) = (orders, None);
         Ok(())
     }
 
-    fn hand_over(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
-        if self.records && !self.handed.is_kept() {
+    fn submit_controls(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+        if self.records && !self.control_rows.is_enabled() {
             let cause = "it is recorded, and its controls are not, so nobody could compute it again; set \
                          record.controls = true";
-            return Err(OrderError::NobodyOutside { cause: cause.into() });
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
         }
-        self.world.hand_over(&mut self.state, self.cycle, controls)?;
-        self.handed.extend(control::rows_of(self.cycle, controls));
+        self.world.submit_controls(&mut self.state, self.cycle, controls)?;
+        self.control_rows.extend(control::control_rows(self.cycle, controls));
         Ok(())
     }
 
-    fn retrace(&mut self, controls: ControlBook) {
-        (self.controls, self.obeyed) = (controls, None);
+    fn replay_controls(&mut self, controls: ControlLog) {
+        (self.control_log, self.last_applied) = (controls, None);
     }
 
-    fn place_rows(&self) -> Vec<PlaceRows> {
-        self.world.place_rows(&self.books)
+    fn position_columns(&self) -> Vec<PositionColumns> {
+        self.world.position_columns(&self.collector)
     }
 
     fn metrics(&self) -> Value {
@@ -446,18 +449,18 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn agent_metrics(&self) -> Value {
-        self.world.agent_metrics(&self.state, &self.books, self.cycle)
+        self.world.agent_metrics(&self.state, &self.collector, self.cycle)
     }
 
     fn pair_metrics(&self) -> Value {
-        self.world.pair_metrics(&self.books)
+        self.world.pair_metrics(&self.collector)
     }
 
-    fn outcome(&self) -> Lines {
-        self.world.outcome(&Run::metrics(self))
+    fn summary_lines(&self) -> KeyValues {
+        self.world.summary_lines(&Run::metrics(self))
     }
 
-    fn poses(&self) -> Said {
+    fn poses(&self) -> Description {
         self.world.poses(&self.state, self.cycle)
     }
 

@@ -1,16 +1,16 @@
 //! The object-safe face of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
-use crate::control::{CellsMut, ControlBook, OrderBook, OrderError, Orders, Team, Teams};
+use crate::control::{BufferMut, ControlLog, OrderError, OrderLog, Orders, Team, Teams};
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::interrupt::Interrupt;
-use crate::plan::Plan;
 use crate::ports::{RecordError, Recorder, TableSchema};
+use crate::run_config::RunConfig;
+use crate::text::{Description, KeyValues};
 use crate::units::{Cycle, EntityId};
-use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
-use crate::words::{Lines, Said};
-use crate::world::Decides;
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use crate::world::DecisionMode;
 use std::any::Any;
 
 /// A world and a state that advances. [`crate::Run`] is the one implementation that computes; a recording that can
@@ -24,10 +24,10 @@ pub trait Simulation: Any + Send {
     fn agent(&self) -> &'static str;
 
     /// The phase in which its agents decide, which determines the names of the phases in reports.
-    fn decides(&self) -> Decides;
+    fn decision_mode(&self) -> DecisionMode;
 
     /// The plan that the scenario asks for.
-    fn plan(&self) -> &Plan;
+    fn config(&self) -> &RunConfig;
 
     /// Cycles done.
     fn cycle(&self) -> Cycle;
@@ -45,7 +45,7 @@ pub trait Simulation: Any + Send {
 
     /// Lets [`Simulation::advance`] unwind when `interrupt` is raised; the run is then useless
     /// except for its recording.
-    fn heed(&mut self, interrupt: Interrupt);
+    fn set_interrupt(&mut self, interrupt: Interrupt);
 
     /// Returns the digest of the present state: equal for equal scenario, seed and cycle.
     fn digest(&self) -> Digest;
@@ -60,7 +60,7 @@ pub trait Simulation: Any + Send {
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError>;
 
     /// Starts to keep the rows that [`Simulation::record`] hands over.
-    fn begin_recording(&mut self);
+    fn start_recording(&mut self);
 
     /// The tables that [`Simulation::record`] fills.
     fn schemas(&self) -> Vec<TableSchema>;
@@ -68,26 +68,26 @@ pub trait Simulation: Any + Send {
     /// Hands all rows since the last call to a recorder.
     ///
     /// # Errors
-    /// When the recorder cannot store it, or [`Simulation::begin_recording`] was never called.
+    /// When the recorder cannot store it, or [`Simulation::start_recording`] was never called.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
 
     /// The scenery: everything that stays the same during the run.
     fn scenery(&self) -> Scenery;
 
     /// Starts to keep events for the next [`Simulation::frame`]; no result depends on it.
-    fn watch(&mut self);
+    fn enable_events(&mut self);
 
     /// Starts to keep odometry for the next [`Simulation::frame`], which takes longer than events do;
     /// no result depends on it.
-    fn watch_odometry(&mut self);
+    fn enable_odometry(&mut self);
 
     /// Returns the present frame, with the events since the last call and the claims of wheels
-    /// since [`Simulation::watch_odometry`] (none without it). No result depends on it.
-    fn frame(&mut self, look: Look) -> Frame;
+    /// since [`Simulation::enable_odometry`] (none without it). No result depends on it.
+    fn frame(&mut self, look: FrameOptions) -> Frame;
 
     /// Returns the percepts and decisions of a body in the next cycle, and their outcome; `None` for a body that does
     /// not exist or has nothing to show. No result depends on it.
-    fn inspect(&self, who: Who) -> Option<Inspection>;
+    fn inspect(&self, who: BodyId) -> Option<Inspection>;
 
     /// The teams of agents with the same observations and orders.
     fn teams(&self) -> &[Team] {
@@ -99,7 +99,7 @@ pub trait Simulation: Any + Send {
     ///
     /// # Errors
     /// When there is no such team, or the room has another shape.
-    fn observe(&self, team: usize, _: &mut [CellsMut<'_>]) -> Result<(), OrderError> {
+    fn observe(&self, team: usize, _: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
         Err(OrderError::NoTeam { team, teams: 0 })
     }
 
@@ -126,7 +126,7 @@ pub trait Simulation: Any + Send {
     ///
     /// # Errors
     /// When one of them cannot be obeyed; all then remain as they were.
-    fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
+    fn replay_orders(&mut self, orders: OrderLog) -> Result<(), OrderError> {
         orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
     }
 
@@ -137,18 +137,18 @@ pub trait Simulation: Any + Send {
     /// # Errors
     /// When no agents of this world decide outside, or an action is impossible; when the run is recorded without
     /// its controls, and could not be computed again.
-    fn hand_over(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+    fn submit_controls(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
         let cause = format!("agents of the world {} decide in the run alone", self.world());
-        Err(OrderError::NobodyOutside { cause })
+        Err(OrderError::NoExternalAgents { cause })
     }
 
     /// Hands over these controls again, each before its cycle, whenever the run gets there: also after
     /// [`Simulation::restore`]. They replace those of an earlier call. One that can no longer be carried out counts
     /// as missing, and the state shows that it did.
-    fn retrace(&mut self, _: ControlBook) {}
+    fn replay_controls(&mut self, _: ControlLog) {}
 
     /// The recorded tables and columns that hold the places of bodies.
-    fn place_rows(&self) -> Vec<PlaceRows>;
+    fn position_columns(&self) -> Vec<PositionColumns>;
 
     /// Returns the metrics of the run so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;
@@ -160,10 +160,10 @@ pub trait Simulation: Any + Send {
     fn pair_metrics(&self) -> serde_json::Value;
 
     /// Returns the outcome of the run so far, in lines for people.
-    fn outcome(&self) -> Lines;
+    fn summary_lines(&self) -> KeyValues;
 
     /// Returns the pose of every body.
-    fn poses(&self) -> Said;
+    fn poses(&self) -> Description;
 
     /// Returns the time spent in each phase in this process.
     fn phase_times(&self) -> PhaseTimes;

@@ -114,7 +114,7 @@ impl Draws {
 
     /// Returns a uniform number in `0..n` without bias (Lemire's rejection); 0 when `n` is 0.
     #[inline]
-    pub fn below(&mut self, n: u32) -> u32 {
+    pub fn uniform_below(&mut self, n: u32) -> u32 {
         loop {
             let wide = u64::from(self.next_u32()) * u64::from(n);
             let low = wide as u32;
@@ -195,10 +195,10 @@ mod tests {
         let mut draws = Streams::new(Seed(3)).draws(0, 0, Purpose(0));
         let mut seen = [0; 5];
         for _ in 0..1000 {
-            seen[draws.below(5) as usize] += 1;
+            seen[draws.uniform_below(5) as usize] += 1;
         }
         assert!(seen.iter().all(|&n| n > 140));
-        assert_eq!(draws.below(1), 0);
-        assert_eq!(draws.below(0), 0);
+        assert_eq!(draws.uniform_below(1), 0);
+        assert_eq!(draws.uniform_below(0), 0);
     }
 }

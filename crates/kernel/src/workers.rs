@@ -6,13 +6,13 @@
 //! calling thread; it takes the pool from front to back, never waits, and makes no system
 //! call.
 //!
-//! [`Waiting`] are workers that are kept between calls.
+//! [`ThreadPool`] are workers that are kept between calls.
 
-mod waiting;
+mod thread_pool;
 
-pub use waiting::{Task, Waiting};
+pub use thread_pool::{Job, ThreadPool};
 
-use crate::interrupt::desert;
+use crate::interrupt::unwind_worker_lost;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
@@ -23,7 +23,7 @@ use std::sync::{Condvar, Mutex, PoisonError};
 const POOLS: usize = 4;
 
 /// Numbers in the largest chunk of a pool.
-const CHUNK: usize = 64;
+const MAX_CHUNK: usize = 64;
 
 /// Spins before a waiting worker offers its processor to others, and yields before it sleeps.
 const SPINS_BEFORE_YIELD: u32 = 4_000;
@@ -31,7 +31,7 @@ const YIELDS_BEFORE_SLEEP: u32 = 200;
 
 /// Returns the number of processors that this process may use, at least 1. The answer takes system
 /// calls that read files, so ask once.
-pub fn available() -> usize {
+pub fn available_workers() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
@@ -44,7 +44,7 @@ pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
     match crew {
         [] => {}
         [only] => work(&Worker::ALONE, only),
-        _ => Team::new(crew.len()).run(crew, &work, &work),
+        _ => WorkerTeam::new(crew.len()).run(crew, &work, &work),
     }
 }
 
@@ -52,7 +52,7 @@ pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
 #[derive(Debug)]
 pub struct Worker<'a> {
     /// `None` for a lone worker.
-    team: Option<&'a Team>,
+    team: Option<&'a WorkerTeam>,
     index: usize,
 }
 
@@ -67,7 +67,7 @@ impl Worker<'_> {
 
     /// Number of workers in the team.
     pub fn team_size(&self) -> usize {
-        self.team.map_or(1, Team::size)
+        self.team.map_or(1, WorkerTeam::size)
     }
 
     /// Takes chunks of `0..n` until none is left. All workers call it with the same `pool`
@@ -75,14 +75,14 @@ impl Worker<'_> {
     #[inline]
     pub fn for_each_chunk(&self, pool: u64, n: usize, mut task: impl FnMut(Range<usize>)) {
         let Some(team) = self.team else {
-            return (0..n).step_by(CHUNK).for_each(|from| task(from..n.min(from + CHUNK)));
+            return (0..n).step_by(MAX_CHUNK).for_each(|from| task(from..n.min(from + MAX_CHUNK)));
         };
         let size = team.size();
         // No worker uses the cursors of the next pool but one now, so they can be reset without a
         // barrier.
         team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
         // At least eight chunks per share, so that the others find some work to take over.
-        let chunk = (n / (size * 8)).clamp(1, CHUNK);
+        let chunk = (n / (size * 8)).clamp(1, MAX_CHUNK);
         for k in 0..size {
             let owner = (self.index + k) % size;
             let (start, end) = (n * owner / size, n * (owner + 1) / size);
@@ -110,7 +110,7 @@ impl Worker<'_> {
 
     /// Returns whether `own` is true for any worker. All must call it, because it waits for all.
     pub fn any(&self, own: bool) -> bool {
-        let Some(Team { votes, .. }) = self.team else { return own };
+        let Some(WorkerTeam { votes, .. }) = self.team else { return own };
         if own {
             votes.fetch_add(1, Ordering::Relaxed);
         }
@@ -128,14 +128,14 @@ impl Worker<'_> {
 /// A counter on cache lines of its own, so that workers do not slow each other down.
 #[derive(Debug, Default)]
 #[repr(align(128))]
-struct Padded(AtomicUsize);
+struct CachePadded(AtomicUsize);
 
 /// The shared data of workers that run together. It outlives a run and serves the next one.
 #[derive(Debug)]
-pub(crate) struct Team {
+pub(crate) struct WorkerTeam {
     size: usize,
     /// `POOLS` cursors per worker.
-    cursors: Vec<Padded>,
+    cursors: Vec<CachePadded>,
     barrier: Barrier,
     /// Number of workers that answer yes, see [`Worker::any`].
     votes: AtomicUsize,
@@ -143,15 +143,15 @@ pub(crate) struct Team {
     spins: u32,
 }
 
-impl Team {
+impl WorkerTeam {
     /// Creates a team of `size` workers. Asks the system for the number of its processors.
     pub(crate) fn new(size: usize) -> Self {
         Self {
             size,
-            cursors: (0..size * POOLS).map(|_| Padded::default()).collect(),
+            cursors: (0..size * POOLS).map(|_| CachePadded::default()).collect(),
             barrier: Barrier::default(),
             votes: AtomicUsize::new(0),
-            spins: if size <= available() { SPINS_BEFORE_YIELD } else { 0 },
+            spins: if size <= available_workers() { SPINS_BEFORE_YIELD } else { 0 },
         }
     }
 
@@ -171,7 +171,7 @@ impl Team {
         work: impl Fn(&Worker<'_>, &mut S) + Sync,
     ) {
         assert_eq!(crew.len(), self.size, "one element per worker");
-        self.put_back();
+        self.reset();
         let (team, work) = (&*self, &work);
         let Some((first, others)) = crew.split_first_mut() else { return };
         std::thread::scope(|scope| {
@@ -192,7 +192,7 @@ impl Team {
 
     /// Resets the cursors because pools are counted from 0 in each run, and all the rest because a
     /// run that panicked left it in disorder.
-    fn put_back(&mut self) {
+    fn reset(&mut self) {
         self.cursors.iter_mut().for_each(|cursor| *cursor.0.get_mut() = 0);
         *self.votes.get_mut() = 0;
         self.barrier = Barrier::default();
@@ -227,7 +227,7 @@ impl Barrier {
             self.wait_past(generation, spins);
         }
         if self.broken.load(Ordering::Relaxed) {
-            desert();
+            unwind_worker_lost();
         }
     }
 
@@ -269,7 +269,7 @@ impl Barrier {
 }
 
 /// Releases the other workers when one panics, so that a bug ends the run instead of hanging it.
-struct ReleaseOnPanic<'a>(&'a Team);
+struct ReleaseOnPanic<'a>(&'a WorkerTeam);
 
 impl Drop for ReleaseOnPanic<'_> {
     fn drop(&mut self) {
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_team_serves_run_after_run_and_survives_a_panic() {
-        let mut team = Team::new(2);
+        let mut team = WorkerTeam::new(2);
         for runs in 0..4 {
             let done = AtomicU64::new(0);
             let work = |worker: &Worker<'_>, (): &mut ()| {

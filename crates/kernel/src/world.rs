@@ -7,14 +7,14 @@
 //! ```
 
 use crate::checkpoint::CheckpointError;
-use crate::conflict::Groups;
-use crate::control::{CellsMut, Order, OrderError, Teams};
+use crate::conflict::ConflictGroups;
+use crate::control::{BufferMut, Order, OrderError, Teams};
 use crate::digest::Digest;
-use crate::plan::Effort;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
+use crate::run_config::RunStats;
+use crate::text::{Description, KeyValues};
 use crate::units::{Cycle, EntityId, Slot};
-use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
-use crate::words::{Lines, Said};
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -22,7 +22,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// A worker's turn in one phase of one cycle: its inputs and its own buffers.
-pub struct Turn<'a, W: Phases> {
+pub struct PhaseContext<'a, W: Phases> {
     /// The immutable world.
     pub world: &'a W,
     /// The state; every slot of a column has one writer in each phase.
@@ -37,11 +37,11 @@ pub struct Turn<'a, W: Phases> {
 
 /// The phase in which agents decide on their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decides {
+pub enum DecisionMode {
     /// Each alone in the phase *claim*, before conflicts are known.
-    Alone,
+    Independent,
     /// Together with their conflict group in the phase *act*.
-    Together,
+    Joint,
 }
 
 /// The phases of one cycle of a compiled, immutable world, in their order.
@@ -57,7 +57,7 @@ pub trait Phases: Sync + Sized {
     type Scratch: Send;
 
     /// The phase in which agents decide, which determines the names of the phases in reports.
-    const DECIDES: Decides = Decides::Alone;
+    const DECISION_MODE: DecisionMode = DecisionMode::Independent;
 
     /// Returns a fresh scratch.
     fn scratch(&self) -> Self::Scratch;
@@ -72,16 +72,16 @@ pub trait Phases: Sync + Sized {
     /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
     /// decide alone), and publishes everything it may need. Writes only the intents and claims of
     /// these bodies.
-    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>);
+    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>);
 
     /// *Join*: joins each body of `bodies` with every other whose claims meet its own. Writes
     /// only `groups`.
-    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups);
+    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups);
 
     /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
     /// order that depends on state and seed alone. Writes only things that the group has claimed.
     /// The order of `group` itself is arbitrary.
-    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]);
+    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
     fn auction(&self) -> Option<&dyn Auction<Self>> {
@@ -94,13 +94,13 @@ pub trait Phases: Sync + Sized {
 /// inside a large group, and the outcome is the same as acting in the order of the bids.
 pub trait Auction<W: Phases> {
     /// Bids for everything that a body claims, and notes it in the scratch.
-    fn bid(&self, turn: &mut Turn<'_, W>, body: Slot);
+    fn bid(&self, turn: &mut PhaseContext<'_, W>, body: Slot);
 
     /// Lets the bodies of `pending` with the highest bids act, and removes them from the list.
-    fn act_on_bids(&self, turn: &mut Turn<'_, W>, pending: &mut Vec<Slot>);
+    fn act_on_bids(&self, turn: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
 
     /// Withdraws all bids noted in the scratch.
-    fn retract_bids(&self, turn: &mut Turn<'_, W>);
+    fn retract_bids(&self, turn: &mut PhaseContext<'_, W>);
 }
 
 /// A world that [`crate::Run`] runs: its phases, and everything else a run needs.
@@ -115,13 +115,13 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Whether [`World::before_cycle`] and [`World::is_over`] are called before every cycle. A
     /// world whose cycles take microseconds leaves it at `false`, because each look takes one more
     /// barrier.
-    const LOOKS_EACH_CYCLE: bool = false;
+    const OBSERVES_EACH_CYCLE: bool = false;
 
     /// The sums, rows and events that a run keeps beside the state.
-    type Books: Send;
+    type Collector: Send;
     /// The content of a checkpoint: the state and those books on which results depend, by entity
     /// id.
-    type Saved: Serialize + DeserializeOwned;
+    type Snapshot: Serialize + DeserializeOwned;
     /// The measurements of a run.
     type Metrics: Serialize;
 
@@ -129,12 +129,12 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn agents(&self) -> usize;
 
     /// Number of cycles that may run before rows must be handed over.
-    fn room(&self, _: &Self::State, _: &Self::Books, _: Cycle) -> u64 {
+    fn cycles_until_flush(&self, _: &Self::State, _: &Self::Collector, _: Cycle) -> u64 {
         u64::MAX
     }
 
     /// Keeps rows of the state at the start of a cycle, if they are recorded.
-    fn before_cycle(&self, _: &Self::State, _: &mut Self::Books, _: Cycle) {}
+    fn before_cycle(&self, _: &Self::State, _: &mut Self::Collector, _: Cycle) {}
 
     /// Returns whether nothing can happen anymore, e.g. because all have arrived; the run is then
     /// complete before its planned number of cycles.
@@ -144,27 +144,27 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Takes over the results of one worker from one or more cycles. The share of each worker
     /// differs from run to run.
-    fn gather(&self, books: &mut Self::Books, scratch: &mut Self::Scratch);
+    fn collect(&self, books: &mut Self::Collector, scratch: &mut Self::Scratch);
 
     /// Books the gathered results of all workers, in an order that does not depend on each worker's
     /// share.
-    fn book(&self, books: &mut Self::Books);
+    fn commit(&self, books: &mut Self::Collector);
 
     /// Starts to keep the rows that [`World::record`] hands over.
-    fn begin_recording(&self, state: &mut Self::State, books: &mut Self::Books, now: Cycle);
+    fn start_recording(&self, state: &mut Self::State, books: &mut Self::Collector, now: Cycle);
 
     /// Starts to keep events for frames.
-    fn watch(&self, books: &mut Self::Books);
+    fn enable_events(&self, books: &mut Self::Collector);
 
     /// Starts to keep odometry for frames, in worlds with wheels that err.
-    fn watch_odometry(&self, _: &mut Self::Books) {}
+    fn enable_odometry(&self, _: &mut Self::Collector) {}
 
-    /// Sets up a worker's scratch for gathering rows and events, after [`World::begin_recording`]
-    /// and [`World::watch`].
-    fn prepare(&self, _: &Self::Books, _: &mut Self::Scratch) {}
+    /// Sets up a worker's scratch for gathering rows and events, after [`World::start_recording`]
+    /// and [`World::enable_events`].
+    fn prepare(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
 
     /// The tables that are recorded.
-    fn schemas(&self, books: &Self::Books) -> Vec<TableSchema>;
+    fn schemas(&self, books: &Self::Collector) -> Vec<TableSchema>;
 
     /// Hands over the rows of all cycles before `now` that were not handed over yet.
     ///
@@ -173,7 +173,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn record(
         &self,
         state: &mut Self::State,
-        books: &mut Self::Books,
+        books: &mut Self::Collector,
         now: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError>;
@@ -182,7 +182,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
     /// Returns the content of a checkpoint.
-    fn save(&self, state: &Self::State, books: &Self::Books, now: Cycle) -> Self::Saved;
+    fn save(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Self::Snapshot;
 
     /// Returns the state that was saved; the books take over their part.
     ///
@@ -190,20 +190,32 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// When it does not fit this world.
     fn restore(
         &self,
-        saved: Self::Saved,
-        books: &mut Self::Books,
+        saved: Self::Snapshot,
+        books: &mut Self::Collector,
     ) -> Result<Self::State, CheckpointError>;
 
     /// Returns the scenery: everything that stays the same during the run.
     fn scenery(&self, name: &str) -> Scenery;
 
     /// Returns the present frame, with the events since the last one.
-    fn frame(&self, state: &Self::State, books: &mut Self::Books, now: Cycle, look: Look) -> Frame;
+    fn frame(
+        &self,
+        state: &Self::State,
+        books: &mut Self::Collector,
+        now: Cycle,
+        look: FrameOptions,
+    ) -> Frame;
 
     /// Returns the percepts and decisions of a body in cycle `now`, and their outcome if nothing
     /// else is asked of the run; `None` for a body that does not exist or has nothing to show. It
     /// works on a copy of the data, so that no result depends on it.
-    fn inspect(&self, _: &Self::State, _: &Self::Books, _: Cycle, _: Who) -> Option<Inspection> {
+    fn inspect(
+        &self,
+        _: &Self::State,
+        _: &Self::Collector,
+        _: Cycle,
+        _: BodyId,
+    ) -> Option<Inspection> {
         None
     }
 
@@ -228,27 +240,27 @@ pub trait World: Phases<State: Send> + Send + 'static {
     ///
     /// # Errors
     /// When an agent decides within the run, or an action is impossible; nothing is noted then.
-    fn hand_over(
+    fn submit_controls(
         &self,
         _: &mut Self::State,
         _now: Cycle,
         _: &[(EntityId, Vec<u8>)],
     ) -> Result<(), OrderError> {
         let cause = format!("agents of the world {} decide in the run alone", Self::NAME);
-        Err(OrderError::NobodyOutside { cause })
+        Err(OrderError::NoExternalAgents { cause })
     }
 
     /// Returns whether a recorded run keeps the controls handed over.
-    fn keeps_controls(&self, _: &Self::Books) -> bool {
+    fn records_controls(&self, _: &Self::Collector) -> bool {
         false
     }
 
     /// Writes the observations of a team's agents in cycle `now` from the frozen state; there is one room
     /// for each of [`crate::control::Team::observed`], and each is as large as it must be.
-    fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [CellsMut<'_>]) {}
+    fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [BufferMut<'_>]) {}
 
     /// The recorded tables and columns that hold the places of bodies.
-    fn place_rows(&self, _: &Self::Books) -> Vec<PlaceRows> {
+    fn position_columns(&self, _: &Self::Collector) -> Vec<PositionColumns> {
         Vec::new()
     }
 
@@ -256,22 +268,22 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn metrics(
         &self,
         state: &Self::State,
-        books: &Self::Books,
+        books: &Self::Collector,
         now: Cycle,
-        effort: &Effort,
+        effort: &RunStats,
     ) -> Self::Metrics;
 
     /// Returns the metrics of each agent, as a JSON array.
-    fn agent_metrics(&self, state: &Self::State, books: &Self::Books, now: Cycle) -> Value;
+    fn agent_metrics(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Value;
 
     /// Returns the metrics of pairs of agents, in worlds that have any.
-    fn pair_metrics(&self, _: &Self::Books) -> Value {
+    fn pair_metrics(&self, _: &Self::Collector) -> Value {
         Value::Null
     }
 
     /// Returns the outcome of a run, in lines for people.
-    fn outcome(&self, metrics: &Self::Metrics) -> Lines;
+    fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
     /// Returns the pose of every body.
-    fn poses(&self, state: &Self::State, now: Cycle) -> Said;
+    fn poses(&self, state: &Self::State, now: Cycle) -> Description;
 }

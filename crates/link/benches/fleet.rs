@@ -6,12 +6,14 @@
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_link::wire::endpoint::hold;
+use sidestep_link::protocol::{Incarnation, Member};
+use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Party, Wire};
-use sidestep_link::words::{Life, Member};
-use sidestep_session::fleet::{Clock, Common, FleetJob, FleetNow, Flown, Job, Told, Topology};
-use sidestep_session::{Journey, Keep, Unwatched};
+use sidestep_link::wire::{Peer, Wire};
+use sidestep_session::fleet::{
+    ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobScenario, LinkMessage, Topology,
+};
+use sidestep_session::{ManagedRun, NoWatcher, OutputPaths};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -20,7 +22,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Barrier};
 use std::time::{Duration, Instant};
 
-const LONG: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn main() {
     let words: Vec<String> =
@@ -43,13 +45,17 @@ fn main() {
 
 /// Prints the time of a round in which each of a team hears all others.
 fn rounds(team: u32, rounds: usize) {
-    let free = || hold("tcp/127.0.0.1:0").expect("a free port");
+    let free = || reserve_port("tcp/127.0.0.1:0").expect("a free port");
     let server = free().endpoint;
     let _server = ZenohWire::server(std::slice::from_ref(&server), None).expect("a server");
     let held: Vec<_> = (0..team).map(|_| free()).collect();
     let members: Vec<Member> = (0..)
         .zip(&held)
-        .map(|(agent, held)| Member { agent, life: Life(0), listens: vec![held.endpoint.clone()] })
+        .map(|(agent, held)| Member {
+            agent,
+            life: Incarnation(0),
+            listens: vec![held.endpoint.clone()],
+        })
         .collect();
     drop(held);
     let barrier = Arc::new(Barrier::new(team as usize));
@@ -57,12 +63,12 @@ fn rounds(team: u32, rounds: usize) {
         .map(|agent| {
             let (server, members, barrier) = (server.clone(), members.clone(), barrier.clone());
             std::thread::spawn(move || {
-                let me = Party::Node(agent);
-                let wire = ZenohWire::node(me, &[server], None, LONG).expect("it answers");
+                let me = Peer::Node(agent);
+                let wire = ZenohWire::node(me, &[server], None, TIMEOUT).expect("it answers");
                 let own = members[agent as usize].listens.iter();
-                let held = own.map(|endpoint| hold(endpoint).expect("free")).collect();
-                let mut wire = wire.listening(held);
-                wire.join(agent, &members).expect("a mesh");
+                let held = own.map(|endpoint| reserve_port(endpoint).expect("free")).collect();
+                let mut wire = wire.with_listeners(held);
+                wire.connect_mesh(agent, &members).expect("a mesh");
                 barrier.wait();
                 meet(&mut wire, agent, team);
                 barrier.wait();
@@ -98,21 +104,21 @@ fn number(bytes: &[u8]) -> u32 {
 /// Sends frames until all others have been heard, and lets them hear it, too.
 fn meet(wire: &mut dyn Wire, agent: u32, team: u32) {
     let mut heard = BTreeMap::new();
-    let until = Instant::now() + LONG;
+    let until = Instant::now() + TIMEOUT;
     while heard.len() + 1 < team as usize && Instant::now() < until {
-        say(wire, agent, team, 0);
+        send_frame(wire, agent, team, 0);
         while let Some(bytes) = wire.receive(Duration::from_millis(20)) {
             heard.insert(number(&bytes[4..]), ());
         }
     }
     assert!(heard.len() + 1 == team as usize, "not all are there");
-    say(wire, agent, team, 0);
+    send_frame(wire, agent, team, 0);
     std::thread::sleep(Duration::from_millis(500));
     while wire.receive(Duration::from_millis(50)).is_some() {}
 }
 
-fn say(wire: &mut dyn Wire, agent: u32, team: u32, round: u32) {
-    let others: Vec<Party> = (0..team).filter(|other| *other != agent).map(Party::Node).collect();
+fn send_frame(wire: &mut dyn Wire, agent: u32, team: u32, round: u32) {
+    let others: Vec<Peer> = (0..team).filter(|other| *other != agent).map(Peer::Node).collect();
     wire.send(&others, &frame(round, agent));
 }
 
@@ -121,10 +127,10 @@ fn one_round(wire: &mut dyn Wire, (agent, team): (u32, u32), round: u32) -> Dura
         static EARLY: std::cell::RefCell<BTreeMap<u32, u32>> = const { std::cell::RefCell::new(BTreeMap::new()) };
     }
     let began = Instant::now();
-    say(wire, agent, team, round);
+    send_frame(wire, agent, team, round);
     EARLY.with_borrow_mut(|heard| {
         while heard.get(&round).copied().unwrap_or(0) + 1 < team {
-            let bytes = wire.receive(LONG).expect("nothing is lost on loopback");
+            let bytes = wire.receive(TIMEOUT).expect("nothing is lost on loopback");
             *heard.entry(number(&bytes)).or_default() += 1;
         }
         heard.remove(&round);
@@ -139,12 +145,12 @@ fn text(n: u32, cycles: u64) -> String {
     )
 }
 
-fn job(folder: &Path, clock: Clock) -> FleetJob {
-    let build = sidestep_session::build().into();
-    let flown = Flown { file: folder.join("s.toml"), overrides: Vec::new(), build };
+fn job(folder: &Path, clock: ClockMode) -> FleetJob {
+    let build = sidestep_session::build_id().into();
+    let flown = JobScenario { file: folder.join("s.toml"), overrides: Vec::new(), build };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
-        common: Common { flown, tls, lease_s: 30.0, metrics, json_log: false, log },
+        common: CommonSettings { flown, tls, lease_s: 30.0, metrics, json_log: false, log },
         nodes: None,
         clock,
         topology: Topology::Mesh,
@@ -156,7 +162,7 @@ fn job(folder: &Path, clock: Clock) -> FleetJob {
 }
 
 /// Flies a fleet; `look` may end it. Returns the digest, and the fleet at the end.
-fn fly(job: FleetJob, mut look: impl FnMut(&FleetNow) -> bool) -> (String, FleetNow) {
+fn fly(job: FleetJob, mut look: impl FnMut(&FleetStatus) -> bool) -> (String, FleetStatus) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
     let mut child =
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("the program starts");
@@ -166,11 +172,11 @@ fn fly(job: FleetJob, mut look: impl FnMut(&FleetNow) -> bool) -> (String, Fleet
     let mut ended = None;
     for line in BufReader::new(child.stdout.take().expect("a pipe")).lines().map_while(Result::ok) {
         match serde_json::from_str(&line).expect("a line that is known") {
-            Told::Fleet(now) if !look(&now) => drop(stdin.take()),
-            Told::Ended { summary, fleet, .. } => {
+            LinkMessage::Fleet(now) if !look(&now) => drop(stdin.take()),
+            LinkMessage::Ended { summary, fleet, .. } => {
                 ended = Some((summary["digest"].as_str().unwrap_or_default().to_string(), fleet));
             }
-            Told::Failed(failed) if !failed.is_interrupted => panic!("{failed:?}"),
+            LinkMessage::Failed(failed) if !failed.is_interrupted => panic!("{failed:?}"),
             _ => {}
         }
     }
@@ -189,11 +195,12 @@ fn conflict(n: u32) {
     for _ in 0..3 {
         let began = Instant::now();
         let journey =
-            Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
-        let alone = journey.travel(&Unwatched).expect("flown");
+            ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+                .expect("started");
+        let alone = journey.run_to_end(&NoWatcher).expect("flown");
         let alone_s = began.elapsed().as_secs_f64();
         let mut first = None;
-        let (digest, fleet) = fly(job(folder.path(), Clock::Lockstep), |now| {
+        let (digest, fleet) = fly(job(folder.path(), ClockMode::Lockstep), |now| {
             // Processes start once, however long the flight is.
             first = first.or(now.has_begun.then(Instant::now));
             true
@@ -215,13 +222,13 @@ fn conflict(n: u32) {
 }
 
 /// News of a fleet: its state, or the part of a cycle to which an airplane has come.
-enum News {
-    Fleet(FleetNow),
+enum FleetNews {
+    Fleet(FleetStatus),
     Part { airplane: u32, cycle: u64, talk: String, at: Instant },
 }
 
 /// Starts a fleet; the second channel tells its news until it ends.
-fn watched(job: FleetJob) -> (Child, Receiver<News>) {
+fn start_watched(job: FleetJob) -> (Child, Receiver<FleetNews>) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("the program starts");
@@ -233,8 +240,8 @@ fn watched(job: FleetJob) -> (Child, Receiver<News>) {
     let told = tells.clone();
     std::thread::spawn(move || {
         for line in out.lines().map_while(Result::ok) {
-            if let Ok(Told::Fleet(now)) = serde_json::from_str(&line) {
-                let _ = told.send(News::Fleet(now));
+            if let Ok(LinkMessage::Fleet(now)) = serde_json::from_str(&line) {
+                let _ = told.send(FleetNews::Fleet(now));
             }
         }
     });
@@ -246,7 +253,7 @@ fn watched(job: FleetJob) -> (Child, Receiver<News>) {
                 (number("agent"), number("cycle"), line["talk"].as_str())
             {
                 let (airplane, talk, at) = (airplane as u32, talk.to_string(), Instant::now());
-                let _ = tells.send(News::Part { airplane, cycle, talk, at });
+                let _ = tells.send(FleetNews::Part { airplane, cycle, talk, at });
             }
         }
     });
@@ -254,7 +261,7 @@ fn watched(job: FleetJob) -> (Child, Receiver<News>) {
 }
 
 /// A node that was killed, and the others that have had their controls since then.
-struct Killed {
+struct KilledNode {
     at: Instant,
     cycle: u64,
     done: BTreeSet<u32>,
@@ -279,18 +286,18 @@ fn abreast(n: u32) -> String {
 fn recovery(n: u32, kills: usize) {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("s.toml"), abreast(n)).expect("written");
-    let mut job = job(folder.path(), Clock::Realtime { speed: 5.0 });
+    let mut job = job(folder.path(), ClockMode::Realtime { speed: 5.0 });
     (job.common.json_log, job.common.log) = (true, "debug".into());
-    let (mut child, news) = watched(job);
+    let (mut child, news) = start_watched(job);
     let mut killer = Killer::new();
-    let (mut times, mut killed): (Vec<Duration>, Option<Killed>) = (Vec::new(), None);
-    let (mut now, mut since) = (FleetNow::default(), Instant::now());
+    let (mut times, mut killed): (Vec<Duration>, Option<KilledNode>) = (Vec::new(), None);
+    let (mut now, mut since) = (FleetStatus::default(), Instant::now());
     while times.len() < kills {
-        assert!(since.elapsed() < LONG, "nobody could be killed, or has come back: {now:?}");
+        assert!(since.elapsed() < TIMEOUT, "nobody could be killed, or has come back: {now:?}");
         let victim = times.len() as u32 % n;
-        match news.recv_timeout(LONG).expect("the fleet flies") {
-            News::Fleet(fleet) => now = fleet,
-            News::Part { airplane, cycle, talk, at } => match &mut killed {
+        match news.recv_timeout(TIMEOUT).expect("the fleet flies") {
+            FleetNews::Fleet(fleet) => now = fleet,
+            FleetNews::Part { airplane, cycle, talk, at } => match &mut killed {
                 None if airplane == victim && talk == "decide" => {
                     let Some(node) = now.nodes.get(victim as usize) else { continue };
                     // All have recovered from the kill before.
@@ -298,7 +305,7 @@ fn recovery(n: u32, kills: usize) {
                     if let Some(process) = node.process.filter(|_| is_whole) {
                         killer.kill(process);
                         let done = BTreeSet::new();
-                        killed = Some(Killed { at: Instant::now(), cycle, done });
+                        killed = Some(KilledNode { at: Instant::now(), cycle, done });
                     }
                 }
                 Some(lost) if airplane != victim && talk == "done" && cycle >= lost.cycle => {
@@ -351,7 +358,7 @@ fn nodes(n: u32, flown_for: Duration) {
     let text = format!("{}radius_m = {radius_m:?}\n", text(n, 1_000_000));
     std::fs::write(folder.path().join("s.toml"), text).expect("written");
     let (mut first, mut memory_kb) = (None, [0, 0]);
-    let (_, fleet) = fly(job(folder.path(), Clock::Realtime { speed: 1.0 }), |now| {
+    let (_, fleet) = fly(job(folder.path(), ClockMode::Realtime { speed: 1.0 }), |now| {
         if now.has_begun {
             let since = *first.get_or_insert(Instant::now());
             let nodes = now.nodes.iter();

@@ -1,27 +1,29 @@
 //! Airplanes: their world at the server, and a pilot at each node.
 
-use crate::deployed::Deployed;
-use crate::faults::Faults;
-use crate::heard::{Heard, dropped};
-use crate::ports::{Absurd, Channel, Controls, Doing, Outgoing, Program, Sight};
-use crate::words::Begin;
+use crate::agent::{
+    Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
+};
+use crate::distributed::DistributedWorld;
+use crate::faults::FaultyChannel;
+use crate::protocol::CycleStart;
+use crate::recent_senders::{RecentSenders, drop_counts};
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::airspace::deploy::Deployment;
-use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Sight as Percept};
+use sidestep::worlds::airspace::pilot::{Fleet, Packet, Percept, Pilot};
 use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
 use std::sync::Arc;
 
 /// Part of a cycle after which an agent asks again: an eighth of the time that a talk has, and a little less.
-const PATIENCE_PART: f64 = 0.05;
+const RETRY_DELAY_FRACTION: f64 = 0.05;
 
 /// Airplanes that may be nodes.
-pub(crate) struct Airplanes {
+pub(crate) struct DistributedAirspace {
     world: Arc<AirspaceWorld>,
 }
 
-impl Airplanes {
+impl DistributedAirspace {
     /// Returns the airplanes of a world; an error has the cause and the remedy.
     pub(crate) fn new(world: Arc<AirspaceWorld>) -> Result<Self, (&'static str, &'static str)> {
         if world.deployment == Deployment::Direct {
@@ -34,12 +36,12 @@ impl Airplanes {
     }
 }
 
-fn of(run: &dyn Simulation) -> &AirspaceRun {
+fn airspace_run(run: &dyn Simulation) -> &AirspaceRun {
     let run: &dyn Any = run;
     run.downcast_ref().expect("it is a run of an airspace")
 }
 
-impl Deployed for Airplanes {
+impl DistributedWorld for DistributedAirspace {
     fn count(&self) -> usize {
         self.world.airplanes.len()
     }
@@ -63,64 +65,64 @@ impl Deployed for Airplanes {
         self.world.network.is_some()
     }
 
-    fn patience(&self, _: f64) -> Option<String> {
+    fn timeout_override(&self, _: f64) -> Option<String> {
         // As long as possible, because processes answer more slowly than agents in memory.
-        let patience_s = PATIENCE_PART * self.cycle_s();
+        let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
         (!self.has_faults()).then(|| format!("airspace.network.patience_s={patience_s}"))
     }
 
-    fn sights(&self, run: &dyn Simulation) -> Vec<Sight> {
-        let beyond = of(run).beyond();
+    fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
+        let beyond = airspace_run(run).out_of_range();
         let one = |percept: Percept| {
             let agent = percept.own.id;
             let place = beyond.binary_search_by_key(&agent, |(id, _)| *id);
             let beyond = place.map(|k| beyond[k].1.clone()).unwrap_or_default();
             let sight = postcard::to_stdvec(&percept).expect("percepts are plain data");
-            let begin = Begin { cycle: percept.cycle, sight, beyond };
-            Sight { agent, group: percept.members(), begin }
+            let begin = CycleStart { cycle: percept.cycle, sight, beyond };
+            AgentPercept { agent, group: percept.members(), begin }
         };
-        of(run).sights().into_iter().map(one).collect()
+        airspace_run(run).percepts().into_iter().map(one).collect()
     }
 
-    fn absurd(&self, run: &dyn Simulation, controls: &Controls) -> Vec<Absurd> {
-        let refused = of(run).absurd(controls).into_iter();
-        refused.map(|(agent, reason)| Absurd { agent, reason }).collect()
+    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
+        let refused = airspace_run(run).invalid_controls(controls).into_iter();
+        refused.map(|(agent, reason)| InvalidControl { agent, reason }).collect()
     }
 
-    fn program(&self, agent: EntityId, build: &str) -> Box<dyn Program> {
-        let pilot = Pilot::new(self.world.clone(), agent, Default::default()).of_build(build);
-        Box::new(Aboard { world: self.world.clone(), pilot, heard: Heard::default() })
+    fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram> {
+        let pilot = Pilot::new(self.world.clone(), agent, Default::default()).with_build(build);
+        Box::new(PilotProgram { world: self.world.clone(), pilot, heard: RecentSenders::default() })
     }
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let talks = move |cycle| world.talks_of(cycle).to_vec();
-        Some(Box::new(Faults::new(self.world.ether()?, agent, talks)))
+        let talks = move |cycle| world.conversation_times(cycle).to_vec();
+        Some(Box::new(FaultyChannel::new(self.world.fault_injector()?, agent, talks)))
     }
 }
 
 /// A pilot, at a node.
-struct Aboard {
+struct PilotProgram {
     world: Arc<AirspaceWorld>,
     pilot: Pilot,
-    heard: Heard,
+    heard: RecentSenders,
 }
 
-impl Program for Aboard {
-    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
+impl AgentProgram for PilotProgram {
+    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
         let percept: Percept = postcard::from_bytes(sight).map_err(|e| e.to_string())?;
         if (percept.own.id, percept.cycle) != (self.pilot.id(), cycle) {
             return Err("it is of another airplane, or of another cycle".into());
         }
         percept.check(&self.world).map_err(|why| format!("it cannot be: {why:?}"))?;
-        self.heard.begin();
-        let tick = self.world.talks_of(cycle)[0].0;
-        self.pilot.begin(percept, tick);
+        self.heard.start_cycle();
+        let tick = self.world.conversation_times(cycle)[0].0;
+        self.pilot.start(percept, tick);
         Ok(tick)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
-        self.heard.note(from);
+        self.heard.record(from);
         self.pilot.on_packet(from, payload, tick);
     }
 
@@ -132,9 +134,12 @@ impl Program for Aboard {
         self.pilot.next_timer()
     }
 
-    fn take_packets(&mut self) -> Vec<Outgoing> {
-        let outgoing =
-            |Packet { to, sequence, payload }| Outgoing { to: to.to_vec(), sequence, payload };
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+        let outgoing = |Packet { to, sequence, payload }| OutgoingPacket {
+            to: to.to_vec(),
+            sequence,
+            payload,
+        };
         self.pilot.take_packets().into_iter().map(outgoing).collect()
     }
 
@@ -147,7 +152,7 @@ impl Program for Aboard {
         self.pilot.is_done()
     }
 
-    fn doing(&self) -> Doing {
+    fn activity(&self) -> Activity {
         let word = match &self.pilot {
             pilot if pilot.is_done() => "done",
             pilot if pilot.has_decided() => "shield",
@@ -155,14 +160,14 @@ impl Program for Aboard {
             _ => "group",
         };
         let progress = self.pilot.progress().unwrap_or_default();
-        Doing { word, round: progress.round, epoch: progress.epoch.into() }
+        Activity { word, round: progress.round, epoch: progress.epoch.into() }
     }
 
-    fn heard(&self) -> Vec<EntityId> {
-        self.heard.all()
+    fn heard_agents(&self) -> Vec<EntityId> {
+        self.heard.senders()
     }
 
-    fn dropped(&self) -> Vec<(String, u64)> {
-        dropped(&self.pilot.refused())
+    fn drop_counts(&self) -> Vec<(String, u64)> {
+        drop_counts(&self.pilot.drop_counts())
     }
 }

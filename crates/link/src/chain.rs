@@ -1,13 +1,15 @@
 //! Connectors of chains: their world at the server, and the agent of one at each node.
 
-use crate::deployed::Deployed;
-use crate::faults::Faults;
-use crate::heard::{Heard, dropped};
-use crate::ports::{Absurd, Channel, Controls, Doing, Outgoing, Program, Sight};
-use crate::words::Begin;
+use crate::agent::{
+    Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
+};
+use crate::distributed::DistributedWorld;
+use crate::faults::FaultyChannel;
+use crate::protocol::CycleStart;
+use crate::recent_senders::{RecentSenders, drop_counts};
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::chain::agents::{
-    ConnectorAgent, Handed, Outgoing as Packet, Sight as Percept,
+    ChainControls, ConnectorAgent, ConnectorPercept as Percept, OutgoingPacket as Packet,
 };
 use sidestep::worlds::chain::{ChainRun, ChainWorld, Deployment};
 use sidestep_session::fleet::AgentName;
@@ -15,17 +17,17 @@ use std::any::Any;
 use std::sync::Arc;
 
 /// Part of a cycle after which a connector asks again: an eighth of the time that a talk has, and a little less.
-const PATIENCE_PART: f64 = 0.1;
+const RETRY_DELAY_FRACTION: f64 = 0.1;
 
 /// Seconds of real time in which a process answers: a request repeated sooner is useless.
-const ANSWERS_S: f64 = 2e-3;
+const MIN_RETRY_DELAY_S: f64 = 2e-3;
 
 /// Connectors that may be nodes, of chains in `D` dimensions.
-pub(crate) struct Connectors<const D: usize> {
+pub(crate) struct DistributedChains<const D: usize> {
     world: Arc<ChainWorld<D>>,
 }
 
-impl<const D: usize> Connectors<D> {
+impl<const D: usize> DistributedChains<D> {
     /// Returns the connectors of a world; an error has the cause and the remedy.
     pub(crate) fn new(world: Arc<ChainWorld<D>>) -> Result<Self, (&'static str, &'static str)> {
         if world.deployment == Deployment::Direct {
@@ -35,40 +37,41 @@ impl<const D: usize> Connectors<D> {
         Ok(Self { world })
     }
 
-    fn run<'a>(&self, run: &'a dyn Simulation) -> &'a ChainRun<D> {
+    fn chain_run<'a>(&self, run: &'a dyn Simulation) -> &'a ChainRun<D> {
         let run: &dyn Any = run;
         run.downcast_ref().expect("it is a run of these chains")
     }
 
     /// Returns the chain of a connector and its number there.
-    fn place(&self, agent: EntityId) -> (EntityId, u32) {
-        self.world.connector_of(agent).expect("agents are the connectors of the world")
+    fn chain_and_number(&self, agent: EntityId) -> (EntityId, u32) {
+        self.world.find_connector(agent).expect("agents are the connectors of the world")
     }
 
     /// Returns the neighbors that a connector's radio does not reach, rising.
-    fn beyond(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
+    fn unreachable_neighbors(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
         let range_m = self.world.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
-        let neighbors = [agent.wrapping_sub(1), agent + 1].into_iter().zip(percept.apart_m());
+        let neighbors =
+            [agent.wrapping_sub(1), agent + 1].into_iter().zip(percept.neighbor_distances_m());
         let is_beyond = |apart_m: Option<f64>| apart_m.is_some_and(|apart_m| apart_m > range_m);
         neighbors.filter(|(_, apart_m)| is_beyond(*apart_m)).map(|(id, _)| id).collect()
     }
 }
 
-impl<const D: usize> Deployed for Connectors<D> {
+impl<const D: usize> DistributedWorld for DistributedChains<D> {
     fn count(&self) -> usize {
         let chains = 0..;
-        let lengths = chains.map(|chain| self.world.connectors(chain) as usize);
+        let lengths = chains.map(|chain| self.world.connector_count(chain) as usize);
         lengths.take_while(|&n| n > 0).sum()
     }
 
     fn name(&self, agent: EntityId) -> AgentName {
-        let (chain, connector) = self.place(agent);
+        let (chain, connector) = self.chain_and_number(agent);
         AgentName::Connector { chain, connector }
     }
 
     fn id(&self, name: AgentName) -> Option<EntityId> {
         match name {
-            AgentName::Connector { chain, connector } => self.world.id_of(chain, connector),
+            AgentName::Connector { chain, connector } => self.world.connector_id(chain, connector),
             AgentName::Airplane(_) => None,
         }
     }
@@ -81,71 +84,71 @@ impl<const D: usize> Deployed for Connectors<D> {
         self.world.network.is_some()
     }
 
-    fn patience(&self, speed: f64) -> Option<String> {
+    fn timeout_override(&self, speed: f64) -> Option<String> {
         // A bus answers in microseconds, and a process does not: repeating so soon would send everything many times.
-        let is_long = |given_s: f64| given_s / speed >= ANSWERS_S;
+        let is_long = |given_s: f64| given_s / speed >= MIN_RETRY_DELAY_S;
         let given_s = self.world.network.as_ref().map(|network| network.patience_s);
-        let patience_s = PATIENCE_PART * self.cycle_s();
+        let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
         let is_kept = given_s.is_some_and(|given_s| is_long(given_s) || given_s >= patience_s);
         (!is_kept).then(|| format!("chain.network.patience_s={patience_s}"))
     }
 
-    fn waits_for_lost(&self) -> bool {
+    fn waits_for_lost_nodes(&self) -> bool {
         true
     }
 
-    fn heeds_lost(&self) -> bool {
+    fn keeps_controls_of_lost_nodes(&self) -> bool {
         // Its messages to neighbors since its decision may be lost with it.
         false
     }
 
-    fn sights(&self, run: &dyn Simulation) -> Vec<Sight> {
-        let run = self.run(run);
+    fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
+        let run = self.chain_run(run);
         let mut sights = Vec::new();
-        for (chain, percepts) in self.world.sights_at(run.state(), run.cycle()) {
+        for (chain, percepts) in self.world.percepts_at(run.state(), run.cycle()) {
             let n = percepts.len() as u32;
-            let first = self.world.id_of(chain, 0).expect("a chain has connectors");
+            let first = self.world.connector_id(chain, 0).expect("a chain has connectors");
             let group: Vec<EntityId> = (first..first + n).collect();
             for (&agent, percept) in group.iter().zip(&percepts) {
                 let sight = postcard::to_stdvec(percept).expect("percepts are plain data");
-                let beyond = self.beyond(agent, percept);
-                let begin = Begin { cycle: percept.cycle, sight, beyond };
-                sights.push(Sight { agent, group: group.clone(), begin });
+                let beyond = self.unreachable_neighbors(agent, percept);
+                let begin = CycleStart { cycle: percept.cycle, sight, beyond };
+                sights.push(AgentPercept { agent, group: group.clone(), begin });
             }
         }
         sights.sort_unstable_by_key(|sight| sight.agent);
         sights
     }
 
-    fn further_rounds(&self, run: &dyn Simulation, groups: usize) -> usize {
-        let run = self.run(run);
-        let waits = |chain: &usize| !run.state().has_handed_over(*chain, run.cycle());
+    fn max_further_rounds(&self, run: &dyn Simulation, groups: usize) -> usize {
+        let run = self.chain_run(run);
+        let waits = |chain: &usize| !run.state().has_submitted_controls(*chain, run.cycle());
         let waiting = (0..run.state().len()).filter(waits).count();
         waiting.saturating_sub(groups)
     }
 
-    fn take(
+    fn accept_controls(
         &self,
         run: &dyn Simulation,
         groups: &[Vec<EntityId>],
         controls: &mut Controls,
         gone: &[EntityId],
-    ) -> Vec<Absurd> {
-        let run = self.run(run);
-        let absurd = self.absurd(run, controls);
+    ) -> Vec<InvalidControl> {
+        let run = self.chain_run(run);
+        let absurd = self.invalid_controls(run, controls);
         controls.retain(|(agent, _)| absurd.iter().all(|one| one.agent != *agent));
-        controls.extend(gone.iter().map(|&id| (id, Handed::<D>::GONE.to_vec())));
+        controls.extend(gone.iter().map(|&id| (id, ChainControls::<D>::ABSENT_CONTROL.to_vec())));
         let read = self.world.read_controls(run.cycle(), controls).expect("all were read");
-        let mut read: Vec<Option<Handed<D>>> = read.into_iter().map(Some).collect();
+        let mut read: Vec<Option<ChainControls<D>>> = read.into_iter().map(Some).collect();
         for group in groups {
-            let (chain, _) = self.place(group[0]);
+            let (chain, _) = self.chain_and_number(group[0]);
             let handed = read[chain as usize].take().expect("a chain talks once in a cycle");
-            self.world.hand_over(run.state(), chain, handed).expect("all were read");
+            self.world.submit_controls(run.state(), chain, handed).expect("all were read");
         }
         absurd
     }
 
-    fn absurd(&self, run: &dyn Simulation, controls: &Controls) -> Vec<Absurd> {
+    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
         let now = run.cycle();
         let why = |(agent, bytes): &(EntityId, Vec<u8>)| {
             let reason = match self.world.read_control(now, *agent, bytes) {
@@ -154,50 +157,50 @@ impl<const D: usize> Deployed for Connectors<D> {
                 Ok(None) => "it is no decision".into(),
                 Ok(Some(_)) => return None,
             };
-            Some(Absurd { agent: *agent, reason })
+            Some(InvalidControl { agent: *agent, reason })
         };
         controls.iter().filter_map(why).collect()
     }
 
-    fn program(&self, agent: EntityId, build: &str) -> Box<dyn Program> {
-        let (chain, connector) = self.place(agent);
+    fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram> {
+        let (chain, connector) = self.chain_and_number(agent);
         let first_tick = {
             let world = self.world.clone();
-            Box::new(move |cycle| world.talk_of(cycle).0)
+            Box::new(move |cycle| world.negotiation_start(cycle).0)
         };
-        let agent = ConnectorAgent::new(&self.world, chain, connector).of_build(build);
-        Box::new(Aboard { first_tick, agent, heard: Heard::default() })
+        let agent = ConnectorAgent::new(&self.world, chain, connector).with_build(build);
+        Box::new(ConnectorProgram { first_tick, agent, heard: RecentSenders::default() })
     }
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let talks = move |cycle| vec![world.talk_of(cycle)];
-        Some(Box::new(Faults::new(self.world.ether()?, agent, talks)))
+        let talks = move |cycle| vec![world.negotiation_start(cycle)];
+        Some(Box::new(FaultyChannel::new(self.world.fault_injector()?, agent, talks)))
     }
 }
 
 /// The agent of a connector, at a node. Of the world it knows the clock and the agent's behavior.
-struct Aboard<const D: usize> {
+struct ConnectorProgram<const D: usize> {
     /// Returns the first tick of a cycle's talk.
     first_tick: Box<dyn Fn(Cycle) -> u64 + Send>,
     agent: ConnectorAgent<D>,
-    heard: Heard,
+    heard: RecentSenders,
 }
 
-impl<const D: usize> Program for Aboard<D> {
-    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
+impl<const D: usize> AgentProgram for ConnectorProgram<D> {
+    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
         let percept: Percept<D> = postcard::from_bytes(sight).map_err(|e| e.to_string())?;
         if percept.cycle != cycle {
             return Err("it is of another cycle".into());
         }
         let tick = (self.first_tick)(cycle);
-        self.agent.begin(percept, tick).map_err(|e| e.to_string())?;
-        self.heard.begin();
+        self.agent.start(percept, tick).map_err(|e| e.to_string())?;
+        self.heard.start_cycle();
         Ok(tick)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
-        self.heard.note(from);
+        self.heard.record(from);
         self.agent.on_packet(from, payload, tick);
     }
 
@@ -209,10 +212,10 @@ impl<const D: usize> Program for Aboard<D> {
         self.agent.next_timer()
     }
 
-    fn take_packets(&mut self) -> Vec<Outgoing> {
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
         let outgoing = |packet: Packet| {
             let Packet { to, sequence, payload } = packet;
-            Outgoing { to: vec![to], sequence, payload }
+            OutgoingPacket { to: vec![to], sequence, payload }
         };
         self.agent.take_packets().into_iter().map(outgoing).collect()
     }
@@ -226,15 +229,15 @@ impl<const D: usize> Program for Aboard<D> {
         self.agent.is_done()
     }
 
-    fn doing(&self) -> Doing {
-        Doing { word: self.agent.part(), ..Doing::default() }
+    fn activity(&self) -> Activity {
+        Activity { word: self.agent.role_name(), ..Activity::default() }
     }
 
-    fn heard(&self) -> Vec<EntityId> {
-        self.heard.all()
+    fn heard_agents(&self) -> Vec<EntityId> {
+        self.heard.senders()
     }
 
-    fn dropped(&self) -> Vec<(String, u64)> {
-        dropped(&self.agent.refused())
+    fn drop_counts(&self) -> Vec<(String, u64)> {
+        drop_counts(&self.agent.drop_counts())
     }
 }

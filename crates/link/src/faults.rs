@@ -1,24 +1,24 @@
 //! The faults of a scenario's network, for the packets of one agent.
 
-use crate::ports::{Arrival, Channel, Sent};
-use sidestep::kernel::network::Ether;
+use crate::agent::{Arrival, Channel, Transmission};
+use sidestep::kernel::network::FaultInjector;
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// First ticks of a cycle's talks, each with its time in seconds after the start of the run.
-type Talks = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
+type ConversationStarts = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
 
 /// The faults of the scenario's network, for the packets of one agent.
-pub(crate) struct Faults {
-    ether: Ether,
+pub(crate) struct FaultyChannel {
+    ether: FaultInjector,
     sender: EntityId,
-    talks: Talks,
+    talks: ConversationStarts,
 }
 
-impl Faults {
+impl FaultyChannel {
     /// Returns the faults of a network, with the given talks in each cycle.
     pub(crate) fn new(
-        ether: Ether,
+        ether: FaultInjector,
         sender: EntityId,
         talks: impl Fn(Cycle) -> Vec<(u64, f64)> + Send + 'static,
     ) -> Self {
@@ -26,9 +26,9 @@ impl Faults {
     }
 }
 
-impl Channel for Faults {
-    fn arrivals(&mut self, sent: &Sent) -> Vec<Arrival> {
-        let &Sent { to, tick, sequence, bytes } = sent;
+impl Channel for FaultyChannel {
+    fn arrivals(&mut self, sent: &Transmission) -> Vec<Arrival> {
+        let &Transmission { to, tick, sequence, bytes } = sent;
         let payload = vec![0; bytes];
         let sender = self.sender;
         let packet = Envelope { cycle: tick, sender, sequence, receiver: to, payload };
@@ -40,7 +40,7 @@ impl Channel for Faults {
         self.ether.tick_s()
     }
 
-    fn begin(&mut self, cycle: Cycle) {
-        self.ether.begin((self.talks)(cycle));
+    fn start_cycle(&mut self, cycle: Cycle) {
+        self.ether.start_cycle((self.talks)(cycle));
     }
 }

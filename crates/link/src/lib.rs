@@ -12,19 +12,19 @@
 //! server/    the world's server                      node/     the node of an agent
 //! ```
 
+pub mod agent;
 mod airspace;
+mod arq;
 mod chain;
-pub mod deployed;
+pub mod distributed;
 mod faults;
-mod heard;
-pub mod mail;
+pub mod hosted_run;
+pub mod messenger;
 pub mod node;
-pub mod party;
-pub mod ports;
-mod post;
+pub mod peer;
 pub mod program;
+pub mod protocol;
+mod recent_senders;
 pub mod server;
-pub mod stage;
 pub mod wire;
-pub mod words;
 pub mod worlds;

@@ -1,11 +1,11 @@
 //! The worlds with agents that may be processes, by their scenarios.
 
-use crate::airspace::Airplanes;
-use crate::chain::Connectors;
-use crate::deployed::Deployed;
-use crate::words::Fingerprint;
+use crate::airspace::DistributedAirspace;
+use crate::chain::DistributedChains;
+use crate::distributed::DistributedWorld;
+use crate::protocol::Fingerprint;
 use sidestep::kernel::{Digest, InputError};
-use sidestep::scenario::{Compiled, Source};
+use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::{airspace, chain};
 use std::sync::Arc;
 
@@ -13,30 +13,39 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// When one of them cannot be read.
-pub fn fingerprint(compiled: &dyn Compiled, source: &Source) -> Result<Fingerprint, InputError> {
+pub fn fingerprint(
+    compiled: &dyn CompiledScenario,
+    source: &Source,
+) -> Result<Fingerprint, InputError> {
     let resolved = compiled.resolve(source)?;
     let mut all = resolved.text.into_bytes();
     for (name, content) in resolved.files {
         all.extend(
-            [name.as_bytes(), &content].map(|part| Digest::of(part).to_string()).concat().bytes(),
+            [name.as_bytes(), &content]
+                .map(|part| Digest::hash_bytes(part).to_string())
+                .concat()
+                .bytes(),
         );
     }
-    Ok(Digest::of(&all).to_string()[..16].to_string())
+    Ok(Digest::hash_bytes(&all).to_string()[..16].to_string())
 }
 
 /// Returns the world of a scenario, if its agents can be nodes.
 ///
 /// # Errors
 /// When it is another world, or one process decides for all.
-pub fn deployed(compiled: &dyn Compiled, source: &Source) -> Result<Arc<dyn Deployed>, InputError> {
+pub fn distributed_world(
+    compiled: &dyn CompiledScenario,
+    source: &Source,
+) -> Result<Arc<dyn DistributedWorld>, InputError> {
     let any = compiled.as_any();
-    let found: Result<Arc<dyn Deployed>, (&str, &str)> =
-        if let Some(one) = any.downcast_ref::<airspace::scenario::Compiled>() {
-            Airplanes::new(one.world.clone()).map(|all| Arc::new(all) as _)
-        } else if let Some(one) = any.downcast_ref::<chain::scenario::Compiled<2>>() {
-            Connectors::new(one.world.clone()).map(|all| Arc::new(all) as _)
-        } else if let Some(one) = any.downcast_ref::<chain::scenario::Compiled<3>>() {
-            Connectors::new(one.world.clone()).map(|all| Arc::new(all) as _)
+    let found: Result<Arc<dyn DistributedWorld>, (&str, &str)> =
+        if let Some(one) = any.downcast_ref::<airspace::scenario::CompiledAirspace>() {
+            DistributedAirspace::new(one.world.clone()).map(|all| Arc::new(all) as _)
+        } else if let Some(one) = any.downcast_ref::<chain::scenario::ChainScenario<2>>() {
+            DistributedChains::new(one.world.clone()).map(|all| Arc::new(all) as _)
+        } else if let Some(one) = any.downcast_ref::<chain::scenario::ChainScenario<3>>() {
+            DistributedChains::new(one.world.clone()).map(|all| Arc::new(all) as _)
         } else {
             let cause = format!("agents of the world `{}` decide in one process", compiled.world());
             let remedy = "give a scenario with world = \"airspace\" or world = \"chain\"";

@@ -17,11 +17,11 @@ pub struct Components {
 /// Label of a box that is not free.
 const BLOCKED: u32 = u32::MAX;
 /// Label of a free box that no component has claimed yet.
-const UNCLAIMED: u32 = u32::MAX - 1;
+const UNLABELED: u32 = u32::MAX - 1;
 
 impl Components {
     /// Returns the component of a box, or `None` where it is not free.
-    pub fn of(&self, col: u32, row: u32) -> Option<u32> {
+    pub fn label_at(&self, col: u32, row: u32) -> Option<u32> {
         let label = self.label[row as usize * self.width as usize + col as usize];
         (label != BLOCKED).then_some(label)
     }
@@ -43,7 +43,7 @@ impl Components {
     }
 
     /// Claims for a new component all boxes that are connected to the box at `seed`.
-    fn claim(&mut self, seed: usize) {
+    fn flood_fill(&mut self, seed: usize) {
         let component = self.sizes.len() as u32;
         let mut pending = vec![seed];
         let mut size = 0;
@@ -51,7 +51,7 @@ impl Components {
         while let Some(at) = pending.pop() {
             size += 1;
             for next in neighbors(at, self.width as usize, self.label.len()).into_iter().flatten() {
-                if self.label[next] == UNCLAIMED {
+                if self.label[next] == UNLABELED {
                     self.label[next] = component;
                     pending.push(next);
                 }
@@ -77,14 +77,14 @@ impl GridMap {
     /// ([`UnknownPolicy::Keep`] keeps them apart, hence not free).
     pub fn components(&self, unknown: UnknownPolicy) -> Components {
         let label = |&cell| match unknown.apply(cell) {
-            Cell::Free => UNCLAIMED,
+            Cell::Free => UNLABELED,
             Cell::Wall | Cell::Unknown => BLOCKED,
         };
         let label = self.cells().iter().map(label).collect();
         let mut components = Components { width: self.width(), label, sizes: Vec::new() };
         for seed in 0..components.label.len() {
-            if components.label[seed] == UNCLAIMED {
-                components.claim(seed);
+            if components.label[seed] == UNLABELED {
+                components.flood_fill(seed);
             }
         }
         components
@@ -101,9 +101,9 @@ mod tests {
         let map = GridMap::new(2, 2, 1.0, vec![Free, Wall, Wall, Free]);
         let components = map.components(UnknownPolicy::Wall);
         assert_eq!(components.sizes(), [1, 1]);
-        assert_eq!(components.of(0, 0), Some(0));
-        assert_eq!(components.of(1, 1), Some(1));
-        assert_eq!(components.of(1, 0), None);
+        assert_eq!(components.label_at(0, 0), Some(0));
+        assert_eq!(components.label_at(1, 1), Some(1));
+        assert_eq!(components.label_at(1, 0), None);
     }
 
     #[test]

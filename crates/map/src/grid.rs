@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::{Floor, Occupancy, Plane};
+use sidestep_kernel::view::{Isometry2, Occupancy, OccupancyGrid};
 
 /// The maximum number of boxes of a map. A larger number is taken for a mistake (a resolution in
 /// millimeters, a size in the wrong unit) and refused before memory is allocated.
@@ -60,7 +60,7 @@ pub struct CellCounts {
 
 impl CellCounts {
     /// Counts `cells`.
-    pub fn of(cells: &[Cell]) -> Self {
+    pub fn from_cells(cells: &[Cell]) -> Self {
         let mut counts = Self::default();
         for cell in cells {
             match cell {
@@ -103,7 +103,7 @@ pub struct GridMap {
     /// Side of a box in meters.
     pub box_size_m: f64,
     /// The place of the lower-left corner of box (0, 0) in the world, and the turn about it.
-    pub plane: Plane,
+    pub plane: Isometry2,
     /// Row by row from the bottom; length `width * height`.
     cells: Vec<Cell>,
 }
@@ -116,17 +116,17 @@ impl GridMap {
     /// When `cells` has another length than `width * height`.
     pub fn new(width: u32, height: u32, box_size_m: f64, cells: Vec<Cell>) -> Self {
         assert_eq!(cells.len(), width as usize * height as usize, "one cell per box");
-        Self { width, height, box_size_m, plane: Plane::default(), cells }
+        Self { width, height, box_size_m, plane: Isometry2::default(), cells }
     }
 
     /// Returns the map as the floor of a scenery.
-    pub fn floor(&self) -> Floor {
+    pub fn occupancy_grid(&self) -> OccupancyGrid {
         let occupancy = |cell: &Cell| match cell {
             Cell::Free => Occupancy::Free,
             Cell::Wall => Occupancy::Wall,
             Cell::Unknown => Occupancy::Unknown,
         };
-        Floor {
+        OccupancyGrid {
             width: self.width,
             height: self.height,
             box_m: self.box_size_m,
@@ -137,7 +137,7 @@ impl GridMap {
 
     /// Returns the same map, laid into the world.
     #[must_use]
-    pub fn with_plane(mut self, plane: Plane) -> Self {
+    pub fn with_plane(mut self, plane: Isometry2) -> Self {
         self.plane = plane;
         self
     }
@@ -182,7 +182,7 @@ impl GridMap {
 
     /// Returns the number of boxes of each type.
     pub fn counts(&self) -> CellCounts {
-        CellCounts::of(&self.cells)
+        CellCounts::from_cells(&self.cells)
     }
 }
 

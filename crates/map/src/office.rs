@@ -79,13 +79,13 @@ impl OfficeSpec {
     /// or the building has more than [`MAX_BOXES`]. The error's place is
     /// `office.` and the key that is wrong.
     pub fn build(&self, box_size_m: f64) -> Result<Office, InputError> {
-        Plan::new(self, check_box_size(box_size_m)?)?.build(box_size_m)
+        BoxDimensions::new(self, check_box_size(box_size_m)?)?.build(box_size_m)
     }
 }
 
 /// The specification in boxes.
 #[derive(Debug, Clone, Copy)]
-struct Plan {
+struct BoxDimensions {
     floors: u32,
     corridors: u32,
     rooms_per_side: u32,
@@ -95,13 +95,13 @@ struct Plan {
     door_width: u32,
 }
 
-impl Plan {
+impl BoxDimensions {
     fn new(spec: &OfficeSpec, box_size_m: f64) -> Result<Self, InputError> {
         let boxes = |key, length_m| boxes(key, length_m, box_size_m);
         let plan = Self {
-            floors: at_least_one("floors", spec.floors)?,
-            corridors: at_least_one("corridors", spec.corridors)?,
-            rooms_per_side: at_least_one("rooms_per_side", spec.rooms_per_side)?,
+            floors: check_positive("floors", spec.floors)?,
+            corridors: check_positive("corridors", spec.corridors)?,
+            rooms_per_side: check_positive("rooms_per_side", spec.rooms_per_side)?,
             room_width: boxes("room_width_m", spec.room_width_m)?,
             room_depth: boxes("room_depth_m", spec.room_depth_m)?,
             corridor_width: boxes("corridor_width_m", spec.corridor_width_m)?,
@@ -112,7 +112,7 @@ impl Plan {
                 "doors of {} m are wider than rooms of {} m",
                 spec.door_width_m, spec.room_width_m
             );
-            return Err(wrong("door_width_m", cause, "give narrower doors or wider rooms"));
+            return Err(spec_error("door_width_m", cause, "give narrower doors or wider rooms"));
         }
         Ok(plan)
     }
@@ -126,7 +126,7 @@ impl Plan {
         for floor in 1..self.floors {
             self.build_passage(&mut layout, floor * self.floor_pitch());
         }
-        let cells = layout.carved(width, height);
+        let cells = layout.to_cells(width, height);
         let map = GridMap::new(width, height, box_size_m, cells);
         let Layout { doors, corridors, rooms } = layout;
         Ok(Office { map, doors, corridors, rooms })
@@ -234,7 +234,7 @@ struct Layout {
 
 impl Layout {
     /// Returns the boxes of a `width` x `height` building: free where the layout has a rectangle.
-    fn carved(&self, width: u32, height: u32) -> Vec<Cell> {
+    fn to_cells(&self, width: u32, height: u32) -> Vec<Cell> {
         let mut cells = vec![Cell::Wall; width as usize * height as usize];
         for rect in self.rooms.iter().chain(&self.doors).chain(&self.corridors) {
             for row in rect.row..rect.row + rect.height {
@@ -254,17 +254,17 @@ fn boxes(key: &str, length_m: f64, box_size_m: f64) -> Result<u32, InputError> {
         return Ok(boxes as u32);
     }
     let cause = format!("{length_m} m are not from 1 to {MAX_BOXES} boxes of {box_size_m} m");
-    Err(wrong(key, cause, "give a length in meters that is at least one box"))
+    Err(spec_error(key, cause, "give a length in meters that is at least one box"))
 }
 
-fn at_least_one(key: &str, number: u32) -> Result<u32, InputError> {
+fn check_positive(key: &str, number: u32) -> Result<u32, InputError> {
     match number {
-        0 => Err(wrong(key, "an office has at least one of these", "give 1 or more")),
+        0 => Err(spec_error(key, "an office has at least one of these", "give 1 or more")),
         _ => Ok(number),
     }
 }
 
-fn wrong(key: impl fmt::Display, cause: impl Into<String>, remedy: &str) -> InputError {
+fn spec_error(key: impl fmt::Display, cause: impl Into<String>, remedy: &str) -> InputError {
     InputError::new(format!("office.{key}"), cause, remedy)
 }
 

@@ -10,19 +10,21 @@ impl GridMap {
     /// of boxes and follows the rule that makes boxes of pixels (wall where any of them is a wall,
     /// else unknown where any is unknown), so that no wall is lost.
     pub fn to_text(&self, max_cols: u32) -> String {
-        let step = self.step(max_cols);
+        let step = self.boxes_per_char(max_cols);
         let cols = self.width().div_ceil(step);
         let rows = self.height().div_ceil(step);
         let mut text = String::with_capacity((cols as usize + 1) * rows as usize);
         for row in (0..rows).rev() {
-            text.extend((0..cols).map(|col| symbol(self.square(col * step, row * step, step))));
+            text.extend(
+                (0..cols).map(|col| symbol(self.merged_cell(col * step, row * step, step))),
+            );
             text.push('\n');
         }
         text
     }
 
     /// Returns the number of boxes along each side of the square that a character stands for.
-    fn step(&self, max_cols: u32) -> u32 {
+    fn boxes_per_char(&self, max_cols: u32) -> u32 {
         self.width().div_ceil(max_cols.max(1))
     }
 
@@ -31,7 +33,7 @@ impl GridMap {
     pub fn to_text_with_rulers(&self, max_cols: u32) -> String {
         let margin = self.height().to_string().len() + 1;
         let max_cols = max_cols.saturating_sub(margin as u32);
-        let (step, map) = (self.step(max_cols), self.to_text(max_cols));
+        let (step, map) = (self.boxes_per_char(max_cols), self.to_text(max_cols));
         let rows = map.lines().count() as u32;
         let mut text = String::new();
         for (line, row) in map.lines().zip((0..rows).rev()) {
@@ -46,7 +48,7 @@ impl GridMap {
 
     /// Returns the combined cell of the square of `side` boxes with the lower-left box (`col`,
     /// `row`).
-    fn square(&self, col: u32, row: u32, side: u32) -> Cell {
+    fn merged_cell(&self, col: u32, row: u32, side: u32) -> Cell {
         let mut whole = Cell::Free;
         for row in row..(row + side).min(self.height()) {
             for col in col..(col + side).min(self.width()) {

@@ -4,12 +4,12 @@
 //! recorded to a temporary folder, column by column.
 
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
-use sidestep_papers::loria::{self, LoriaPlan};
+use sidestep_papers::loria::{self, LoriaConfig};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
 /// Writes every column to a file of its own, in the byte order of this machine.
-struct Columns(Vec<Vec<BufWriter<File>>>);
+struct ColumnFiles(Vec<Vec<BufWriter<File>>>);
 
 fn bytes(values: &Values) -> Vec<u8> {
     match values {
@@ -21,7 +21,7 @@ fn bytes(values: &Values) -> Vec<u8> {
     }
 }
 
-impl Recorder for Columns {
+impl Recorder for ColumnFiles {
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
         for (file, values) in self.0[table].iter_mut().zip(block) {
             file.write_all(&bytes(values)).map_err(|e| RecordError::new("column", e))?;
@@ -39,12 +39,12 @@ fn columns(schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
     let file = || tempfile::tempfile().map(BufWriter::new);
     let open = |schema: &TableSchema| schema.columns.iter().map(|_| file()).collect();
     let tables: Result<_, std::io::Error> = schemas.iter().map(open).collect();
-    Ok(Box::new(Columns(tables.map_err(|e| RecordError::new("temporary folder", e))?)))
+    Ok(Box::new(ColumnFiles(tables.map_err(|e| RecordError::new("temporary folder", e))?)))
 }
 
 fn main() -> Result<(), loria::LoriaError> {
     let quick = std::env::args().any(|argument| argument == "--quick");
-    let plan = if quick { LoriaPlan::quick() } else { LoriaPlan::default() };
+    let plan = if quick { LoriaConfig::quick() } else { LoriaConfig::default() };
     let mut last = -1;
     let mut progress = |what: &str, share: f64| {
         let percent = (100.0 * share) as i32;

@@ -1,7 +1,7 @@
 //! Results, shared by all papers: columns, each declared once, that say how the runs of a case are
 //! summed up -> cells, which are printed as a table, kept as JSON and read by claims.
 
-use crate::study::{Results, number};
+use crate::study::{StudyResults, setting_number};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use sidestep::experiment::sweep::Variant;
@@ -11,20 +11,20 @@ use sidestep_document::{Estimate, Figure, Series, Table};
 use std::fmt;
 
 /// The runs of one case.
-pub(crate) struct Runs<'a> {
-    results: &'a Results,
+pub(crate) struct CaseRuns<'a> {
+    results: &'a StudyResults,
     variant: &'a Variant,
     rows: Vec<usize>,
 }
 
 /// One run of a case.
 #[derive(Clone, Copy)]
-pub(crate) struct Run<'a> {
-    results: &'a Results,
+pub(crate) struct CaseRun<'a> {
+    results: &'a StudyResults,
     row: usize,
 }
 
-impl Run<'_> {
+impl CaseRun<'_> {
     /// Returns a metric as a number; true is 1.
     pub(crate) fn number(&self, metric: &str) -> Option<f64> {
         self.results.table.column(metric)?.values.number(self.row)
@@ -36,24 +36,24 @@ impl Run<'_> {
     }
 
     /// Returns a metric as a number; 0 if it is missing.
-    pub(crate) fn or_zero(&self, metric: &str) -> f64 {
+    pub(crate) fn number_or_zero(&self, metric: &str) -> f64 {
         self.number(metric).unwrap_or(0.0)
     }
 
     /// Returns a count of steps, in percent of all steps.
-    pub(crate) fn percent(&self, metric: &str) -> f64 {
-        100.0 * self.or_zero(metric) / self.or_zero("steps")
+    pub(crate) fn percent_of_steps(&self, metric: &str) -> f64 {
+        100.0 * self.number_or_zero(metric) / self.number_or_zero("steps")
     }
 
     /// Returns whether a metric is true, or above 0.
-    pub(crate) fn is(&self, metric: &str) -> bool {
-        self.or_zero(metric) > 0.0
+    pub(crate) fn is_true(&self, metric: &str) -> bool {
+        self.number_or_zero(metric) > 0.0
     }
 }
 
-impl Runs<'_> {
+impl CaseRuns<'_> {
     /// Returns the value that the case sets a key to.
-    pub(crate) fn set(&self, key: &str) -> Value {
+    pub(crate) fn setting(&self, key: &str) -> Value {
         match self.variant.value(key) {
             Some(toml::Value::Integer(n)) => Value::Count(*n as u64),
             Some(toml::Value::Float(x)) => Value::Number(*x),
@@ -69,65 +69,66 @@ impl Runs<'_> {
     }
 
     /// Returns the value that the case sets a key to, as a number.
-    pub(crate) fn set_number(&self, key: &str) -> f64 {
-        number(self.variant, key)
+    pub(crate) fn setting_number(&self, key: &str) -> f64 {
+        setting_number(self.variant, key)
     }
 
     /// Returns the runs, by seed.
-    pub(crate) fn each(&self) -> impl Iterator<Item = Run<'_>> {
-        self.rows.iter().map(|&row| Run { results: self.results, row })
+    pub(crate) fn iter_runs(&self) -> impl Iterator<Item = CaseRun<'_>> {
+        self.rows.iter().map(|&row| CaseRun { results: self.results, row })
     }
 
     /// Returns the mean of a metric over the runs.
     pub(crate) fn mean(&self, metric: &str) -> Value {
-        Value::Estimate(Estimate::of(self.each().map(|run| run.number(metric))))
+        Value::Estimate(Estimate::from_values(self.iter_runs().map(|run| run.number(metric))))
     }
 
     /// Returns the mean of the values that `of` gives for each run.
-    pub(crate) fn mean_of(&self, of: impl Fn(&Run<'_>) -> f64) -> Value {
-        Value::Estimate(Estimate::of(self.each().map(|run| Some(of(&run)))))
+    pub(crate) fn mean_of(&self, of: impl Fn(&CaseRun<'_>) -> f64) -> Value {
+        Value::Estimate(Estimate::from_values(self.iter_runs().map(|run| Some(of(&run)))))
     }
 
     /// Returns the mean of shares in percent, one of each run: neither it nor its interval leaves 0 to 100.
-    pub(crate) fn mean_share(&self, of: impl Fn(&Run<'_>) -> f64) -> Value {
-        let mean = Estimate::of(self.each().map(|run| Some(of(&run))));
-        Value::Estimate(mean.within(0.0, 100.0))
+    pub(crate) fn mean_proportion(&self, of: impl Fn(&CaseRun<'_>) -> f64) -> Value {
+        let mean = Estimate::from_values(self.iter_runs().map(|run| Some(of(&run))));
+        Value::Estimate(mean.clamped(0.0, 100.0))
     }
 
     /// Returns the mean of a count of steps in percent of all, of which a step may have several.
     pub(crate) fn mean_rate(&self, metric: &str) -> Value {
-        let mean = Estimate::of(self.each().map(|run| Some(run.percent(metric))));
-        Value::Estimate(mean.within(0.0, f64::INFINITY))
+        let mean =
+            Estimate::from_values(self.iter_runs().map(|run| Some(run.percent_of_steps(metric))));
+        Value::Estimate(mean.clamped(0.0, f64::INFINITY))
     }
 
     /// Returns the share of the runs for which this holds.
-    pub(crate) fn share(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
-        Value::Share(Share::of(self.each().map(|run| holds(&run))))
+    pub(crate) fn proportion(&self, holds: impl Fn(&CaseRun<'_>) -> bool) -> Value {
+        Value::Share(Proportion::from_flags(self.iter_runs().map(|run| holds(&run))))
     }
 
     /// Returns the sum of a count over all runs.
     pub(crate) fn sum(&self, metric: &str) -> Value {
-        Value::Count(self.each().map(|run| run.or_zero(metric) as u64).sum())
+        Value::Count(self.iter_runs().map(|run| run.number_or_zero(metric) as u64).sum())
     }
 
     /// Returns the number of runs for which this holds.
-    pub(crate) fn count(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
-        Value::Count(self.each().filter(|run| holds(run)).count() as u64)
+    pub(crate) fn count(&self, holds: impl Fn(&CaseRun<'_>) -> bool) -> Value {
+        Value::Count(self.iter_runs().filter(|run| holds(run)).count() as u64)
     }
 
     /// Returns the least value of the runs that have it.
-    pub(crate) fn least(&self, metric: &str) -> Option<f64> {
-        least(self.each().map(|run| run.number(metric)))
+    pub(crate) fn min_value(&self, metric: &str) -> Option<f64> {
+        min_value(self.iter_runs().map(|run| run.number(metric)))
     }
 
     /// Returns the greatest value; 0 if there is none.
-    pub(crate) fn most(&self, metric: &str) -> f64 {
-        most(self.each().filter_map(|run| run.number(metric)))
+    pub(crate) fn max_value(&self, metric: &str) -> f64 {
+        max_value(self.iter_runs().filter_map(|run| run.number(metric)))
     }
 
     /// Returns the median; 0 if there is none.
     pub(crate) fn median(&self, metric: &str) -> f64 {
-        median(self.each().filter_map(|run| run.number(metric)))
+        median(self.iter_runs().filter_map(|run| run.number(metric)))
     }
 }
 
@@ -137,7 +138,7 @@ pub(crate) struct Column {
     name: &'static str,
     /// Its head in the table; a column without one is not shown there.
     head: &'static str,
-    of: fn(&Runs<'_>) -> Value,
+    of: fn(&CaseRuns<'_>) -> Value,
     show: Option<fn(&CaseResults) -> String>,
 }
 
@@ -145,14 +146,14 @@ pub(crate) struct Column {
 pub(crate) const fn column(
     name: &'static str,
     head: &'static str,
-    of: fn(&Runs<'_>) -> Value,
+    of: fn(&CaseRuns<'_>) -> Value,
 ) -> Column {
     Column { name, head, of, show: None }
 }
 
 impl Column {
     /// Sets how the column is shown.
-    pub(crate) const fn shown(self, show: fn(&CaseResults) -> String) -> Self {
+    pub(crate) const fn with_format(self, show: fn(&CaseResults) -> String) -> Self {
         Self { show: Some(show), ..self }
     }
 }
@@ -160,19 +161,19 @@ impl Column {
 /// The columns of an experiment: the settings of its cases, and their results.
 pub(crate) struct Columns {
     pub(crate) case: &'static [Column],
-    pub(crate) came: &'static [Column],
+    pub(crate) results: &'static [Column],
 }
 
 impl Columns {
     /// Returns a cell for every case.
-    pub(crate) fn cells(&self, results: &Results) -> Vec<CaseResults> {
-        let named = |columns: &[Column], runs: &Runs<'_>| {
+    pub(crate) fn cells(&self, results: &StudyResults) -> Vec<CaseResults> {
+        let named = |columns: &[Column], runs: &CaseRuns<'_>| {
             columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
         };
-        runs(results)
+        case_runs(results)
             .map(|r| CaseResults {
                 case: named(self.case, &r),
-                came: named(self.came, &r),
+                results: named(self.results, &r),
                 runs: r.rows.len(),
             })
             .collect()
@@ -181,7 +182,7 @@ impl Columns {
     /// Returns the cells as a table.
     pub(crate) fn table(&self, title: &str, note: &str, cells: &[CaseResults]) -> Table {
         let shown: Vec<&Column> =
-            self.case.iter().chain(self.came).filter(|c| !c.head.is_empty()).collect();
+            self.case.iter().chain(self.results).filter(|c| !c.head.is_empty()).collect();
         let heads: Vec<&str> = shown.iter().map(|c| c.head).collect();
         let mut table = Table::new(title, note, &heads);
         for cell in cells {
@@ -189,20 +190,20 @@ impl Columns {
                 Some(show) => show(cell),
                 None => cell.value(c.name).to_string(),
             };
-            table.row(shown.iter().map(words));
+            table.push_row(shown.iter().map(words));
         }
         table
     }
 }
 
 /// Returns the runs of every case.
-pub(crate) fn runs(results: &Results) -> impl Iterator<Item = Runs<'_>> {
+pub(crate) fn case_runs(results: &StudyResults) -> impl Iterator<Item = CaseRuns<'_>> {
     let variants = results.table.column("variant");
     (0u32..).zip(&results.variants).map(move |(k, variant)| {
         let is_its =
             |row: &usize| variants.and_then(|c| c.values.number(*row)) == Some(f64::from(k));
         let rows = (0..results.table.runs()).filter(is_its).collect();
-        Runs { results, variant, rows }
+        CaseRuns { results, variant, rows }
     })
 }
 
@@ -216,18 +217,18 @@ pub(crate) enum Value {
     Yes(bool),
     Word(String),
     Words(Vec<String>),
-    Share(Share),
+    Share(Proportion),
     Estimate(Estimate),
     /// Some numbers of every run, by name.
     #[serde(serialize_with = "of_runs")]
-    BySeed(Vec<Named>),
+    BySeed(Vec<NamedNumbers>),
 }
 
 /// Numbers by name.
-type Named = Vec<(&'static str, f64)>;
+type NamedNumbers = Vec<(&'static str, f64)>;
 
-fn of_runs<S: Serializer>(runs: &[Named], serializer: S) -> Result<S::Ok, S::Error> {
-    let map = |run: &Named| -> serde_json::Map<String, serde_json::Value> {
+fn of_runs<S: Serializer>(runs: &[NamedNumbers], serializer: S) -> Result<S::Ok, S::Error> {
+    let map = |run: &NamedNumbers| -> serde_json::Map<String, serde_json::Value> {
         run.iter().map(|(name, x)| ((*name).into(), (*x).into())).collect()
     };
     serializer.collect_seq(runs.iter().map(map))
@@ -253,7 +254,7 @@ impl fmt::Display for Value {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CaseResults {
     case: Vec<(&'static str, Value)>,
-    came: Vec<(&'static str, Value)>,
+    results: Vec<(&'static str, Value)>,
     runs: usize,
 }
 
@@ -264,13 +265,13 @@ impl CaseResults {
         case: impl IntoIterator<Item = (&'static str, Value)>,
         came: impl IntoIterator<Item = (&'static str, Value)>,
     ) -> Self {
-        Self { case: case.into_iter().collect(), came: came.into_iter().collect(), runs: 10 }
+        Self { case: case.into_iter().collect(), results: came.into_iter().collect(), runs: 10 }
     }
 
     /// Replaces a value.
     #[cfg(test)]
-    pub(crate) fn put(&mut self, name: &str, value: Value) {
-        let mut all = self.case.iter_mut().chain(&mut self.came);
+    pub(crate) fn set_value(&mut self, name: &str, value: Value) {
+        let mut all = self.case.iter_mut().chain(&mut self.results);
         all.find(|(own, _)| *own == name).expect("a column of this name").1 = value;
     }
 
@@ -284,7 +285,7 @@ impl CaseResults {
     /// # Panics
     /// If the experiment has no such column.
     pub(crate) fn value(&self, name: &str) -> &Value {
-        let mut all = self.case.iter().chain(&self.came);
+        let mut all = self.case.iter().chain(&self.results);
         let found = all.find(|(own, _)| *own == name).map(|(_, value)| value);
         found.unwrap_or_else(|| panic!("there is no column `{name}`"))
     }
@@ -297,7 +298,7 @@ impl CaseResults {
             Value::Maybe(x) => x.unwrap_or(0.0),
             Value::Yes(is) => f64::from(*is),
             Value::Share(share) => share.percent(),
-            Value::Estimate(estimate) => estimate.or_zero(),
+            Value::Estimate(estimate) => estimate.mean_or_zero(),
             other => panic!("`{name}` is no number: {other:?}"),
         }
     }
@@ -311,7 +312,7 @@ impl CaseResults {
     }
 
     /// Returns a number that may be missing.
-    pub(crate) fn maybe(&self, name: &str) -> Option<f64> {
+    pub(crate) fn optional_number(&self, name: &str) -> Option<f64> {
         match self.value(name) {
             Value::Maybe(x) => *x,
             _ => Some(self.number(name)),
@@ -319,17 +320,17 @@ impl CaseResults {
     }
 
     /// Returns whether the value is true.
-    pub(crate) fn is(&self, name: &str) -> bool {
+    pub(crate) fn is_true(&self, name: &str) -> bool {
         *self.value(name) == Value::Yes(true)
     }
 
     /// Returns whether the value is this word.
-    pub(crate) fn says(&self, name: &str, word: &str) -> bool {
+    pub(crate) fn has_text(&self, name: &str, word: &str) -> bool {
         matches!(self.value(name), Value::Word(own) if own == word)
     }
 
     /// Returns a share of runs.
-    pub(crate) fn share(&self, name: &str) -> &Share {
+    pub(crate) fn proportion(&self, name: &str) -> &Proportion {
         match self.value(name) {
             Value::Share(share) => share,
             other => panic!("`{name}` is no share: {other:?}"),
@@ -337,8 +338,8 @@ impl CaseResults {
     }
 
     /// Returns whether it is true in all runs, of which there is at least one.
-    pub(crate) fn in_all(&self, name: &str) -> bool {
-        self.share(name).is_all()
+    pub(crate) fn is_true_in_all_runs(&self, name: &str) -> bool {
+        self.proportion(name).holds_always()
     }
 
     /// Returns a mean.
@@ -352,13 +353,13 @@ impl CaseResults {
     /// Returns results of runs, one by one.
     pub(crate) fn by_seed(&self, column: &str, name: &str) -> Vec<Option<f64>> {
         let Value::BySeed(runs) = self.value(column) else { return Vec::new() };
-        let of = |run: &Named| run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x);
+        let of = |run: &NamedNumbers| run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x);
         runs.iter().map(of).collect()
     }
 
     /// Returns a length, in millimeters.
-    pub(crate) fn mm(&self, name: &str) -> String {
-        mm(self.maybe(name))
+    pub(crate) fn format_mm(&self, name: &str) -> String {
+        format_mm(self.optional_number(name))
     }
 
     /// Returns a point of a figure.
@@ -373,18 +374,18 @@ impl CaseResults {
 
 impl Serialize for CaseResults {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        struct Case<'a>(&'a [(&'static str, Value)]);
-        impl Serialize for Case<'_> {
+        struct NamedValues<'a>(&'a [(&'static str, Value)]);
+        impl Serialize for NamedValues<'_> {
             fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
             }
         }
         let mut map = serializer.serialize_map(None)?;
         if !self.case.is_empty() {
-            map.serialize_entry("case", &Case(&self.case))?;
+            map.serialize_entry("case", &NamedValues(&self.case))?;
         }
         map.serialize_entry("runs", &self.runs)?;
-        self.came.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        self.results.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
         map.end()
     }
 }
@@ -402,7 +403,7 @@ pub(crate) fn table<T>(
     let heads: Vec<&str> = columns.iter().map(|(head, _)| *head).collect();
     let mut table = Table::new(title, note, &heads);
     for item in items {
-        table.row(columns.iter().map(|(_, cell)| cell(&item)));
+        table.push_row(columns.iter().map(|(_, cell)| cell(&item)));
     }
     table
 }
@@ -436,7 +437,7 @@ pub(crate) fn figure(title: &str, [x, y]: [&str; 2], series: impl Into<Vec<Serie
 /// A number of runs out of several, with the 95 % interval of its share of all runs, by Clopper and
 /// Pearson.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Share {
+pub(crate) struct Proportion {
     /// Number of runs in which it was true,
     pub(crate) hits: u64,
     /// out of this many.
@@ -445,9 +446,9 @@ pub(crate) struct Share {
     interval: Interval,
 }
 
-impl Share {
+impl Proportion {
     /// Returns the share of those that are true.
-    pub(crate) fn of(all: impl IntoIterator<Item = bool>) -> Self {
+    pub(crate) fn from_flags(all: impl IntoIterator<Item = bool>) -> Self {
         let (mut hits, mut n) = (0, 0);
         for hit in all {
             hits += u64::from(hit);
@@ -462,7 +463,7 @@ impl Share {
     }
 
     /// Returns whether it is all of one or more.
-    pub(crate) fn is_all(&self) -> bool {
+    pub(crate) fn holds_always(&self) -> bool {
         self.n > 0 && self.hits == self.n
     }
 
@@ -474,11 +475,11 @@ impl Share {
     fn point(&self, x: f64) -> Point {
         let Interval { low, high } = self.interval;
         let interval = Some((100.0 * low, 100.0 * high));
-        Point::new(x, self.percent()).with_interval(interval).of_runs(self.n as usize)
+        Point::new(x, self.percent()).with_interval(interval).with_runs(self.n as usize)
     }
 }
 
-impl fmt::Display for Share {
+impl fmt::Display for Proportion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Interval { low, high } = self.interval;
         let percent = |x: f64| (100.0 * x).round();
@@ -494,17 +495,17 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Returns the least of the values that are present.
-pub(crate) fn least(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
+pub(crate) fn min_value(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
     values.into_iter().flatten().reduce(f64::min)
 }
 
 /// Returns the greatest; 0 if there are none.
-pub(crate) fn most(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn max_value(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
 /// Returns a length in millimeters, with its sign, or words if nothing came near.
-pub(crate) fn mm(value_m: Option<f64>) -> String {
+pub(crate) fn format_mm(value_m: Option<f64>) -> String {
     match value_m {
         None => "far".into(),
         Some(m) if m.abs() < 1e-6 => "0.000".into(),
@@ -518,8 +519,12 @@ mod tests {
 
     #[test]
     fn a_share_says_how_sure_it_is() {
-        let share = Share::of([true, true, true, false]);
+        let share = Proportion::from_flags([true, true, true, false]);
         assert_eq!(share.to_string(), "3/4 [19, 99] %");
-        assert!(!share.is_all() && Share::of([true; 2]).is_all() && !Share::of([]).is_all());
+        assert!(
+            !share.holds_always()
+                && Proportion::from_flags([true; 2]).holds_always()
+                && !Proportion::from_flags([]).holds_always()
+        );
     }
 }

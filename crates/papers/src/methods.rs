@@ -1,18 +1,18 @@
 //! Methods of collision avoidance, compared on the same traffic.
 
 use crate::cells;
-use crate::study::{Progress, all_of, setting};
+use crate::study::{Progress, run_all, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::plan::check_seeds;
-use sidestep::experiment::sweep::seeds::remedy;
+use sidestep::experiment::sweep::seeds::seed_remedy;
 use sidestep::kernel::{Digest, InputError, Interrupt, Simulation};
-use sidestep::scenario::{Seeds, Source};
+use sidestep::scenario::{SeedEffect, Source};
 use sidestep::statistics::{Interval, wilson};
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
-use sidestep::worlds::airspace::scenario::Compiled;
+use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::world::Method;
-use sidestep_document::estimate::short;
+use sidestep_document::estimate::format_short;
 use sidestep_document::{Estimate, Table};
 
 /// Results of a method over all runs.
@@ -23,7 +23,7 @@ pub struct MethodResult {
     /// Runs; run `k` of every method has the same traffic.
     pub runs: usize,
     /// The effect of another seed; where it changes nothing, there is one run.
-    pub seeds: Seeds,
+    pub seeds: SeedEffect,
     /// Runs without any loss of separation, and the 95 % interval of their share (Wilson).
     pub loss_free: usize,
     /// See `loss_free`; absent where seeds change nothing.
@@ -68,14 +68,14 @@ pub fn compare(
     workers: usize,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<MethodResult>, InputError> {
-    compare_heeding(source, methods, seeds, workers, progress, &Interrupt::default())
+    compare_with_interrupt(source, methods, seeds, workers, progress, &Interrupt::default())
 }
 
 /// Compares methods like [`compare`], and unwinds when the interrupt is raised.
 ///
 /// # Errors
 /// When the scenario is wrong.
-pub fn compare_heeding(
+pub fn compare_with_interrupt(
     source: &Source,
     methods: &[Method],
     seeds: SeedSpan,
@@ -89,84 +89,92 @@ pub fn compare_heeding(
     })?;
     let mut results = Vec::new();
     for method in methods {
-        let source =
-            source.clone().with(&[setting("airspace.method", method.name()).to_override()])?;
+        let source = source
+            .clone()
+            .with_overrides(&[setting("airspace.method", method.name()).to_override()])?;
         let report = |share| progress(method.name(), share);
-        let flights = Flights { source: &source, workers, interrupt };
-        let (change, all) = flights.all(seeds, report)?;
-        results.push(result(method.name(), change, &all));
+        let flights = MethodRuns { source: &source, workers, interrupt };
+        let (change, all) = flights.run_seeds(seeds, report)?;
+        results.push(method_result(method.name(), change, &all));
     }
     Ok(results)
 }
 
 /// A scenario to be flown with several seeds.
-struct Flights<'a> {
+struct MethodRuns<'a> {
     source: &'a Source,
     workers: usize,
     interrupt: &'a Interrupt,
 }
 
 /// Number of flights that show whether seeds change anything, where the world cannot tell.
-const TRIALS: usize = 2;
+const PILOT_RUNS: usize = 2;
 
-impl Flights<'_> {
+impl MethodRuns<'_> {
     /// Flies with as many seeds as are of use, and returns the effect of seeds.
-    fn all(
+    fn run_seeds(
         &self,
         SeedSpan { first, runs }: SeedSpan,
         mut report: impl FnMut(f64),
-    ) -> Result<(Seeds, Vec<Metrics>), InputError> {
+    ) -> Result<(SeedEffect, Vec<Metrics>), InputError> {
         let seeds: Vec<u64> = (first..first + runs as u64).collect();
-        let first = match Compiled::new(self.source)?.seeds {
-            Seeds::Nothing => return Ok((Seeds::Nothing, ends(&self.fly(&seeds[..1], report)?))),
-            Seeds::Perhaps if runs > TRIALS => self.fly(&seeds[..TRIALS], &mut report)?,
-            Seeds::Perhaps | Seeds::Decide => Vec::new(),
+        let first = match CompiledAirspace::new(self.source)?.seeds {
+            SeedEffect::Nothing => {
+                return Ok((SeedEffect::Nothing, metrics_of(&self.run_each(&seeds[..1], report)?)));
+            }
+            SeedEffect::Perhaps if runs > PILOT_RUNS => {
+                self.run_each(&seeds[..PILOT_RUNS], &mut report)?
+            }
+            SeedEffect::Perhaps | SeedEffect::Decide => Vec::new(),
         };
         if let [(one, digest), (_, other)] = &first[..]
             && digest == other
         {
-            return Ok((Seeds::Perhaps, vec![one.clone()]));
+            return Ok((SeedEffect::Perhaps, vec![one.clone()]));
         }
-        let rest = self.fly(&seeds[first.len()..], report)?;
-        Ok((Seeds::Decide, ends(&[first, rest].concat())))
+        let rest = self.run_each(&seeds[first.len()..], report)?;
+        Ok((SeedEffect::Decide, metrics_of(&[first, rest].concat())))
     }
 
-    fn fly(
+    fn run_each(
         &self,
         seeds: &[u64],
         report: impl FnMut(f64),
     ) -> Result<Vec<(Metrics, Digest)>, InputError> {
         let run = |seed: &u64| {
-            flown(&self.source.clone().with(&[format!("seed={seed}")])?, self.interrupt)
+            run_to_end(
+                &self.source.clone().with_overrides(&[format!("seed={seed}")])?,
+                self.interrupt,
+            )
         };
-        all_of(seeds, self.workers, report, run)
+        run_all(seeds, self.workers, report, run)
     }
 }
 
-fn ends(flights: &[(Metrics, Digest)]) -> Vec<Metrics> {
+fn metrics_of(flights: &[(Metrics, Digest)]) -> Vec<Metrics> {
     flights.iter().map(|(metrics, _)| metrics.clone()).collect()
 }
 
 /// Runs a scenario to its end.
-fn flown(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest), InputError> {
+fn run_to_end(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest), InputError> {
     let mut run = airspace_run(source, 1)?;
-    run.heed(interrupt.clone());
-    let cycles = run.plan().cycles;
+    run.set_interrupt(interrupt.clone());
+    let cycles = run.config().cycles;
     while run.cycle() < cycles && !run.is_over() {
         run.advance(cycles - run.cycle());
     }
     Ok((run.metrics(), run.digest()))
 }
 
-fn result(method: &'static str, seeds: Seeds, all: &[Metrics]) -> MethodResult {
-    let of = |value: fn(&Metrics) -> Option<f64>| Estimate::of(all.iter().map(value));
+fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> MethodResult {
+    let of = |value: fn(&Metrics) -> Option<f64>| Estimate::from_values(all.iter().map(value));
     let loss_free = all.iter().filter(|m| m.losses_of_separation == 0).count();
     MethodResult {
         method,
         runs: all.len(),
         seeds,
         loss_free,
-        loss_free_interval: (seeds == Seeds::Decide)
+        loss_free_interval: (seeds == SeedEffect::Decide)
             .then(|| wilson(loss_free as f64, all.len() as f64)),
         losses: of(|m| Some(m.losses_of_separation as f64)),
         min_separation_m: all.iter().filter_map(|m| m.min_separation_m).reduce(f64::min),
@@ -183,26 +191,26 @@ fn result(method: &'static str, seeds: Seeds, all: &[Metrics]) -> MethodResult {
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
     cells::table(
         title,
-        note(results),
+        table_note(results),
         results,
         &[
             ("method", &|r| r.method.to_string()),
-            ("runs without loss", &|r| loss_free(r)),
-            ("losses", &|r| of_runs(r, &r.losses)),
+            ("runs without loss", &|r| format_loss_free(r)),
+            ("losses", &|r| format_mean(r, &r.losses)),
             ("nearest of all runs, m", &|r| {
                 r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
             }),
-            ("arrived", &|r| of_runs(r, &r.arrived)),
-            ("delay, %", &|r| of_runs(r, &r.delay_percent)),
-            ("deciding, s", &|r| of_runs(r, &r.optimize_cpu_s)),
-            ("messages", &|r| of_runs(r, &r.messages)),
-            ("bytes", &|r| of_runs(r, &r.bytes)),
-            ("changed by the shield", &|r| of_runs(r, &r.shield_overrides)),
+            ("arrived", &|r| format_mean(r, &r.arrived)),
+            ("delay, %", &|r| format_mean(r, &r.delay_percent)),
+            ("deciding, s", &|r| format_mean(r, &r.optimize_cpu_s)),
+            ("messages", &|r| format_mean(r, &r.messages)),
+            ("bytes", &|r| format_mean(r, &r.bytes)),
+            ("changed by the shield", &|r| format_mean(r, &r.shield_overrides)),
         ],
     )
 }
 
-fn loss_free(result: &MethodResult) -> String {
+fn format_loss_free(result: &MethodResult) -> String {
     let runs = format!("{}/{}", result.loss_free, result.runs);
     match result.loss_free_interval {
         Some(Interval { low, high }) => format!("{runs} [{low:.2}, {high:.2}]"),
@@ -211,15 +219,15 @@ fn loss_free(result: &MethodResult) -> String {
 }
 
 /// Returns a mean over runs; the number alone where there is one.
-fn of_runs(result: &MethodResult, estimate: &Estimate) -> String {
+fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
     match (result.seeds, estimate.mean) {
-        (Seeds::Nothing | Seeds::Perhaps, Some(mean)) => short(mean),
+        (SeedEffect::Nothing | SeedEffect::Perhaps, Some(mean)) => format_short(mean),
         _ => estimate.to_string(),
     }
 }
 
 /// Returns the sentence without which the shield's deeds would pass for those of a method.
-fn shielded(results: &[MethodResult]) -> Option<String> {
+fn shield_note(results: &[MethodResult]) -> Option<String> {
     let changed = |r: &&MethodResult| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0);
     let names: Vec<_> = results.iter().filter(changed).map(|r| r.method).collect();
     (!names.is_empty()).then(|| {
@@ -232,31 +240,31 @@ fn shielded(results: &[MethodResult]) -> Option<String> {
 }
 
 /// Returns the note that a reader must know about the runs.
-fn note(results: &[MethodResult]) -> String {
-    let of = |seeds: Seeds| -> Option<String> {
+fn table_note(results: &[MethodResult]) -> String {
+    let of = |seeds: SeedEffect| -> Option<String> {
         let names = results.iter().filter(|r| r.seeds == seeds).map(|r| r.method);
         let names = names.collect::<Vec<_>>().join(", ");
         (!names.is_empty()).then_some(names)
     };
     let mut words = vec!["Every method flies the same traffic.".to_string()];
-    words.extend(shielded(results));
-    if of(Seeds::Decide).is_some() {
+    words.extend(shield_note(results));
+    if of(SeedEffect::Decide).is_some() {
         words.push("Means over runs, with their 95 % intervals.".into());
     }
-    if let Some(names) = of(Seeds::Nothing) {
+    if let Some(names) = of(SeedEffect::Nothing) {
         words.push(format!(
             "Seeds change nothing with {names}: no random number is drawn. So there is one run, and \
              no interval."
         ));
     }
-    if let Some(names) = of(Seeds::Perhaps) {
+    if let Some(names) = of(SeedEffect::Perhaps) {
         words.push(format!(
             "Seeds are taken to change nothing with {names}: two runs with different seeds ended in \
              the same state, to the bit. So there is no interval."
         ));
     }
-    if results.iter().all(|result| result.seeds != Seeds::Decide) {
-        words.extend(remedy("airspace"));
+    if results.iter().all(|result| result.seeds != SeedEffect::Decide) {
+        words.extend(seed_remedy("airspace"));
     }
     words.join(" ")
 }

@@ -5,9 +5,10 @@
 //! longer.
 
 use serde_json::{Map, Value};
-use sidestep::experiment::sweep::work::run_cells;
+use sidestep::experiment::sweep::scheduler::run_cells;
 use sidestep::experiment::sweep::{
-    Base, Cell, Outcome, Plan, Rows, RunTable, Setting, Shard, Sweep, Variant, start,
+    BaseScenario, Cell, Outcome, Plan, RunTable, RunTableBuilder, Setting, Shard, Sweep, Variant,
+    start_cell,
 };
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
@@ -18,18 +19,22 @@ use std::any::Any;
 pub type Progress<'a> = dyn FnMut(&str, f64) + 'a;
 
 /// Returns the progress of a part of the whole that goes from share `from` to share `to`.
-pub(crate) fn stage(progress: &mut Progress<'_>, from: f64, to: f64) -> impl FnMut(&str, f64) {
+pub(crate) fn sub_progress(
+    progress: &mut Progress<'_>,
+    from: f64,
+    to: f64,
+) -> impl FnMut(&str, f64) {
     move |what, share| progress(what, from + (to - from) * share)
 }
 
 /// Runs between two reports of progress, per worker.
-const BATCH: usize = 8;
+const BATCH_RUNS: usize = 8;
 
 /// Runs every item on one of up to `workers` workers; results in the order of the items.
 ///
 /// # Errors
 /// The first error that `run` returns.
-pub(crate) fn all_of<C: Sync, T: Send, E: Send>(
+pub(crate) fn run_all<C: Sync, T: Send, E: Send>(
     items: &[C],
     workers: usize,
     mut report: impl FnMut(f64),
@@ -37,7 +42,7 @@ pub(crate) fn all_of<C: Sync, T: Send, E: Send>(
 ) -> Result<Vec<T>, E> {
     let numbers: Vec<usize> = (0..items.len()).collect();
     let mut results: Vec<(usize, T)> = Vec::with_capacity(items.len());
-    for batch in numbers.chunks(workers.max(1) * BATCH) {
+    for batch in numbers.chunks(workers.max(1) * BATCH_RUNS) {
         let run = |k: &usize| Some(run(&items[*k]).map(|result| (*k, result)));
         run_cells(batch, workers, run, &mut |result| {
             results.push(result);
@@ -60,7 +65,7 @@ pub(crate) fn setting(key: &str, value: impl Into<toml::Value>) -> Setting {
 /// When a setting does not fit.
 pub(crate) fn source(text: &str, settings: &[Setting]) -> Result<Source, InputError> {
     let overrides: Vec<String> = settings.iter().map(Setting::to_override).collect();
-    Source::new("a scenario of this experiment", text, "").with(&overrides)
+    Source::new("a scenario of this experiment", text, "").with_overrides(&overrides)
 }
 
 /// Variants, the number of runs of each, and their scenario.
@@ -76,21 +81,21 @@ impl Study {
     ///
     /// # Errors
     /// When the file is wrong.
-    pub(crate) fn of_file(file: &str, scenario: &'static str) -> Result<Self, InputError> {
+    pub(crate) fn from_file(file: &str, scenario: &'static str) -> Result<Self, InputError> {
         let sweep = Sweep::parse(&Source::new("a sweep of this experiment", file, ""))?;
         let variants = sweep.design.variants(&sweep.place)?;
         Ok(Self { scenario, sweep, variants })
     }
 
     /// Returns variants that no sweep file can describe, because they set no keys of a scenario.
-    pub(crate) fn of_variants(scenario: &'static str, variants: Vec<Vec<Setting>>) -> Self {
-        let sweep = Sweep::of_scenario("a case of this experiment");
+    pub(crate) fn from_variants(scenario: &'static str, variants: Vec<Vec<Setting>>) -> Self {
+        let sweep = Sweep::from_scenario("a case of this experiment");
         let variants = variants.into_iter().map(Variant::from).collect();
         Self { scenario, sweep, variants }
     }
 
     /// Sets the runs of each variant, and the cycles of each run.
-    pub(crate) fn sized(mut self, seeds: usize, cycles: Option<Cycle>) -> Self {
+    pub(crate) fn with_size(mut self, seeds: usize, cycles: Option<Cycle>) -> Self {
         self.sweep.replicates = seeds as u32;
         self.sweep.first_seed = Some(1);
         // A variant that sets its own number of cycles keeps it.
@@ -102,14 +107,14 @@ impl Study {
     }
 
     /// Keeps the variants for which this holds.
-    pub(crate) fn keep(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
+    pub(crate) fn filtered(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
         self.variants.retain(holds);
         self
     }
 
     /// Keeps the variants that set `key` to one of these numbers.
-    pub(crate) fn keep_numbers(self, key: &str, among: &[f64]) -> Self {
-        self.keep(|v| among.contains(&number(v, key)))
+    pub(crate) fn filtered_by_number(self, key: &str, among: &[f64]) -> Self {
+        self.filtered(|v| among.contains(&setting_number(v, key)))
     }
 
     /// Returns the number of variants.
@@ -127,9 +132,9 @@ impl Study {
         workers: usize,
         what: &str,
         progress: &mut Progress<'_>,
-    ) -> Result<Results, InputError> {
+    ) -> Result<StudyResults, InputError> {
         self.run_by(workers, what, progress, |scenario, _, cell| {
-            let run = start(WORLDS, *cell, &scenario()?, 1)?;
+            let run = start_cell(WORLDS, *cell, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
         })
     }
@@ -145,7 +150,7 @@ impl Study {
         progress: &mut Progress<'_>,
         settings: impl Fn(&Variant, u64) -> Vec<Setting> + Sync,
         run: impl Fn(&Source, &Cell) -> Result<Outcome, InputError> + Sync,
-    ) -> Result<Results, InputError> {
+    ) -> Result<StudyResults, InputError> {
         self.run_by(workers, what, progress, |_, variant, cell| {
             let all = [&self.sweep.fixed[..], &settings(variant, cell.seed)].concat();
             run(&source(self.scenario, &all)?, cell)
@@ -162,13 +167,13 @@ impl Study {
         workers: usize,
         what: &str,
         progress: &mut Progress<'_>,
-        run: impl Fn(&Scenario<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
-    ) -> Result<Results, InputError> {
+        run: impl Fn(&ScenarioFn<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
+    ) -> Result<StudyResults, InputError> {
         let base = source(self.scenario, &self.sweep.fixed)?;
-        let own = Base { world: "", seed: 1, source: &base };
+        let own = BaseScenario { world: "", seed: 1, source: &base };
         let plan = Plan::new(&self.sweep, self.variants.clone(), own)?;
-        let cells: Vec<Cell> = plan.share(Shard::ALL).collect();
-        let outcomes = all_of(
+        let cells: Vec<Cell> = plan.shard_cells(Shard::ALL).collect();
+        let outcomes = run_all(
             &cells,
             workers,
             |share| progress(what, share),
@@ -177,22 +182,26 @@ impl Study {
                 let overrides: Vec<String> =
                     variant.settings.iter().map(Setting::to_override).collect();
                 let seed = format!("seed={}", cell.seed);
-                let scenario = || base.clone().with(&overrides)?.with(std::slice::from_ref(&seed));
+                let scenario = || {
+                    base.clone()
+                        .with_overrides(&overrides)?
+                        .with_overrides(std::slice::from_ref(&seed))
+                };
                 run(&scenario, variant, cell)
             },
         )?;
-        let mut rows = Rows::default();
+        let mut rows = RunTableBuilder::default();
         outcomes.iter().for_each(|outcome| rows.push(outcome));
-        let table = rows.table(&plan)?;
-        Ok(Results { table, variants: plan.variants })
+        let table = rows.build(&plan)?;
+        Ok(StudyResults { table, variants: plan.variants })
     }
 }
 
 /// Makes the scenario of a cell.
-pub(crate) type Scenario<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
+pub(crate) type ScenarioFn<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
 
 /// Returns the outcome of a run that is no run of a scenario: its values by name.
-pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
+pub(crate) fn outcome_from_values(cell: &Cell, values: Value) -> Outcome {
     let metrics = match values {
         Value::Object(metrics) => metrics,
         _ => Map::new(),
@@ -202,8 +211,8 @@ pub(crate) fn outcome(cell: &Cell, values: Value) -> Outcome {
 }
 
 /// Runs a simulation to its end, and calls `look` after every cycle.
-pub(crate) fn finish(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulation)) {
-    let until = run.plan().cycles;
+pub(crate) fn run_to_end(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulation)) {
+    let until = run.config().cycles;
     while run.cycle() < until && !run.is_over() {
         run.advance(1);
         look(run);
@@ -214,21 +223,21 @@ pub(crate) fn finish(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulat
 ///
 /// # Panics
 /// When it is a run of another world.
-pub(crate) fn known<R: Simulation>(run: &dyn Simulation) -> &R {
+pub(crate) fn downcast<R: Simulation>(run: &dyn Simulation) -> &R {
     let run: &dyn Any = run;
     run.downcast_ref().expect("a run of the world that the scenario names")
 }
 
 /// The table of runs, and the variants that its rows belong to.
 #[derive(Debug)]
-pub(crate) struct Results {
+pub(crate) struct StudyResults {
     pub(crate) table: RunTable,
     pub(crate) variants: Vec<Variant>,
 }
 
 /// Returns the value that a variant sets a key to, as a number; for a list its first; NaN if it is
 /// none.
-pub(crate) fn number(variant: &Variant, key: &str) -> f64 {
+pub(crate) fn setting_number(variant: &Variant, key: &str) -> f64 {
     fn of(value: &toml::Value) -> Option<f64> {
         let first = || value.as_array().and_then(|all| all.first()).and_then(of);
         value.as_float().or(value.as_integer().map(|n| n as f64)).or_else(first)
@@ -247,7 +256,7 @@ mod tests {
             let items: Vec<usize> = (0..100).collect();
             let mut shares = vec![0.0];
             let square = |i: &usize| Ok::<_, ()>(i * i);
-            let results = all_of(&items, workers, |share| shares.push(share), square);
+            let results = run_all(&items, workers, |share| shares.push(share), square);
             assert_eq!(results, Ok(items.iter().map(|i| i * i).collect()));
             assert!(shares.is_sorted() && shares.last() == Some(&1.0));
         }
@@ -256,9 +265,14 @@ mod tests {
     #[test]
     fn rows_are_by_variant_and_seed() {
         let variants = vec![vec![setting("n", 1)], vec![setting("n", 2)], vec![setting("n", 3)]];
-        let study = Study::of_variants("", variants).sized(2, None).keep(|v| number(v, "n") > 1.0);
-        let run = |_: &Scenario<'_>, v: &Variant, cell: &Cell| {
-            Ok(outcome(cell, json!({ "x": 10.0 * number(v, "n") + cell.seed as f64 })))
+        let study = Study::from_variants("", variants)
+            .with_size(2, None)
+            .filtered(|v| setting_number(v, "n") > 1.0);
+        let run = |_: &ScenarioFn<'_>, v: &Variant, cell: &Cell| {
+            Ok(outcome_from_values(
+                cell,
+                json!({ "x": 10.0 * setting_number(v, "n") + cell.seed as f64 }),
+            ))
         };
         let results = study.run_by(2, "", &mut |_, _| (), run).expect("valid");
         let x = results.table.column("x").expect("there");

@@ -7,7 +7,7 @@
 
 use cpu_time::ProcessTime;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};
-use sidestep_record::{Origin, ParquetRecorder};
+use sidestep_record::{ParquetRecorder, Provenance};
 
 const ROWS: usize = 8_000_000;
 
@@ -19,7 +19,7 @@ fn main() {
     let rows: usize = blocks.iter().map(|b| b[0].len()).sum();
 
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let origin = Origin { program_version: "0".into(), scenario: String::new(), seed: 1 };
+    let origin = Provenance { program_version: "0".into(), scenario: String::new(), seed: 1 };
     let mut recorder = ParquetRecorder::create(folder.path(), &[schema()], &origin).expect("room");
     let start = ProcessTime::now();
     for block in &blocks {

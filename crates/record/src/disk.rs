@@ -8,7 +8,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 /// Returns the name of a file or folder while it is incomplete: `NAME.partial`.
-pub(crate) fn partial(path: &Path) -> PathBuf {
+pub(crate) fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
     name.into()
@@ -20,7 +20,7 @@ pub(crate) fn partial(path: &Path) -> PathBuf {
 /// # Errors
 /// An I/O error; the old content stays.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
-    let growing = partial(path);
+    let growing = partial_path(path);
     let written = write_through(&growing, bytes);
     written.map_err(|e| {
         // On a full disk the half-written copy must not keep its space.
@@ -41,7 +41,7 @@ fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// An I/O error.
-pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
+pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
     fs::write(path, bytes).map_err(|e| RecordError::new(path.display(), e))
 }
 
@@ -100,7 +100,7 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
 }
 
 /// The error of a run folder that cannot be made.
-pub(crate) fn cannot_make(path: &Path, cause: impl std::fmt::Display) -> InputError {
+pub(crate) fn cannot_create(path: &Path, cause: impl std::fmt::Display) -> InputError {
     let cause = format!("cannot make the run folder: {cause}");
     InputError::new(path.display(), cause, "name a folder in a place where you may write")
 }
@@ -124,11 +124,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("a");
         fs::create_dir(&inner).unwrap();
-        put(&inner.join("b"), b"text").unwrap();
+        write_new(&inner.join("b"), b"text").unwrap();
         sync_below(folder.path()).unwrap();
         assert_eq!(fs::read(inner.join("b")).unwrap(), b"text");
         assert!(sync_below(&folder.path().join("gone")).is_err());
-        assert!(put(&folder.path().join("gone/b"), b"").unwrap_err().to_string().contains("gone"));
+        assert!(
+            write_new(&folder.path().join("gone/b"), b"").unwrap_err().to_string().contains("gone")
+        );
     }
 
     #[test]
@@ -136,7 +138,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.bin");
         replace(&path, b"old").unwrap();
-        fs::create_dir(partial(&path)).unwrap();
+        fs::create_dir(partial_path(&path)).unwrap();
         let error = replace(&path, b"new").unwrap_err();
         assert!(error.to_string().contains("a.bin"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");

@@ -10,8 +10,8 @@ use sidestep_kernel::ports::{RecordError, TableSchema};
 use crate::disk;
 use crate::manifest::{self, Manifest, Status, json};
 use crate::parquet::ParquetRecorder;
-use crate::schema::Origin;
-use crate::staging::Staging;
+use crate::schema::Provenance;
+use crate::staging::StagingFolder;
 
 /// File name of the manifest.
 pub(crate) const MANIFEST: &str = "run.json";
@@ -28,14 +28,14 @@ pub struct NewRun {
     /// The build that makes it.
     pub build: String,
     /// Scenario, seed and version that its rows result from.
-    pub origin: Origin,
+    pub origin: Provenance,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
 }
 
 /// The treatment of an existing run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Existing {
+pub enum IfExists {
     /// Leave it alone and fail.
     Refuse,
     /// Delete it. Folders that hold something other than a run are refused anyway.
@@ -69,17 +69,17 @@ impl RunFolder {
     ///
     /// # Errors
     /// A folder that may not be used; a place where none can be created.
-    pub fn create(path: &Path, run: &NewRun, existing: Existing) -> Result<Self, InputError> {
+    pub fn create(path: &Path, run: &NewRun, existing: IfExists) -> Result<Self, InputError> {
         check_vacant(path, existing)?;
-        let staging = Staging::new(path)?;
-        let Origin { program_version, scenario, seed } = &run.origin;
-        let begun = manifest::begin(&run.world, *seed, program_version, run.cycles_planned);
+        let staging = StagingFolder::new(path)?;
+        let Provenance { program_version, scenario, seed } = &run.origin;
+        let begun = manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned);
         let manifest = Manifest { build: Some(run.build.clone()), ..begun };
         fill(staging.path(), &manifest, scenario)
-            .map_err(|e| disk::cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
+            .map_err(|e| disk::cannot_create(path, format!("{}: {}", e.place, e.cause)))?;
         // No process may be writing the run that is about to be deleted.
         let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
-        staging.take_place()?;
+        staging.commit()?;
         drop(old_lock);
         let lock = lock(path)?;
         let scenario = scenario.clone();
@@ -94,7 +94,7 @@ impl RunFolder {
     pub fn resume(path: &Path) -> Result<(Self, ResumePoint), InputError> {
         check_is_run(path)?;
         let lock = lock(path)?;
-        let RunView { manifest, scenario, .. } = RunView::open(path)?;
+        let RunReader { manifest, scenario, .. } = RunReader::open(path)?;
         if manifest.status == Status::Complete {
             let remedy = "read its tables, or start another run in a new folder";
             return Err(InputError::new(path.display(), "the run is complete", remedy));
@@ -128,7 +128,7 @@ impl RunFolder {
         schemas: &[TableSchema],
         cycle: u64,
     ) -> Result<ParquetRecorder, RecordError> {
-        let origin = Origin {
+        let origin = Provenance {
             program_version: self.manifest.program_version.clone(),
             scenario: self.scenario.clone(),
             seed: self.manifest.seed,
@@ -190,7 +190,7 @@ impl RunFolder {
 
 /// A run folder to read from; its run may still be in progress.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RunView {
+pub struct RunReader {
     /// Path of the folder.
     pub path: PathBuf,
     /// The content of `run.json`.
@@ -199,7 +199,7 @@ pub struct RunView {
     pub scenario: String,
 }
 
-impl RunView {
+impl RunReader {
     /// Opens the folder at `path` without locking it.
     ///
     /// # Errors
@@ -247,21 +247,21 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
 }
 
 /// Refuses a path at which a new run must not be created.
-pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
+pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
     let refuse = |cause, remedy: &str| Err(InputError::new(path.display(), cause, remedy));
     let mut entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(_) if !path.exists() => return Ok(()),
-        Err(e) => return Err(disk::cannot_make(path, e)),
+        Err(e) => return Err(disk::cannot_create(path, e)),
     };
     match (entries.next().is_some(), is_run(path), existing) {
-        (false, _, _) | (true, true, Existing::Replace) => Ok(()),
-        (true, true, Existing::Refuse) => refuse(
+        (false, _, _) | (true, true, IfExists::Replace) => Ok(()),
+        (true, true, IfExists::Refuse) => refuse(
             "the folder holds a run already",
             "resume that run, name another folder, or replace the old run (--replace)",
         ),
         (true, false, _) => {
-            let what = match path.join(manifest::OF_SWEEP).is_file() {
+            let what = match path.join(manifest::SWEEP_MANIFEST).is_file() {
                 true => "the folder holds a sweep",
                 false => "the folder holds something else than a run",
             };

@@ -47,7 +47,7 @@ impl RowGroup {
     }
 
     /// Returns the columns to be written; afterwards the group has no rows.
-    pub(crate) fn take(&mut self) -> &mut [ColumnEncoder] {
+    pub(crate) fn drain(&mut self) -> &mut [ColumnEncoder] {
         self.rows = 0;
         &mut self.columns
     }

@@ -14,19 +14,20 @@ pub mod manifest;
 pub mod mcap;
 pub mod parquet;
 pub mod read;
+pub mod run_table;
 pub mod sweep;
-pub mod whole;
 
-pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
+pub use folder::{IfExists, NewRun, ResumePoint, RunFolder, RunReader};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
-    BagSchema, BagWriter, LiveFrames, LiveServer, McapEnd, McapOrigin, McapRecorder, McapRun,
-    McapScenes, Playback, Playing, Steering, is_mcap, live,
+    BagSchema, BagWriter, LiveFrameWriter, LiveServer, McapFooter, McapProvenance, McapRecorder,
+    McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, is_mcap,
+    start_live_server,
 };
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, tables};
-pub use schema::Origin;
-pub use staging::followed;
-pub use table_file::TableFile;
-pub use whole::WholeTable;
+pub use run_table::LoadedTable;
+pub use schema::Provenance;
+pub use staging::resolve_link;
+pub use table_file::TableFileWriter;

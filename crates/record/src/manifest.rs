@@ -11,7 +11,7 @@ use crate::disk;
 use crate::format::{self, FormatVersion};
 
 /// File name of the manifest of a sweep.
-pub(crate) const OF_SWEEP: &str = "sweep.json";
+pub(crate) const SWEEP_MANIFEST: &str = "sweep.json";
 
 /// The progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +53,7 @@ pub struct Manifest {
 
 /// The one key that every format has.
 #[derive(Deserialize)]
-struct Probe {
+struct FormatProbe {
     format: FormatVersion,
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, InputErro
         InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
     })?;
     // The version comes first: a newer manifest need not have the keys of this one.
-    let probe: Probe = parse(path, &text)?;
+    let probe: FormatProbe = parse(path, &text)?;
     probe.format.check_readable(path.display())?;
     parse(path, &text)
 }
@@ -98,12 +98,12 @@ fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, InputE
     serde_json::from_str(text).map_err(|e| {
         let remedy = "the file is damaged: restore it, or run the scenario again in a new folder";
         let error = InputError::new(path.display(), format!("this is no manifest: {e}"), remedy);
-        if e.line() > 0 { error.at(e.line(), e.column().max(1)) } else { error }
+        if e.line() > 0 { error.with_position(e.line(), e.column().max(1)) } else { error }
     })
 }
 
 /// Returns the manifest of a run that starts now.
-pub(crate) fn begin(
+pub(crate) fn new_manifest(
     world: &str,
     seed: u64,
     program_version: &str,
@@ -136,13 +136,15 @@ mod tests {
     }
 
     fn text() -> String {
-        String::from_utf8(json(&begin("robots", u64::MAX, "0.1.0", 5), Path::new("x")).unwrap())
-            .unwrap()
+        String::from_utf8(
+            json(&new_manifest("robots", u64::MAX, "0.1.0", 5), Path::new("x")).unwrap(),
+        )
+        .unwrap()
     }
 
     #[test]
     fn a_manifest_survives_its_json() {
-        assert_eq!(read(&text()).unwrap(), begin("robots", u64::MAX, "0.1.0", 5));
+        assert_eq!(read(&text()).unwrap(), new_manifest("robots", u64::MAX, "0.1.0", 5));
     }
 
     #[test]

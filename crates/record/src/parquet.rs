@@ -17,8 +17,8 @@ use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
 
 use crate::disk;
 use crate::group::RowGroup;
-use crate::part::{PartWriter, cause, first_cycle, next_cycle, part_name};
-use crate::schema::{Origin, check_schema, key_values, parquet_schema};
+use crate::part::{PartWriter, error_cause, first_cycle, next_cycle, part_name};
+use crate::schema::{Provenance, check_schema, key_values, parquet_schema};
 
 /// Writes every table to Parquet files; the [module](self) describes their names.
 pub struct ParquetRecorder {
@@ -35,10 +35,10 @@ impl ParquetRecorder {
     pub fn create(
         folder: &Path,
         schemas: &[TableSchema],
-        origin: &Origin,
+        origin: &Provenance,
     ) -> Result<Self, RecordError> {
         for table in schemas.iter().map(|s| folder.join(&s.name)) {
-            if table.exists() || disk::partial(&table).exists() {
+            if table.exists() || disk::partial_path(&table).exists() {
                 return Err(RecordError::new(table.display(), "the table is there already"));
             }
         }
@@ -56,7 +56,7 @@ impl ParquetRecorder {
     pub fn resume(
         folder: &Path,
         schemas: &[TableSchema],
-        origin: &Origin,
+        origin: &Provenance,
         cycle: u64,
     ) -> Result<Self, RecordError> {
         schemas.iter().try_for_each(check_schema)?;
@@ -65,7 +65,7 @@ impl ParquetRecorder {
     }
 
     /// Does `work` unless rows are missing already, and remembers a failure.
-    fn unless_broken(
+    fn run_unless_failed(
         &mut self,
         work: impl FnOnce(&mut [TableWriter]) -> Result<(), RecordError>,
     ) -> Result<(), RecordError> {
@@ -82,15 +82,15 @@ impl Recorder for ParquetRecorder {
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
         let schema = self.tables.get(table).map(|t| &t.schema);
         check_block(schema.ok_or_else(|| RecordError::new(table, "no such table"))?, block)?;
-        self.unless_broken(|tables| tables[table].append(block))
+        self.run_unless_failed(|tables| tables[table].append(block))
     }
 
     fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
-        self.unless_broken(|tables| tables.iter_mut().try_for_each(|t| t.seal(next_cycle)))
+        self.run_unless_failed(|tables| tables.iter_mut().try_for_each(|t| t.seal(next_cycle)))
     }
 
     fn finish(&mut self) -> Result<(), RecordError> {
-        self.unless_broken(|tables| tables.iter_mut().try_for_each(TableWriter::finish))
+        self.run_unless_failed(|tables| tables.iter_mut().try_for_each(TableWriter::finish))
     }
 }
 
@@ -112,10 +112,10 @@ impl TableWriter {
     fn open(
         parent: &Path,
         schema: &TableSchema,
-        origin: &Origin,
+        origin: &Provenance,
         cycle: u64,
     ) -> Result<Self, RecordError> {
-        let failed = |e| RecordError::new(&schema.name, cause(e));
+        let failed = |e| RecordError::new(&schema.name, error_cause(e));
         let parquet_schema = parquet_schema(schema).map_err(failed)?;
         let folder = parent.join(&schema.name);
         rewind(&folder, cycle)?;
@@ -139,7 +139,7 @@ impl TableWriter {
         let mut start = 0;
         while start < rows {
             let filled = self.group.fill(block, start);
-            start = filled.map_err(|e| RecordError::new(self.folder.display(), cause(e)))?;
+            start = filled.map_err(|e| RecordError::new(self.folder.display(), error_cause(e)))?;
             if self.group.is_full() {
                 self.write_row_group()?;
             }
@@ -152,11 +152,11 @@ impl TableWriter {
             self.part = Some(self.new_part()?);
         }
         let part = self.part.as_mut().expect("opened above");
-        part.write_row_group(self.group.take())
+        part.write_row_group(self.group.drain())
     }
 
     fn new_part(&self) -> Result<PartWriter, RecordError> {
-        let path = disk::partial(&self.folder).join(part_name(self.part_cycle));
+        let path = disk::partial_path(&self.folder).join(part_name(self.part_cycle));
         if path.exists() {
             let cause = "sealed at this cycle already; a recorder is sealed at rising cycles";
             return Err(RecordError::new(path.display(), cause));
@@ -184,7 +184,7 @@ impl TableWriter {
             return Ok(());
         }
         self.end_part(None)?;
-        let growing = disk::partial(&self.folder);
+        let growing = disk::partial_path(&self.folder);
         if parts(&growing)?.is_empty() {
             // A table without rows still needs a file for its columns.
             self.new_part()?.close(None)?;
@@ -197,7 +197,7 @@ impl TableWriter {
 
 /// Returns the table's folder to its state when the recorder was sealed at `cycle`.
 fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
-    let growing = disk::partial(folder);
+    let growing = disk::partial_path(folder);
     if folder.exists() {
         // The run was stopped after this table was finished, but before the last one was.
         disk::rename(folder, &growing)?;

@@ -49,11 +49,11 @@ impl PartWriter {
             .set_offset_index_disabled(true)
             .set_key_value_metadata(Some(key_values))
             .build();
-        let growing = disk::partial(&path);
+        let growing = disk::partial_path(&path);
         let failed = |cause: String| RecordError::new(growing.display(), cause);
         let file = File::create(&growing).map_err(|e| failed(e.to_string()))?;
         let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
-            .map_err(|e| failed(cause(e)))?;
+            .map_err(|e| failed(error_cause(e)))?;
         Ok(Self { path, file, checksums: Vec::new() })
     }
 
@@ -62,8 +62,9 @@ impl PartWriter {
         &mut self,
         columns: &mut [ColumnEncoder],
     ) -> std::result::Result<(), RecordError> {
-        let checksum = append_chunks(&mut self.file, columns)
-            .map_err(|e| RecordError::new(disk::partial(&self.path).display(), cause(e)))?;
+        let checksum = append_chunks(&mut self.file, columns).map_err(|e| {
+            RecordError::new(disk::partial_path(&self.path).display(), error_cause(e))
+        })?;
         self.checksums.push(checksum);
         Ok(())
     }
@@ -77,9 +78,9 @@ impl PartWriter {
         for (key, value) in [(schema::CHECKSUMS, checksums), (schema::NEXT_CYCLE, next_cycle)] {
             file.append_key_value_metadata(KeyValue::new(key.to_string(), value));
         }
-        let growing = disk::partial(&path);
+        let growing = disk::partial_path(&path);
         let failed = |cause: String| RecordError::new(growing.display(), cause);
-        let file = file.into_inner().map_err(|e| failed(cause(e)))?;
+        let file = file.into_inner().map_err(|e| failed(error_cause(e)))?;
         file.sync_all().map_err(|e| failed(e.to_string()))?;
         disk::rename(&growing, &path)
     }
@@ -89,7 +90,7 @@ impl PartWriter {
 pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, RecordError> {
     let failed = |cause: String| RecordError::new(path.display(), cause);
     let file = File::open(path).map_err(|e| failed(e.to_string()))?;
-    let file = SerializedFileReader::new(file).map_err(|e| failed(cause(e)))?;
+    let file = SerializedFileReader::new(file).map_err(|e| failed(error_cause(e)))?;
     let text = schema::key_value(file.metadata(), schema::NEXT_CYCLE);
     Ok(text.and_then(|cycle| cycle.parse().ok()))
 }
@@ -113,7 +114,7 @@ fn append_chunks(
 }
 
 /// Returns the system's message, without the library's wrapping.
-pub(crate) fn cause(error: ParquetError) -> String {
+pub(crate) fn error_cause(error: ParquetError) -> String {
     match error {
         ParquetError::External(inner) => inner.to_string(),
         other => other.to_string(),

@@ -19,8 +19,8 @@ use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values}
 use crate::disk;
 use crate::format::FormatVersion;
 use crate::parquet::parts;
-use crate::part::cause;
-use crate::schema::{self, Origin};
+use crate::part::error_cause;
+use crate::schema::{self, Provenance};
 
 /// The column by which rows are chosen.
 const CYCLE: &str = "cycle";
@@ -36,7 +36,7 @@ pub struct Table {
     /// The values, one entry for each column of the schema, all of one length.
     pub columns: Vec<Values>,
     /// Scenario, seed and version of the run.
-    pub origin: Origin,
+    pub origin: Provenance,
     /// Whether the run has ended; otherwise the rows reach to its last checkpoint.
     pub complete: bool,
 }
@@ -69,18 +69,19 @@ pub fn read_table(
     name: &str,
     cycles: impl RangeBounds<u64>,
 ) -> Result<Table, InputError> {
-    let cycles = Cycles { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
+    let cycles =
+        CycleRange { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
     let (paths, complete) = find_parts(folder, name)?;
     let mut table: Option<Table> = None;
     for path in &paths {
-        let part = Part::open(path, name)?;
+        let part = PartReader::open(path, name)?;
         let table = table.get_or_insert_with(|| part.empty_table(complete));
         if table.schema != part.schema {
             return Err(damaged(path, "its columns differ from those of the part before it"));
         }
         part.read_into(&mut table.columns, cycles)?;
     }
-    table.ok_or_else(|| nothing_whole(folder, name))
+    table.ok_or_else(|| no_complete_part(folder, name))
 }
 
 /// Reads a table like [`read_table`], but one block of rows at a time, in order: for tables that
@@ -94,12 +95,13 @@ pub fn for_each_block<E: From<InputError>>(
     cycles: impl RangeBounds<u64>,
     mut each: impl FnMut(Table) -> Result<(), E>,
 ) -> Result<(), E> {
-    let cycles = Cycles { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
+    let cycles =
+        CycleRange { from: cycles.start_bound().cloned(), to: cycles.end_bound().cloned() };
     let (paths, complete) = find_parts(folder, name)?;
     let mut empty: Option<Table> = None;
     let mut has_rows = false;
     for path in &paths {
-        let part = Part::open(path, name)?;
+        let part = PartReader::open(path, name)?;
         let empty = &*empty.get_or_insert_with(|| part.empty_table(complete));
         if empty.schema != part.schema {
             let cause = "its columns differ from those of the part before it";
@@ -117,7 +119,7 @@ pub fn for_each_block<E: From<InputError>>(
     match empty {
         Some(empty) if !has_rows => each(empty),
         Some(_) => Ok(()),
-        None => Err(nothing_whole(folder, name).into()),
+        None => Err(no_complete_part(folder, name).into()),
     }
 }
 
@@ -142,7 +144,7 @@ pub fn tables(folder: &Path) -> Result<Vec<String>, InputError> {
     Ok(names)
 }
 
-fn nothing_whole(folder: &Path, name: &str) -> InputError {
+fn no_complete_part(folder: &Path, name: &str) -> InputError {
     let remedy = "resume the run, or wait for its first checkpoint";
     InputError::new(folder.join(name).display(), "no part of the table is whole yet", remedy)
 }
@@ -150,7 +152,7 @@ fn nothing_whole(folder: &Path, name: &str) -> InputError {
 /// Returns the complete parts of a table, and whether these are all.
 fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputError> {
     let table = folder.join(name);
-    let growing = disk::partial(&table);
+    let growing = disk::partial_path(&table);
     let complete = table.is_dir();
     if !complete && !growing.is_dir() {
         let remedy = "name a run folder and one of the tables in it";
@@ -168,12 +170,12 @@ pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
 
 /// The requested range of cycles.
 #[derive(Debug, Clone, Copy)]
-struct Cycles {
+struct CycleRange {
     from: Bound<u64>,
     to: Bound<u64>,
 }
 
-impl Cycles {
+impl CycleRange {
     fn is_all(self) -> bool {
         (self.from, self.to) == (Bound::Unbounded, Bound::Unbounded)
     }
@@ -199,34 +201,35 @@ impl Cycles {
 }
 
 /// One open file.
-struct Part<'a> {
+struct PartReader<'a> {
     path: &'a Path,
     bytes: File,
     file: SerializedFileReader<File>,
     checksums: Vec<u32>,
     schema: TableSchema,
-    origin: Origin,
+    origin: Provenance,
 }
 
-impl<'a> Part<'a> {
+impl<'a> PartReader<'a> {
     fn open(path: &'a Path, name: &str) -> Result<Self, InputError> {
-        let bytes = File::open(path).map_err(|e| bad(path, e))?;
-        let file = bytes.try_clone().map_err(|e| bad(path, e))?;
-        let file = SerializedFileReader::new(file).map_err(|e| damaged(path, cause(e)))?;
-        let text = |key| text(path, file.metadata(), key);
-        let format: FormatVersion = text(schema::FORMAT)?.parse().map_err(|e| bad(path, e))?;
+        let bytes = File::open(path).map_err(|e| decode_error(path, e))?;
+        let file = bytes.try_clone().map_err(|e| decode_error(path, e))?;
+        let file = SerializedFileReader::new(file).map_err(|e| damaged(path, error_cause(e)))?;
+        let text = |key| required_value(path, file.metadata(), key);
+        let format: FormatVersion =
+            text(schema::FORMAT)?.parse().map_err(|e| decode_error(path, e))?;
         format.check_readable(path.display())?;
-        let columns =
-            schema::columns_from_json(&text(schema::COLUMNS)?).map_err(|e| bad(path, e))?;
-        let origin = Origin {
+        let columns = schema::columns_from_json(&text(schema::COLUMNS)?)
+            .map_err(|e| decode_error(path, e))?;
+        let origin = Provenance {
             program_version: text(schema::VERSION)?,
             scenario: text(schema::SCENARIO)?,
-            seed: text(schema::SEED)?.parse().map_err(|e| bad(path, e))?,
+            seed: text(schema::SEED)?.parse().map_err(|e| decode_error(path, e))?,
         };
-        let checksums =
-            schema::checksums_from_text(&text(schema::CHECKSUMS)?).map_err(|e| bad(path, e))?;
+        let checksums = schema::checksums_from_text(&text(schema::CHECKSUMS)?)
+            .map_err(|e| decode_error(path, e))?;
         let about = match schema::key_value(file.metadata(), schema::ABOUT) {
-            Some(json) => schema::about_from_json(json).map_err(|e| bad(path, e))?,
+            Some(json) => schema::about_from_json(json).map_err(|e| decode_error(path, e))?,
             // Files of earlier versions have none.
             None => Vec::new(),
         };
@@ -258,7 +261,7 @@ impl<'a> Part<'a> {
         Table { schema: self.schema.clone(), columns, origin: self.origin.clone(), complete }
     }
 
-    fn read_into(&self, columns: &mut [Values], cycles: Cycles) -> Result<(), InputError> {
+    fn read_into(&self, columns: &mut [Values], cycles: CycleRange) -> Result<(), InputError> {
         (0..self.file.num_row_groups())
             .try_for_each(|group| self.read_group_into(group, columns, cycles))
     }
@@ -268,7 +271,7 @@ impl<'a> Part<'a> {
         &self,
         group: usize,
         columns: &mut [Values],
-        cycles: Cycles,
+        cycles: CycleRange,
     ) -> Result<(), InputError> {
         let cycle_column = position(&self.schema, CYCLE);
         if cycle_column.is_none() && !cycles.is_all() {
@@ -277,7 +280,7 @@ impl<'a> Part<'a> {
         }
         let bounds = cycle_column.and_then(|c| bounds(self.file.metadata().row_group(group), c));
         if bounds.is_none_or(|(least, most)| cycles.overlaps(least, most)) {
-            let rows = self.read_group(group).map_err(|e| damaged(self.path, cause(e)))?;
+            let rows = self.read_group(group).map_err(|e| damaged(self.path, error_cause(e)))?;
             append(columns, rows, cycle_column, cycles);
         }
         Ok(())
@@ -300,12 +303,12 @@ impl<'a> Part<'a> {
     }
 }
 
-fn bad(path: &Path, cause: impl std::fmt::Display) -> InputError {
+fn decode_error(path: &Path, cause: impl std::fmt::Display) -> InputError {
     damaged(path, cause.to_string())
 }
 
 /// Returns the value of the key `key` of a file.
-pub(crate) fn text(
+pub(crate) fn required_value(
     path: &Path,
     metadata: &ParquetMetaData,
     key: &str,
@@ -364,7 +367,7 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
 }
 
 /// Appends the rows with a cycle in the range.
-fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: Cycles) {
+fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: CycleRange) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,
         Some(Values::U64(v)) => Some(v.iter().map(|&c| cycles.contains(c)).collect()),
@@ -398,7 +401,7 @@ fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<Values>
         (BoolColumnReader(r), ColumnType::Bool) => Values::Bool(read_cells(r, nullable, Ok)?),
         (ByteArrayColumnReader(r), ColumnType::Label) => {
             let mut index = LabelIndex::new(spec);
-            Values::Label(read_cells(r, nullable, |label| index.of(&label))?)
+            Values::Label(read_cells(r, nullable, |label| index.index_of(&label))?)
         }
         (ByteArrayColumnReader(r), ColumnType::Text) => Values::Text(read_texts(r, nullable)?),
         _ => return Err(ParquetError::General(format!("column `{}` has another type", spec.name))),
@@ -480,7 +483,7 @@ impl<'a> LabelIndex<'a> {
         Self { name: &spec.name, indices: labels.zip(0..).collect(), last: None }
     }
 
-    fn of(&mut self, label: &ByteArray) -> ParquetResult<u32> {
+    fn index_of(&mut self, label: &ByteArray) -> ParquetResult<u32> {
         if let Some((last, index)) = &self.last
             && last == label
         {

@@ -31,7 +31,7 @@ pub(crate) const NEXT_CYCLE: &str = "sidestep.next_cycle";
 
 /// The origin of a run, recorded in each of its files.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Origin {
+pub struct Provenance {
     /// Version of the program that made the run.
     pub program_version: String,
     /// The scenario's text, with every default and include resolved.
@@ -81,11 +81,11 @@ pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), Reco
     if schema.columns.is_empty() {
         return wrong("a table has at least one column".into());
     }
-    if let Some(name) = repeated(schema.columns.iter().map(|c| &c.name)) {
+    if let Some(name) = first_duplicate(schema.columns.iter().map(|c| &c.name)) {
         return wrong(format!("two columns are named `{name}`"));
     }
     for column in &schema.columns {
-        if let Some(label) = repeated(column.labels.iter()) {
+        if let Some(label) = first_duplicate(column.labels.iter()) {
             return wrong(format!("column `{}` has the label `{label}` twice", column.name));
         }
     }
@@ -93,7 +93,7 @@ pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), Reco
 }
 
 /// Returns the first text, in sorted order, that occurs more than once.
-fn repeated<'a>(texts: impl Iterator<Item = &'a String>) -> Option<&'a String> {
+fn first_duplicate<'a>(texts: impl Iterator<Item = &'a String>) -> Option<&'a String> {
     let mut sorted: Vec<_> = texts.collect();
     sorted.sort();
     sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
@@ -135,7 +135,7 @@ pub(crate) fn physical_type(ty: ColumnType) -> PhysicalType {
 }
 
 /// Returns the key-value pairs of a file of `schema`.
-pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue> {
+pub(crate) fn key_values(schema: &TableSchema, origin: &Provenance) -> Vec<KeyValue> {
     let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
     vec![
         pair(FORMAT, format::CURRENT.to_string()),

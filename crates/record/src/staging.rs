@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 
 use crate::disk;
-use crate::disk::cannot_make;
+use crate::disk::cannot_create;
 
 /// A folder with a temporary name. If it is dropped, it and the parents created for it are deleted.
-pub(crate) struct Staging {
+pub(crate) struct StagingFolder {
     path: PathBuf,
     /// The place that it takes: of a link, the folder that it leads to.
     target: PathBuf,
@@ -18,11 +18,11 @@ pub(crate) struct Staging {
     made: Vec<PathBuf>,
 }
 
-impl Staging {
+impl StagingFolder {
     /// Creates an empty folder in the parent of `target`, and that parent if it is missing.
     pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
-        let target = followed(target).map_err(|e| cannot_make(target, e))?;
-        let path = beside(&target, "new")?;
+        let target = resolve_link(target).map_err(|e| cannot_create(target, e))?;
+        let path = hidden_sibling(&target, "new")?;
         let mut made: Vec<_> = disk::parent(&target)
             .ancestors()
             .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
@@ -30,14 +30,14 @@ impl Staging {
             .collect();
         made.reverse();
         let staging = Self { path, target, made };
-        staging.make().map_err(|e| cannot_make(&staging.target, e))?;
+        staging.make().map_err(|e| cannot_create(&staging.target, e))?;
         Ok(staging)
     }
 
     fn make(&self) -> io::Result<()> {
         fs::create_dir_all(disk::parent(&self.path))?;
         // Remains of a killed process with the same id.
-        remove_if_there(&self.path)?;
+        remove_if_exists(&self.path)?;
         fs::create_dir(&self.path)
     }
 
@@ -46,11 +46,11 @@ impl Staging {
     }
 
     /// Moves the folder to its place, replacing anything there.
-    pub(crate) fn take_place(mut self) -> Result<(), InputError> {
+    pub(crate) fn commit(mut self) -> Result<(), InputError> {
         let target = &self.target;
-        let failed = |e| cannot_make(target, e);
-        let old = beside(target, "old")?;
-        remove_if_there(&old).map_err(failed)?;
+        let failed = |e| cannot_create(target, e);
+        let old = hidden_sibling(target, "old")?;
+        remove_if_exists(&old).map_err(failed)?;
         let replaces = target.exists();
         if replaces {
             fs::rename(target, &old).map_err(failed)?;
@@ -62,13 +62,13 @@ impl Staging {
             return Err(failed(io::Error::other(e.cause)));
         }
         self.made.clear();
-        remove_if_there(&old).map_err(failed)
+        remove_if_exists(&old).map_err(failed)
     }
 }
 
-impl Drop for Staging {
+impl Drop for StagingFolder {
     fn drop(&mut self) {
-        let _ = remove_if_there(&self.path);
+        let _ = remove_if_exists(&self.path);
         for parent in self.made.iter().rev() {
             // Fails, as it should, if the folder is not empty.
             let _ = fs::remove_dir(parent);
@@ -81,7 +81,7 @@ impl Drop for Staging {
 ///
 /// # Errors
 /// A link to a missing folder.
-pub fn followed(target: &Path) -> io::Result<PathBuf> {
+pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
     // With a `/` at its end, a link is not known as one, and a name beside the folder would be one inside.
     let target: PathBuf = target.components().collect();
     if !target.is_symlink() {
@@ -93,13 +93,13 @@ pub fn followed(target: &Path) -> io::Result<PathBuf> {
 }
 
 /// Returns a hidden name in the same folder that no other process uses.
-fn beside(target: &Path, role: &str) -> Result<PathBuf, InputError> {
-    let name = target.file_name().ok_or_else(|| cannot_make(target, "it has no name"))?;
+fn hidden_sibling(target: &Path, role: &str) -> Result<PathBuf, InputError> {
+    let name = target.file_name().ok_or_else(|| cannot_create(target, "it has no name"))?;
     let name = format!(".{}.{role}-{}", name.display(), std::process::id());
     Ok(disk::parent(target).join(name))
 }
 
-fn remove_if_there(folder: &Path) -> io::Result<()> {
+fn remove_if_exists(folder: &Path) -> io::Result<()> {
     match fs::remove_dir_all(folder) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
         other => other,

@@ -7,12 +7,12 @@ use sidestep_kernel::ports::{RecordError, TableSchema, Values};
 
 use crate::disk;
 use crate::group::RowGroup;
-use crate::part::{PartWriter, cause};
-use crate::schema::{Origin, check_schema, key_values, parquet_schema};
+use crate::part::{PartWriter, error_cause};
+use crate::schema::{Provenance, check_schema, key_values, parquet_schema};
 
 /// The writer of a table to one file, with the same key-value pairs as a run's own parts. If it is
 /// dropped before it is finished, it deletes the file.
-pub struct TableFile {
+pub struct TableFileWriter {
     path: PathBuf,
     schema: TableSchema,
     group: RowGroup,
@@ -20,14 +20,18 @@ pub struct TableFile {
     part: Option<PartWriter>,
 }
 
-impl TableFile {
+impl TableFileWriter {
     /// Starts the file that is called `path` once it is complete.
     ///
     /// # Errors
     /// A schema that cannot become a file; an I/O error.
-    pub fn create(path: &Path, schema: &TableSchema, origin: &Origin) -> Result<Self, RecordError> {
+    pub fn create(
+        path: &Path,
+        schema: &TableSchema,
+        origin: &Provenance,
+    ) -> Result<Self, RecordError> {
         check_schema(schema)?;
-        let failed = |e| RecordError::new(&schema.name, cause(e));
+        let failed = |e| RecordError::new(&schema.name, error_cause(e));
         let stored = parquet_schema(schema).map_err(failed)?;
         Ok(Self {
             group: RowGroup::new(schema, &stored),
@@ -47,7 +51,7 @@ impl TableFile {
         let mut start = 0;
         while start < rows {
             let filled = self.group.fill(block, start);
-            start = filled.map_err(|e| RecordError::new(self.path.display(), cause(e)))?;
+            start = filled.map_err(|e| RecordError::new(self.path.display(), error_cause(e)))?;
             if self.group.is_full() {
                 self.write_row_group()?;
             }
@@ -56,7 +60,7 @@ impl TableFile {
     }
 
     fn write_row_group(&mut self) -> Result<(), RecordError> {
-        let group = self.group.take();
+        let group = self.group.drain();
         self.part.as_mut().map_or(Ok(()), |part| part.write_row_group(group))
     }
 
@@ -69,14 +73,14 @@ impl TableFile {
             self.write_row_group()?;
         }
         let ended = self.part.take().map_or(Ok(()), |part| part.close(None));
-        ended.inspect_err(|_| drop(std::fs::remove_file(disk::partial(&self.path))))
+        ended.inspect_err(|_| drop(std::fs::remove_file(disk::partial_path(&self.path))))
     }
 }
 
-impl Drop for TableFile {
+impl Drop for TableFileWriter {
     fn drop(&mut self) {
         if self.part.take().is_some() {
-            let _ = std::fs::remove_file(disk::partial(&self.path));
+            let _ = std::fs::remove_file(disk::partial_path(&self.path));
         }
     }
 }

@@ -13,18 +13,18 @@ const SQUARE: Style = Style { height_px: 620.0, ..Style::CHART };
 /// When it cannot be drawn.
 pub fn chart_svg(figure: &Figure) -> Result<String, DrawError> {
     let style = if figure.kind == FigureKind::Ways { &SQUARE } else { &Style::CHART };
-    styled(figure, style)
+    chart_svg_with_style(figure, style)
 }
 
 /// Draws a figure in a style.
 ///
 /// # Errors
 /// When it cannot be drawn.
-pub(crate) fn styled(figure: &Figure, style: &Style) -> Result<String, DrawError> {
+pub(crate) fn chart_svg_with_style(figure: &Figure, style: &Style) -> Result<String, DrawError> {
     let plotted = |mark| plot(figure, mark).to_svg(style);
     match &figure.kind {
         FigureKind::Bars { categories } => bars(figure, categories).to_svg(style),
-        FigureKind::Ways => ways(figure).to_svg(style),
+        FigureKind::Ways => trajectory_plot(figure).to_svg(style),
         FigureKind::Lines => plotted(Mark::Line),
         FigureKind::Bands => plotted(Mark::Band),
         FigureKind::Points => plotted(Mark::Points),
@@ -56,7 +56,7 @@ fn point(p: &Point) -> sidestep_draw::Point {
 }
 
 /// Returns a plot with axes that span the same length around the middle of the drawing.
-fn ways(figure: &Figure) -> Plot {
+fn trajectory_plot(figure: &Figure) -> Plot {
     let plot = plot(figure, Mark::Way);
     let points = || figure.series.iter().flat_map(|s| &s.points);
     let (x, y) = (extent(points().map(|p| p.x)), extent(points().map(|p| p.y)));

@@ -6,7 +6,7 @@ pub mod markdown;
 mod print;
 
 pub use chart::chart_svg;
-pub use print::Print;
+pub use print::PrintStyle;
 
 use sidestep_document::Document;
 use sidestep_document::document::Block;
@@ -14,7 +14,7 @@ use sidestep_draw::DrawError;
 
 /// A report, ready to be stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Rendered {
+pub struct RenderedReport {
     /// The page; self-contained.
     pub html: String,
     /// The Markdown version, which shows the pictures below.
@@ -37,9 +37,9 @@ pub struct SvgFile {
 ///
 /// # Errors
 /// When a figure cannot be drawn.
-pub fn render(document: &Document, folder: &str) -> Result<Rendered, DrawError> {
+pub fn render(document: &Document, folder: &str) -> Result<RenderedReport, DrawError> {
     let pictures = pictures(document)?;
-    Ok(Rendered {
+    Ok(RenderedReport {
         html: html::page(document, &pictures),
         markdown: markdown::text(document, folder, &pictures),
         pictures,

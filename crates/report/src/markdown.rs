@@ -9,19 +9,19 @@ use std::fmt::Write;
 
 /// Returns a document as text; `folder` holds the `pictures`, one for each figure and picture.
 pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> String {
-    let mut parts = vec![format!("# {}", plain(&document.title)), spans(&document.lead)];
+    let mut parts = vec![format!("# {}", escaped(&document.title)), spans(&document.lead)];
     let mut pictures = pictures.iter();
     for block in &document.blocks {
         parts.push(match block {
-            Block::Section(title) => format!("## {}", plain(title)),
+            Block::Section(title) => format!("## {}", escaped(title)),
             Block::Paragraph(text) => spans(text),
             Block::Warning(text) => format!("> {}", spans(text)),
-            Block::Code(code) => fenced(code),
-            Block::Facts(facts) => listed(facts),
+            Block::Code(code) => fenced_code(code),
+            Block::Facts(facts) => fact_list(facts),
             Block::Table(table) => self::table(table).trim_end().into(),
             Block::Claims(claims) => claims_table(claims),
-            Block::Figure(f) => pictured(&f.title, &f.note, folder, pictures.next()),
-            Block::Picture(p) => pictured(&p.title, &p.caption, folder, pictures.next()),
+            Block::Figure(f) => picture_block(&f.title, &f.note, folder, pictures.next()),
+            Block::Picture(p) => picture_block(&p.title, &p.caption, folder, pictures.next()),
         });
     }
     parts.retain(|part| !part.is_empty());
@@ -30,12 +30,12 @@ pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> S
 
 /// Returns a table, with its title as a heading of the third level.
 pub fn table(table: &Table) -> String {
-    let columns: Vec<String> = table.columns.iter().map(|c| cell(c)).collect();
-    let rows = table.rows.iter().map(|row| table.cells(row).map(cell).collect());
-    let mut text = format!("### {}\n\n{}", plain(&table.title), grid(&columns, rows));
+    let columns: Vec<String> = table.columns.iter().map(|c| plain_cell(c)).collect();
+    let rows = table.rows.iter().map(|row| table.cells(row).map(plain_cell).collect());
+    let mut text = format!("### {}\n\n{}", escaped(&table.title), grid(&columns, rows));
     if !table.note.is_empty() {
         // Writing to a string cannot fail.
-        let _ = write!(text, "\n{}\n", spans(&Text::marked(&table.note)));
+        let _ = write!(text, "\n{}\n", spans(&Text::from_markup(&table.note)));
     }
     text
 }
@@ -53,43 +53,48 @@ fn claims_table(claims: &[Claim]) -> String {
     if has_figure {
         columns.insert(2, "the paper's figure");
     }
-    let columns: Vec<String> = columns.into_iter().map(cell).collect();
+    let columns: Vec<String> = columns.into_iter().map(plain_cell).collect();
     let row = |c: &Claim| {
         let verdict = format!("**{}**", c.verdict.name());
-        let mut row =
-            vec![cell(c.id), marked(c.paper), marked(&c.ours), verdict, marked(&c.reason)];
+        let mut row = vec![
+            plain_cell(c.id),
+            markup_cell(c.paper),
+            markup_cell(&c.ours),
+            verdict,
+            markup_cell(&c.reason),
+        ];
         if has_figure {
-            row.insert(2, cell(c.papers_figure.unwrap_or("none")));
+            row.insert(2, plain_cell(c.papers_figure.unwrap_or("none")));
         }
         row
     };
-    let note = spans(&Text::marked(claim::NOTE));
+    let note = spans(&Text::from_markup(claim::READING_NOTE));
     format!("{}\n{note}", grid(&columns, claims.iter().map(row)))
 }
 
-fn listed(facts: &[(String, Text)]) -> String {
-    let line = |(name, value): &(String, Text)| format!("- {}: {}", plain(name), spans(value));
+fn fact_list(facts: &[(String, Text)]) -> String {
+    let line = |(name, value): &(String, Text)| format!("- {}: {}", escaped(name), spans(value));
     facts.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-fn pictured(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) -> String {
+fn picture_block(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) -> String {
     let Some(picture) = picture else { return String::new() };
-    let note = if note.is_empty() { String::new() } else { format!("\n\n{}", plain(note)) };
-    format!("### {0}\n\n![{0}]({folder}/{1}.svg){note}", plain(title), picture.stem)
+    let note = if note.is_empty() { String::new() } else { format!("\n\n{}", escaped(note)) };
+    format!("### {0}\n\n![{0}]({folder}/{1}.svg){note}", escaped(title), picture.stem)
 }
 
 /// Returns a code block with a fence that is longer than every row of backticks in the text.
-fn fenced(code: &Code) -> String {
+fn fenced_code(code: &Code) -> String {
     let rows = code.text.split(|c| c != '`').map(str::len);
     let fence = "`".repeat(rows.max().unwrap_or(0).max(2) + 1);
     let text = code.text.trim_end();
-    format!("{}:\n\n{fence}{}\n{text}\n{fence}", plain(&code.title), code.language)
+    format!("{}:\n\n{fence}{}\n{text}\n{fence}", escaped(&code.title), code.language)
 }
 
 fn spans(text: &Text) -> String {
     let of = |span: &Span| match span {
-        Span::Plain(words) => plain(words),
-        Span::Strong(words) => format!("**{}**", plain(words)),
+        Span::Plain(words) => escaped(words),
+        Span::Strong(words) => format!("**{}**", escaped(words)),
         Span::Code(code) => code_span(code),
     };
     text.0.iter().map(of).collect()
@@ -104,18 +109,18 @@ fn code_span(code: &str) -> String {
 }
 
 /// Returns our own text, with markup, for a cell.
-fn marked(text: &str) -> String {
-    let text = spans(&Text::marked(text));
+fn markup_cell(text: &str) -> String {
+    let text = spans(&Text::from_markup(text));
     text.replace('|', "\\|")
 }
 
 /// Returns text for a cell, in which a bar would end the cell.
-fn cell(words: &str) -> String {
-    plain(words).replace('|', "\\|")
+fn plain_cell(words: &str) -> String {
+    escaped(words).replace('|', "\\|")
 }
 
 /// Returns text in which Markdown and its HTML find no markup.
-fn plain(words: &str) -> String {
+fn escaped(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
     let is_word = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
     let mut before = None;

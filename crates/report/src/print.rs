@@ -12,7 +12,7 @@ const PX_PER_PT: f64 = 96.0 / 72.0;
 
 /// The look of figures for print.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Print {
+pub struct PrintStyle {
     /// Width and height in mm.
     pub size_mm: [f64; 2],
     /// Size of text in points.
@@ -21,7 +21,7 @@ pub struct Print {
     pub labels: Vec<(String, String)>,
 }
 
-impl Print {
+impl PrintStyle {
     /// Draws all figures of a document, numbered in order.
     ///
     /// # Errors
@@ -33,17 +33,17 @@ impl Print {
         });
         let style = self.style();
         let file = |(k, figure): (usize, &Figure)| {
-            let svg = chart::styled(&self.bare(figure), &style)?;
+            let svg = chart::chart_svg_with_style(&self.without_heading(figure), &style)?;
             Ok(SvgFile { stem: format!("{k:02}-{}", slug(&figure.title)), svg })
         };
         (1..).zip(figures).map(file).collect()
     }
 
     /// Returns the labels that occur in no figure of a document.
-    pub fn unused<'a>(&'a self, document: &Document) -> Vec<&'a str> {
+    pub fn unused_labels<'a>(&'a self, document: &Document) -> Vec<&'a str> {
         let is_used = |label: &str| {
             document.blocks.iter().any(|block| match block {
-                Block::Figure(figure) => words(figure).any(|word| word == label),
+                Block::Figure(figure) => figure_labels(figure).any(|word| word == label),
                 _ => false,
             })
         };
@@ -55,7 +55,7 @@ impl Print {
         Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT }
     }
 
-    fn bare(&self, figure: &Figure) -> Figure {
+    fn without_heading(&self, figure: &Figure) -> Figure {
         let mut bare = Figure { title: String::new(), note: String::new(), ..figure.clone() };
         let said = |word: &mut String| {
             if let Some((_, to)) = self.labels.iter().find(|(from, _)| from == word) {
@@ -73,7 +73,7 @@ impl Print {
 }
 
 /// Returns all words at the axes and in the legend of a figure.
-fn words(figure: &Figure) -> impl Iterator<Item = &str> {
+fn figure_labels(figure: &Figure) -> impl Iterator<Item = &str> {
     let categories = match &figure.kind {
         FigureKind::Bars { categories } => &categories[..],
         _ => &[],
@@ -107,14 +107,14 @@ mod tests {
         document.figures([figure]);
         let words = [("hits", "Number of hits"), ("calm", "Calm sea"), ("missing", "x")];
         let labels = words.map(|(from, to)| (from.into(), to.into())).to_vec();
-        let print = Print { size_mm: [127.0, 63.5], font_pt: 9.0, labels };
+        let print = PrintStyle { size_mm: [127.0, 63.5], font_pt: 9.0, labels };
         let files = print.figures(&document).unwrap();
         let svg = &files[0].svg;
         assert!(svg.contains(r#"width="480""#) && svg.contains("Number of hits"), "{svg}");
         assert!(svg.contains("Calm sea") && svg.contains("gap (m)") && !svg.contains(">hits<"));
         assert!(!svg.contains("The title") && !svg.contains("The note"));
         assert_eq!(
-            (files[0].stem.as_str(), print.unused(&document)),
+            (files[0].stem.as_str(), print.unused_labels(&document)),
             ("01-the-title", vec!["missing"])
         );
     }

@@ -1,7 +1,7 @@
 //! Properties that both renderers guarantee for every document.
 
 use super::*;
-use sidestep_document::claim::{Claim, Verdict, tally};
+use sidestep_document::claim::{Claim, Verdict, verdict_summary};
 use sidestep_document::document::{Picture, Text};
 use sidestep_document::figure::{Point, Scale};
 use sidestep_document::{Figure, FigureKind, Series, Table};
@@ -10,18 +10,18 @@ use sidestep_document::{Figure, FigureKind, Series, Table};
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)> | `a` **b** [c](d) & \"e\"";
 
 /// A document with every block, and [`HOSTILE`] words wherever there are words.
-fn whole() -> Document {
+fn full_document() -> Document {
     let mut document = Document::new(HOSTILE, Text::from(HOSTILE));
-    document.warning(Text::marked("**Mind** the `gap`."));
+    document.warning(Text::from_markup("**Mind** the `gap`."));
     document
         .section("Claims")
         .push(Block::Claims(vec![claim("C-1", Some("3 m")), claim("C-2", None)]));
     document.section(HOSTILE).paragraph(HOSTILE).commands("Again", "sidestep run a ``` b");
     document.push(Block::Facts(vec![("seed".into(), Text::code(HOSTILE))]));
     let mut table = Table::new(HOSTILE, "Note with `code`.", &["name", "value"]);
-    table.row([HOSTILE.into(), "1.5".into()]);
-    table.row(["short".into()]);
-    document.section("Numbers").tables([table]).figures(every_kind());
+    table.push_row([HOSTILE.into(), "1.5".into()]);
+    table.push_row(["short".into()]);
+    document.section("Numbers").tables([table]).figures(all_figure_kinds());
     let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"></svg>".into();
     let (title, caption) = (HOSTILE.into(), "Small print.".into());
     document.section("Pictures").pictures([Picture { title, caption, svg }]);
@@ -39,7 +39,7 @@ fn claim(id: &'static str, papers_figure: Option<&'static str>) -> Claim {
     }
 }
 
-fn every_kind() -> Vec<Figure> {
+fn all_figure_kinds() -> Vec<Figure> {
     let categories = vec![HOSTILE.to_string(), "b".into()];
     let kinds = [
         FigureKind::Lines,
@@ -49,7 +49,7 @@ fn every_kind() -> Vec<Figure> {
         FigureKind::Bars { categories },
     ];
     let point =
-        |x: f64, y: f64| Point::new(x, y).with_interval(Some((0.5 * y, 2.0 * y))).of_runs(4);
+        |x: f64, y: f64| Point::new(x, y).with_interval(Some((0.5 * y, 2.0 * y))).with_runs(4);
     let series = Series { name: HOSTILE.into(), points: vec![point(0.0, 1.0), point(1.0, 30.0)] };
     let figure = |kind| Figure {
         title: "A figure".into(),
@@ -71,12 +71,12 @@ fn before_scripts(html: &str) -> &str {
 
 #[test]
 fn the_same_document_gives_the_same_bytes() {
-    assert_eq!(render(&whole(), "figures"), render(&whole(), "figures"));
+    assert_eq!(render(&full_document(), "figures"), render(&full_document(), "figures"));
 }
 
 #[test]
 fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
-    let Rendered { html, markdown, pictures } = render(&whole(), "figures").unwrap();
+    let RenderedReport { html, markdown, pictures } = render(&full_document(), "figures").unwrap();
     assert_eq!(pictures.len(), 6);
     assert_eq!(pictures[0].stem, "01-a-figure");
     for picture in &pictures {
@@ -91,7 +91,7 @@ fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
 
 #[test]
 fn words_stay_words_in_html() {
-    let html = render(&whole(), "figures").unwrap().html;
+    let html = render(&full_document(), "figures").unwrap().html;
     let own = before_scripts(&html);
     assert!(!own.contains("<img src=x") && !own.contains("</script><img"));
     // Of scripts: one for each figure, the figures' and the page's own.
@@ -102,7 +102,7 @@ fn words_stay_words_in_html() {
 
 #[test]
 fn words_stay_words_in_markdown() {
-    let text = render(&whole(), "figures").unwrap().markdown;
+    let text = render(&full_document(), "figures").unwrap().markdown;
     let escaped =
         "&lt;/script>&lt;img src=x onerror=alert(1)> | \\`a\\` \\*\\*b\\*\\* [c\\](d) &amp; \"e\"";
     assert!(
@@ -116,7 +116,7 @@ fn words_stay_words_in_markdown() {
 
 #[test]
 fn claims_stand_with_the_papers_figure_beside_ours_and_a_verdict_in_words() {
-    let Rendered { html, markdown, .. } = render(&whole(), "figures").unwrap();
+    let RenderedReport { html, markdown, .. } = render(&full_document(), "figures").unwrap();
     assert!(
         markdown.contains("| 3 m | 2.9 [2.8, 3.1] n=4 | **refuted** | by the rule `r` |"),
         "{markdown}"
@@ -133,10 +133,10 @@ fn the_headline_counts_the_same_words_as_the_badges() {
         (0..).zip(Verdict::ALL).flat_map(|(k, verdict)| vec![verdict; k + 1]).collect();
     let claims: Vec<Claim> =
         verdicts.iter().map(|&verdict| Claim { verdict, ..claim("C", None) }).collect();
-    let lead = tally(&claims);
+    let lead = verdict_summary(&claims);
     let mut document = Document::new("T", lead.clone());
     document.section("Claims").push(Block::Claims(claims));
-    let Rendered { html, markdown, .. } = render(&document, "figures").unwrap();
+    let RenderedReport { html, markdown, .. } = render(&document, "figures").unwrap();
     for (k, verdict) in (0..).zip(Verdict::ALL) {
         let (word, count): (&str, usize) = (verdict.name(), k + 1);
         assert!(lead.contains(&format!("{count} {word}")), "{lead}");
@@ -152,7 +152,7 @@ fn the_headline_counts_the_same_words_as_the_badges() {
 
 #[test]
 fn a_page_is_accessible_and_forbids_the_network() {
-    let html = render(&whole(), "figures").unwrap().html;
+    let html = render(&full_document(), "figures").unwrap().html;
     let own = before_scripts(&html);
     for part in [
         "<html lang=\"en\">",
@@ -174,8 +174,8 @@ fn a_page_is_accessible_and_forbids_the_network() {
 fn bounds_stand_among_the_numbers_and_words_do_not() {
     let mut document = Document::new("T", "");
     let mut table = Table::new("Results", "", &["metric", "p", "verdict"]);
-    table.row(["a", "0.5", "held"].map(String::from));
-    table.row(["b", "< 0.0001", "-"].map(String::from));
+    table.push_row(["a", "0.5", "held"].map(String::from));
+    table.push_row(["b", "< 0.0001", "-"].map(String::from));
     document.section("Results").tables([table]);
     let html = render(&document, "figures").unwrap().html;
     assert!(html.contains("<th scope=\"col\" class=\"number\">p</th>"), "{html}");

@@ -15,7 +15,7 @@ const MAX_BYTES: u64 = 64 << 20;
 
 /// A scenario that needs no file from elsewhere, together with the files that it contains instead.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Resolved {
+pub struct ResolvedScenario {
     /// The TOML text.
     pub text: String,
     /// Files by their path relative to the scenario.
@@ -25,30 +25,30 @@ pub struct Resolved {
 /// The text of a resolved scenario before and after its seed: it gives the texts of all scenarios that differ only by
 /// their seed, without reading or editing any of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Seedless {
+pub struct SeedTemplate {
     before: String,
     behind: String,
 }
 
 /// The only key of a resolved scenario that is read.
 #[derive(Deserialize)]
-struct OfSeed {
+struct SeedKey {
     seed: Spanned<i64>,
 }
 
-impl Resolved {
+impl ResolvedScenario {
     /// Returns its text without its seed; `None` if it has none, and so is no resolved scenario.
-    pub fn seedless(&self) -> Option<Seedless> {
-        let OfSeed { seed } = toml::from_str(&self.text).ok()?;
+    pub fn seed_template(&self) -> Option<SeedTemplate> {
+        let SeedKey { seed } = toml::from_str(&self.text).ok()?;
         let span = seed.span();
         let (before, behind) = (&self.text[..span.start], &self.text[span.end..]);
-        Some(Seedless { before: before.into(), behind: behind.into() })
+        Some(SeedTemplate { before: before.into(), behind: behind.into() })
     }
 }
 
-impl Seedless {
+impl SeedTemplate {
     /// Returns the text with a seed.
-    pub fn with(&self, seed: u64) -> String {
+    pub fn with_seed(&self, seed: u64) -> String {
         format!("{}{seed}{}", self.before, self.behind)
     }
 }
@@ -101,9 +101,9 @@ impl<'a> Bundle<'a> {
     ///
     /// # Errors
     /// When a key leads through something that is not a table.
-    pub fn finish(self) -> Result<Resolved, InputError> {
-        let text = self.source.clone().with(&self.overrides)?.text;
-        Ok(Resolved { text: format!("{}{text}", self.source.heading()), files: self.files })
+    pub fn finish(self) -> Result<ResolvedScenario, InputError> {
+        let text = self.source.clone().with_overrides(&self.overrides)?.text;
+        Ok(ResolvedScenario { text: format!("{}{text}", self.source.heading()), files: self.files })
     }
 }
 
@@ -111,7 +111,7 @@ impl<'a> Bundle<'a> {
 mod tests {
     use super::*;
 
-    fn resolved(text: &str, seed: u64) -> Resolved {
+    fn resolved(text: &str, seed: u64) -> ResolvedScenario {
         let source = Source::new("s.toml", text, "");
         let mut bundle = Bundle::new(&source, seed, 100);
         bundle.set("map.file", "\"seed = 4\"");
@@ -126,12 +126,12 @@ mod tests {
             "format = 1\nname = 'seed = 1'\nseed =    7\nmap = {}\n",
         ] {
             let one = resolved(text, 7);
-            let seedless = one.seedless().expect("it has a seed");
+            let seedless = one.seed_template().expect("it has a seed");
             for seed in [0, 7, 12_345_678_901, i64::MAX as u64] {
-                assert_eq!(seedless.with(seed), resolved(text, seed).text);
+                assert_eq!(seedless.with_seed(seed), resolved(text, seed).text);
             }
         }
-        let none = Resolved { text: "format = 1\n".into(), files: Vec::new() };
-        assert_eq!(none.seedless(), None);
+        let none = ResolvedScenario { text: "format = 1\n".into(), files: Vec::new() };
+        assert_eq!(none.seed_template(), None);
     }
 }

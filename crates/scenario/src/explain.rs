@@ -1,6 +1,6 @@
 //! Errors of the TOML reader in helpful words.
 
-use super::checked::told_by_a_value;
+use super::number::split_invalid_value;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 
@@ -13,29 +13,29 @@ pub(crate) fn explain(
 ) -> (String, String) {
     let message = error.message().trim();
     let path = path_of(error);
-    if let Some((value, remedy)) = told_by_a_value(message) {
+    if let Some((value, remedy)) = split_invalid_value(message) {
         let key = path.as_deref().map_or("a value", last_key);
         return (format!("{key} = {value}"), remedy.into());
     }
-    if let Some((found, known)) = named(message, "unknown field `") {
+    if let Some((found, known)) = backticked_name(message, "unknown field `") {
         let remedy = match path {
-            None => nearest(found, &[&quoted(known), top].concat()),
+            None => suggestion(found, &[&quoted(known), top].concat()),
             // In TOML, keys after a [section] belong to it, even if their author meant otherwise.
-            Some(_) if top.contains(&found) => belongs_to_the_top(found),
-            Some(_) => nearest(found, &quoted(known)),
+            Some(_) if top.contains(&found) => top_level_remedy(found),
+            Some(_) => suggestion(found, &quoted(known)),
         };
         return (format!("unknown key `{found}`"), remedy);
     }
-    if let Some((found, known)) = named(message, "unknown variant `") {
-        return (format!("unknown value `{found}`"), nearest(found, &quoted(known)));
+    if let Some((found, known)) = backticked_name(message, "unknown variant `") {
+        return (format!("unknown value `{found}`"), suggestion(found, &quoted(known)));
     }
-    if let Some((missing, _)) = named(message, "missing field `") {
+    if let Some((missing, _)) = backticked_name(message, "missing field `") {
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
     (message.replace('\n', " "), otherwise)
 }
 
-fn belongs_to_the_top(key: &str) -> String {
+fn top_level_remedy(key: &str) -> String {
     format!(
         "`{key}` belongs to the top level: above the first [section], or as [{key}] if it is one"
     )
@@ -44,12 +44,13 @@ fn belongs_to_the_top(key: &str) -> String {
 /// Returns the keys of a table, which its reader lists in its error for an unknown one.
 pub(crate) fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let Err(error) = toml::from_str::<T>("\"\" = 0") else { return Vec::new() };
-    let told = named(error.message(), "unknown field `").map(|(_, known)| known.to_string());
+    let told =
+        backticked_name(error.message(), "unknown field `").map(|(_, known)| known.to_string());
     told.iter().flat_map(|known| quoted(known)).map(String::from).collect()
 }
 
 /// Returns the name in backticks after a prefix, and the rest of the message.
-fn named<'a>(message: &'a str, beginning: &str) -> Option<(&'a str, &'a str)> {
+fn backticked_name<'a>(message: &'a str, beginning: &str) -> Option<(&'a str, &'a str)> {
     message.strip_prefix(beginning)?.split_once('`')
 }
 
@@ -72,7 +73,7 @@ fn quoted(text: &str) -> Vec<&str> {
 }
 
 /// Returns "did you mean" with the nearest of `known`, or the whole list.
-pub fn nearest(found: &str, known: &[&str]) -> String {
+pub fn suggestion(found: &str, known: &[&str]) -> String {
     let distance = |k: &&&str| strsim::osa_distance(found, k);
     match known.iter().min_by_key(distance) {
         // The longer a name, the more typing errors it may have.
@@ -80,13 +81,13 @@ pub fn nearest(found: &str, known: &[&str]) -> String {
             format!("did you mean `{best}`?")
         }
         // A list may be put together from several, which share keys.
-        Some(_) => format!("known are: {}", each_once(known).join(", ")),
+        Some(_) => format!("known are: {}", deduplicated(known).join(", ")),
         None => "nothing is known here".into(),
     }
 }
 
 /// Returns the words, without repetitions.
-fn each_once<'a>(words: &[&'a str]) -> Vec<&'a str> {
+fn deduplicated<'a>(words: &[&'a str]) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     words.iter().copied().filter(|word| seen.insert(*word)).collect()
 }

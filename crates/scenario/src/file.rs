@@ -32,7 +32,7 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
     let text = String::from_utf8(read_bytes(path, max_bytes)?).map_err(|error| {
         let readable = String::from_utf8_lossy(error.as_bytes());
         InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
-            .in_text(&readable, error.utf8_error().valid_up_to())
+            .with_offset(&readable, error.utf8_error().valid_up_to())
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

@@ -4,7 +4,7 @@
 //! a section that stands alone by 0 or without a number; names with dots stand in quotes.
 
 use crate::Source;
-use crate::edit::{Part, parts};
+use crate::edit::{KeyPart, parse_key};
 use crate::locate::{locate, path};
 use sidestep_kernel::InputError;
 use std::ops::Range;
@@ -34,7 +34,7 @@ impl Source {
     /// Returns the value of a key, if the text has it.
     pub fn value(&self, path: &str) -> Option<Value> {
         let mut found = Value::Table(self.text.parse().ok()?);
-        for part in parts(path).ok()? {
+        for part in parse_key(path).ok()? {
             if let Value::Array(many) = &mut found
                 && part.number().is_none()
                 && many.len() == 1
@@ -58,7 +58,7 @@ impl Source {
         cause: impl Into<String>,
         remedy: impl Into<String>,
     ) -> InputError {
-        match self.place_of(path) {
+        match self.span_of(path) {
             Some(span) => self.error(span, cause, remedy),
             None => self.error(None, cause, remedy).with_key(path),
         }
@@ -66,14 +66,14 @@ impl Source {
 
     /// Returns the place of the first of `keys` that the section at a span has, for errors about keys
     /// with values that do not know their places; the place of the section if it has none of them.
-    pub fn within(&self, section: Range<usize>, keys: &[&str]) -> Range<usize> {
+    pub fn key_span(&self, section: Range<usize>, keys: &[&str]) -> Range<usize> {
         let way = locate(&self.text, &section).map(|way| path(&way));
-        let place = |key: &&str| self.place_of(&format!("{}.{key}", way.as_ref()?));
+        let place = |key: &&str| self.span_of(&format!("{}.{key}", way.as_ref()?));
         keys.iter().find_map(place).unwrap_or(section)
     }
 
     /// Returns the place of a key, if the text has it.
-    fn place_of(&self, path: &str) -> Option<Range<usize>> {
+    fn span_of(&self, path: &str) -> Option<Range<usize>> {
         let root = DeTable::parse(&self.text).ok()?;
         let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
         find(&Spanned::new(span, root), path).map(|found| found.span)
@@ -81,8 +81,8 @@ impl Source {
 
     /// Creates the error for a key that has no effect; `because` completes the
     /// sentence "`key` does nothing ...".
-    pub fn idle(&self, path: &str, because: &str) -> InputError {
-        let last = parts(path).ok().and_then(|mut parts| parts.pop());
+    pub fn unused_key(&self, path: &str, because: &str) -> InputError {
+        let last = parse_key(path).ok().and_then(|mut parts| parts.pop());
         let key = last.map_or_else(|| path.to_string(), |part| part.name);
         self.error_at(path, format!("`{key}` does nothing {because}"), "leave it out")
     }
@@ -94,37 +94,37 @@ fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
 }
 
 /// A value, and the place of its key; that of an element of an array is its own.
-struct Found<'t, 'i> {
+struct LocatedValue<'t, 'i> {
     span: Range<usize>,
     value: &'t Spanned<DeValue<'i>>,
 }
 
-impl<'t, 'i> Found<'t, 'i> {
+impl<'t, 'i> LocatedValue<'t, 'i> {
     fn without_key(value: &'t Spanned<DeValue<'i>>) -> Self {
         Self { span: value.span(), value }
     }
 }
 
 /// Returns the value at a path.
-fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<Found<'t, 'i>> {
-    let mut found = Found::without_key(root);
-    for part in parts(path).ok()? {
+fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<LocatedValue<'t, 'i>> {
+    let mut found = LocatedValue::without_key(root);
+    for part in parse_key(path).ok()? {
         found = step(found, &part)?;
     }
     Some(found)
 }
 
-fn step<'t, 'i>(found: Found<'t, 'i>, part: &Part) -> Option<Found<'t, 'i>> {
+fn step<'t, 'i>(found: LocatedValue<'t, 'i>, part: &KeyPart) -> Option<LocatedValue<'t, 'i>> {
     match (found.value.get_ref(), part.number()) {
-        (DeValue::Array(many), Some(index)) => many.get(index).map(Found::without_key),
+        (DeValue::Array(many), Some(index)) => many.get(index).map(LocatedValue::without_key),
         // An array of one may be passed without a number, as in overrides.
         (DeValue::Array(many), None) if many.len() == 1 => {
-            step(Found::without_key(many.first()?), part)
+            step(LocatedValue::without_key(many.first()?), part)
         }
         (DeValue::Table(_), Some(0)) => Some(found),
         (DeValue::Table(table), _) => {
             let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part.name)?;
-            Some(Found { span: key.span(), value })
+            Some(LocatedValue { span: key.span(), value })
         }
         _ => None,
     }
@@ -179,7 +179,7 @@ mod tests {
             let start = TEXT.rfind(header).expect(header);
             start..start + header.len()
         };
-        let found = |header, keys: &[&str]| &TEXT[source.within(section(header), keys)];
+        let found = |header, keys: &[&str]| &TEXT[source.key_span(section(header), keys)];
         assert_eq!(found("[[robots]]", &["count", "b"]), "b", "the second has no count");
         assert_eq!(found("{ c = 3 }", &["c"]), "c");
         assert_eq!(found("[people]", &["n"]), "n");
@@ -202,12 +202,12 @@ mod tests {
         assert_eq!((value("kinds.\"a.b\".n"), value("kinds.'0'.n")), (Some(1), Some(2)));
         assert_eq!(value("many.0.x.\"c d\".1"), Some(7));
         assert_eq!((value("kinds.a.b.n"), value("kinds..n"), value("\"")), (None, None, None));
-        assert_eq!(source.idle("kinds.\"a.b\"", "here").cause(), "`a.b` does nothing here");
+        assert_eq!(source.unused_key("kinds.\"a.b\"", "here").cause(), "`a.b` does nothing here");
     }
 
     #[test]
     fn an_idle_key_is_refused_where_it_stands() {
-        let error = Source::new("s.toml", TEXT, "").idle("robots.1.at", "beside `scen`");
+        let error = Source::new("s.toml", TEXT, "").unused_key("robots.1.at", "beside `scen`");
         assert_eq!(
             (error.position(), error.cause()),
             (Some((5, 1)), "`at` does nothing beside `scen`")

@@ -6,7 +6,7 @@ use toml::de::{DeTable, DeValue};
 
 /// A part of the path to a key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Part {
+pub(crate) enum PathStep {
     /// The name of a key in a table.
     Name(String),
     /// The number of an element of an array, from 0.
@@ -15,14 +15,14 @@ pub(crate) enum Part {
 
 /// Returns a path in the notation of `--set`: `robots.1.at.0`. Names that are no bare keys are
 /// quoted as in TOML.
-pub(crate) fn path(way: &[Part]) -> String {
+pub(crate) fn path(way: &[PathStep]) -> String {
     let words: Vec<String> = way
         .iter()
         .map(|part| match part {
             // Without quotes it would be the number of an element.
-            Part::Name(name) if name.bytes().all(|b| b.is_ascii_digit()) => format!("{name:?}"),
-            Part::Name(name) => toml_edit::Key::new(name).display_repr().into_owned(),
-            Part::Index(index) => index.to_string(),
+            PathStep::Name(name) if name.bytes().all(|b| b.is_ascii_digit()) => format!("{name:?}"),
+            PathStep::Name(name) => toml_edit::Key::new(name).display_repr().into_owned(),
+            PathStep::Index(index) => index.to_string(),
         })
         .collect();
     words.join(".")
@@ -31,29 +31,29 @@ pub(crate) fn path(way: &[Part]) -> String {
 /// Returns the path to the innermost key (or element of an array) that contains a span of a text,
 /// in its name or value; `None` for a span in no key. A text with syntax errors is read as far as
 /// possible.
-pub(crate) fn locate(text: &str, span: &Range<usize>) -> Option<Vec<Part>> {
+pub(crate) fn locate(text: &str, span: &Range<usize>) -> Option<Vec<PathStep>> {
     let (root, _) = DeTable::parse_recoverable(text);
-    let mut search = Search { span, way: Vec::new(), best: None };
+    let mut search = KeySearch { span, way: Vec::new(), best: None };
     search.table(root.get_ref());
     search.best.map(|best| best.way)
 }
 
 /// The smallest place found so far.
-struct Best {
+struct BestMatch {
     bytes: usize,
-    way: Vec<Part>,
+    way: Vec<PathStep>,
 }
 
-struct Search<'a> {
+struct KeySearch<'a> {
     span: &'a Range<usize>,
-    way: Vec<Part>,
-    best: Option<Best>,
+    way: Vec<PathStep>,
+    best: Option<BestMatch>,
 }
 
-impl Search<'_> {
+impl KeySearch<'_> {
     fn table(&mut self, table: &DeTable<'_>) {
         for (key, value) in table.iter() {
-            self.way.push(Part::Name(key.get_ref().to_string()));
+            self.way.push(PathStep::Name(key.get_ref().to_string()));
             self.offer(&key.span());
             self.value(value);
             self.way.pop();
@@ -68,7 +68,7 @@ impl Search<'_> {
             DeValue::Table(table) => self.table(table),
             DeValue::Array(many) => {
                 for (index, one) in many.iter().enumerate() {
-                    self.way.push(Part::Index(index));
+                    self.way.push(PathStep::Index(index));
                     self.value(one);
                     self.way.pop();
                 }
@@ -83,7 +83,7 @@ impl Search<'_> {
         let contains = place.start <= self.span.start && self.span.end <= place.end;
         let bytes = place.len();
         if contains && bytes > 0 && self.best.as_ref().is_none_or(|best| bytes <= best.bytes) {
-            self.best = Some(Best { bytes, way: self.way.clone() });
+            self.best = Some(BestMatch { bytes, way: self.way.clone() });
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The section of a network that may lose and delay messages: the same keys in every world with agents that
 //! talk.
 //!
-//! A world defines the notation of its agents in the lists of faults, and the agents that exist ([`Names`]).
+//! A world defines the notation of its agents in the lists of faults, and the agents that exist ([`AgentNaming`]).
 
-use super::checked::{FromBelow, NonNegative, Number, Positive, Rule, Share};
+use super::number::{Fraction, NonNegative, Number, Positive, RightOpen, Rule};
 use super::schema;
 use super::spanned::Spanned;
 use schemars::JsonSchema;
@@ -11,51 +11,56 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::{Bursts, Network, OneWay, Partition, Silence, While};
+use sidestep_kernel::network::{
+    GilbertElliott, Network, Partition, RadioOutage, TimeWindow, UnidirectionalLink,
+};
 use std::fmt::Debug;
 use std::marker::PhantomData;
 use std::ops::Range;
 
 /// The names of a world's agents in its network's section, and the defaults there.
-pub trait Names {
+pub trait AgentNaming {
     /// A silence, as written.
-    type Silence: DeserializeOwned + JsonSchema + Debug;
+    type RadioOutage: DeserializeOwned + JsonSchema + Debug;
     /// A partition, as written.
     type Partition: DeserializeOwned + JsonSchema + Debug;
     /// A link that works one way, as written.
-    type OneWay: DeserializeOwned + JsonSchema + Debug;
+    type UnidirectionalLink: DeserializeOwned + JsonSchema + Debug;
 
     /// Latency unless it is given, seconds.
-    const LATENCY_S: f64;
+    const DEFAULT_LATENCY_S: f64;
     /// The shortest latency that a clock can resolve, seconds.
-    const SHORTEST_LATENCY_S: f64;
+    const MIN_LATENCY_S: f64;
     /// Number of talks in a cycle, one after the other.
-    const TALKS: u32;
+    const CONVERSATIONS_PER_CYCLE: u32;
     /// Words for the longest deadline.
-    const LONGEST_DEADLINE: &str;
+    const MAX_DEADLINE_TEXT: &str;
 
     /// Returns a silence by its agent's id on the network.
     ///
     /// # Errors
     /// When there is no such agent, or the times make no sense.
-    fn silence(&self, one: &Self::Silence) -> Result<Silence, Wrong>;
+    fn radio_outage(&self, one: &Self::RadioOutage) -> Result<RadioOutage, SectionError>;
 
     /// Returns a partition by its agents' ids on the network.
     ///
     /// # Errors
     /// When there are no such agents or sides, or the times make no sense.
-    fn partition(&self, one: &Self::Partition) -> Result<Partition, Wrong>;
+    fn partition(&self, one: &Self::Partition) -> Result<Partition, SectionError>;
 
     /// Returns a link by its agents' ids on the network.
     ///
     /// # Errors
     /// When there is no such link, or the times make no sense.
-    fn one_way(&self, one: &Self::OneWay) -> Result<OneWay, Wrong>;
+    fn unidirectional_link(
+        &self,
+        one: &Self::UnidirectionalLink,
+    ) -> Result<UnidirectionalLink, SectionError>;
 }
 
 /// A network's section that makes no sense.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wrong {
+pub struct SectionError {
     /// The place of the error; none for the section itself.
     pub span: Option<Range<usize>>,
     /// The cause.
@@ -64,7 +69,7 @@ pub struct Wrong {
     pub remedy: String,
 }
 
-impl Wrong {
+impl SectionError {
     /// Returns an error without a place of its own.
     pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { span: None, cause: cause.into(), remedy: remedy.into() }
@@ -73,24 +78,24 @@ impl Wrong {
 
 /// The section of a network.
 #[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default, bound = "N: Names")]
-#[schemars(rename = "NetworkSection", bound = "N: Names")]
-pub struct NetworkSection<N: Names> {
-    loss: Option<Chance>,
-    duplication: Option<Chance>,
-    latency_s: Option<Number<Latency<N>>>,
+#[serde(deny_unknown_fields, default, bound = "N: AgentNaming")]
+#[schemars(rename = "NetworkSection", bound = "N: AgentNaming")]
+pub struct NetworkSection<N: AgentNaming> {
+    loss: Option<LossProbability>,
+    duplication: Option<LossProbability>,
+    latency_s: Option<Number<LatencyRule<N>>>,
     max_delay_s: Option<NonNegative>,
     patience_s: Option<Positive>,
     deadline_s: Option<Positive>,
-    bandwidth_bit_s: Option<Number<Bandwidth>>,
+    bandwidth_bit_s: Option<Number<BandwidthRule>>,
     range_m: Option<Positive>,
     bursts: Option<BurstsSection>,
-    silent: Vec<Spanned<N::Silence>>,
+    silent: Vec<Spanned<N::RadioOutage>>,
     partitions: Vec<Spanned<N::Partition>>,
-    one_way: Vec<Spanned<N::OneWay>>,
+    one_way: Vec<Spanned<N::UnidirectionalLink>>,
 }
 
-impl<N: Names> Default for NetworkSection<N> {
+impl<N: AgentNaming> Default for NetworkSection<N> {
     fn default() -> Self {
         Self {
             loss: None,
@@ -113,7 +118,7 @@ impl<N: Names> Default for NetworkSection<N> {
 #[serde(deny_unknown_fields)]
 struct BurstsSection {
     /// Probability of a loss within a burst.
-    loss: Share,
+    loss: Fraction,
     /// Mean length of a burst.
     lasts_s: Positive,
     /// Mean time between two bursts.
@@ -121,71 +126,71 @@ struct BurstsSection {
 }
 
 impl BurstsSection {
-    fn bursts(&self) -> Bursts {
+    fn bursts(&self) -> GilbertElliott {
         let Self { loss, lasts_s, every_s } = self;
-        Bursts { loss: loss.get(), lasts_s: lasts_s.get(), every_s: every_s.get() }
+        GilbertElliott { loss: loss.get(), mean_burst_s: lasts_s.get(), mean_gap_s: every_s.get() }
     }
 }
 
 /// A probability below 1, because some messages must get through in the end.
-type Chance = Number<FromBelow<0, 1>>;
+type LossProbability = Number<RightOpen<0, 1>>;
 
 /// A time that the clock of a world can resolve.
 #[derive(Debug)]
-struct Latency<N>(PhantomData<N>);
+struct LatencyRule<N>(PhantomData<N>);
 
-impl<N> Clone for Latency<N> {
+impl<N> Clone for LatencyRule<N> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<N> Copy for Latency<N> {}
+impl<N> Copy for LatencyRule<N> {}
 
-impl<N: Names> Rule for Latency<N> {
+impl<N: AgentNaming> Rule for LatencyRule<N> {
     fn allows(number: f64) -> bool {
-        number >= N::SHORTEST_LATENCY_S && number.is_finite()
+        number >= N::MIN_LATENCY_S && number.is_finite()
     }
 
-    fn words() -> String {
-        format!("at least {:e} s", N::SHORTEST_LATENCY_S)
+    fn description() -> String {
+        format!("at least {:e} s", N::MIN_LATENCY_S)
     }
 
     fn limits() -> Value {
-        json!({ "minimum": N::SHORTEST_LATENCY_S })
+        json!({ "minimum": N::MIN_LATENCY_S })
     }
 }
 
 /// A bandwidth that carries a message in the time of a run.
 #[derive(Debug, Clone, Copy)]
-struct Bandwidth;
+struct BandwidthRule;
 
-impl Rule for Bandwidth {
+impl Rule for BandwidthRule {
     fn allows(number: f64) -> bool {
         number >= 1.0
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "at least 1 bit/s".into()
     }
 
     fn limits() -> Value {
-        schema::or_infinite(json!({ "minimum": 1 }))
+        schema::with_infinity(json!({ "minimum": 1 }))
     }
 }
 
 /// Part of a cycle in which its talks end, unless it is given.
-const TALKING: f64 = 0.9;
+const CONVERSATION_FRACTION: f64 = 0.9;
 
-impl<N: Names> NetworkSection<N> {
+impl<N: AgentNaming> NetworkSection<N> {
     /// Returns the network, in a world with cycles of `dt_s` seconds.
     ///
     /// # Errors
     /// When times do not fit into a cycle, or a fault makes no sense: the first one of these.
-    pub fn network(&self, dt_s: f64, names: &N) -> Result<Network, Wrong> {
-        let latency_s = self.latency_s.map_or(N::LATENCY_S, f64::from);
+    pub fn network(&self, dt_s: f64, names: &N) -> Result<Network, SectionError> {
+        let latency_s = self.latency_s.map_or(N::DEFAULT_LATENCY_S, f64::from);
         let max_delay_s = self.max_delay_s.map_or(0.0, f64::from);
-        let deadline_s = TALKING / f64::from(N::TALKS) * dt_s;
+        let deadline_s = CONVERSATION_FRACTION / f64::from(N::CONVERSATIONS_PER_CYCLE) * dt_s;
         let network = Network {
             loss: self.loss.map_or(0.0, f64::from),
             duplication: self.duplication.map_or(0.0, f64::from),
@@ -196,32 +201,36 @@ impl<N: Names> NetworkSection<N> {
             deadline_s: self.deadline_s.map_or(deadline_s, f64::from),
             range_m: self.range_m.map_or(f64::INFINITY, f64::from),
             bursts: self.bursts.as_ref().map(BurstsSection::bursts),
-            silences: Vec::new(),
+            radio_outages: Vec::new(),
             partitions: Vec::new(),
-            one_ways: Vec::new(),
+            unidirectional_links: Vec::new(),
         };
         check_times::<N>(&network, dt_s)?;
         Ok(Network {
-            silences: read(&self.silent, |one| names.silence(one))?,
-            partitions: read(&self.partitions, |one| names.partition(one))?,
-            one_ways: read(&self.one_way, |one| names.one_way(one))?,
+            radio_outages: read_faults(&self.silent, |one| names.radio_outage(one))?,
+            partitions: read_faults(&self.partitions, |one| names.partition(one))?,
+            unidirectional_links: read_faults(&self.one_way, |one| names.unidirectional_link(one))?,
             ..network
         })
     }
 }
 
 /// Reads a list of faults.
-fn read<A, B>(all: &[Spanned<A>], one: impl Fn(&A) -> Result<B, Wrong>) -> Result<Vec<B>, Wrong> {
+fn read_faults<A, B>(
+    all: &[Spanned<A>],
+    one: impl Fn(&A) -> Result<B, SectionError>,
+) -> Result<Vec<B>, SectionError> {
     let at = |written: &Spanned<A>| {
-        one(written.get_ref()).map_err(|wrong| Wrong { span: Some(written.span()), ..wrong })
+        one(written.get_ref()).map_err(|wrong| SectionError { span: Some(written.span()), ..wrong })
     };
     all.iter().map(at).collect()
 }
 
 /// Checks that times fit into a cycle.
-fn check_times<N: Names>(n: &Network, dt_s: f64) -> Result<(), Wrong> {
+fn check_times<N: AgentNaming>(n: &Network, dt_s: f64) -> Result<(), SectionError> {
     let waits_s = n.patience_s.max(n.latency_s + n.max_delay_s);
-    if f64::from(N::TALKS) * n.deadline_s <= dt_s && 8.0 * waits_s <= n.deadline_s {
+    if f64::from(N::CONVERSATIONS_PER_CYCLE) * n.deadline_s <= dt_s && 8.0 * waits_s <= n.deadline_s
+    {
         return Ok(());
     }
     let cause = format!(
@@ -231,52 +240,52 @@ fn check_times<N: Names>(n: &Network, dt_s: f64) -> Result<(), Wrong> {
     let remedy = format!(
         "give a patience of at most an eighth of the deadline, latency and delay of no more, and a \
          deadline of {}",
-        N::LONGEST_DEADLINE
+        N::MAX_DEADLINE_TEXT
     );
-    Err(Wrong::new(cause, remedy))
+    Err(SectionError::new(cause, remedy))
 }
 
 /// Returns a while from its two times.
 ///
 /// # Errors
 /// When its times are invalid.
-pub fn during(from_s: f64, until_s: f64) -> Result<While, Wrong> {
+pub fn time_window(from_s: f64, until_s: f64) -> Result<TimeWindow, SectionError> {
     if from_s >= 0.0 && from_s.is_finite() && until_s > from_s {
-        return Ok(While { from_s, until_s });
+        return Ok(TimeWindow { from_s, until_s });
     }
     let cause = format!("from_s = {from_s}, until_s = {until_s}");
-    Err(Wrong::new(cause, "give times in seconds from 0 on, the end after the start"))
+    Err(SectionError::new(cause, "give times in seconds from 0 on, the end after the start"))
 }
 
 /// Checks the sides of a partition; `agent` is the word for its agents.
 ///
 /// # Errors
 /// When one is named twice, or there are fewer than two sides.
-pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), Wrong> {
-    check_once(sides.concat(), agent)?;
+pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), SectionError> {
+    check_unique(sides.concat(), agent)?;
     if sides.len() >= 2 {
         return Ok(());
     }
     let remedy = "give at least two, e.g. sides = [[0, 2], [1, 3]]";
-    Err(Wrong::new("a partition with fewer than two sides", remedy))
+    Err(SectionError::new("a partition with fewer than two sides", remedy))
 }
 
 /// Checks that no agent is named twice.
 ///
 /// # Errors
 /// With the lowest id that is.
-pub fn check_once(mut ids: Vec<EntityId>, agent: &str) -> Result<(), Wrong> {
+pub fn check_unique(mut ids: Vec<EntityId>, agent: &str) -> Result<(), SectionError> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
         Some(pair) => {
             let cause = format!("{agent} {} is named twice", pair[0]);
-            Err(Wrong::new(cause, format!("name each {agent} once")))
+            Err(SectionError::new(cause, format!("name each {agent} once")))
         }
     }
 }
 
 /// The end of an endless while, in seconds.
-pub fn for_ever() -> f64 {
+pub fn endless_s() -> f64 {
     f64::INFINITY
 }

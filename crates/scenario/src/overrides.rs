@@ -1,7 +1,7 @@
 //! Overrides: `key=value` set in the text of a scenario, keeping its comments and its order.
 
-use crate::edit::Refusal;
-use crate::source::{Source, WITH_OVERRIDES};
+use crate::edit::EditError;
+use crate::source::{OVERRIDES_SUFFIX, Source};
 use sidestep_kernel::InputError;
 use toml_edit::Value;
 
@@ -12,32 +12,32 @@ impl Source {
     ///
     /// # Errors
     /// When the text is not TOML, or a key leads through something that is not a table.
-    pub fn with(mut self, overrides: &[String]) -> Result<Self, InputError> {
+    pub fn with_overrides(mut self, overrides: &[String]) -> Result<Self, InputError> {
         // Without overrides the text stays the same, byte for byte.
         if overrides.is_empty() {
             return Ok(self);
         }
-        let wanted: Vec<Wanted<'_>> =
-            overrides.iter().map(|text| parsed(text)).collect::<Result<_, _>>()?;
+        let wanted: Vec<Override<'_>> =
+            overrides.iter().map(|text| parse_override(text)).collect::<Result<_, _>>()?;
         let given: Vec<(&str, String)> =
             wanted.iter().map(|(_, key, value)| (*key, value.to_string().trim().into())).collect();
         let others = self.replace_values(&given);
         for (place, key, value) in others.into_iter().map(|k| &wanted[k]) {
-            let told = |refused: Refusal| InputError::new(place, refused.cause, refused.remedy);
+            let told = |refused: EditError| InputError::new(place, refused.cause, refused.remedy);
             self.set_to(key, value, told)?;
         }
         // Overrides may be applied in several steps.
-        if !self.place.ends_with(WITH_OVERRIDES) {
-            self.place.push_str(WITH_OVERRIDES);
+        if !self.place.ends_with(OVERRIDES_SUFFIX) {
+            self.place.push_str(OVERRIDES_SUFFIX);
         }
         Ok(self)
     }
 }
 
 /// The name of an override in errors, its key, and its value.
-type Wanted<'a> = (String, &'a str, Value);
+type Override<'a> = (String, &'a str, Value);
 
-fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
+fn parse_override(override_text: &str) -> Result<Override<'_>, InputError> {
     let place = format!("--set {override_text}");
     let Some((key, value)) = override_text.split_once('=') else {
         let remedy = "write --set key=value, e.g. --set robots.count=20";
@@ -47,7 +47,7 @@ fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
     match value.parse() {
         Ok(value) => Ok((place, key, value)),
         // As text, it would be refused later, where it is no longer clear that a number was meant.
-        Err(_) if is_beyond_all_numbers(value) => {
+        Err(_) if overflows_to_infinity(value) => {
             let cause = format!("`{value}` is larger than any number that can be held (1.8e308)");
             Err(InputError::new(
                 place,
@@ -61,7 +61,7 @@ fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
 }
 
 /// Returns whether a text is written like a number, in digits, and rounds to infinity.
-fn is_beyond_all_numbers(text: &str) -> bool {
+fn overflows_to_infinity(text: &str) -> bool {
     text.contains(|c: char| c.is_ascii_digit()) && text.parse().is_ok_and(f64::is_infinite)
 }
 
@@ -72,7 +72,7 @@ mod tests {
 
     fn with(text: &str, overrides: &[&str]) -> Result<String, InputError> {
         let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-        Source::new("s.toml", text, "").with(&overrides).map(|s| s.text)
+        Source::new("s.toml", text, "").with_overrides(&overrides).map(|s| s.text)
     }
 
     #[test]
@@ -95,9 +95,9 @@ mod tests {
                         [[robots]]\ncount = 2\n[[robots]]\ncount = 3\n";
             let overrides: Vec<String> =
                 picks.iter().map(|(k, v)| format!("{}={}", KEYS[*k], VALUES[*v])).collect();
-            let together = Source::new("s.toml", text, "").with(&overrides);
+            let together = Source::new("s.toml", text, "").with_overrides(&overrides);
             let first = Ok(Source::new("s.toml", text, ""));
-            let one_by_one = overrides.iter().fold(first, |source: Result<Source, _>, o| source?.with(std::slice::from_ref(o)));
+            let one_by_one = overrides.iter().fold(first, |source: Result<Source, _>, o| source?.with_overrides(std::slice::from_ref(o)));
             match (together, one_by_one) {
                 (Ok(a), Ok(b)) => prop_assert_eq!(a.text, b.text),
                 (a, b) => prop_assert_eq!(a.is_err(), b.is_err()),

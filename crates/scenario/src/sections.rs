@@ -18,11 +18,11 @@ impl<T> Default for Sections<T> {
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let spanned = Spanned::<OneOrEach<T, Spanned<T>>>::deserialize(deserializer)?;
+        let spanned = Spanned::<OneOrMany<T, Spanned<T>>>::deserialize(deserializer)?;
         let span = spanned.span();
         Ok(Self(match spanned.into_inner() {
-            OneOrEach::One(one) => vec![Spanned::new(span, one)],
-            OneOrEach::Each(many) => many,
+            OneOrMany::One(one) => vec![Spanned::new(span, one)],
+            OneOrMany::Each(many) => many,
         }))
     }
 }
@@ -43,19 +43,19 @@ impl<T: JsonSchema> JsonSchema for Sections<T> {
 }
 
 /// The content of a key: one table, or an array of them.
-enum OneOrEach<One, Each> {
+enum OneOrMany<One, Each> {
     One(One),
     Each(Vec<Each>),
 }
 
-impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
+impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrMany<One, Each> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor<One, Each>(std::marker::PhantomData<(One, Each)>);
 
         impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> serde::de::Visitor<'de>
             for Visitor<One, Each>
         {
-            type Value = OneOrEach<One, Each>;
+            type Value = OneOrMany<One, Each>;
 
             fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 f.write_str("a table or an array of tables")
@@ -66,7 +66,7 @@ impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for On
                 map: A,
             ) -> Result<Self::Value, A::Error> {
                 One::deserialize(serde::de::value::MapAccessDeserializer::new(map))
-                    .map(OneOrEach::One)
+                    .map(OneOrMany::One)
             }
 
             fn visit_seq<A: serde::de::SeqAccess<'de>>(
@@ -77,7 +77,7 @@ impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for On
                 while let Some(one) = seq.next_element()? {
                     many.push(one);
                 }
-                Ok(OneOrEach::Each(many))
+                Ok(OneOrMany::Each(many))
             }
         }
         deserializer.deserialize_any(Visitor(std::marker::PhantomData))

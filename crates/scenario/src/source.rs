@@ -15,7 +15,7 @@ use toml::de::{DeTable, Deserializer};
 pub const FORMAT: u32 = 1;
 
 /// The suffix of the place of a scenario with overrides.
-pub(crate) const WITH_OVERRIDES: &str = " (with --set)";
+pub(crate) const OVERRIDES_SUFFIX: &str = " (with --set)";
 
 /// The text of a scenario, where it came from, and the folder that its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,10 +38,10 @@ pub struct Preamble {
 }
 
 /// Words in errors about constructs that may span many lines.
-const OPEN: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
+const MULTILINE_CONSTRUCTS: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
 
 /// Keys of [`Head`].
-const HEAD: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
+const HEAD_KEYS: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
 
 /// The keys that all worlds share.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -57,13 +57,13 @@ pub struct Head {
     #[serde(default)]
     pub name: String,
     /// The seed; 1 by default.
-    #[serde(default = "first_seed")]
+    #[serde(default = "default_seed")]
     pub seed: u64,
     /// Number of cycles to run, if given.
     pub cycles: Option<u64>,
 }
 
-fn first_seed() -> u64 {
+fn default_seed() -> u64 {
     1
 }
 
@@ -75,7 +75,7 @@ impl Source {
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, InputError> {
         let text = crate::file::read_text(path, 16 << 20)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-        Self::new(path.display().to_string(), text, folder).with(overrides)
+        Self::new(path.display().to_string(), text, folder).with_overrides(overrides)
     }
 
     /// Creates a scenario from text; `place` names it in errors.
@@ -93,7 +93,7 @@ impl Source {
     /// When the text does not fit the type, with line and column; the error for an unknown key
     /// suggests the nearest known one.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, InputError> {
-        toml::from_str(&self.text).map_err(|error| self.explained(&error, &[]))
+        toml::from_str(&self.text).map_err(|error| self.toml_error(&error, &[]))
     }
 
     /// Parses a scenario: the head that all worlds share, and the sections of one world.
@@ -103,14 +103,17 @@ impl Source {
     pub fn parse_world<T: DeserializeOwned>(&self) -> Result<(Head, T), InputError> {
         let told = |error| {
             let own = keys_of::<T>();
-            let top: Vec<&str> = HEAD.into_iter().chain(own.iter().map(String::as_str)).collect();
-            self.explained(&error, &top)
+            let top: Vec<&str> =
+                HEAD_KEYS.into_iter().chain(own.iter().map(String::as_str)).collect();
+            self.toml_error(&error, &top)
         };
         let table = DeTable::parse(&self.text).map_err(told)?;
         let span = table.span();
         // Two tables instead of a flattened field, which would lose the places of its entries.
-        let (head, own): (DeTable<'_>, DeTable<'_>) =
-            table.into_inner().into_iter().partition(|(key, _)| HEAD.contains(&&**key.get_ref()));
+        let (head, own): (DeTable<'_>, DeTable<'_>) = table
+            .into_inner()
+            .into_iter()
+            .partition(|(key, _)| HEAD_KEYS.contains(&&**key.get_ref()));
         let part = |table| Deserializer::from(toml::Spanned::new(span.clone(), table));
         Ok((Head::deserialize(part(head)).map_err(told)?, T::deserialize(part(own)).map_err(told)?))
     }
@@ -123,10 +126,10 @@ impl Source {
         errors.sort_by_key(|error| error.span().map(|span| span.start));
         let mut told: Vec<InputError> = Vec::new();
         for error in errors {
-            let error = self.explained(&error, &[]);
+            let error = self.toml_error(&error, &[]);
             let line = |error: &InputError| error.position().map(|(line, _)| line);
             if told.last().is_none_or(|last| line(last) != line(&error)) {
-                let is_open = OPEN.iter().any(|word| error.cause().contains(word));
+                let is_open = MULTILINE_CONSTRUCTS.iter().any(|word| error.cause().contains(word));
                 told.push(error);
                 if is_open {
                     break;
@@ -136,19 +139,19 @@ impl Source {
         told
     }
 
-    fn explained(&self, error: &toml::de::Error, top: &[&str]) -> InputError {
-        let (cause, remedy) = explain(error, top, self.example());
+    fn toml_error(&self, error: &toml::de::Error, top: &[&str]) -> InputError {
+        let (cause, remedy) = explain(error, top, self.example_remedy());
         let told = InputError::new(&self.place, cause, remedy);
         match error.span() {
-            Some(span) => self.told_at(told, span),
+            Some(span) => self.with_span(told, span),
             None => told,
         }
     }
 
     /// Adds a place of the text to an error: position, end and key.
-    fn told_at(&self, error: InputError, span: Range<usize>) -> InputError {
+    fn with_span(&self, error: InputError, span: Range<usize>) -> InputError {
         let way = locate(&self.text, &span);
-        let error = error.over(&self.text, span);
+        let error = error.with_span(&self.text, span);
         match way {
             Some(way) => error.with_key(path(&way)),
             None => error,
@@ -156,7 +159,7 @@ impl Source {
     }
 
     /// Returns the remedy that points to an example of the scenario's own world.
-    fn example(&self) -> String {
+    fn example_remedy(&self) -> String {
         let table = self.text.parse::<toml::Table>();
         let world = table.as_ref().ok().and_then(|table| table.get("world")?.as_str());
         match (&table, world) {
@@ -173,7 +176,7 @@ impl Source {
     pub fn preamble(&self) -> Result<Preamble, InputError> {
         let preamble = match toml::from_str::<Preamble>(self.top()) {
             Ok(preamble) => preamble,
-            Err(_) => self.parse().map_err(|e| self.sweep_instead().unwrap_or(e))?,
+            Err(_) => self.parse().map_err(|e| self.sweep_error().unwrap_or(e))?,
         };
         if *preamble.format.get_ref() == FORMAT {
             return Ok(preamble);
@@ -190,7 +193,7 @@ impl Source {
     }
 
     /// Returns the error for a file that is not a scenario because it is a sweep.
-    fn sweep_instead(&self) -> Option<InputError> {
+    fn sweep_error(&self) -> Option<InputError> {
         let table = self.text.parse::<toml::Table>().ok()?;
         let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
         let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
@@ -207,13 +210,13 @@ impl Source {
     ) -> InputError {
         let error = InputError::new(&self.place, cause, remedy);
         match span.into().filter(|span| *span != (0..0)) {
-            Some(span) => self.told_at(error, span),
+            Some(span) => self.with_span(error, span),
             None => error,
         }
     }
 
     /// Adds the position of a section to an error from code that does not know the text.
-    pub fn error_of(
+    pub fn error_from(
         &self,
         span: impl Into<Option<Range<usize>>>,
         error: &InputError,
@@ -222,7 +225,7 @@ impl Source {
     }
 
     /// Adds the key that names a file, at a span, to the file's error.
-    pub fn naming(&self, span: Range<usize>, error: InputError) -> InputError {
+    pub fn with_key_at(&self, span: Range<usize>, error: InputError) -> InputError {
         match locate(&self.text, &span) {
             Some(way) => error.with_key(path(&way)),
             None => error,
@@ -234,18 +237,18 @@ impl Source {
     ///
     /// # Errors
     /// Those of reading it.
-    pub fn named<T>(
+    pub fn with_file_key<T>(
         &self,
         section: Range<usize>,
         key: &str,
         read: Result<T, InputError>,
     ) -> Result<T, InputError> {
-        read.map_err(|error| self.naming(self.within(section, &[key]), error))
+        read.map_err(|error| self.with_key_at(self.key_span(section, &[key]), error))
     }
 
     /// Returns an error as one of this text, for readers who see only that: an error of a file that the text names
     /// becomes one of the key that names it.
-    pub fn told(&self, error: &InputError) -> InputError {
+    pub fn error_at_reference(&self, error: &InputError) -> InputError {
         let Some(key) = error.key().filter(|_| error.place() != self.place) else {
             return error.clone();
         };
@@ -257,7 +260,7 @@ impl Source {
 
     /// Returns its place without the mark of overrides.
     pub fn file_place(&self) -> &str {
-        self.place.trim_end_matches(WITH_OVERRIDES)
+        self.place.trim_end_matches(OVERRIDES_SUFFIX)
     }
 
     /// Returns the first line of a resolved scenario: its source, and the program that resolved it.
@@ -280,17 +283,20 @@ mod tests {
     fn the_error_of_a_named_file_is_told_at_the_key_that_names_it() {
         let source = Source::new("s.toml", "n = 1\n[map]\nfile = \"a.png\"\n", "");
         let span = source.text.find("\"a.png\"").map(|at| at..at + 7).expect("it is there");
-        let wrong = InputError::new("a.png", "it is cut off", "copy it again").at(3, 4);
-        let named = source.naming(span, wrong.clone());
+        let wrong = InputError::new("a.png", "it is cut off", "copy it again").with_position(3, 4);
+        let named = source.with_key_at(span, wrong.clone());
         assert_eq!((named.place(), named.key()), ("a.png", Some("map.file")));
-        let told = source.told(&named);
+        let told = source.error_at_reference(&named);
         assert_eq!((told.place(), told.key()), ("s.toml", Some("map.file")));
         assert_eq!(told.position().map(|(line, _)| line), Some(3));
         assert_eq!((told.cause(), told.remedy()), ("a.png:3:4: it is cut off", "copy it again"));
         // An error of the text itself, and one of a file that no key names, stay the same.
         let own = source.error(0..1, "wrong", "right");
-        assert_eq!((source.told(&own), source.told(&wrong)), (own, wrong.clone()));
-        assert_eq!(source.naming(0..source.text.len(), wrong).key(), None);
+        assert_eq!(
+            (source.error_at_reference(&own), source.error_at_reference(&wrong)),
+            (own, wrong.clone())
+        );
+        assert_eq!(source.with_key_at(0..source.text.len(), wrong).key(), None);
     }
 
     #[derive(Debug, Deserialize)]
@@ -383,6 +389,6 @@ mod tests {
         assert_eq!((error.position(), error.end()), (Some((1, 5)), Some((1, 6))));
         assert_eq!(error.key(), Some("a"));
         let part = InputError::new("part", "is wrong", "mend it");
-        assert_eq!(source.error_of(4..5, &part).cause(), "part: is wrong");
+        assert_eq!(source.error_from(4..5, &part).cause(), "part: is wrong");
     }
 }

@@ -6,7 +6,7 @@
 use cpu_time::ProcessTime;
 use serde_json::{Value, json};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::Look;
+use sidestep::kernel::view::FrameOptions;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep_server::protocol::FrameText;
@@ -32,7 +32,7 @@ fn office(cycles: u64) -> String {
     text.replace("\ncycles = 10000\n", &format!("\ncycles = {cycles}\n"))
 }
 
-fn started(text: &str) -> Box<dyn Simulation> {
+fn start_run(text: &str) -> Box<dyn Simulation> {
     let source = Source::new("bench", text, "");
     WORLDS.compile(&source).unwrap_or_else(|e| panic!("{e}")).start(&source, 1)
 }
@@ -61,13 +61,13 @@ fn cpu_ms(n: u32, mut work: impl FnMut()) -> f64 {
 }
 
 fn frame() {
-    let mut run = started(&hall(10_000, 1000));
-    run.watch();
+    let mut run = start_run(&hall(10_000, 1000));
+    run.enable_events();
     run.advance(20);
     let text = FrameText { scans: Vec::new(), events: Vec::new(), events_left_out: 0 };
     let mut encoder = Encoder::new(1, &run.scenery());
-    let frame = run.frame(Look::BODIES);
-    let made = cpu_ms(20, || drop(run.frame(Look::BODIES)));
+    let frame = run.frame(FrameOptions::WITHOUT_SCANS);
+    let made = cpu_ms(20, || drop(run.frame(FrameOptions::WITHOUT_SCANS)));
     let encoded = cpu_ms(20, || drop(encoder.encode(&frame, &text, 0)));
     let (_, bytes) = encoder.encode(&frame, &text, 0);
     println!("a frame of {} bodies, CPU time of one core", frame.bodies.len());
@@ -87,7 +87,7 @@ struct Page {
 }
 
 impl Page {
-    fn of(studio: &Studio) -> Self {
+    fn open(studio: &Studio) -> Self {
         let host = studio.url().trim_start_matches("http://").trim_end_matches('/').to_string();
         let stream = TcpStream::connect(&host).expect("it listens");
         let (socket, _) =
@@ -146,30 +146,30 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         screens: Vec::new(),
     };
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
-    let mut page = Page::of(&studio);
+    let mut page = Page::open(&studio);
     let path = folder.join("s.toml").display().to_string();
     page.ask(&json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }));
     (studio, page)
 }
 
 /// Cycles, CPU seconds and wall seconds.
-type Stretch = (f64, f64, f64);
+type Measurement = (f64, f64, f64);
 
 /// Advances a run without a watcher for a while.
-fn unwatched(run: &mut dyn Simulation, cycles: u64) -> Stretch {
+fn measure_unwatched(run: &mut dyn Simulation, cycles: u64) -> Measurement {
     let (cpu, wall, from) = (ProcessTime::now(), Instant::now(), run.cycle());
-    while wall.elapsed() < STRETCH {
+    while wall.elapsed() < STRETCH_DURATION {
         run.advance(cycles);
     }
     ((run.cycle() - from) as f64, cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64())
 }
 
 /// Plays a session for a while, with a page that takes all frames.
-fn watched(page: &mut Page) -> Stretch {
+fn measure_watched(page: &mut Page) -> Measurement {
     let from = page.cycle();
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     page.ask(&json!({ "do": "play", "session": 1, "speed": "fastest" }));
-    while wall.elapsed() < STRETCH {
+    while wall.elapsed() < STRETCH_DURATION {
         page.read();
     }
     page.ask(&json!({ "do": "pause", "session": 1 }));
@@ -181,7 +181,7 @@ fn watched(page: &mut Page) -> Stretch {
 }
 
 /// Duration of a compared stretch.
-const STRETCH: Duration = Duration::from_millis(1500);
+const STRETCH_DURATION: Duration = Duration::from_millis(1500);
 
 fn watching() {
     println!(
@@ -192,14 +192,14 @@ fn watching() {
         let folder = tempfile::tempdir().expect("a folder");
         let (_studio, mut page) = studio(folder.path(), &text);
         page.ask(&json!({ "do": "credit", "session": 1, "frames": 3 }));
-        let mut run = started(&text);
+        let mut run = start_run(&text);
         let slice = if name == "office" { 200 } else { 2 };
         let (mut by_cpu, mut by_wall, mut shown) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..REPEATS {
             let frames = page.frames;
-            let (cycles, cpu_s, wall_s) = watched(&mut page);
+            let (cycles, cpu_s, wall_s) = measure_watched(&mut page);
             shown.push(f64::from(page.frames - frames) / wall_s);
-            let alone = unwatched(run.as_mut(), slice);
+            let alone = measure_unwatched(run.as_mut(), slice);
             by_cpu.push((cycles / cpu_s) / (alone.0 / alone.1));
             by_wall.push((cycles / wall_s) / (alone.0 / alone.2));
         }

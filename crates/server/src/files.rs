@@ -13,15 +13,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The largest number of entries listed of a folder; further ones are left out.
-const MOST_ENTRIES: usize = 1000;
+const MAX_ENTRIES: usize = 1000;
 /// The size of the largest file that is read when a folder is listed.
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_FILE_BYTES: u64 = 1 << 20;
 /// The number of files of other programs that are read in a folder.
-const MOST_FOREIGN: usize = 50;
+const MAX_FOREIGN_FILES: usize = 50;
 
 /// The folders and files that may be read.
 #[derive(Debug, Clone)]
-pub(crate) struct Files {
+pub(crate) struct AllowedFiles {
     roots: Arc<Vec<Root>>,
     /// Real places elsewhere named by the scenarios that were named at start.
     granted: Arc<BTreeSet<PathBuf>>,
@@ -38,7 +38,7 @@ struct Root {
 
 /// The first keys of a TOML file, by which it is known.
 #[derive(Deserialize)]
-struct Known {
+struct TomlHeader {
     world: Option<String>,
     name: Option<String>,
     scenario: Option<IgnoredAny>,
@@ -46,7 +46,7 @@ struct Known {
 }
 
 /// Endings of maps and images of floors, and words for such a file.
-const MAPS: [(&str, &str); 6] = [
+const MAP_EXTENSIONS: [(&str, &str); 6] = [
     ("yaml", "map of ROS"),
     ("yml", "map of ROS"),
     ("map", "map of MovingAI"),
@@ -55,12 +55,12 @@ const MAPS: [(&str, &str); 6] = [
     ("world", "world of Stage"),
 ];
 
-impl Files {
+impl AllowedFiles {
     /// Returns the files that may be read: everything below these folders, and these files.
     ///
     /// # Errors
     /// When one of them is not there.
-    pub(crate) fn below(named: &[PathBuf]) -> Result<Self, Problem> {
+    pub(crate) fn from_roots(named: &[PathBuf]) -> Result<Self, Problem> {
         let root = |path: &PathBuf| {
             let real = path.canonicalize().map_err(|e| {
                 let remedy = "name a scenario, a recording or a folder that is there";
@@ -74,20 +74,20 @@ impl Files {
 
     /// Also allows the files named by these scenarios, because a user who starts the studio with a scenario wants it
     /// to run. Texts written by pages later can name no further files elsewhere.
-    pub(crate) fn with_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
+    pub(crate) fn with_files_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
         let sources = scenarios.filter_map(|path| Source::read(path, &[]).ok());
         let named = sources.flat_map(|source| {
-            let names = named(&source).unwrap_or_default();
+            let names = strings_in(&source).unwrap_or_default();
             names
                 .into_iter()
                 .filter_map(move |name| source.path(Path::new(&name)).canonicalize().ok())
         });
-        let granted = named.filter(|real| !self.holds(real)).collect();
+        let granted = named.filter(|real| !self.contains(real)).collect();
         Self { granted: Arc::new(granted), ..self }
     }
 
     /// Returns the first folder that was named.
-    pub(crate) fn first_folder(&self) -> PathBuf {
+    pub(crate) fn first_root_folder(&self) -> PathBuf {
         let folder = self.roots.iter().find(|root| root.real.is_dir());
         folder.map_or_else(PathBuf::new, |root| root.path.clone())
     }
@@ -96,23 +96,23 @@ impl Files {
     ///
     /// # Errors
     /// When it is not there, or elsewhere.
-    pub(crate) fn find(&self, path: &str) -> Result<PathBuf, Problem> {
+    pub(crate) fn resolve(&self, path: &str) -> Result<PathBuf, Problem> {
         let found = PathBuf::from(path);
         // A missing path and a forbidden one are reported alike: a page learns nothing about the rest of the disk. A
         // pipe or a device might keep its reader waiting forever.
         let is_plain = |real: &Path| real.is_file() || real.is_dir();
         let is_allowed =
-            found.canonicalize().is_ok_and(|real| self.holds(&real) && is_plain(&real));
-        if is_allowed { Ok(found) } else { Err(elsewhere(path)) }
+            found.canonicalize().is_ok_and(|real| self.contains(&real) && is_plain(&real));
+        if is_allowed { Ok(found) } else { Err(outside_roots(path)) }
     }
 
     /// Returns whether a path without links is below the folders, or is named by a scenario that was named at start.
-    pub(crate) fn holds(&self, real: &Path) -> bool {
-        self.below_root(real).is_some() || self.granted.contains(real)
+    pub(crate) fn contains(&self, real: &Path) -> bool {
+        self.relative_to_root(real).is_some() || self.granted.contains(real)
     }
 
     /// Returns a path without links relative to the folder that it is below.
-    pub(crate) fn below_root<'p>(&self, real: &'p Path) -> Option<&'p Path> {
+    pub(crate) fn relative_to_root<'p>(&self, real: &'p Path) -> Option<&'p Path> {
         self.roots.iter().find_map(|root| real.strip_prefix(&root.real).ok())
     }
 
@@ -121,14 +121,14 @@ impl Files {
     /// # Errors
     /// With the value.
     pub(crate) fn check_text(&self, source: &Source) -> Result<(), Problem> {
-        let names = named(source).map_err(|e| problem(&e))?;
+        let names = strings_in(source).map_err(|e| problem(&e))?;
         names.iter().try_for_each(|name| self.check_value(source, name))
     }
 
     fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
         // Paths start at the scenario's folder, wherever the server was started.
         let real = source.path(Path::new(text)).canonicalize();
-        if real.is_ok_and(|real| !self.holds(&real)) { Err(elsewhere(text)) } else { Ok(()) }
+        if real.is_ok_and(|real| !self.contains(&real)) { Err(outside_roots(text)) } else { Ok(()) }
     }
 
     /// Lists the things that can be opened in a folder, or everything that was named at start.
@@ -144,17 +144,18 @@ impl Files {
             let named = |root: &Root| entry(&root.path, worlds, &mut 0);
             return Ok(self.roots.iter().filter_map(named).collect());
         };
-        let path = self.find(folder)?;
+        let path = self.resolve(folder)?;
         let told = |e: std::io::Error| {
             Problem::new(folder, format!("cannot be listed: {e}"), "name a folder that may be read")
         };
         let mut paths = Vec::new();
-        for item in fs::read_dir(&path).map_err(told)?.take(MOST_ENTRIES) {
+        for item in fs::read_dir(&path).map_err(told)?.take(MAX_ENTRIES) {
             paths.push(item.map_err(told)?.path());
         }
         paths.sort();
         let mut foreign = 0;
-        let listed = paths.iter().filter(|path| path.canonicalize().is_ok_and(|p| self.holds(&p)));
+        let listed =
+            paths.iter().filter(|path| path.canonicalize().is_ok_and(|p| self.contains(&p)));
         let mut entries: Vec<FileEntry> =
             listed.filter_map(|path| entry(path, worlds, &mut foreign)).collect();
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
@@ -163,7 +164,7 @@ impl Files {
 }
 
 /// Returns the problem of a path that may not be read.
-fn elsewhere(path: &str) -> Problem {
+fn outside_roots(path: &str) -> Problem {
     let cause = "is not below the folders that were named at start";
     Problem::new(path, cause, "start the studio with its folder: sidestep studio FOLDER")
 }
@@ -172,7 +173,7 @@ fn elsewhere(path: &str) -> Problem {
 ///
 /// # Errors
 /// When it is no TOML.
-fn named(source: &Source) -> Result<Vec<String>, InputError> {
+fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
     let mut open = vec![source.parse::<Value>()?];
     let mut names = Vec::new();
     while let Some(value) = open.pop() {
@@ -216,11 +217,11 @@ fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(Fil
         let megabytes = bytes as f64 / 1e6;
         return Some((FileKind::Recording, format!("{megabytes:.1} MB")));
     }
-    if bytes > MOST_BYTES {
+    if bytes > MAX_FILE_BYTES {
         return None;
     }
     if ends_in("toml") {
-        let known: Known = Source::read(path, &[]).ok()?.parse().ok()?;
+        let known: TomlHeader = Source::read(path, &[]).ok()?.parse().ok()?;
         return match (known.world, known.scenario) {
             (Some(world), _) => {
                 let name = known.name.filter(|name| !name.is_empty());
@@ -233,11 +234,11 @@ fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(Fil
             (None, None) => known.profile.map(|name| (FileKind::Profile, name)),
         };
     }
-    if let Some((_, about)) = MAPS.iter().find(|(ending, _)| ends_in(ending)) {
+    if let Some((_, about)) = MAP_EXTENSIONS.iter().find(|(ending, _)| ends_in(ending)) {
         return Some((FileKind::Map, (*about).into()));
     }
     *foreign += 1;
-    let told = (*foreign <= MOST_FOREIGN).then(|| worlds.translate(path))?.ok()??;
+    let told = (*foreign <= MAX_FOREIGN_FILES).then(|| worlds.translate(path))?.ok()??;
     told.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
 }
 
@@ -247,7 +248,7 @@ mod tests {
     use sidestep::worlds::WORLDS;
 
     /// A folder `in` that may be read, and one beside it that may not.
-    fn places() -> (tempfile::TempDir, Files) {
+    fn places() -> (tempfile::TempDir, AllowedFiles) {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in [
             ("in/a.toml", "format = 1\nworld = \"robots\"\nname = \"crowd\"\n"),
@@ -267,7 +268,7 @@ mod tests {
             fs::create_dir_all(path.parent().expect("a folder")).expect("made");
             fs::write(path, text).expect("written");
         }
-        let files = Files::below(&[folder.path().join("in")]).expect("a folder");
+        let files = AllowedFiles::from_roots(&[folder.path().join("in")]).expect("a folder");
         (folder, files)
     }
 
@@ -293,7 +294,7 @@ mod tests {
         );
         let roots = files.list(None, WORLDS).expect("listed");
         assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
-        assert!(files.find(&listed[1].path).is_ok());
+        assert!(files.resolve(&listed[1].path).is_ok());
     }
 
     #[test]
@@ -313,17 +314,17 @@ mod tests {
             "in/gone.toml",
         ];
         let problems: Vec<Problem> =
-            outside.iter().map(|name| files.find(&path(name)).expect_err(name)).collect();
+            outside.iter().map(|name| files.resolve(&path(name)).expect_err(name)).collect();
         assert!(
             problems.iter().all(|p| p.cause == problems[0].cause),
             "nothing is told of what is there"
         );
         assert!(files.list(Some(&path("out")), WORLDS).is_err());
         assert!(files.list(Some(&path("in/..")), WORLDS).is_err());
-        assert!(files.find("/etc/passwd").is_err() && files.find("").is_err());
+        assert!(files.resolve("/etc/passwd").is_err() && files.resolve("").is_err());
         let listed = files.list(Some(&path("in")), WORLDS).expect("listed");
         assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
-        assert!(files.find(&path("in/deep/../a.toml")).is_ok());
+        assert!(files.resolve(&path("in/deep/../a.toml")).is_ok());
     }
 
     #[test]
@@ -343,8 +344,8 @@ mod tests {
     fn a_name_leads_from_the_scenarios_folder_wherever_the_server_was_started() {
         let (folder, _) = places();
         // From the working directory, `.` leads inside.
-        let files = Files::below(&[".".into()]).expect("a folder");
-        assert!(files.find(".").is_ok());
+        let files = AllowedFiles::from_roots(&[".".into()]).expect("a folder");
+        assert!(files.resolve(".").is_ok());
         let source = Source::new("s.toml", "a = \".\"", folder.path().join("out"));
         assert_eq!(files.check_text(&source).map_err(|p| p.place), Err(".".into()));
     }
@@ -355,12 +356,14 @@ mod tests {
         let path = |name: &str| folder.path().join(name).display().to_string();
         fs::write(path("out/map.txt"), "....").expect("written");
         fs::write(path("in/a.toml"), "map = { file = \"../out/map.txt\" }\n").expect("written");
-        let files = files.with_named_by([Path::new(&path("in/a.toml"))].into_iter());
+        let files = files.with_files_named_by([Path::new(&path("in/a.toml"))].into_iter());
         let check =
             |text: &str| files.check_text(&Source::new("s.toml", text, folder.path().join("in")));
         assert_eq!(check("a = \"../out/map.txt\""), Ok(()));
-        assert!(files.find(&path("out/map.txt")).is_ok());
-        assert!(check("a = \"../out/secret.toml\"").is_err() && files.find(&path("out")).is_err());
+        assert!(files.resolve(&path("out/map.txt")).is_ok());
+        assert!(
+            check("a = \"../out/secret.toml\"").is_err() && files.resolve(&path("out")).is_err()
+        );
         assert!(files.target(&path("out/map.txt")).is_err(), "it may be read, not written");
     }
 }

@@ -1,8 +1,8 @@
 //! The routes of the server, and the headers of all its answers.
 
-use crate::guard::Refusal;
-use crate::house::House;
-use crate::request::MOST_REQUEST_BYTES;
+use crate::access::AccessError;
+use crate::request::MAX_REQUEST_BYTES;
+use crate::state::AppState;
 use crate::{page, results, socket};
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
@@ -15,11 +15,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Longest body of a request that is no socket: a token.
-const MOST_BODY_BYTES: usize = 256;
+const MAX_BODY_BYTES: usize = 256;
 /// The longest time for a token to arrive.
-const LONGEST_ENTRANCE: Duration = Duration::from_secs(10);
+const TOKEN_TIMEOUT: Duration = Duration::from_secs(10);
 /// Longest message of a socket. Longer ones than a request may be are answered; beyond this the socket is closed.
-const MOST_MESSAGE_BYTES: usize = MOST_REQUEST_BYTES + (8 << 20);
+const MAX_MESSAGE_BYTES: usize = MAX_REQUEST_BYTES + (8 << 20);
 
 /// Headers of every answer, unless it has its own: the page loads nothing from elsewhere, and is shown in no other
 /// page.
@@ -36,21 +36,25 @@ const HEADERS: [(HeaderName, &str); 6] = [
 ];
 
 /// Returns the routes: the page, its socket, and the entrance for holders of the token.
-pub(crate) fn routes(house: Arc<House>) -> Router {
+pub(crate) fn routes(house: Arc<AppState>) -> Router {
     Router::new()
         .route("/socket", get(upgrade))
-        .route("/enter", get(trusted).post(enter).layer(from_fn(hurried)))
+        .route("/enter", get(access_status).post(sign_in).layer(from_fn(with_body_timeout)))
         .route("/report", get(results::report))
         .route("/export", get(results::export))
         .fallback(get(file))
-        .layer(DefaultBodyLimit::max(MOST_BODY_BYTES))
-        .layer(from_fn_with_state(house.clone(), guarded))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(from_fn_with_state(house.clone(), check_access))
         .with_state(house)
 }
 
 /// Lets requests of our own page through, and adds the headers of every answer.
-async fn guarded(State(house): State<Arc<House>>, request: Request, next: Next) -> Response {
-    let mut response = match house.guard.admit(request.headers()) {
+async fn check_access(
+    State(house): State<Arc<AppState>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let mut response = match house.guard.check_origin(request.headers()) {
         Ok(()) => next.run(request).await,
         Err(refusal) => refusal.into_response(),
     };
@@ -62,43 +66,43 @@ async fn guarded(State(house): State<Arc<House>>, request: Request, next: Next) 
 }
 
 /// Gives up a request if its body does not come.
-async fn hurried(request: Request, next: Next) -> Response {
-    let answer = tokio::time::timeout(LONGEST_ENTRANCE, next.run(request)).await;
+async fn with_body_timeout(request: Request, next: Next) -> Response {
+    let answer = tokio::time::timeout(TOKEN_TIMEOUT, next.run(request)).await;
     answer.unwrap_or_else(|_| StatusCode::REQUEST_TIMEOUT.into_response())
 }
 
 async fn upgrade(
-    State(house): State<Arc<House>>,
+    State(house): State<Arc<AppState>>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    if let Err(refusal) = house.guard.trust(&headers) {
+    if let Err(refusal) = house.guard.authorize(&headers) {
         return refusal.into_response();
     }
-    let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
-    let Some(seat) = house.seat() else { return full() };
+    let upgrade = upgrade.max_message_size(MAX_MESSAGE_BYTES).max_frame_size(MAX_MESSAGE_BYTES);
+    let Some(seat) = house.acquire_socket() else { return too_many_pages() };
     upgrade.on_upgrade(move |socket| socket::serve(socket, house, seat))
 }
 
 /// Refuses a further page.
-fn full() -> Response {
+fn too_many_pages() -> Response {
     let words =
         "So many pages are open that there is no place for another one: close one of them.\n";
     (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
 }
 
 /// Answers whether the browser has the cookie, and whether there is a place for its page.
-async fn trusted(State(house): State<Arc<House>>, headers: HeaderMap) -> Response {
-    match house.guard.trust(&headers) {
-        Ok(()) if house.is_full() => full(),
+async fn access_status(State(house): State<Arc<AppState>>, headers: HeaderMap) -> Response {
+    match house.guard.authorize(&headers) {
+        Ok(()) if house.is_full() => too_many_pages(),
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
         Err(refusal) => refusal.into_response(),
     }
 }
 
 /// Gives the cookie to a client that knows the token.
-async fn enter(State(house): State<Arc<House>>, said: String) -> Response {
-    match house.guard.enter(&said) {
+async fn sign_in(State(house): State<Arc<AppState>>, said: String) -> Response {
+    match house.guard.sign_in(&said) {
         Ok(cookie) => (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response(),
         Err(refusal) => refusal.into_response(),
     }
@@ -108,7 +112,7 @@ async fn file(uri: Uri, headers: HeaderMap) -> Response {
     page::answer(uri.path(), &headers)
 }
 
-impl IntoResponse for Refusal {
+impl IntoResponse for AccessError {
     fn into_response(self) -> Response {
         match self {
             Self::Host => {

@@ -10,20 +10,20 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Duration;
 
 /// The least time of computing between two keyframes, before any thinning.
-const SPACING: Duration = Duration::from_millis(20);
+const MIN_SPACING: Duration = Duration::from_millis(20);
 /// The least ratio of computing time to the time spent on keyframes.
-const COST: u32 = 50;
+const MIN_COST_RATIO: u32 = 50;
 
 /// The memory for the keyframes of all runs, which share it evenly.
 #[derive(Debug)]
-pub(crate) struct Budget {
+pub(crate) struct MemoryBudget {
     used: AtomicUsize,
     runs: AtomicUsize,
     most: usize,
     most_of_one: usize,
 }
 
-impl Budget {
+impl MemoryBudget {
     /// Returns a budget of `most` bytes in all, and at most `most_of_one` for one run.
     pub(crate) fn new(most: usize, most_of_one: usize) -> Self {
         Self { used: AtomicUsize::new(0), runs: AtomicUsize::new(0), most, most_of_one }
@@ -40,7 +40,7 @@ impl Budget {
 pub(crate) struct Keyframes {
     kept: BTreeMap<Cycle, Vec<u8>>,
     bytes: usize,
-    budget: Arc<Budget>,
+    budget: Arc<MemoryBudget>,
     spacing: Duration,
     /// The computing time since the last keyframe.
     computed: Duration,
@@ -50,9 +50,9 @@ pub(crate) struct Keyframes {
 
 impl Keyframes {
     /// Returns a store for one run's part of a budget, without anything in it.
-    pub(crate) fn new(budget: &Arc<Budget>) -> Self {
+    pub(crate) fn new(budget: &Arc<MemoryBudget>) -> Self {
         budget.runs.fetch_add(1, Relaxed);
-        let (spacing, zero, budget) = (SPACING, Duration::ZERO, budget.clone());
+        let (spacing, zero, budget) = (MIN_SPACING, Duration::ZERO, budget.clone());
         Self { kept: BTreeMap::new(), bytes: 0, budget, spacing, computed: zero, took: zero }
     }
 
@@ -63,30 +63,31 @@ impl Keyframes {
             return false;
         }
         self.computed += took;
-        self.kept.is_empty() || self.computed >= self.spacing.max(self.took.saturating_mul(COST))
+        self.kept.is_empty()
+            || self.computed >= self.spacing.max(self.took.saturating_mul(MIN_COST_RATIO))
     }
 
     /// Keeps a checkpoint that took a time to make.
-    pub(crate) fn keep(&mut self, cycle: Cycle, checkpoint: Vec<u8>, took: Duration) {
+    pub(crate) fn push(&mut self, cycle: Cycle, checkpoint: Vec<u8>, took: Duration) {
         (self.computed, self.took) = (Duration::ZERO, took);
         self.kept.insert(cycle, checkpoint);
-        self.count();
+        self.update_bytes();
         // Others may have more than their part for a while: the memory missing then is missing here.
         while self.budget.used.load(Relaxed) > self.budget.most && self.kept.len() > 1 {
             self.thin();
         }
-        self.fit();
+        self.shrink_to_budget();
     }
 
     /// Drops keyframes beyond the run's part, which shrinks whenever another run begins.
-    pub(crate) fn fit(&mut self) {
+    pub(crate) fn shrink_to_budget(&mut self) {
         while self.bytes > self.budget.share() && self.kept.len() > 1 {
             self.thin();
         }
     }
 
     /// Notes the number of bytes kept.
-    fn count(&mut self) {
+    fn update_bytes(&mut self) {
         let bytes = self.kept.values().map(Vec::len).sum();
         self.budget.used.fetch_add(bytes, Relaxed);
         self.budget.used.fetch_sub(std::mem::replace(&mut self.bytes, bytes), Relaxed);
@@ -99,7 +100,7 @@ impl Keyframes {
             is_odd = !is_odd;
             !is_odd
         });
-        self.count();
+        self.update_bytes();
         self.spacing = self.spacing.saturating_mul(2);
     }
 
@@ -124,21 +125,21 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
 
     fn alone(most: usize) -> Keyframes {
-        Keyframes::new(&Arc::new(Budget::new(most, most)))
+        Keyframes::new(&Arc::new(MemoryBudget::new(most, most)))
     }
 
     #[test]
     fn runs_share_a_budget_and_give_back_what_another_one_needs() {
-        let budget = Arc::new(Budget::new(1000, 600));
+        let budget = Arc::new(MemoryBudget::new(1000, 600));
         let mut first = Keyframes::new(&budget);
-        (0..40).for_each(|cycle| first.keep(cycle, vec![0; 50], MS));
+        (0..40).for_each(|cycle| first.push(cycle, vec![0; 50], MS));
         assert!(first.bytes > 250 && first.bytes <= 600, "{}", first.bytes);
         let mut others: Vec<Keyframes> = (0..3).map(|_| Keyframes::new(&budget)).collect();
         for cycle in 0..40 {
-            others.iter_mut().for_each(|other| other.keep(cycle, vec![0; 50], MS));
+            others.iter_mut().for_each(|other| other.push(cycle, vec![0; 50], MS));
             assert!(budget.used.load(Relaxed) <= 1000 && others[0].before(0).is_some());
         }
-        first.fit();
+        first.shrink_to_budget();
         assert!(first.bytes <= 250 && first.before(0).is_some());
         assert!(others.iter().all(|other| other.bytes <= 250));
         drop((first, others));
@@ -149,10 +150,10 @@ mod tests {
     fn the_first_is_wanted_at_once_and_the_next_ones_after_some_time() {
         let mut keyframes = alone(1000);
         assert!(keyframes.is_due(0, Duration::ZERO));
-        keyframes.keep(0, vec![0; 10], MS / 100);
+        keyframes.push(0, vec![0; 10], MS / 100);
         assert!(!keyframes.is_due(10, 19 * MS));
         assert!(keyframes.is_due(20, MS));
-        keyframes.keep(20, vec![0; 10], 2 * MS);
+        keyframes.push(20, vec![0; 10], 2 * MS);
         assert!(!keyframes.is_due(30, 99 * MS), "two in a hundred");
         assert!(keyframes.is_due(40, MS));
         assert!(!keyframes.is_due(15, 1000 * MS), "it was computed before");
@@ -163,7 +164,7 @@ mod tests {
         let mut keyframes = alone(1000);
         assert_eq!(keyframes.before(5), None);
         for cycle in [0, 10, 20] {
-            keyframes.keep(cycle, vec![cycle as u8], MS);
+            keyframes.push(cycle, vec![cycle as u8], MS);
         }
         let at = |cycle| keyframes.before(cycle).map(|(at, bytes)| (at, bytes[0]));
         assert_eq!(
@@ -179,7 +180,7 @@ mod tests {
         ) {
             let mut keyframes = alone(1000);
             for (cycle, size) in (0..).zip(sizes) {
-                keyframes.keep(cycle, vec![0; size], MS);
+                keyframes.push(cycle, vec![0; size], MS);
                 let kept: usize = keyframes.kept.values().map(Vec::len).sum();
                 prop_assert!(kept <= 1000 && kept == keyframes.bytes);
                 prop_assert_eq!(keyframes.before(0).map(|(at, _)| at), Some(0));
@@ -191,8 +192,8 @@ mod tests {
             let mut keyframes = alone(1600);
             let mut cycle = 0;
             while cycle < count {
-                if keyframes.is_due(cycle, SPACING / 2) {
-                    keyframes.keep(cycle, vec![0; 100], Duration::ZERO);
+                if keyframes.is_due(cycle, MIN_SPACING / 2) {
+                    keyframes.push(cycle, vec![0; 100], Duration::ZERO);
                 }
                 cycle += 1;
             }

@@ -16,15 +16,16 @@
 //! result, and a slow page loses frames, never the run. The worlds are passed in by the program that starts the
 //! server.
 
-mod beside;
-mod chronicle;
-mod doors;
+mod access;
+mod compress;
 mod encode;
+mod event_store;
+mod file_choices;
 mod files;
-mod guard;
-mod house;
+mod fleet_feed;
 mod http;
 mod keyframes;
+mod limits;
 mod listen;
 mod outbox;
 mod page;
@@ -32,27 +33,26 @@ pub mod protocol;
 mod request;
 mod results;
 mod samples;
-mod screen;
 mod serve;
 mod session;
 mod socket;
+mod state;
 mod write;
-mod zip;
 
 pub use encode::Encoder;
-pub use request::{MOST_REQUEST_BYTES, decode};
-pub use screen::Screen;
+pub use fleet_feed::FleetFeed;
+pub use request::{MAX_REQUEST_BYTES, decode};
 
-use files::Files;
-use guard::Guard;
-use house::{House, MOST_ASIDES};
-use keyframes::Budget;
-use protocol::{Named, Problem};
-use serve::Patience;
-use session::{Means, Showcase};
+use access::AccessPolicy;
+use files::AllowedFiles;
+use keyframes::MemoryBudget;
+use protocol::{Problem, TargetRef};
+use serve::Timeouts;
+use session::{FoxgloveHost, SessionDeps};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Worlds;
-use sidestep_session::{Error, ViewersAt};
+use sidestep_session::{Error, ViewerAddress};
+use state::{AppState, MAX_BLOCKING_THREADS};
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -63,13 +63,13 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 
 /// The largest number of frames made by a session in a second.
-pub const FRAMES_PER_S: u32 = 30;
+pub const MAX_FRAMES_PER_S: u32 = 30;
 /// The bound of memory for the keyframes of a session.
-pub const KEYFRAME_BYTES: usize = 256 << 20;
+pub const MAX_KEYFRAME_BYTES: usize = 256 << 20;
 /// The bound of memory for the keyframes of all sessions together, which share it evenly.
-pub const ALL_KEYFRAME_BYTES: usize = 1 << 30;
+pub const MAX_TOTAL_KEYFRAME_BYTES: usize = 1 << 30;
 /// Speeds at which a run can be played, in simulated seconds per second.
-pub const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
+pub const SPEED_RANGE: RangeInclusive<f64> = 0.1..=100.0;
 
 /// Options for the start of a server.
 #[derive(Clone)]
@@ -89,9 +89,9 @@ pub struct Options {
     /// The number of worker threads of each session.
     pub workers: usize,
     /// The configured address at which viewers of Foxglove's protocol watch the session that was opened last.
-    pub foxglove: Option<ViewersAt>,
+    pub foxglove: Option<ViewerAddress>,
     /// Fleets that fly elsewhere, which are opened and only watched.
-    pub screens: Vec<Arc<Screen>>,
+    pub screens: Vec<Arc<FleetFeed>>,
 }
 
 /// A running server, until it is ended or dropped.
@@ -108,35 +108,37 @@ impl Studio {
     /// # Errors
     /// When something that was named is not there, or the port cannot be taken.
     pub fn start(options: Options) -> Result<Self, Error> {
-        let (folders, mut open) = divided(&options.named);
+        let (folders, mut open) = split_targets(&options.named);
         open.extend(
             options
                 .screens
                 .iter()
-                .map(|screen| Named { kind: "fleet".into(), path: screen.endpoint.clone() }),
+                .map(|screen| TargetRef { kind: "fleet".into(), path: screen.endpoint.clone() }),
         );
         let scenarios = open.iter().filter(|named| named.kind == "scenario");
-        let files = Files::below(&folders).map_err(|p| input(&p))?;
-        let files = files.with_named_by(scenarios.map(|named| Path::new(&named.path)));
+        let files = AllowedFiles::from_roots(&folders).map_err(|p| input_error(&p))?;
+        let files = files.with_files_named_by(scenarios.map(|named| Path::new(&named.path)));
         let listener = listen::bind(&options.host, options.port)?;
         let failed = |e: std::io::Error| {
-            Error::stopped(
+            Error::other(
                 format!("the server cannot be started: {e}"),
                 "end other programs, and try again",
             )
         };
         listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let guard = Guard::new(address, &options.host).map_err(failed)?;
+        let guard = AccessPolicy::new(address, &options.host).map_err(failed)?;
         let token = guard.token().map(String::from);
         let (ending, ends) = watch::channel(false);
         let Options { worlds, workers, read_only, program, foxglove, screens, .. } = options;
-        let budget = Arc::new(Budget::new(ALL_KEYFRAME_BYTES, KEYFRAME_BYTES));
-        let showcase = foxglove.map(|at| Arc::new(Showcase::new(at)));
-        let means = Means { worlds, files, workers, read_only, budget, showcase, screens };
-        let house = Arc::new(House::new(means, guard, program, open, ends));
-        let runtime =
-            Builder::new_current_thread().enable_all().max_blocking_threads(MOST_ASIDES).build();
+        let budget = Arc::new(MemoryBudget::new(MAX_TOTAL_KEYFRAME_BYTES, MAX_KEYFRAME_BYTES));
+        let showcase = foxglove.map(|at| Arc::new(FoxgloveHost::new(at)));
+        let means = SessionDeps { worlds, files, workers, read_only, budget, showcase, screens };
+        let house = Arc::new(AppState::new(means, guard, program, open, ends));
+        let runtime = Builder::new_current_thread()
+            .enable_all()
+            .max_blocking_threads(MAX_BLOCKING_THREADS)
+            .build();
         let runtime = runtime.map_err(failed)?;
         let thread = std::thread::Builder::new().name("studio".into());
         let thread = thread.spawn(move || run(runtime, listener, &house)).map_err(failed)?;
@@ -162,7 +164,7 @@ impl Studio {
     }
 
     /// Returns whether its address names this machine in a way that other machines cannot use.
-    pub fn is_named_for_itself(&self) -> bool {
+    pub fn has_local_address(&self) -> bool {
         self.ip().is_none_or(|ip| ip.is_loopback())
     }
 
@@ -188,20 +190,20 @@ impl Drop for Studio {
 }
 
 /// Answers requests until the server is ended.
-fn run(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
+fn run(runtime: Runtime, listener: TcpListener, house: &Arc<AppState>) {
     runtime.block_on(async {
         // A bound, nonblocking listener is never refused.
         let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-        let (routes, ending) = (http::routes(house.clone()), house.ending());
-        serve::serve(listener, routes, ending, Patience::default()).await;
-        house.emptied().await;
+        let (routes, ending) = (http::routes(house.clone()), house.shutdown_signal());
+        serve::serve(listener, routes, ending, Timeouts::default()).await;
+        house.wait_for_sessions().await;
     });
     runtime.shutdown_timeout(Duration::from_millis(100));
 }
 
 /// Returns the folders that may be read, and the things to open.
-fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
-    let (mut folders, mut open): (Vec<PathBuf>, Vec<Named>) = Default::default();
+fn split_targets(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
+    let (mut folders, mut open): (Vec<PathBuf>, Vec<TargetRef>) = Default::default();
     for path in named {
         let is_run = path.join("run.json").is_file();
         let is_film = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
@@ -212,7 +214,7 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
                 () if is_run || is_film => "recording",
                 () => "scenario",
             };
-            open.push(Named { kind: kind.into(), path: path.display().to_string() });
+            open.push(TargetRef { kind: kind.into(), path: path.display().to_string() });
         }
         // The files that a scenario names lie beside it.
         let folder = match (path.is_dir() || !path.exists(), path.parent()) {
@@ -230,7 +232,7 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
     (folders, open)
 }
 
-fn input(problem: &Problem) -> InputError {
+fn input_error(problem: &Problem) -> InputError {
     InputError::new(&problem.place, &*problem.cause, &*problem.remedy)
 }
 
@@ -249,11 +251,15 @@ mod tests {
         std::fs::write(path("a.toml"), "").expect("written");
         std::fs::write(path("b.mcap"), "").expect("written");
         let named = ["run", "a.toml", "b.mcap", "sweep"].map(path);
-        let (folders, open) = divided(&named);
+        let (folders, open) = split_targets(&named);
         assert_eq!(folders, [path("run"), place.path().to_path_buf(), path("sweep")]);
         let kinds: Vec<&str> = open.iter().map(|named| named.kind.as_str()).collect();
         assert_eq!(kinds, ["recording", "scenario", "recording", "sweep"]);
-        assert_eq!(divided(&[]), (vec![".".into()], vec![]));
-        assert_eq!(divided(&["a.toml".into()]).0, [PathBuf::from("a.toml")], "it is not there");
+        assert_eq!(split_targets(&[]), (vec![".".into()], vec![]));
+        assert_eq!(
+            split_targets(&["a.toml".into()]).0,
+            [PathBuf::from("a.toml")],
+            "it is not there"
+        );
     }
 }

@@ -1,14 +1,14 @@
 //! The port: found and bound; and the address by which others reach it.
 
 use sidestep::kernel::InputError;
-use sidestep_session::next_free;
+use sidestep_session::next_free_port;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 
 /// The first port that is tried where none is given.
 const FIRST_PORT: u16 = 7800;
 /// The number of ports that are tried.
-const PORTS: u16 = 100;
+const PORTS_TRIED: u16 = 100;
 
 /// Binds the given port, or the first free one of a range.
 ///
@@ -18,19 +18,19 @@ pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputEr
     let ip = resolve(host)?;
     let at = |port: u16| TcpListener::bind(SocketAddr::new(ip, port));
     let Some(port) = port else {
-        let mut tried = (FIRST_PORT..FIRST_PORT + PORTS).map(at);
+        let mut tried = (FIRST_PORT..FIRST_PORT + PORTS_TRIED).map(at);
         let found = tried.find(|bound| !is_taken(bound)).unwrap_or_else(|| at(0));
-        return found.map_err(|e| unusable(host, &e));
+        return found.map_err(|e| host_error(host, &e));
     };
     match at(port) {
         bound if is_taken(&bound) => {
-            let remedy = match next_free(ip, port) {
+            let remedy = match next_free_port(ip, port) {
                 Some(free) => format!("give --port {free}, which is free, or leave it out"),
                 None => "leave it out, and a free one is taken".into(),
             };
             Err(InputError::new(format!("--port {port}"), "the port is in use", remedy))
         }
-        bound => bound.map_err(|e| unusable(&format!("{host} --port {port}"), &e)),
+        bound => bound.map_err(|e| host_error(&format!("{host} --port {port}"), &e)),
     }
 }
 
@@ -40,12 +40,12 @@ fn is_taken(bound: &io::Result<TcpListener>) -> bool {
 
 fn resolve(host: &str) -> Result<IpAddr, InputError> {
     let name = host.trim_start_matches('[').trim_end_matches(']');
-    let found = (name, 0).to_socket_addrs().map_err(|e| unusable(host, &e))?;
+    let found = (name, 0).to_socket_addrs().map_err(|e| host_error(host, &e))?;
     let first = found.map(|address| address.ip()).next();
-    first.ok_or_else(|| unusable(host, &io::ErrorKind::AddrNotAvailable.into()))
+    first.ok_or_else(|| host_error(host, &io::ErrorKind::AddrNotAvailable.into()))
 }
 
-fn unusable(host: &str, error: &io::Error) -> InputError {
+fn host_error(host: &str, error: &io::Error) -> InputError {
     let remedy = "give an address of this machine, such as 127.0.0.1 or 0.0.0.0, and a port that you may use";
     InputError::new(format!("--addr {host}"), error.to_string(), remedy)
 }
@@ -74,7 +74,7 @@ mod tests {
         let port = taken.local_addr().expect("bound").port();
         let error = bind("127.0.0.1", Some(port)).expect_err("in use");
         assert_eq!(error.place(), format!("--port {port}"));
-        assert!(error.remedy().contains("--port ") || port > u16::MAX - PORTS, "{error}");
+        assert!(error.remedy().contains("--port ") || port > u16::MAX - PORTS_TRIED, "{error}");
         assert!(bind("127.0.0.1", None).is_ok());
     }
 

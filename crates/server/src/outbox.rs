@@ -2,14 +2,14 @@
 //!
 //! Sessions put things here from their threads and never wait; the socket takes them when it can.
 
-use crate::protocol::{Notice, Reply, SessionId};
+use crate::protocol::{Notification, Reply, SessionId};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 
 /// Something to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Mail {
+pub(crate) enum OutboxItem {
     /// A reply or a notice.
     Text(String),
     /// A frame.
@@ -19,66 +19,66 @@ pub(crate) enum Mail {
 /// The mail of one socket.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<PendingMessages>,
     ready: Notify,
 }
 
 #[derive(Debug, Default)]
-struct Waiting {
+struct PendingMessages {
     texts: VecDeque<String>,
     /// Number of requests that were taken in and are not answered yet.
     open_requests: usize,
     /// Numbers and bytes of the long ones among them.
     long: Vec<(u32, usize)>,
-    newest: BTreeMap<SessionId, Newest>,
+    newest: BTreeMap<SessionId, LatestUpdate>,
     /// The session that was served last, so that all have their turn.
     last: SessionId,
 }
 
 /// The newest frame and state of one session.
 #[derive(Debug, Default)]
-struct Newest {
+struct LatestUpdate {
     status: Option<String>,
     cast: Option<String>,
     frame: Option<Vec<u8>>,
 }
 
 /// Returns one of our messages as JSON, which cannot fail.
-fn json(value: &impl serde::Serialize) -> String {
+fn to_json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
 impl Outbox {
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn lock(&self) -> MutexGuard<'_, PendingMessages> {
         // The mail is consistent after every step, even if a thread panicked between two of them.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes that a request was taken in; each needs one reply.
     pub(crate) fn expect_reply(&self) {
-        self.waiting().open_requests += 1;
+        self.lock().open_requests += 1;
     }
 
     /// Returns the number of requests without a reply, and of replies that were not sent yet.
     pub(crate) fn backlog(&self) -> usize {
-        let waiting = self.waiting();
+        let waiting = self.lock();
         waiting.open_requests + waiting.texts.len()
     }
 
     /// Notes that the request just taken in is a long one.
-    pub(crate) fn note_long(&self, id: u32, bytes: usize) {
-        self.waiting().long.push((id, bytes));
+    pub(crate) fn record_long_request(&self, id: u32, bytes: usize) {
+        self.lock().long.push((id, bytes));
     }
 
     /// Returns the bytes of all long requests without a reply.
     pub(crate) fn long_bytes(&self) -> usize {
-        self.waiting().long.iter().map(|(_, bytes)| bytes).sum()
+        self.lock().long.iter().map(|(_, bytes)| bytes).sum()
     }
 
     /// Sends a reply.
-    pub(crate) fn reply(&self, reply: &Reply) {
-        let text = json(reply);
-        let mut waiting = self.waiting();
+    pub(crate) fn send_reply(&self, reply: &Reply) {
+        let text = to_json(reply);
+        let mut waiting = self.lock();
         waiting.open_requests = waiting.open_requests.saturating_sub(1);
         if let Some(at) = waiting.long.iter().position(|(id, _)| *id == reply.id) {
             waiting.long.swap_remove(at);
@@ -89,24 +89,29 @@ impl Outbox {
     }
 
     /// Sends a notice; all of them go out, in their order.
-    pub(crate) fn notice(&self, notice: &Notice) {
-        let text = json(notice);
-        self.waiting().texts.push_back(text);
+    pub(crate) fn send_notification(&self, notice: &Notification) {
+        let text = to_json(notice);
+        self.lock().texts.push_back(text);
         self.ready.notify_one();
     }
 
     /// Sends the state of a session, unless a newer one comes before it has been sent.
-    pub(crate) fn status(&self, session: SessionId, status: &Notice) {
-        let text = json(status);
-        self.waiting().newest.entry(session).or_default().status = Some(text);
+    pub(crate) fn send_status(&self, session: SessionId, status: &Notification) {
+        let text = to_json(status);
+        self.lock().newest.entry(session).or_default().status = Some(text);
         self.ready.notify_one();
     }
 
     /// Sends a frame, and the cast that it begins, unless a newer one comes before it has been sent. Returns whether
     /// it replaces one that was not sent.
-    pub(crate) fn frame(&self, session: SessionId, cast: Option<&Notice>, frame: Vec<u8>) -> bool {
-        let cast = cast.map(json);
-        let mut waiting = self.waiting();
+    pub(crate) fn send_frame(
+        &self,
+        session: SessionId,
+        cast: Option<&Notification>,
+        frame: Vec<u8>,
+    ) -> bool {
+        let cast = cast.map(to_json);
+        let mut waiting = self.lock();
         let newest = waiting.newest.entry(session).or_default();
         if cast.is_some() {
             newest.cast = cast;
@@ -119,22 +124,22 @@ impl Outbox {
 
     /// Takes back the frame and the state of a session that were not sent; returns whether there was a frame.
     pub(crate) fn clear(&self, session: SessionId) -> bool {
-        let newest = self.waiting().newest.remove(&session);
+        let newest = self.lock().newest.remove(&session);
         newest.is_some_and(|newest| newest.frame.is_some())
     }
 
     /// Returns the next message to send: texts first, then the mail of the sessions in turn.
-    pub(crate) fn next(&self) -> Option<Mail> {
-        let mut waiting = self.waiting();
+    pub(crate) fn pop(&self) -> Option<OutboxItem> {
+        let mut waiting = self.lock();
         if let Some(text) = waiting.texts.pop_front() {
-            return Some(Mail::Text(text));
+            return Some(OutboxItem::Text(text));
         }
         let last = waiting.last;
         let all = waiting.newest.range(last + 1..).chain(waiting.newest.range(..=last));
         let session = all.map(|(&session, _)| session).next()?;
         let newest = waiting.newest.get_mut(&session)?;
-        let text = newest.status.take().or_else(|| newest.cast.take()).map(Mail::Text);
-        let mail = text.or_else(|| newest.frame.take().map(Mail::Frame));
+        let text = newest.status.take().or_else(|| newest.cast.take()).map(OutboxItem::Text);
+        let mail = text.or_else(|| newest.frame.take().map(OutboxItem::Frame));
         if newest.status.is_none() && newest.cast.is_none() && newest.frame.is_none() {
             waiting.newest.remove(&session);
             waiting.last = session;
@@ -143,7 +148,7 @@ impl Outbox {
     }
 
     /// Waits until there may be something to send.
-    pub(crate) async fn ready(&self) {
+    pub(crate) async fn wait_until_ready(&self) {
         self.ready.notified().await;
     }
 }
@@ -151,36 +156,36 @@ impl Outbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::{Answer, Outcome};
+    use crate::protocol::{ReplyBody, ReplyResult};
 
     fn reply(id: u32) -> Reply {
-        Reply { id, result: Outcome::Answer(Answer::Done) }
+        Reply { id, result: ReplyResult::Answer(ReplyBody::Done) }
     }
 
-    fn notice(text: &str) -> Notice {
+    fn notice(text: &str) -> Notification {
         let (program, worlds, open) = (text.to_string(), Vec::new(), Vec::new());
-        Notice::Hello { version: 1, program, worlds, read_only: false, open }
+        Notification::Hello { version: 1, program, worlds, read_only: false, open }
     }
 
     fn all(outbox: &Outbox) -> Vec<String> {
         let name = |mail| match mail {
-            Mail::Frame(bytes) => format!("frame {}", bytes[0]),
-            Mail::Text(text) if text.contains("\"id\"") => "reply".to_string(),
-            Mail::Text(text) => text.split('"').nth(9).expect("a program").to_string(),
+            OutboxItem::Frame(bytes) => format!("frame {}", bytes[0]),
+            OutboxItem::Text(text) if text.contains("\"id\"") => "reply".to_string(),
+            OutboxItem::Text(text) => text.split('"').nth(9).expect("a program").to_string(),
         };
-        std::iter::from_fn(|| outbox.next()).map(name).collect()
+        std::iter::from_fn(|| outbox.pop()).map(name).collect()
     }
 
     #[test]
     fn replies_go_first_and_of_frames_and_states_the_newest_alone() {
         let outbox = Outbox::default();
-        assert!(!outbox.frame(1, Some(&notice("cast 1")), vec![1]));
-        assert!(outbox.frame(1, None, vec![2]));
-        outbox.status(1, &notice("old"));
-        outbox.status(1, &notice("new"));
+        assert!(!outbox.send_frame(1, Some(&notice("cast 1")), vec![1]));
+        assert!(outbox.send_frame(1, None, vec![2]));
+        outbox.send_status(1, &notice("old"));
+        outbox.send_status(1, &notice("new"));
         outbox.expect_reply();
         assert_eq!(outbox.backlog(), 1);
-        outbox.reply(&reply(1));
+        outbox.send_reply(&reply(1));
         assert_eq!(outbox.backlog(), 1);
         assert_eq!(all(&outbox), ["reply", "new", "cast 1", "frame 2"]);
         assert_eq!(outbox.backlog(), 0);
@@ -189,17 +194,17 @@ mod tests {
     #[test]
     fn sessions_have_their_turns() {
         let outbox = Outbox::default();
-        assert!([3, 1, 2].into_iter().all(|k| !outbox.frame(k, None, vec![k as u8])));
-        assert_eq!(outbox.next(), Some(Mail::Frame(vec![1])));
-        outbox.frame(1, None, vec![9]);
+        assert!([3, 1, 2].into_iter().all(|k| !outbox.send_frame(k, None, vec![k as u8])));
+        assert_eq!(outbox.pop(), Some(OutboxItem::Frame(vec![1])));
+        outbox.send_frame(1, None, vec![9]);
         assert_eq!(all(&outbox), ["frame 2", "frame 3", "frame 9"]);
     }
 
     #[test]
     fn what_was_taken_back_is_not_sent() {
         let outbox = Outbox::default();
-        outbox.frame(1, None, vec![1]);
+        outbox.send_frame(1, None, vec![1]);
         assert!(outbox.clear(1) && !outbox.clear(1));
-        assert_eq!(outbox.next(), None);
+        assert_eq!(outbox.pop(), None);
     }
 }

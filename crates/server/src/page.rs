@@ -1,6 +1,6 @@
 //! The page: files that `build.rs` has put into the program.
 
-use crate::zip;
+use crate::compress;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, ETAG, IF_NONE_MATCH, VARY,
 };
@@ -23,14 +23,14 @@ struct Asset {
 include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
 /// Files that are smaller as gzip, made once.
-static ZIPPED: LazyLock<BTreeMap<&str, Vec<u8>>> = LazyLock::new(|| {
-    let zipped = ASSETS.iter().map(|asset| (asset, zip::gzip(asset.bytes)));
+static GZIPPED: LazyLock<BTreeMap<&str, Vec<u8>>> = LazyLock::new(|| {
+    let zipped = ASSETS.iter().map(|asset| (asset, compress::gzip(asset.bytes)));
     let smaller = zipped.filter(|(asset, zipped)| zipped.len() < asset.bytes.len());
     smaller.map(|(asset, zipped)| (asset.path, zipped)).collect()
 });
 
 /// Files in this folder have a digest in their names: a loaded file stays right.
-const LASTING: &str = "assets/";
+const IMMUTABLE_FOLDER: &str = "assets/";
 
 /// Returns the file at a path. A path without a dot is the page itself, so that its own addresses can be opened.
 pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
@@ -40,9 +40,9 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     let Some(asset) = ASSETS.iter().find(|asset| asset.path == name) else {
         return (StatusCode::NOT_FOUND, "There is no such file.\n").into_response();
     };
-    let is_lasting = asset.path.starts_with(LASTING);
+    let is_lasting = asset.path.starts_with(IMMUTABLE_FOLDER);
     let cache = if is_lasting { "public, max-age=31536000, immutable" } else { "no-cache" };
-    let zipped = ZIPPED.get(asset.path).filter(|_| zip::is_taken(headers));
+    let zipped = GZIPPED.get(asset.path).filter(|_| compress::accepts_gzip(headers));
     // A different sequence of bytes needs a different tag.
     let tag = match zipped {
         Some(_) => asset.tag.trim_end_matches('"').to_string() + "-gzip\"",

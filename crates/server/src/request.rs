@@ -1,15 +1,15 @@
 //! Reading of requests: every message of a page gets an answer.
 
-use crate::protocol::{Call, Problem, Request, SessionId};
+use crate::protocol::{Method, Problem, Request, SessionId};
 use serde::Deserialize;
 
 /// Longest text of a request, in bytes: room for the longest scenario that can be read (16 MiB), and for the one that
 /// it replaces, both as JSON.
-pub const MOST_REQUEST_BYTES: usize = 40 << 20;
+pub const MAX_REQUEST_BYTES: usize = 40 << 20;
 
 /// A request of which only the number can be read.
 #[derive(Deserialize)]
-struct Numbered {
+struct RequestNumber {
     id: u32,
 }
 
@@ -18,24 +18,24 @@ struct Numbered {
 /// # Errors
 /// With the number of the request, 0 if it cannot be found, and the problem.
 pub fn decode(text: &str) -> Result<Request, Box<(u32, Problem)>> {
-    if text.len() > MOST_REQUEST_BYTES {
-        let cause = format!("it has more than {MOST_REQUEST_BYTES} bytes");
+    if text.len() > MAX_REQUEST_BYTES {
+        let cause = format!("it has more than {MAX_REQUEST_BYTES} bytes");
         let remedy = "make the text shorter, or change the file with another program";
-        return Err(Box::new((number(text), Problem::new("request", cause, remedy))));
+        return Err(Box::new((request_number(text), Problem::new("request", cause, remedy))));
     }
     serde_json::from_str(text).map_err(|error| {
-        let id = number(text);
+        let id = request_number(text);
         let cause = format!("it cannot be read: {error}");
         Box::new((id, Problem::new("request", cause, "send JSON as the protocol has it")))
     })
 }
 
 /// Returns the number of a request that is not read as a whole, 0 if it has none.
-fn number(text: &str) -> u32 {
-    serde_json::from_str(text).map_or(0, |Numbered { id }| id)
+fn request_number(text: &str) -> u32 {
+    serde_json::from_str(text).map_or(0, |RequestNumber { id }| id)
 }
 
-impl Call {
+impl Method {
     /// Returns the session asked, if it is a question to one.
     pub(crate) fn session(&self) -> Option<SessionId> {
         match *self {
@@ -66,24 +66,24 @@ impl Call {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::{Speed, Subject};
+    use crate::protocol::{OpenTarget, Speed};
     use proptest::prelude::*;
 
     #[test]
     fn requests_are_read_as_the_protocol_has_them() {
         for (text, call) in [
-            (r#"{"do":"files"}"#, Call::Files { folder: None }),
+            (r#"{"do":"files"}"#, Method::Files { folder: None }),
             (
                 r#"{"do":"open","what":{"kind":"new","world":"robots"},"seed":null}"#,
-                Call::Open { what: Subject::New { world: "robots".into() }, seed: None },
+                Method::Open { what: OpenTarget::New { world: "robots".into() }, seed: None },
             ),
             (
                 r#"{"do":"play","session":3,"speed":{"times":2.5}}"#,
-                Call::Play { session: 3, speed: Speed::Times(2.5) },
+                Method::Play { session: 3, speed: Speed::Times(2.5) },
             ),
             (
                 r#"{"do":"play","session":3,"speed":"fastest"}"#,
-                Call::Play { session: 3, speed: Speed::Fastest },
+                Method::Play { session: 3, speed: Speed::Fastest },
             ),
         ] {
             let request = decode(&format!(r#"{{"id":7,"call":{text}}}"#)).expect(text);
@@ -104,7 +104,7 @@ mod tests {
         ] {
             assert_eq!(decode(text).map_err(|unread| unread.0), Err(id), "{text}");
         }
-        let long = format!(r#"{{"id":8,"call":{{"text":"{}"}}}}"#, " ".repeat(MOST_REQUEST_BYTES));
+        let long = format!(r#"{{"id":8,"call":{{"text":"{}"}}}}"#, " ".repeat(MAX_REQUEST_BYTES));
         let (id, problem) = *decode(&long).expect_err("too long");
         assert!(id == 8 && problem.cause.contains("bytes"));
     }

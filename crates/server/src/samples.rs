@@ -1,23 +1,23 @@
 //! Samples of all numbers that a run measures, for lines against time.
 
-use crate::protocol::{Answer, MetricName};
+use crate::protocol::{MetricName, ReplyBody};
 use serde_json::Value;
 use sidestep::kernel::Cycle;
-use sidestep::scenario::{Meaning, Told, told};
+use sidestep::scenario::{MetricInfo, MetricLabel, metric_label};
 use std::time::Duration;
 
 /// The largest number of samples; beyond it they are thinned by half.
-const MOST_SAMPLES: usize = 2048;
+const MAX_SAMPLES: usize = 2048;
 /// The largest number of metrics; further ones are left out.
-const MOST_METRICS: usize = 400;
+const MAX_METRICS: usize = 400;
 /// The least time between two samples, before any thinning.
-const SPACING: Duration = Duration::from_millis(100);
+const MIN_SPACING: Duration = Duration::from_millis(100);
 /// The least ratio of total time to the time spent on sampling.
-const COST: u32 = 100;
+const MIN_COST_RATIO: u32 = 100;
 
 /// The samples of one run.
 pub(crate) struct Samples {
-    meanings: &'static [Meaning],
+    meanings: &'static [MetricInfo],
     names: Vec<MetricName>,
     cycles: Vec<Cycle>,
     /// Values in each sample, metric by metric.
@@ -29,14 +29,14 @@ pub(crate) struct Samples {
 
 impl Samples {
     /// Returns a store for the metrics of a world, without anything in it.
-    pub(crate) fn new(meanings: &'static [Meaning]) -> Self {
+    pub(crate) fn new(meanings: &'static [MetricInfo]) -> Self {
         Self {
             meanings,
             names: Vec::new(),
             cycles: Vec::new(),
             values: Vec::new(),
             thinned: 0,
-            spacing: SPACING,
+            spacing: MIN_SPACING,
             took: Duration::ZERO,
         }
     }
@@ -44,7 +44,7 @@ impl Samples {
     /// Returns whether a sample of a cycle is wanted, a given time after the last one.
     pub(crate) fn is_due(&self, cycle: Cycle, since: Duration) -> bool {
         let Some(&last) = self.cycles.last() else { return true };
-        cycle > last && since >= self.spacing.max(self.took.saturating_mul(COST))
+        cycle > last && since >= self.spacing.max(self.took.saturating_mul(MIN_COST_RATIO))
     }
 
     /// Returns whether a cycle comes after all samples.
@@ -53,30 +53,30 @@ impl Samples {
     }
 
     /// Keeps the metrics of a cycle, and the time that it took to get them.
-    pub(crate) fn keep(&mut self, cycle: Cycle, metrics: &Value, took: Duration) {
+    pub(crate) fn push(&mut self, cycle: Cycle, metrics: &Value, took: Duration) {
         self.took = took;
         let mut found = Vec::new();
-        numbers(metrics, "", &mut found);
+        collect_numbers(metrics, "", &mut found);
         let row = self.cycles.len();
         self.cycles.push(cycle);
         self.values.iter_mut().for_each(|column| column.push(None));
         for (key, value) in found {
-            if let Some(metric) = self.metric(key) {
+            if let Some(metric) = self.column(key) {
                 self.values[metric][row] = Some(value);
             }
         }
-        if self.cycles.len() > MOST_SAMPLES {
+        if self.cycles.len() > MAX_SAMPLES {
             self.thin();
         }
     }
 
     /// Returns the column of a metric, a new one for a new metric.
-    fn metric(&mut self, key: String) -> Option<usize> {
+    fn column(&mut self, key: String) -> Option<usize> {
         let known = self.names.iter().position(|name| name.key == key);
-        if known.is_some() || self.names.len() == MOST_METRICS {
+        if known.is_some() || self.names.len() == MAX_METRICS {
             return known;
         }
-        let Told { words, unit, .. } = told(self.meanings, &key);
+        let MetricLabel { words, unit, .. } = metric_label(self.meanings, &key);
         self.names.push(MetricName { key, words, unit: unit.unwrap_or_default().into() });
         self.values.push(vec![None; self.cycles.len()]);
         Some(self.names.len() - 1)
@@ -94,9 +94,9 @@ impl Samples {
     }
 
     /// Returns the samples from a number on.
-    pub(crate) fn answer(&self, from: u32) -> Answer {
+    pub(crate) fn answer(&self, from: u32) -> ReplyBody {
         let first = (from as usize).min(self.cycles.len());
-        Answer::Metrics {
+        ReplyBody::Metrics {
             names: self.names.clone(),
             first: first as u32,
             thinned: self.thinned,
@@ -107,14 +107,14 @@ impl Samples {
 }
 
 /// Collects the numbers of a tree, named by the path to them; lists are no metrics.
-fn numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
+fn collect_numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
     match tree {
         Value::Number(number) => {
             found.extend(number.as_f64().map(|number| (path.to_string(), number)));
         }
         Value::Object(members) => members.iter().for_each(|(key, value)| match path {
-            "" => numbers(value, key, found),
-            _ => numbers(value, &format!("{path}.{key}"), found),
+            "" => collect_numbers(value, key, found),
+            _ => collect_numbers(value, &format!("{path}.{key}"), found),
         }),
         _ => {}
     }
@@ -134,7 +134,7 @@ mod tests {
     }
 
     fn told_of(samples: &Samples, from: u32) -> Told {
-        let Answer::Metrics { names, first, cycles, values, .. } = samples.answer(from) else {
+        let ReplyBody::Metrics { names, first, cycles, values, .. } = samples.answer(from) else {
             panic!("no metrics");
         };
         Told { keys: names.into_iter().map(|name| name.key).collect(), first, cycles, values }
@@ -143,8 +143,12 @@ mod tests {
     #[test]
     fn numbers_are_named_by_the_way_to_them_and_new_ones_have_no_past() {
         let mut samples = Samples::new(&[]);
-        samples.keep(0, &json!({ "a": 1, "list": [1], "of": { "b": 2.5, "word": "x" } }), SPACING);
-        samples.keep(5, &json!({ "a": 2, "of": { "c": 3 } }), SPACING);
+        samples.push(
+            0,
+            &json!({ "a": 1, "list": [1], "of": { "b": 2.5, "word": "x" } }),
+            MIN_SPACING,
+        );
+        samples.push(5, &json!({ "a": 2, "of": { "c": 3 } }), MIN_SPACING);
         let all = told_of(&samples, 0);
         assert_eq!((all.first, all.keys), (0, ["a", "of.b", "of.c"].map(String::from).into()));
         assert_eq!(all.cycles, [0.0, 5.0]);
@@ -158,21 +162,24 @@ mod tests {
     #[test]
     fn samples_stay_within_their_bound_and_keep_the_first() {
         let mut samples = Samples::new(&[]);
-        (0..5000).for_each(|cycle| samples.keep(cycle, &json!({ "n": cycle }), Duration::ZERO));
+        (0..5000).for_each(|cycle| samples.push(cycle, &json!({ "n": cycle }), Duration::ZERO));
         let Told { cycles, values, .. } = told_of(&samples, 0);
-        assert!(cycles.len() <= MOST_SAMPLES && cycles.len() > MOST_SAMPLES / 4);
+        assert!(cycles.len() <= MAX_SAMPLES && cycles.len() > MAX_SAMPLES / 4);
         assert_eq!(cycles[0], 0.0);
         let same = |(cycle, value): (&f64, &Option<f64>)| Some(*cycle) == *value;
         assert!(cycles.iter().zip(&values[0]).all(same));
-        assert!(samples.thinned > 0 && samples.spacing > SPACING);
+        assert!(samples.thinned > 0 && samples.spacing > MIN_SPACING);
     }
 
     #[test]
     fn a_sample_is_wanted_of_later_cycles_alone() {
         let mut samples = Samples::new(&[]);
         assert!(samples.is_due(0, Duration::ZERO));
-        samples.keep(7, &json!({}), Duration::from_millis(5));
-        assert!(!samples.is_due(7, SPACING * 100) && !samples.is_new(7));
-        assert!(samples.is_due(8, SPACING * 5) && !samples.is_due(8, SPACING), "one in a hundred");
+        samples.push(7, &json!({}), Duration::from_millis(5));
+        assert!(!samples.is_due(7, MIN_SPACING * 100) && !samples.is_new(7));
+        assert!(
+            samples.is_due(8, MIN_SPACING * 5) && !samples.is_due(8, MIN_SPACING),
+            "one in a hundred"
+        );
     }
 }

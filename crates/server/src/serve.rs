@@ -1,6 +1,6 @@
 //! Connections: taken, served for a time, and ended. No silent one keeps its place.
 
-use crate::doors::{Doors, Place};
+use crate::limits::{ConnectionLimiter, ConnectionPermit};
 use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -17,7 +17,7 @@ use tokio::time::{sleep, timeout};
 
 /// The patience with connections that are no sockets.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Patience {
+pub(crate) struct Timeouts {
     /// The time for the head of a request, and between two requests.
     head: Duration,
     /// The time after which a connection ends with the answer that is under way; the browser opens another one.
@@ -26,7 +26,7 @@ pub(crate) struct Patience {
     reading: Duration,
 }
 
-impl Default for Patience {
+impl Default for Timeouts {
     fn default() -> Self {
         let [head, longest, reading] = [20, 600, 60].map(Duration::from_secs);
         Self { head, longest, reading }
@@ -34,12 +34,12 @@ impl Default for Patience {
 }
 
 /// The time that an answer under way has when a connection ends.
-const GRACE: Duration = Duration::from_secs(1);
+const GRACE_TIMEOUT: Duration = Duration::from_secs(1);
 /// The wait where the system gives no connections, because too many files are open.
-const PAUSE: Duration = Duration::from_millis(500);
+const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(500);
 /// The number of connections refused with an answer at a time.
-const MOST_TOLD: usize = 32;
-const TOO_MANY: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
+const MAX_REFUSALS: usize = 32;
+const TOO_MANY_RESPONSE: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
     connection: close\r\ncontent-length: 63\r\n\r\nThere are too many connections: close pages, and try it again.\n";
 
 /// Answers requests until the server ends, as `ending` signals.
@@ -47,28 +47,34 @@ pub(crate) async fn serve(
     listener: TcpListener,
     routes: Router,
     ending: watch::Receiver<bool>,
-    patience: Patience,
+    patience: Timeouts,
 ) {
-    let (doors, told) = (Arc::new(Doors::default()), Arc::new(Semaphore::new(MOST_TOLD)));
+    let (doors, told) =
+        (Arc::new(ConnectionLimiter::default()), Arc::new(Semaphore::new(MAX_REFUSALS)));
     loop {
         let accepted = tokio::select! {
-            () = ended(ending.clone()) => break,
+            () = wait_for_shutdown(ending.clone()) => break,
             accepted = listener.accept() => accepted,
         };
         let Ok((stream, address)) = accepted else {
-            sleep(PAUSE).await;
+            sleep(ACCEPT_RETRY_DELAY).await;
             continue;
         };
         // With it frames are sent at once; without it they are only late.
         let _ = stream.set_nodelay(true);
-        match (doors.enter(address.ip()), told.clone().try_acquire_owned()) {
+        match (doors.acquire(address.ip()), told.clone().try_acquire_owned()) {
             (Some(place), _) => {
-                let connection = Connection { stream, stuck: Stuck::default(), _place: place };
-                tokio::spawn(converse(connection, routes.clone(), ending.clone(), patience));
+                let connection = Connection { stream, stuck: StallTimer::default(), _place: place };
+                tokio::spawn(serve_connection(
+                    connection,
+                    routes.clone(),
+                    ending.clone(),
+                    patience,
+                ));
             }
             (None, Ok(turn)) => drop(tokio::spawn(async move {
                 let _turn = turn;
-                let _ = timeout(GRACE, turn_away(stream)).await;
+                let _ = timeout(GRACE_TIMEOUT, refuse(stream)).await;
             })),
             (None, Err(_)) => {}
         }
@@ -78,16 +84,16 @@ pub(crate) async fn serve(
             sleep(Duration::from_millis(5)).await;
         }
     };
-    let _ = timeout(GRACE, emptied).await;
+    let _ = timeout(GRACE_TIMEOUT, emptied).await;
 }
 
 /// Serves one connection, until it ends, becomes a socket, or has had its time. An answer that is under way then comes
 /// to its end, however long it takes to make or to send, unless its peer does not read it.
-async fn converse(
+async fn serve_connection(
     connection: Connection,
     routes: Router,
     ending: watch::Receiver<bool>,
-    patience: Patience,
+    patience: Timeouts,
 ) {
     let stuck = connection.stuck.clone();
     let mut http = http1::Builder::new();
@@ -96,33 +102,33 @@ async fn converse(
     let mut served = pin!(served.with_upgrades());
     tokio::select! {
         _ = &mut served => return,
-        () = ended(ending.clone()) => {}
+        () = wait_for_shutdown(ending.clone()) => {}
         () = sleep(patience.longest) => {
             served.as_mut().graceful_shutdown();
             tokio::select! {
                 _ = &mut served => return,
-                () = ended(ending) => {}
-                () = stuck.lasts(patience.reading) => return,
+                () = wait_for_shutdown(ending) => {}
+                () = stuck.wait_for_stall(patience.reading) => return,
             }
         }
     }
     served.as_mut().graceful_shutdown();
-    let _ = timeout(GRACE, served).await;
+    let _ = timeout(GRACE_TIMEOUT, served).await;
 }
 
 /// The instant since which a peer has taken none of the written bytes, as long as it takes none.
 #[derive(Debug, Clone, Default)]
-struct Stuck(Arc<Mutex<Option<Instant>>>);
+struct StallTimer(Arc<Mutex<Option<Instant>>>);
 
-impl Stuck {
+impl StallTimer {
     /// Notes whether a write had to wait.
-    fn note(&self, waits: bool) {
+    fn record(&self, waits: bool) {
         let mut since = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *since = if waits { since.or_else(|| Some(Instant::now())) } else { None };
     }
 
     /// Waits until the peer has taken nothing for the given time.
-    async fn lasts(&self, longest: Duration) {
+    async fn wait_for_stall(&self, longest: Duration) {
         loop {
             let since = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
             match since.map_or(longest, |since| longest.saturating_sub(since.elapsed())) {
@@ -134,14 +140,14 @@ impl Stuck {
 }
 
 /// Waits until the server ends.
-pub(crate) async fn ended(mut ending: watch::Receiver<bool>) {
+pub(crate) async fn wait_for_shutdown(mut ending: watch::Receiver<bool>) {
     // An error means that its owner is gone: then it ends, too.
     let _ = ending.wait_for(|ends| *ends).await;
 }
 
 /// Tells a peer that there are too many connections.
-async fn turn_away(mut stream: TcpStream) -> io::Result<()> {
-    stream.write_all(TOO_MANY).await?;
+async fn refuse(mut stream: TcpStream) -> io::Result<()> {
+    stream.write_all(TOO_MANY_RESPONSE).await?;
     stream.shutdown().await?;
     // Its request must be read, or the system may discard our answer.
     let mut said = [0; 1024];
@@ -152,8 +158,8 @@ async fn turn_away(mut stream: TcpStream) -> io::Result<()> {
 /// A connection, and its place among all.
 struct Connection {
     stream: TcpStream,
-    stuck: Stuck,
-    _place: Place,
+    stuck: StallTimer,
+    _place: ConnectionPermit,
 }
 
 impl AsyncRead for Connection {
@@ -173,7 +179,7 @@ impl AsyncWrite for Connection {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.stuck.note(written.is_pending());
+        self.stuck.record(written.is_pending());
         written
     }
 
@@ -199,7 +205,7 @@ mod tests {
         listener.set_nonblocking(true).expect("set");
         let (ends, ending) = watch::channel(false);
         let [head, reading] = [200, 2000].map(Duration::from_millis);
-        let patience = Patience { head, longest, reading };
+        let patience = Timeouts { head, longest, reading };
         std::thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
             runtime.expect("a runtime").block_on(async {
@@ -315,7 +321,7 @@ mod tests {
 
     #[test]
     fn the_refusal_has_the_length_that_it_names() {
-        let text = String::from_utf8_lossy(TOO_MANY);
+        let text = String::from_utf8_lossy(TOO_MANY_RESPONSE);
         let (head, body) = text.split_once("\r\n\r\n").expect("a head");
         assert!(
             head.ends_with(&format!("content-length: {}", body.len())),

@@ -1,6 +1,6 @@
 //! Files that a page may write: scenarios below the folders that were named at start, whole or not at all.
 
-use crate::files::Files;
+use crate::files::AllowedFiles;
 use crate::protocol::Problem;
 use serde_json::Value;
 use sidestep::scenario::Source;
@@ -9,13 +9,13 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The size of the largest file that is replaced.
-const MOST_BYTES: u64 = 16 << 20;
+const MAX_FILE_BYTES: u64 = 16 << 20;
 const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
 const BYTE_ORDER_MARK: &str = "\u{feff}";
 
 /// A file that a page may write.
 #[derive(Debug)]
-pub(crate) struct Target {
+pub(crate) struct WriteTarget {
     /// Its path as named.
     pub(crate) path: PathBuf,
     /// Its path without links.
@@ -23,26 +23,26 @@ pub(crate) struct Target {
 }
 
 /// A file that is replaced.
-struct Old {
+struct OldContent {
     text: String,
     has_mark: bool,
     permissions: Permissions,
 }
 
-impl Files {
+impl AllowedFiles {
     /// Returns the file that a page may write at a path.
     ///
     /// # Errors
     /// When it is elsewhere, hidden, or no plain file.
-    pub(crate) fn target(&self, path: &str) -> Result<Target, Problem> {
+    pub(crate) fn target(&self, path: &str) -> Result<WriteTarget, Problem> {
         let refuse = |cause| {
             let remedy = "name a .toml file below the folders that were named at start";
             Err(Problem::new(path, cause, remedy))
         };
         let named = PathBuf::from(path);
         // A missing folder and a forbidden one are reported alike.
-        let real = real(&named).unwrap_or_default();
-        let Some(below) = self.below_root(&real) else {
+        let real = real_path(&named).unwrap_or_default();
+        let Some(below) = self.relative_to_root(&real) else {
             return refuse("is in no folder below those that were named at start");
         };
         let is_hidden = |part: &std::ffi::OsStr| part.as_encoded_bytes().starts_with(b".");
@@ -51,9 +51,9 @@ impl Files {
         }
         match fs::symlink_metadata(&real) {
             Ok(found) if !found.is_file() => refuse("is no plain file"),
-            Ok(_) => Ok(Target { path: named, real }),
+            Ok(_) => Ok(WriteTarget { path: named, real }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Ok(Target { path: named, real })
+                Ok(WriteTarget { path: named, real })
             }
             Err(_) => refuse("cannot be read"),
         }
@@ -61,7 +61,7 @@ impl Files {
 }
 
 /// Returns the path without links of a file that exists, or that can be created.
-fn real(path: &Path) -> Option<PathBuf> {
+fn real_path(path: &Path) -> Option<PathBuf> {
     // A link to nowhere could be made to lead anywhere.
     if path.is_symlink() || path.exists() {
         return path.canonicalize().ok();
@@ -75,33 +75,34 @@ fn real(path: &Path) -> Option<PathBuf> {
 ///
 /// # Errors
 /// When it cannot be written, or is a foreign file and no scenario; then it stays as it was.
-pub(crate) fn replaced(
-    target: &Target,
+pub(crate) fn replace_file(
+    target: &WriteTarget,
     text: &str,
     is_own: bool,
     may_replace: impl Fn(Option<&str>) -> bool,
 ) -> Result<Option<String>, Problem> {
     let old = read(target)?;
     if let Some(old) = &old {
-        check(target, old, is_own)?;
+        check_replaceable(target, old, is_own)?;
     }
     let found = old.as_ref().map(|old| old.text.as_str());
     if !may_replace(found) {
         return Ok(old.map(|old| old.text));
     }
-    let growing = Growing::new(target).and_then(|growing| growing.filled(text, old.as_ref()));
-    let growing = growing.map_err(|error| unwritten(target, &error))?;
+    let growing =
+        PartialFile::new(target).and_then(|growing| growing.with_text(text, old.as_ref()));
+    let growing = growing.map_err(|error| write_error(target, &error))?;
     // Writing took a while.
     let again = read(target)?;
     match again
         .filter(|again| Some(again.text.as_str()) != found && !may_replace(Some(&again.text)))
     {
         Some(again) => Ok(Some(again.text)),
-        None => growing.finish(target).map(|()| None).map_err(|error| unwritten(target, &error)),
+        None => growing.finish(target).map(|()| None).map_err(|error| write_error(target, &error)),
     }
 }
 
-fn read(target: &Target) -> Result<Option<Old>, Problem> {
+fn read(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
     let told = |cause: String, remedy: &str| {
         Err(Problem::new(target.path.display().to_string(), cause, remedy))
     };
@@ -111,15 +112,15 @@ fn read(target: &Target) -> Result<Option<Old>, Problem> {
         Ok((bytes, _)) if bytes.starts_with(GZIP_MAGIC) => {
             told("is packed with gzip".into(), "unpack it, or save it under another name")
         }
-        Ok((bytes, _)) if bytes.len() as u64 > MOST_BYTES => {
-            told(format!("has more than {MOST_BYTES} bytes"), "save it under another name")
+        Ok((bytes, _)) if bytes.len() as u64 > MAX_FILE_BYTES => {
+            told(format!("has more than {MAX_FILE_BYTES} bytes"), "save it under another name")
         }
         Ok((bytes, permissions)) => match String::from_utf8(bytes) {
             Err(_) => told("is no text (UTF-8)".into(), "save it under another name"),
             Ok(text) => {
                 let plain = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
                 let has_mark = plain.is_some();
-                Ok(Some(Old { text: plain.unwrap_or(text), has_mark, permissions }))
+                Ok(Some(OldContent { text: plain.unwrap_or(text), has_mark, permissions }))
             }
         },
     }
@@ -129,12 +130,12 @@ fn try_read(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {
     let file = File::open(path)?;
     let permissions = file.metadata()?.permissions();
     let mut bytes = Vec::new();
-    file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
     Ok((bytes, permissions))
 }
 
 /// Refuses files that are not replaced even where a page insists.
-fn check(target: &Target, old: &Old, is_own: bool) -> Result<(), Problem> {
+fn check_replaceable(target: &WriteTarget, old: &OldContent, is_own: bool) -> Result<(), Problem> {
     let place = target.path.display().to_string();
     if old.permissions.readonly() {
         let remedy = "allow to write it, or save it under another name";
@@ -156,7 +157,7 @@ fn check(target: &Target, old: &Old, is_own: bool) -> Result<(), Problem> {
     }
 }
 
-fn unwritten(target: &Target, error: &io::Error) -> Problem {
+fn write_error(target: &WriteTarget, error: &io::Error) -> Problem {
     let remedy = match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room, and save again",
         _ => "check that its folder may be written, or save it elsewhere",
@@ -166,21 +167,21 @@ fn unwritten(target: &Target, error: &io::Error) -> Problem {
 }
 
 /// A file that is written beside the one that it will replace, and removed if it does not.
-struct Growing {
+struct PartialFile {
     path: PathBuf,
     file: File,
     is_done: bool,
 }
 
-impl Growing {
-    fn new(target: &Target) -> io::Result<Self> {
+impl PartialFile {
+    fn new(target: &WriteTarget) -> io::Result<Self> {
         let name = format!(".sidestep-{:016x}.part", getrandom::u64().map_err(io::Error::other)?);
         let path = target.real.with_file_name(name);
         let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
         Ok(Self { path, file, is_done: false })
     }
 
-    fn filled(mut self, text: &str, old: Option<&Old>) -> io::Result<Self> {
+    fn with_text(mut self, text: &str, old: Option<&OldContent>) -> io::Result<Self> {
         if let Some(old) = old {
             self.file.set_permissions(old.permissions.clone())?;
         }
@@ -192,7 +193,7 @@ impl Growing {
         Ok(self)
     }
 
-    fn finish(mut self, target: &Target) -> io::Result<()> {
+    fn finish(mut self, target: &WriteTarget) -> io::Result<()> {
         fs::rename(&self.path, &target.real)?;
         self.is_done = true;
         // The file is replaced by now, and either text is whole in any case. Not all file systems sync folders.
@@ -201,7 +202,7 @@ impl Growing {
     }
 }
 
-impl Drop for Growing {
+impl Drop for PartialFile {
     fn drop(&mut self) {
         if !self.is_done {
             let _ = fs::remove_file(&self.path);

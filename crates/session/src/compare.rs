@@ -1,11 +1,11 @@
 //! Comparison of a state that was computed again with the recorded one.
 
 use crate::Error;
-use crate::recorded::has_rows;
+use crate::run_tables::has_rows;
 use sidestep::kernel::InputError;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
-use sidestep::kernel::view::{PlaceRows, Who};
+use sidestep::kernel::view::{BodyId, PositionColumns};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,14 +16,14 @@ use std::path::Path;
 ///
 /// # Errors
 /// When a pose differs, or the folder is damaged.
-pub(crate) fn compare(
+pub(crate) fn compare_poses(
     run: &dyn Simulation,
     mut again: Box<dyn Simulation>,
     folder: &Path,
 ) -> Result<usize, Error> {
     let cycle = run.cycle();
-    let mut recorded: Vec<(PlaceRows, Table)> = Vec::new();
-    for rows in run.place_rows().into_iter().filter(|rows| has_rows(folder, rows.table)) {
+    let mut recorded: Vec<(PositionColumns, Table)> = Vec::new();
+    for rows in run.position_columns().into_iter().filter(|rows| has_rows(folder, rows.table)) {
         let table = read_table(folder, rows.table, cycle..=cycle)?;
         if table.rows() > 0 {
             recorded.push((rows, table));
@@ -36,62 +36,63 @@ pub(crate) fn compare(
         InputError::new(folder.display(), e.to_string(), "this is a bug: please report it")
     };
     again.restore(&run.checkpoint()).map_err(rejected)?;
-    again.begin_recording();
+    again.start_recording();
     let mut memory = MemoryRecorder::new(&again.schemas());
     again.advance(1);
     again.record(&mut memory)?;
     let mut different = Vec::new();
     for (rows, table) in &recorded {
         let now = |name: &str| memory.column(rows.table, name);
-        different.extend(differences(rows, table, now));
+        different.extend(differing_bodies(rows, table, now));
     }
     different.sort_unstable();
     different.dedup();
     match different.first() {
-        None => Ok(recorded.iter().map(|(rows, table)| bodies(rows, table)).sum()),
-        Some(&first) => Err(differs(cycle, different.len(), first)),
+        None => Ok(recorded.iter().map(|(rows, table)| count_bodies(rows, table)).sum()),
+        Some(&first) => Err(pose_mismatch(cycle, different.len(), first)),
     }
 }
 
-fn differs(cycle: u64, bodies: usize, first: Who) -> Error {
+fn pose_mismatch(cycle: u64, bodies: usize, first: BodyId) -> Error {
     let cause = format!(
         "at cycle {cycle} the poses of {bodies} bodies differ from what was recorded, first of {first}"
     );
     let remedy = "the folder was changed, or this is a bug: please report it with the folder";
-    Error::stopped(cause, remedy)
+    Error::other(cause, remedy)
 }
 
 /// Returns the bodies with recorded rows that differ from the present ones.
-fn differences<'a>(
-    rows: &PlaceRows,
+fn differing_bodies<'a>(
+    rows: &PositionColumns,
     table: &Table,
     now: impl Fn(&str) -> Option<&'a Values>,
-) -> Vec<Who> {
+) -> Vec<BodyId> {
     let names: Vec<&str> = table.schema.columns.iter().map(|c| c.name.as_str()).collect();
-    let recorded = by_body(rows, &names, |name| table.column(name));
-    let present = by_body(rows, &names, now);
-    let differs = |(of, cells): (&Who, &Vec<u64>)| (present.get(of) != Some(cells)).then_some(*of);
+    let recorded = bits_by_body(rows, &names, |name| table.column(name));
+    let present = bits_by_body(rows, &names, now);
+    let differs =
+        |(of, cells): (&BodyId, &Vec<u64>)| (present.get(of) != Some(cells)).then_some(*of);
     recorded.iter().filter_map(differs).collect()
 }
 
 /// Returns the number of bodies that have rows.
-fn bodies(rows: &PlaceRows, table: &Table) -> usize {
-    by_body(rows, &[], |name| table.column(name)).len()
+fn count_bodies(rows: &PositionColumns, table: &Table) -> usize {
+    bits_by_body(rows, &[], |name| table.column(name)).len()
 }
 
 /// Returns the bits of all columns by body, of all its rows.
-fn by_body<'a>(
-    rows: &PlaceRows,
+fn bits_by_body<'a>(
+    rows: &PositionColumns,
     names: &[&str],
     column: impl Fn(&str) -> Option<&'a Values>,
-) -> BTreeMap<Who, Vec<u64>> {
+) -> BTreeMap<BodyId, Vec<u64>> {
     let word = |name: &str, row| column(name).map(|values| bits(values, row) as u32);
     let columns: Vec<Option<&Values>> = names.iter().map(|name| column(name)).collect();
     let count = column(rows.number).map_or(0, Values::len);
-    let mut all: BTreeMap<Who, Vec<u64>> = BTreeMap::new();
+    let mut all: BTreeMap<BodyId, Vec<u64>> = BTreeMap::new();
     for row in 0..count {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
-        let of = Who::new(rows.kind, number, rows.part.and_then(|part| word(part, row)));
+        let of = BodyId::new(rows.kind, number, rows.part.and_then(|part| word(part, row)));
         // A missing value has bits that differ from those of every other value.
         let cells = columns.iter().flat_map(|values| match values {
             Some(values) if !values.is_missing(row) => [1, bits(values, row)],
@@ -118,21 +119,21 @@ fn bits(values: &Values, row: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::{Axis, Kind};
+    use sidestep::kernel::view::{Axis, BodyKind};
 
     #[test]
     fn one_changed_cell_is_found() {
-        let rows = PlaceRows {
+        let rows = PositionColumns {
             table: "trajectories",
-            kind: Kind::Connector,
+            kind: BodyKind::Connector,
             number: "chain",
             part: Some("connector"),
             axes: vec![Axis::meters("x_m")],
             plane: None,
             is_corner: false,
-            ahead: None,
-            every: 1,
-            worth: 1,
+            heading: None,
+            interval: 1,
+            history: 1,
         };
         let column = |name: &str, x: f64| match name {
             "x_m" => Values::F64(vec![1.5, x].into()),
@@ -143,14 +144,16 @@ mod tests {
         let table = |x| names.map(|name| (name, column(name, x)));
         let bodies = |x| {
             let table: &'static _ = Box::leak(Box::new(table(x)));
-            by_body(&rows, &names, |name| table.iter().find(|(n, _)| *n == name).map(|(_, v)| v))
+            bits_by_body(&rows, &names, |name| {
+                table.iter().find(|(n, _)| *n == name).map(|(_, v)| v)
+            })
         };
         let (was, is) = (bodies(2.0), bodies(2.0 + f64::EPSILON * 2.0));
         assert_eq!(was, bodies(2.0));
-        let same = |of: &Who| was[of] == is[of];
+        let same = |of: &BodyId| was[of] == is[of];
         assert!(
-            same(&Who::new(Kind::Connector, 0, Some(3)))
-                && !same(&Who::new(Kind::Connector, 0, Some(4)))
+            same(&BodyId::new(BodyKind::Connector, 0, Some(3)))
+                && !same(&BodyId::new(BodyKind::Connector, 0, Some(4)))
         );
     }
 }

@@ -25,10 +25,10 @@ pub enum Error {
     #[error(
         "interrupted within cycle {0}, which is lost; a run folder continues from its last checkpoint"
     )]
-    WithinACycle(Cycle),
+    InterruptedInCycle(Cycle),
     /// Anything else that stopped the work, with its remedy.
     #[error("{cause}\n  help: {remedy}")]
-    Stopped {
+    Other {
         /// The reason.
         cause: String,
         /// The remedy.
@@ -38,13 +38,13 @@ pub enum Error {
 
 impl Error {
     /// Returns a stop with its cause and remedy.
-    pub fn stopped(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Stopped { cause: cause.into(), remedy: remedy.into() }
+    pub fn other(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Other { cause: cause.into(), remedy: remedy.into() }
     }
 
     /// Returns the error of a file that could not be written.
-    pub fn write(path: &Path, error: &std::io::Error) -> Self {
+    pub fn cannot_write(path: &Path, error: &std::io::Error) -> Self {
         let remedy = "check the folder, its permissions and the space on the disk";
-        Self::stopped(format!("cannot write {}: {error}", path.display()), remedy)
+        Self::other(format!("cannot write {}: {error}", path.display()), remedy)
     }
 }

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 /// Returns a path for programs and people to read. One that is not valid text is shown with marks in place of the
 /// invalid parts: JSON cannot express it otherwise, and a result must not be lost because of its name.
-pub fn shown(path: impl AsRef<Path>) -> String {
+pub fn display_path(path: impl AsRef<Path>) -> String {
     path.as_ref().display().to_string()
 }
 
 /// Returns the target of a path, links resolved as far as it exists: two paths to one place are equal.
-pub(crate) fn whereabouts_of(path: &Path) -> PathBuf {
+pub(crate) fn resolve_path(path: &Path) -> PathBuf {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let real = |above: &Path| {
         let rest = whole.strip_prefix(above).ok()?;
@@ -27,21 +27,21 @@ pub(crate) fn whereabouts_of(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// An I/O error.
-pub fn replace(
+pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> std::result::Result<(), Error> {
     let mut growing = path.as_os_str().to_owned();
     growing.push(format!(".{}.partial", std::process::id()));
     let growing = Path::new(&growing);
-    fill(growing, write)
+    write_file(growing, write)
         .and_then(|()| std::fs::rename(growing, path))
         .inspect_err(|_| drop(std::fs::remove_file(growing)))
-        .map_err(|e| Error::write(path, &e))
+        .map_err(|e| Error::cannot_write(path, &e))
 }
 
 /// Fills a file, in a folder that is created if there is none.
-fn fill(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+fn write_file(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
@@ -59,8 +59,8 @@ mod tests {
     fn what_cannot_be_written_leaves_the_old_file_and_no_other() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.txt");
-        replace(&path, |f| f.write_all(b"old")).expect("written");
-        let fails = replace(&path, |f| {
+        write_atomically(&path, |f| f.write_all(b"old")).expect("written");
+        let fails = write_atomically(&path, |f| {
             f.write_all(b"half")?;
             Err(std::io::Error::other("no"))
         });
@@ -74,14 +74,14 @@ mod tests {
     fn a_path_that_is_no_text_is_shown() {
         use std::os::unix::ffi::OsStrExt;
         let path = std::ffi::OsStr::from_bytes(b"ou\xfft");
-        assert_eq!(shown(path), "ou\u{fffd}t");
+        assert_eq!(display_path(path), "ou\u{fffd}t");
     }
 
     #[test]
     fn the_folder_of_a_file_is_made_with_it() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a/b/c.txt");
-        replace(&path, |f| f.write_all(b"new")).expect("written");
+        write_atomically(&path, |f| f.write_all(b"new")).expect("written");
         assert_eq!(std::fs::read(&path).expect("read"), b"new");
     }
 }

@@ -1,18 +1,18 @@
 //! The language in which a command asks the program `sidestep-link` to fly a fleet, and in which that answers.
 //!
-//! One line of JSON goes in, a [`Job`]; lines of JSON come out, [`Told`]. The program ends in good order when its
+//! One line of JSON goes in, a [`Job`]; lines of JSON come out, [`LinkMessage`]. The program ends in good order when its
 //! standard input ends: the process that started it is gone, or wants it to end. So no process is left over, however
 //! its parent has ended.
 
 use serde::{Deserialize, Serialize};
+use sidestep::kernel::text::KeyValues;
 use sidestep::kernel::view::{Frame, Scenery};
-use sidestep::kernel::words::Lines;
 use sidestep::kernel::{Cycle, EntityId, InputError};
 use std::fmt;
 use std::path::PathBuf;
 
 /// The name of the program.
-pub const PROGRAM: &str = "sidestep-link";
+pub const LINK_PROGRAM: &str = "sidestep-link";
 
 /// A job for the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ impl fmt::Display for AgentName {
 
 /// A scenario, and the build that is to fly it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Flown {
+pub struct JobScenario {
     /// The scenario's file.
     pub file: PathBuf,
     /// Changes of it, as `key=value`.
@@ -86,9 +86,9 @@ pub struct Flown {
 
 /// Settings that a server and its nodes share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Common {
+pub struct CommonSettings {
     /// The scenario.
-    pub flown: Flown,
+    pub flown: JobScenario,
     /// Certificates, where links are encrypted and both ends prove their identity.
     pub tls: Option<Tls>,
     /// Time in seconds after which a party that is not heard counts as gone.
@@ -105,11 +105,11 @@ pub struct Common {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FleetJob {
     /// Settings that nodes have, too.
-    pub common: Common,
+    pub common: CommonSettings,
     /// Number of nodes that are started here, of the agents with the lowest ids; all of them unless given.
     pub nodes: Option<usize>,
     /// The course of time.
-    pub clock: Clock,
+    pub clock: ClockMode,
     /// The way from node to node.
     pub topology: Topology,
     /// Endpoints at which the server listens, e.g. `tcp/127.0.0.1:0`.
@@ -126,7 +126,7 @@ pub struct FleetJob {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NodeJob {
     /// Settings that the server has, too.
-    pub common: Common,
+    pub common: CommonSettings,
     /// Its agent.
     pub agent: AgentName,
     /// Endpoints, at one of which the server listens.
@@ -153,7 +153,7 @@ pub struct WatchJob {
 /// The course of time in a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Clock {
+pub enum ClockMode {
     /// The server waits for every control.
     Lockstep,
     /// Each cycle is a deadline; time passes at a speed.
@@ -187,31 +187,31 @@ pub struct Tls {
 /// A line of the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Told {
+pub enum LinkMessage {
     /// It listens at these endpoints.
     Listens(Vec<String>),
     /// The present state of the fleet.
-    Fleet(FleetNow),
+    Fleet(FleetStatus),
     /// The scenery for watchers: everything that stays the same.
-    Scene(Box<Staged>),
+    Scene(Box<FleetScene>),
     /// The present state of the world and of the fleet, for watchers.
-    Seen(Box<Seen>),
+    Seen(Box<FleetFrame>),
     /// The fleet has come to its end, or was stopped.
     Ended {
         /// The summary of the run, as in `summary.json`.
         summary: serde_json::Value,
         /// The world's own results as text.
-        outcome: Lines,
+        outcome: KeyValues,
         /// The state of the fleet at the end.
-        fleet: FleetNow,
+        fleet: FleetStatus,
     },
     /// It could not do its job.
-    Failed(Failed),
+    Failed(JobError),
 }
 
 /// The reason why the program could not do its job, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Failed {
+pub struct JobError {
     /// Whether an option, a file or another party's input is wrong: then nothing was started.
     pub is_input: bool,
     /// Whether it was asked to stop.
@@ -226,7 +226,7 @@ pub struct Failed {
 
 /// Everything of a fleet that stays the same, for its watchers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Staged {
+pub struct FleetScene {
     /// The build of its server.
     pub build: String,
     /// The world's name.
@@ -241,21 +241,21 @@ pub struct Staged {
 
 /// A world and its fleet at one moment, for its watchers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Seen {
+pub struct FleetFrame {
     /// Its number among all that were shown, from 1.
     pub number: u64,
     /// The bodies; its log has the last events of the run, not only those since the frame before, which a viewer may
     /// not have seen.
     pub frame: Frame,
     /// The nodes.
-    pub fleet: FleetNow,
+    pub fleet: FleetStatus,
     /// Whether the fleet has come to its end.
     pub is_over: bool,
 }
 
 /// A fleet at one moment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct FleetNow {
+pub struct FleetStatus {
     /// Cycles done.
     pub cycle: Cycle,
     /// Cycles planned.
@@ -275,12 +275,12 @@ pub struct FleetNow {
     /// Names of the agents for which all wait, because their nodes are not heard.
     pub waits_for: Vec<String>,
     /// The nodes, by rising id.
-    pub nodes: Vec<NodeNow>,
+    pub nodes: Vec<NodeStatus>,
 }
 
 /// A node at one moment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct NodeNow {
+pub struct NodeStatus {
     /// Its agent, by its id on the network.
     pub agent: EntityId,
     /// The name of its agent, e.g. `3`, or `0.3` for connector 3 of chain 0.
@@ -320,19 +320,19 @@ pub struct NodeNow {
     pub silent_s: Option<f64>,
 }
 
-impl Failed {
+impl JobError {
     /// Returns the failure as an error of a session.
     pub fn into_error(self) -> crate::Error {
         let Self { is_input, is_interrupted, place, cause, remedy } = self;
         match () {
             () if is_interrupted => crate::Error::Interrupted,
             () if is_input => InputError::new(place, cause, remedy).into(),
-            () => crate::Error::stopped(cause, remedy),
+            () => crate::Error::other(cause, remedy),
         }
     }
 }
 
-impl From<&crate::Error> for Failed {
+impl From<&crate::Error> for JobError {
     fn from(error: &crate::Error) -> Self {
         let none = String::new;
         let stopped = |cause: String, remedy: String| Self {
@@ -351,7 +351,7 @@ impl From<&crate::Error> for Failed {
             crate::Error::Interrupted => {
                 Self { is_interrupted: true, ..stopped(error.to_string(), none()) }
             }
-            crate::Error::Stopped { cause, remedy } => stopped(cause.clone(), remedy.clone()),
+            crate::Error::Other { cause, remedy } => stopped(cause.clone(), remedy.clone()),
             other => stopped(other.to_string(), none()),
         }
     }

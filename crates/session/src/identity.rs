@@ -6,29 +6,29 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 /// The identity of a program that adds code of its own, for the whole process.
-static OWN: OnceLock<String> = OnceLock::new();
+static EXTENDED_BUILD_ID: OnceLock<String> = OnceLock::new();
 
 /// Returns the identity of this program: the library's build, and the code that was added to it.
-pub fn build() -> &'static str {
-    OWN.get().map_or(BUILD, String::as_str)
+pub fn build_id() -> &'static str {
+    EXTENDED_BUILD_ID.get().map_or(BUILD, String::as_str)
 }
 
 /// Declares that this program adds code that affects results, identified by a digest of it. The first
 /// digest stays.
-pub fn adds_code(digest: &str) {
-    OWN.get_or_init(|| format!("{BUILD}.own-{}", &digest[..digest.len().min(12)]));
+pub fn register_added_code(digest: &str) {
+    EXTENDED_BUILD_ID.get_or_init(|| format!("{BUILD}.own-{}", &digest[..digest.len().min(12)]));
 }
 
 /// The program that made a run or a sweep, as recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Maker {
+pub(crate) struct Producer {
     /// The version of the program.
     pub(crate) version: String,
     /// The build; early recordings do not have it.
     pub(crate) build: Option<String>,
 }
 
-impl Maker {
+impl Producer {
     /// Refuses the work of another build, or of another version if no build is recorded, because
     /// results may change between them. The noun `what` names the work, at `place`; `remedy` gets
     /// the maker's name.
@@ -42,7 +42,7 @@ impl Maker {
         remedy: impl FnOnce(&str) -> String,
     ) -> Result<(), InputError> {
         let (wrote, reads) = match &self.build {
-            Some(made) => (made.as_str(), build()),
+            Some(made) => (made.as_str(), build_id()),
             None => (self.version.as_str(), VERSION),
         };
         if wrote == reads {
@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn builds_are_compared_and_versions_where_there_is_none() {
         let check = |version: &str, build: Option<&str>| {
-            let maker = Maker { version: version.into(), build: build.map(Into::into) };
+            let maker = Producer { version: version.into(), build: build.map(Into::into) };
             maker.check(Path::new("x"), "run", |wrote| format!("use {wrote}"))
         };
         assert!(check(VERSION, None).is_ok() && check(VERSION, Some(BUILD)).is_ok());

@@ -10,24 +10,25 @@ use std::path::Path;
 ///
 /// # Errors
 /// When they cannot be read, or can no longer be obeyed.
-pub(crate) fn follow_recorded(run: &mut dyn Simulation, folder: &Path) -> Result<(), InputError> {
+pub(crate) fn replay_recorded(run: &mut dyn Simulation, folder: &Path) -> Result<(), InputError> {
     let mut orders = OrderReader::default();
-    if read(folder, OrderReader::TABLE, |schema, columns| orders.read(schema, columns))? {
-        run.follow(orders.into_book()).map_err(|error| {
+    if read_blocks(folder, OrderReader::TABLE, |schema, columns| orders.read(schema, columns))? {
+        run.replay_orders(orders.into_log()).map_err(|error| {
             let place = folder.join(OrderReader::TABLE).display().to_string();
             let remedy = "the recording was changed, or another program made it: run it again";
             InputError::new(place, error.to_string(), remedy)
         })?;
     }
     let mut controls = ControlReader::default();
-    if read(folder, ControlReader::TABLE, |schema, columns| controls.read(schema, columns))? {
-        run.retrace(controls.into_book());
+    if read_blocks(folder, ControlReader::TABLE, |schema, columns| controls.read(schema, columns))?
+    {
+        run.replay_controls(controls.into_log());
     }
     Ok(())
 }
 
 /// Reads a table of a folder block by block. Returns whether the table exists.
-fn read(
+fn read_blocks(
     folder: &Path,
     table: &str,
     mut take: impl FnMut(&TableSchema, &[Values]) -> Option<()>,
@@ -55,22 +56,22 @@ pub(crate) fn has_orders(folder: &Path) -> Result<bool, InputError> {
     }
     let found = for_each_block(folder, OrderReader::TABLE, .., |block| {
         // The first row settles it.
-        if block.rows() > 0 { Err(Stop::Found) } else { Ok(()) }
+        if block.rows() > 0 { Err(ReadStop::Found) } else { Ok(()) }
     });
     match found {
         Ok(()) => Ok(false),
-        Err(Stop::Found) => Ok(true),
-        Err(Stop::Damaged(error)) => Err(error),
+        Err(ReadStop::Found) => Ok(true),
+        Err(ReadStop::Damaged(error)) => Err(error),
     }
 }
 
 /// The reason to stop reading rows.
-enum Stop {
+enum ReadStop {
     Found,
     Damaged(InputError),
 }
 
-impl From<InputError> for Stop {
+impl From<InputError> for ReadStop {
     fn from(error: InputError) -> Self {
         Self::Damaged(error)
     }

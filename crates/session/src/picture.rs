@@ -1,33 +1,33 @@
 //! Pictures as files.
 
 use crate::Error;
-use crate::files::replace;
-use crate::recorded::trails;
+use crate::files::write_atomically;
+use crate::run_tables::read_trails;
 use sidestep::VERSION;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::Look;
-use sidestep_draw::{Options, describe, draw, to_png};
+use sidestep::kernel::view::FrameOptions;
+use sidestep_draw::{PictureOptions, describe, draw, to_png};
 use sidestep_record::RunFolder;
 use std::io::Write;
 use std::path::Path;
 
 /// Longer side of a PNG in pixels.
-const PNG_PX: u32 = 1600;
+const PNG_WIDTH_PX: u32 = 1600;
 
 /// Draws the trajectory picture into a run folder, as SVG and PNG.
 ///
 /// # Errors
 /// When it cannot be drawn or written.
 pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(), Error> {
-    let plan = run.plan();
+    let plan = run.config();
     let origin = match run.cycle() < plan.cycles && !run.is_over() {
         true => {
-            format!("{} INCOMPLETE: {} of {} cycles.", origin(run), run.cycle(), plan.cycles)
+            format!("{} INCOMPLETE: {} of {} cycles.", footnote(run), run.cycle(), plan.cycles)
         }
-        false => origin(run),
+        false => footnote(run),
     };
-    let svg = svg(run, Some(folder.path()), &origin)?;
-    write(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
+    let svg = draw_svg(run, Some(folder.path()), &origin)?;
+    write_bytes(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
     write_png(&folder.path().join("trajectories.png"), &svg)
 }
 
@@ -36,23 +36,23 @@ pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(
 ///
 /// # Errors
 /// When the folder is damaged, or the picture cannot be drawn.
-pub(crate) fn svg(
+pub(crate) fn draw_svg(
     run: &mut dyn Simulation,
     folder: Option<&Path>,
     origin: &str,
 ) -> Result<String, Error> {
-    let (scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
+    let (scenery, frame) = (run.scenery(), run.frame(FrameOptions::WITHOUT_SCANS));
     let trails = match folder {
-        Some(folder) => trails(&run.place_rows(), folder, &scenery, &frame)?,
+        Some(folder) => read_trails(&run.position_columns(), folder, &scenery, &frame)?,
         None => Vec::new(),
     };
     let caption = format!("{} {origin}", describe(&scenery, &frame, &trails));
-    Ok(draw(&scenery, &frame, &trails, &Options::page(&scenery, caption))?)
+    Ok(draw(&scenery, &frame, &trails, &PictureOptions::page(&scenery, caption))?)
 }
 
 /// Returns the small print under a picture.
-pub(crate) fn origin(run: &dyn Simulation) -> String {
-    format!("Seed {}, sidestep {}.", run.plan().seed, VERSION)
+pub(crate) fn footnote(run: &dyn Simulation) -> String {
+    format!("Seed {}, sidestep {}.", run.config().seed, VERSION)
 }
 
 /// Writes an SVG picture as PNG.
@@ -60,9 +60,9 @@ pub(crate) fn origin(run: &dyn Simulation) -> String {
 /// # Errors
 /// When it cannot be drawn or written.
 pub fn write_png(path: &Path, svg: &str) -> Result<(), Error> {
-    write(path, &to_png(svg, PNG_PX)?)
+    write_bytes(path, &to_png(svg, PNG_WIDTH_PX)?)
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    replace(path, |file| file.write_all(bytes))
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    write_atomically(path, |file| file.write_all(bytes))
 }

@@ -1,18 +1,18 @@
 //! A recorded run computed again: to its end, or up to any cycle.
 
-use crate::compare::compare;
-use crate::driver::{Effort, Sinks, drive};
-use crate::picture::{origin, svg, write_png};
-use crate::{Error, Recorded, Watcher};
+use crate::compare::compare_poses;
+use crate::driver::{RunTiming, Sinks, drive};
+use crate::picture::{draw_svg, footnote, write_png};
+use crate::{Error, RecordedRun, Watcher};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use std::path::Path;
 
 /// The result of computing a run again.
-pub struct Replayed {
+pub struct ReplayReport {
     /// The run, at the requested cycle.
     pub run: Box<dyn Simulation>,
     /// Cycles and time that this took.
-    pub effort: Effort,
+    pub effort: RunTiming,
     /// Number of recorded poses of that cycle that were compared.
     pub compared_poses: usize,
 }
@@ -23,10 +23,10 @@ pub struct Replayed {
 /// When no digest is recorded, or it differs; [`Error::Interrupted`] when the watcher asked to
 /// stop.
 pub fn replay_all(
-    recorded: &Recorded,
+    recorded: &RecordedRun,
     workers: usize,
     watcher: &dyn Watcher,
-) -> Result<Replayed, Error> {
+) -> Result<ReplayReport, Error> {
     if recorded.digest.is_none() {
         let remedy = "end it with `sidestep resume DIR`, or give a --cycle";
         let cause = "the run is not complete: no digest of it is recorded";
@@ -41,10 +41,10 @@ pub fn replay_all(
     if run.cycle() != until {
         let cause = format!("the run is over after {} cycles, recorded are {until}", run.cycle());
         let remedy = "the recording was changed, or this is a bug: please report it";
-        return Err(Error::stopped(cause, remedy));
+        return Err(Error::other(cause, remedy));
     }
-    recorded.confirm(run.as_ref())?;
-    Ok(Replayed { run, effort, compared_poses: 0 })
+    recorded.verify_digest(run.as_ref())?;
+    Ok(ReplayReport { run, effort, compared_poses: 0 })
 }
 
 /// Computes the state at the start of a cycle, and compares it with the poses recorded for
@@ -54,13 +54,13 @@ pub fn replay_all(
 /// When the run has no such cycle, or a pose differs; [`Error::Interrupted`] when the watcher asked
 /// to stop.
 pub fn replay_to(
-    recorded: &Recorded,
+    recorded: &RecordedRun,
     cycle: Cycle,
     workers: usize,
     watcher: &dyn Watcher,
-) -> Result<Replayed, Error> {
+) -> Result<ReplayReport, Error> {
     let mut run = recorded.start_near(cycle, workers)?;
-    check_cycle(cycle, run.plan().cycles)?;
+    check_cycle(cycle, run.config().cycles)?;
     let effort = drive(run.as_mut(), cycle, Sinks::default(), watcher)?;
     if run.cycle() < cycle {
         return Err(match run.is_over() {
@@ -69,10 +69,10 @@ pub fn replay_to(
         });
     }
     let compared_poses = match &recorded.folder {
-        Some(folder) => compare(run.as_ref(), recorded.start(workers)?, folder)?,
+        Some(folder) => compare_poses(run.as_ref(), recorded.start(workers)?, folder)?,
         None => 0,
     };
-    Ok(Replayed { run, effort, compared_poses })
+    Ok(ReplayReport { run, effort, compared_poses })
 }
 
 fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {
@@ -84,14 +84,14 @@ fn no_such_cycle(cycle: Cycle, last: Cycle) -> InputError {
     InputError::new(format!("--cycle {cycle}"), cause, format!("give 0 to {last}"))
 }
 
-impl Replayed {
+impl ReplayReport {
     /// Draws the state to a PNG file, with the recorded tracks.
     ///
     /// # Errors
     /// When it cannot be drawn or written.
-    pub fn draw(&mut self, recorded: &Recorded, png: &Path) -> Result<(), Error> {
-        let origin = origin(self.run.as_ref());
-        let svg = svg(self.run.as_mut(), recorded.folder.as_deref(), &origin)?;
+    pub fn draw(&mut self, recorded: &RecordedRun, png: &Path) -> Result<(), Error> {
+        let origin = footnote(self.run.as_ref());
+        let svg = draw_svg(self.run.as_mut(), recorded.folder.as_deref(), &origin)?;
         write_png(png, &svg)
     }
 }

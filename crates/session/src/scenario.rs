@@ -1,39 +1,39 @@
 //! A scenario file and overrides -> a valid scenario.
 
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Source, Worlds};
+use sidestep::scenario::{CompiledScenario, Source, Worlds};
 use std::path::Path;
 
 /// Reads a scenario, applies `key=value` overrides and compiles it.
 ///
 /// # Errors
 /// When the scenario or an override is wrong.
-pub fn read(
+pub fn read_scenario(
     worlds: Worlds,
     file: &Path,
     overrides: &[String],
-) -> Result<(Source, Box<dyn Compiled>), InputError> {
-    let (source, is_made) = made_or_read(worlds, file, overrides)?;
+) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
+    let (source, is_made) = import_or_read(worlds, file, overrides)?;
     let told = match worlds.compile(&source) {
         Ok(compiled) => return Ok((source, compiled)),
         // An error in another file, e.g. in a profile, has its own place.
         Err(error) if overrides.is_empty() || error.place() != source.place => error,
-        Err(error) => explained(worlds, file, overrides, error),
+        Err(error) => locate_error(worlds, file, overrides, error),
     };
-    Err(if is_made { of_made_text(file, &source, told) } else { told })
+    Err(if is_made { imported_text_error(file, &source, told) } else { told })
 }
 
 /// Returns an error in a text that was made from a file of another program, without its position: users do not see
 /// the lines of that text.
-fn of_made_text(file: &Path, source: &Source, error: InputError) -> InputError {
+fn imported_text_error(file: &Path, source: &Source, error: InputError) -> InputError {
     if ![source.place.as_str(), source.file_place()].contains(&error.place()) {
         return error;
     }
     let place = format!("the scenario made from {}", file.display());
-    keyed(InputError::new(place, error.cause(), error.remedy()), error.key())
+    with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
 }
 
-fn keyed(error: InputError, key: Option<&str>) -> InputError {
+fn with_key(error: InputError, key: Option<&str>) -> InputError {
     match key {
         Some(key) => error.with_key(key),
         None => error,
@@ -52,10 +52,10 @@ pub fn problems(
     overrides: &[String],
 ) -> Result<Vec<InputError>, InputError> {
     if worlds.translate(file)?.is_some() {
-        return Ok(read(worlds, file, overrides).err().into_iter().collect());
+        return Ok(read_scenario(worlds, file, overrides).err().into_iter().collect());
     }
     let of = |count: usize| {
-        let source = source_of(worlds, file, &overrides[..count])?;
+        let source = read_source(worlds, file, &overrides[..count])?;
         Ok((sidestep::problems(worlds, &source), source.place))
     };
     let (told, place) = of(overrides.len())?;
@@ -70,17 +70,17 @@ pub fn problems(
         match earlier.iter().position(|told| found(told).is_some()) {
             _ if error.place() != place => error,
             Some(0) => found(&earlier[0]).unwrap_or(error),
-            Some(count) => caused(file, &overrides[count - 1], &error),
-            None => caused(file, &overrides[overrides.len() - 1], &error),
+            Some(count) => override_error(file, &overrides[count - 1], &error),
+            None => override_error(file, &overrides[overrides.len() - 1], &error),
         }
     };
     Ok(told.into_iter().map(explained).collect())
 }
 
 /// Returns an error with the override that caused it as its place.
-fn caused(file: &Path, override_text: &str, error: &InputError) -> InputError {
+fn override_error(file: &Path, override_text: &str, error: &InputError) -> InputError {
     let place = format!("{} with --set {override_text}", file.display());
-    keyed(InputError::new(place, error.cause(), error.remedy()), error.key())
+    with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
 }
 
 /// Returns the scenario in a file, or the one that a file of another format represents, with
@@ -88,16 +88,16 @@ fn caused(file: &Path, override_text: &str, error: &InputError) -> InputError {
 ///
 /// # Errors
 /// When the file cannot be read, or an override does not fit.
-pub(crate) fn source_of(
+pub(crate) fn read_source(
     worlds: Worlds,
     file: &Path,
     overrides: &[String],
 ) -> Result<Source, InputError> {
-    Ok(made_or_read(worlds, file, overrides)?.0)
+    Ok(import_or_read(worlds, file, overrides)?.0)
 }
 
 /// Returns the same scenario, and whether its text was made from a file of another format.
-fn made_or_read(
+fn import_or_read(
     worlds: Worlds,
     file: &Path,
     overrides: &[String],
@@ -106,19 +106,24 @@ fn made_or_read(
         return Ok((Source::read(file, overrides)?, false));
     };
     let source = Source::new(file.display().to_string(), foreign.scenario?, "");
-    Ok((source.with(overrides)?, true))
+    Ok((source.with_overrides(overrides)?, true))
 }
 
 /// Returns the same error with its position in the file, or with the override that caused it: users
 /// do not see the lines of the text that overrides have edited.
-fn explained(worlds: Worlds, file: &Path, overrides: &[String], error: InputError) -> InputError {
+fn locate_error(
+    worlds: Worlds,
+    file: &Path,
+    overrides: &[String],
+    error: InputError,
+) -> InputError {
     let with = |count: usize| {
-        let source = source_of(worlds, file, &overrides[..count]).ok()?;
+        let source = read_source(worlds, file, &overrides[..count]).ok()?;
         worlds.compile(&source).err().filter(|found| found.cause() == error.cause())
     };
     match (0..=overrides.len()).find_map(|count| Some((count, with(count)?))) {
         Some((0, plain)) => plain,
-        Some((count, _)) => caused(file, &overrides[count - 1], &error),
+        Some((count, _)) => override_error(file, &overrides[count - 1], &error),
         None => error,
     }
 }
@@ -159,14 +164,15 @@ mod tests {
         let text = "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n".to_string()
             + &turns.collect::<String>();
         std::fs::write(&file, text).expect("written");
-        let error = read(WORLDS, &file, &[]).err().expect("wrong");
+        let error = read_scenario(WORLDS, &file, &[]).err().expect("wrong");
         let place = format!("the scenario made from {}", file.display());
         assert_eq!((error.place(), error.position()), (place.as_str(), None), "{error}");
         assert!(error.cause().contains("orders") && error.key().is_some(), "{error}");
         assert_eq!(problems(WORLDS, &file, &[]), Ok(vec![error.clone()]));
-        let other = read(WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
+        let other = read_scenario(WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
         assert_eq!(other, error, "no override causes it");
-        let caused = read(WORLDS, &file, &["airspace.dt_s=-3".into()]).err().expect("wrong");
+        let caused =
+            read_scenario(WORLDS, &file, &["airspace.dt_s=-3".into()]).err().expect("wrong");
         assert!(caused.place().ends_with("a.scn with --set airspace.dt_s=-3"), "{caused}");
     }
 
@@ -179,7 +185,7 @@ mod tests {
         std::fs::write(&file, text).expect("written");
         let of = |overrides: &[&str]| {
             let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-            read(WORLDS, &file, &overrides).err().expect("wrong")
+            read_scenario(WORLDS, &file, &overrides).err().expect("wrong")
         };
         let error = of(&["airspace.dt_s=4", "airspace.generator.n=-3", "airspace.shield=off"]);
         assert!(error.place().ends_with("s.toml with --set airspace.generator.n=-3"), "{error}");

@@ -1,22 +1,22 @@
 //! The summary of a run: the content of `summary.json`, and text for people.
 
-use crate::driver::Effort;
-use crate::files::shown;
+use crate::driver::RunTiming;
+use crate::files::display_path;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 use sidestep::VERSION;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::words::Lines;
-use sidestep::kernel::world::Decides;
-use sidestep::scenario::Foreign;
+use sidestep::kernel::text::KeyValues;
+use sidestep::kernel::world::DecisionMode;
+use sidestep::scenario::ImportedScenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Whether a run reached its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Status {
+pub enum RunStatus {
     /// All cycles are done.
     Complete,
     /// The run was stopped before its end.
@@ -36,7 +36,7 @@ pub struct Summary {
     /// Name of the scenario.
     pub name: String,
     /// Whether the run reached its end.
-    pub status: Status,
+    pub status: RunStatus,
     /// The seed.
     pub seed: u64,
     /// Digest of the state after `cycles` cycles, in hexadecimal.
@@ -76,15 +76,15 @@ pub struct Summary {
     pub file: Option<Value>,
     /// The same report as text.
     #[serde(skip)]
-    pub file_lines: Lines,
+    pub file_lines: KeyValues,
     /// The world's own results as text.
     #[serde(skip)]
-    pub outcome: Lines,
+    pub outcome: KeyValues,
 }
 
-/// Writes a path as [`shown`]: serde's own way would fail on a name that is no text, at the end of a run.
+/// Writes a path as [`display_path`]: serde's own way would fail on a name that is no text, at the end of a run.
 fn as_shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
-    path.as_ref().map(shown).serialize(to)
+    path.as_ref().map(display_path).serialize(to)
 }
 
 /// Seconds spent in each phase, by the clock of worker 0.
@@ -104,7 +104,7 @@ pub struct Phases {
     react: f64,
     /// The phase in which agents decide, which determines the names of phases for people.
     #[serde(skip)]
-    pub decides: Decides,
+    pub decides: DecisionMode,
 }
 
 impl Phases {
@@ -120,30 +120,30 @@ impl Phases {
             perceive_decide: claim,
             conflicts: join,
             react: act,
-            decides: run.decides(),
+            decides: run.decision_mode(),
         }
     }
 }
 
 /// Time that a process spent on a run.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cost {
+pub(crate) struct RunCost {
     pub(crate) workers: usize,
-    pub(crate) effort: Effort,
+    pub(crate) effort: RunTiming,
     /// Time spent on recording.
     pub(crate) recording: Duration,
 }
 
 impl Summary {
     /// Returns the summary of the present state of a run.
-    pub(crate) fn new(run: &dyn Simulation, cost: Cost, folder: Option<&Path>) -> Self {
-        let plan = run.plan();
+    pub(crate) fn new(run: &dyn Simulation, cost: RunCost, folder: Option<&Path>) -> Self {
+        let plan = run.config();
         let (cycles, agents, effort) = (run.cycle(), run.agents(), cost.effort);
         let cpu_s = effort.cpu.as_secs_f64();
         let agent_cycles_per_cpu_s = agents as f64 * effort.cycles as f64 / cpu_s.max(1e-9);
         let status = match cycles < plan.cycles && !run.is_over() {
-            true => Status::Incomplete,
-            false => Status::Complete,
+            true => RunStatus::Incomplete,
+            false => RunStatus::Complete,
         };
         Self {
             version: VERSION,
@@ -169,18 +169,18 @@ impl Summary {
             mcap: None,
             file: None,
             file_lines: Vec::new(),
-            outcome: run.outcome(),
+            outcome: run.summary_lines(),
         }
     }
 
     /// Adds the report about the file that the scenario was made from.
-    pub(crate) fn tell_of_file(&mut self, foreign: Foreign) {
+    pub(crate) fn set_import_report(&mut self, foreign: ImportedScenario) {
         self.file = Some(foreign.json);
         self.file_lines = foreign.lines;
     }
 
     /// Adds the path of the recording for viewers.
-    pub(crate) fn tell_of_mcap(&mut self, path: PathBuf) {
+    pub(crate) fn set_mcap_path(&mut self, path: PathBuf) {
         self.mcap = Some(path);
     }
 }

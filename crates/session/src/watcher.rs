@@ -39,13 +39,13 @@ pub enum Progress<'a> {
 /// it from several threads, so it takes `&self`.
 pub trait Watcher: Sync {
     /// Takes note of progress: at irregular times, at least every 30 ms of a run.
-    fn at(&self, _: Progress<'_>) {}
+    fn on_progress(&self, _: Progress<'_>) {}
 
     /// Takes note of a failure that stops nothing, e.g. of the picture of a run.
     fn warn(&self, _: &Error) {}
 
     /// Returns whether to go on; asked between slices of a run.
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         true
     }
 
@@ -58,20 +58,20 @@ pub trait Watcher: Sync {
 
 /// A watcher that does nothing: work runs to its end.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Unwatched;
+pub struct NoWatcher;
 
-impl Watcher for Unwatched {}
+impl Watcher for NoWatcher {}
 
 /// A watcher of larger work, which does not report the cycles of its parts.
-pub(crate) struct Within<'a>(pub(crate) &'a dyn Watcher);
+pub(crate) struct NestedWatcher<'a>(pub(crate) &'a dyn Watcher);
 
-impl Watcher for Within<'_> {
+impl Watcher for NestedWatcher<'_> {
     fn warn(&self, error: &Error) {
         self.0.warn(error);
     }
 
-    fn go_on(&self) -> bool {
-        self.0.go_on()
+    fn should_continue(&self) -> bool {
+        self.0.should_continue()
     }
 
     fn interrupt(&self) -> Interrupt {
@@ -80,16 +80,16 @@ impl Watcher for Within<'_> {
 }
 
 /// A piece of work that is being watched; its end is always reported.
-pub(crate) struct Watched<'a>(pub(crate) &'a dyn Watcher);
+pub(crate) struct ProgressGuard<'a>(pub(crate) &'a dyn Watcher);
 
-impl Watched<'_> {
-    pub(crate) fn at(&self, progress: Progress<'_>) {
-        self.0.at(progress);
+impl ProgressGuard<'_> {
+    pub(crate) fn report(&self, progress: Progress<'_>) {
+        self.0.on_progress(progress);
     }
 }
 
-impl Drop for Watched<'_> {
+impl Drop for ProgressGuard<'_> {
     fn drop(&mut self) {
-        self.0.at(Progress::Ended);
+        self.0.on_progress(Progress::Ended);
     }
 }

@@ -9,11 +9,11 @@ use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::robots::heap_bytes;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::ports::{Recorder, SystemClock};
-use sidestep_kernel::view::{Kind, Look, Who};
-use sidestep_kernel::{Phases, Simulation, Turn};
-use sidestep_record::{Origin, ParquetRecorder};
+use sidestep_kernel::view::{BodyId, BodyKind, FrameOptions};
+use sidestep_kernel::{PhaseContext, Phases, Simulation};
+use sidestep_record::{ParquetRecorder, Provenance};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -150,7 +150,7 @@ fn rates() {
 }
 
 fn teams() {
-    let most = sidestep_kernel::workers::available().min(16);
+    let most = sidestep_kernel::workers::available_workers().min(16);
     println!("speed-up over one worker, wall time (median of 9 pairs)");
     for case in CASES {
         print!("  {:<16}", case.name);
@@ -189,14 +189,15 @@ fn plain_loop() {
         let mut engine = case.simulation(1);
         let plain = case.simulation(1);
         let (world, state) = (plain.world().clone(), plain.state());
-        let (mut scratch, groups) = (world.scratch(), Groups::new(world.bodies.len()));
+        let (mut scratch, groups) = (world.scratch(), ConflictGroups::new(world.bodies.len()));
         let n = world.bodies.len();
         let clock = &SystemClock::default();
         let mut now = 0;
         let mut members = Vec::new();
         let mut plain_cycle = || {
             (0..n as u32).for_each(|slot| groups.reset(slot));
-            let turn = &mut Turn { world: &*world, state, now, clock, scratch: &mut scratch };
+            let turn =
+                &mut PhaseContext { world: &*world, state, now, clock, scratch: &mut scratch };
             RobotsWorld::claim(turn, 0..n);
             RobotsWorld::join(turn, 0..n, &groups);
             for slot in (0..n as u32).filter(|&s| groups.is_leader(s)) {
@@ -220,14 +221,14 @@ fn plain_loop() {
 fn recording() {
     let case = &CASES[1];
     let folder = std::env::temp_dir().join(format!("sidestep-bench-{}", std::process::id()));
-    let origin = Origin { program_version: "bench".into(), scenario: String::new(), seed: 1 };
+    let origin = Provenance { program_version: "bench".into(), scenario: String::new(), seed: 1 };
     let mut plain = case.simulation(1);
     let cycles = 4096;
     let mut bytes = 0.0;
     let ratio = median_of(7, || {
         let plain_s = time(&mut plain, cycles).0;
         let mut recorded = case.simulation(1);
-        recorded.begin_recording();
+        recorded.start_recording();
         std::fs::create_dir_all(&folder).expect("a temporary folder");
         let mut recorder =
             ParquetRecorder::create(&folder, &recorded.schemas(), &origin).expect("a recorder");
@@ -255,7 +256,7 @@ fn looking() {
     let case =
         Case { name: "10000-1x1-8x8", robots: 10_000, size: 1, ray_boxes: Some(8), promised: 0.0 };
     let mut run = case.simulation(1);
-    run.watch();
+    run.enable_events();
     let best_ms = |n: u32, mut work: Box<dyn FnMut(u32) + '_>| {
         let once = |k: u32| {
             let started = ProcessTime::now();
@@ -265,8 +266,9 @@ fn looking() {
         (0..n).map(once).fold(f64::INFINITY, f64::min)
     };
     advance(&mut run, 20);
-    let frame_ms = best_ms(40, Box::new(|_| drop(black_box(run.frame(Look::BODIES)))));
-    let asked = |k: u32| Who::new(Kind::Robot, 97 * k, None);
+    let frame_ms =
+        best_ms(40, Box::new(|_| drop(black_box(run.frame(FrameOptions::WITHOUT_SCANS)))));
+    let asked = |k: u32| BodyId::new(BodyKind::Robot, 97 * k, None);
     let inspect_ms = best_ms(20, Box::new(|k| drop(black_box(run.inspect(asked(k))))));
     println!("{}: a frame in {frame_ms:.2} ms, an inspection in {inspect_ms:.1} ms", case.name);
     let traffic = |kind: &str, n: u32, more: &str| {
@@ -274,7 +276,7 @@ fn looking() {
             "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"{kind}\"\nn = {n}\n{more}\n"
         )
     };
-    let chains = WORLDS.named("chain").map_or("", |kind| kind.default_scenario());
+    let chains = WORLDS.find("chain").map_or("", |kind| kind.default_scenario());
     inspections("20 airplanes in one conflict", traffic("superconflict", 20, ""));
     inspections("5000 airplanes", traffic("random", 5000, "radius_m = 400000"));
     inspections("the chains of the default scenario", chains.into());
@@ -286,13 +288,13 @@ fn inspections(what: &str, text: String) {
     let compiled = WORLDS.compile(&source).expect("a valid scenario");
     let mut run = compiled.start(&source, 1);
     run.advance(25);
-    let bodies = run.frame(Look::BODIES).bodies;
+    let bodies = run.frame(FrameOptions::WITHOUT_SCANS).bodies;
     let agents: Vec<_> = bodies.iter().filter(|body| body.kind.is_agent()).collect();
     let every = agents.len().div_ceil(20);
     let mut took_ms: Vec<f64> = Vec::new();
     for body in agents.iter().step_by(every) {
         let started = ProcessTime::now();
-        black_box(run.inspect(body.who()));
+        black_box(run.inspect(body.id()));
         took_ms.push(1e3 * started.elapsed().as_secs_f64());
     }
     took_ms.sort_by(f64::total_cmp);

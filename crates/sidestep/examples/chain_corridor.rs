@@ -6,20 +6,21 @@
 
 use sidestep::kernel::Seed;
 use sidestep::kernel::stream::Streams;
-use sidestep::worlds::chain::convoy::{Convoy, Measures, Plan, Surroundings};
+use sidestep::worlds::chain::convoy::{Convoy, ConvoyConfig, ConvoyStats, ConvoySurroundings};
 use sidestep::worlds::chain::geometry::{Point, distance};
 use sidestep::worlds::chain::ground::corridor::{Corridor, WALL_PIECE_M};
-use sidestep::worlds::chain::swarm::drive::Drive;
+use sidestep::worlds::chain::swarm::drive::DifferentialDrive;
 use sidestep::worlds::chain::swarm::laser::LASER_NOISE;
-use sidestep::worlds::chain::swarm::leader::{LeaveRule, Turning};
-use sidestep::worlds::chain::swarm::{Follower, Leaving, Pose};
+use sidestep::worlds::chain::swarm::leader::{LeaveRule, TurnMode};
+use sidestep::worlds::chain::swarm::{Follower, Pose2, WallLossRule};
 use sidestep::worlds::chain::{Obstacle, Obstacles, Rod};
 use std::error::Error;
 use std::f64::consts::PI;
 
 const SPEED_M_S: f64 = 0.5;
 const WIDTHS_M: [f64; 8] = [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5, 3.0];
-const READINGS: [Leaving; 3] = [Leaving::Latched, Leaving::Range, Leaving::Level];
+const READINGS: [WallLossRule; 3] =
+    [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level];
 
 type Measure = fn() -> Result<(), Box<dyn Error>>;
 
@@ -29,7 +30,7 @@ struct Course {
     target: Option<Point<2>>,
     finish: Point<2>,
     finish_radius_m: f64,
-    start: Pose,
+    start: Pose2,
     limit_s: f64,
 }
 
@@ -37,13 +38,13 @@ struct Course {
 /// the middle if the corridor is too narrow for that, and the finish is 1 m before the end.
 fn corridor(width_m: f64, start_m: f64) -> Result<Course, Box<dyn Error>> {
     let corridor = Corridor::pinned(width_m)?;
-    let (line, walls) = (corridor.line(WALL_PIECE_M), corridor.walls(0));
+    let (line, walls) = (corridor.center_line(WALL_PIECE_M), corridor.walls(0));
     Ok(Course {
         obstacles: Obstacles::new(walls, 1.3)?,
         target: None,
         finish: line[line.len() - 7].at,
         finish_radius_m: 0.5 * width_m,
-        start: Pose { at: [start_m, (0.8 - 0.5 * width_m).min(0.0)], heading_rad: 0.0 },
+        start: Pose2 { at: [start_m, (0.8 - 0.5 * width_m).min(0.0)], heading_rad: 0.0 },
         limit_s: 400.0,
     })
 }
@@ -66,24 +67,24 @@ fn field(seed: u64, discs: u32) -> Result<Course, Box<dyn Error>> {
         target: Some(target),
         finish: target,
         finish_radius_m: 0.5,
-        start: Pose { at: start, heading_rad: 2.0 * PI * draws.uniform() },
+        start: Pose2 { at: start, heading_rad: 2.0 * PI * draws.uniform() },
         limit_s: 300.0,
     })
 }
 
 struct Run {
     arrived: bool,
-    measures: Measures,
+    measures: ConvoyStats,
 }
 
-fn run(plan: &Plan, course: &Course) -> Result<Run, Box<dyn Error>> {
+fn run(plan: &ConvoyConfig, course: &Course) -> Result<Run, Box<dyn Error>> {
     let (obstacles, target) = (course.obstacles.clone(), course.target);
-    let around = Surroundings { obstacles, target, seed: 1 };
+    let around = ConvoySurroundings { obstacles, target, seed: 1 };
     let mut convoy = Convoy::new(plan.clone(), course.start, around)?;
-    let mut measures = Measures::default();
+    let mut measures = ConvoyStats::default();
     for _ in 0..(course.limit_s / plan.dt_s) as u64 {
         let tick = convoy.tick();
-        measures.note(&convoy, &course.obstacles, &tick);
+        measures.record(&convoy, &course.obstacles, &tick);
         if distance(convoy.leader().at, course.finish) <= course.finish_radius_m {
             return Ok(Run { arrived: true, measures });
         }
@@ -105,7 +106,7 @@ fn leader() -> Result<(), Box<dyn Error>> {
     for sector in [[0.0, 90.0], [15.0, 90.0], [30.0, 90.0], [45.0, 90.0], [0.0, 60.0], [15.0, 60.0]]
     {
         for leaving in READINGS {
-            let mut plan = Plan::new(0, SPEED_M_S)?;
+            let mut plan = ConvoyConfig::new(0, SPEED_M_S)?;
             plan.leader.leaving = leaving;
             plan.leader.sector_rad = sector.map(f64::to_radians);
             let runs = WIDTHS_M
@@ -141,7 +142,7 @@ fn fields() -> Result<(), Box<dyn Error>> {
     for leave_rule in [Some(LeaveRule::default()), None] {
         for leaving in READINGS {
             for discs in [0, 10, 25, 40] {
-                let mut plan = Plan::new(0, SPEED_M_S)?;
+                let mut plan = ConvoyConfig::new(0, SPEED_M_S)?;
                 (plan.leader.leaving, plan.leader.leave_rule) = (leaving, leave_rule);
                 let (mut arrived, mut touched, mut ticks) = (0, 0, 0);
                 for seed in 0..30 {
@@ -170,7 +171,7 @@ fn chain() -> Result<(), Box<dyn Error>> {
     for width_m in [1.2, 1.6, 2.0, 2.5, 3.0] {
         for followers in [15, 40] {
             for (min_m, max_m) in [(0.6, 0.8), (1.0, 1.0)] {
-                let mut plan = Plan::new(followers, SPEED_M_S)?;
+                let mut plan = ConvoyConfig::new(followers, SPEED_M_S)?;
                 plan.rod = Rod { min_m, max_m, radius_m: 0.05 };
                 (plan.margin_m, plan.lag_limit_m) = (0.0, f64::INFINITY);
                 let start_m = 0.3 + max_m * 15.0_f64.min(13.5 / max_m).floor();
@@ -204,9 +205,10 @@ fn wheels() -> Result<(), Box<dyn Error>> {
                     ("waits", 0.0, 0.15),
                     ("slides, waits", 0.08, 0.15),
                 ] {
-                    let mut plan = Plan::new(15, SPEED_M_S)?;
+                    let mut plan = ConvoyConfig::new(15, SPEED_M_S)?;
                     (plan.margin_m, plan.lag_limit_m) = (margin_m, lag_limit_m);
-                    plan.follower = Follower::new(Drive::new(0.4, q * SPEED_M_S)?, 0.25)?;
+                    plan.follower =
+                        Follower::new(DifferentialDrive::new(0.4, q * SPEED_M_S)?, 0.25)?;
                     plan.follower.slide_m = slide_m;
                     let run = run(&plan, &corridor(width_m, 12.3)?)?;
                     println!(
@@ -220,7 +222,7 @@ fn wheels() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn wheel_row(plan: &Plan, Run { arrived, measures: m }: &Run) -> String {
+fn wheel_row(plan: &ConvoyConfig, Run { arrived, measures: m }: &Run) -> String {
     let percent = |n: usize| 100.0 * n as f64 / (m.ticks * plan.followers) as f64;
     let time = if *arrived { format!("{:.0}", m.ticks as f64 * plan.dt_s) } else { "never".into() };
     format!(
@@ -243,9 +245,9 @@ fn narrow() -> Result<(), Box<dyn Error>> {
     );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     for width_m in [0.8, 0.9, 1.0, 1.1, 1.2] {
-        for turning in [Turning::AboutAWheel, Turning::OnTheSpotWhereBlocked] {
+        for turning in [TurnMode::AboutAWheel, TurnMode::OnTheSpotWhereBlocked] {
             for (near_m, far_m) in [(0.7, 0.9), (0.45, 0.65)] {
-                let mut plan = Plan::new(0, SPEED_M_S)?;
+                let mut plan = ConvoyConfig::new(0, SPEED_M_S)?;
                 plan.leader.turning = turning;
                 (plan.leader.near_m, plan.leader.far_m) = (near_m, far_m);
                 let Run { arrived, measures: m } = run(&plan, &corridor(width_m, 2.0)?)?;

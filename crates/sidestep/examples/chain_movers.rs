@@ -6,10 +6,12 @@
 
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{InputError, Seed, math};
-use sidestep::worlds::chain::geometry::{Bounds, Point, along, distance, dot, scaled, sub, unit};
+use sidestep::worlds::chain::geometry::{
+    Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub,
+};
 use sidestep::worlds::chain::{
-    Chain, Connector, Escape, Escaper, Method, Obstacle, Obstacles, Outcome, Propagator, Request,
-    Rod, Rules, WayOut,
+    Chain, Connector, EscapeMethod, EscapePlan, EscapeRules, Escaper, Obstacle, Obstacles, Outcome,
+    Propagator, Request, Rod, Rules,
 };
 use std::f64::consts::TAU;
 
@@ -22,16 +24,16 @@ const LEADER_M_S: f64 = 0.5;
 /// Half the side in m of the square in which the discs stay.
 const HALF_M: f64 = 10.0;
 /// Gap in m between discs that keep apart, wide enough for a robot.
-const APART_M: f64 = 0.7;
+const MIN_GAP_M: f64 = 0.7;
 const PENETRATION_M: f64 = 1e-3;
 
 /// Random numbers in [0, 1), by (seed, index).
-struct Numbers {
+struct RandomNumbers {
     streams: Streams,
     next: u64,
 }
 
-impl Numbers {
+impl RandomNumbers {
     fn within(&mut self, low: f64, high: f64) -> f64 {
         self.next += 1;
         let word = self.streams.block(0, self.next, Purpose(1), 0)[0];
@@ -92,7 +94,7 @@ fn chain() -> Result<Chain<2>, InputError> {
 }
 
 /// Returns discs anywhere but on the chain.
-fn discs(cell: &Cell, chain: &Chain<2>, numbers: &mut Numbers) -> Vec<Obstacle<2>> {
+fn discs(cell: &Cell, chain: &Chain<2>, numbers: &mut RandomNumbers) -> Vec<Obstacle<2>> {
     let mut disc = |id: u32| loop {
         let center = [0; 2].map(|_| numbers.within(-HALF_M, HALF_M));
         let radius_m = numbers.within(0.2, 0.5);
@@ -119,22 +121,22 @@ fn reflect(obstacles: &mut Obstacles<2>) {
     obstacles.set_moving(&discs).expect("discs are finite");
 }
 
-/// Turns two discs away from each other if they come nearer than [`APART_M`].
+/// Turns two discs away from each other if they come nearer than [`MIN_GAP_M`].
 fn keep_apart(obstacles: &mut Obstacles<2>) {
     let mut discs = obstacles.moving().to_vec();
     for a in 0..discs.len() {
         for b in a + 1..discs.len() {
             let (from, to) = (center(&discs[a]), center(&discs[b]));
             let apart_m = distance(from, to) - discs[a].radius_m - discs[b].radius_m;
-            let Some(u) = unit(sub(to, from)) else { continue };
+            let Some(u) = normalized(sub(to, from)) else { continue };
             let (va, vb) = (dot(discs[a].velocity_m_s, u), dot(discs[b].velocity_m_s, u));
-            if apart_m < APART_M && va > vb {
+            if apart_m < MIN_GAP_M && va > vb {
                 // Each disc keeps its speed: the component toward the other is reversed.
                 if va > 0.0 {
-                    discs[a].velocity_m_s = along(discs[a].velocity_m_s, u, -2.0 * va);
+                    discs[a].velocity_m_s = add_scaled(discs[a].velocity_m_s, u, -2.0 * va);
                 }
                 if vb < 0.0 {
-                    discs[b].velocity_m_s = along(discs[b].velocity_m_s, u, -2.0 * vb);
+                    discs[b].velocity_m_s = add_scaled(discs[b].velocity_m_s, u, -2.0 * vb);
                 }
             }
         }
@@ -153,22 +155,22 @@ struct Leader {
 }
 
 impl Leader {
-    fn target(&mut self, from: Point<2>, numbers: &mut Numbers) -> Point<2> {
+    fn target(&mut self, from: Point<2>, numbers: &mut RandomNumbers) -> Point<2> {
         self.heading_rad += numbers.within(-0.1, 0.1);
         if from.iter().any(|x| x.abs() > HALF_M - 1.0) {
             let home_rad = math::atan2(-from[1], -from[0]);
             self.heading_rad += 0.05 * math::wrap_angle(home_rad - self.heading_rad);
         }
-        along(from, toward(self.heading_rad), LEADER_M_S * DT_S)
+        add_scaled(from, toward(self.heading_rad), LEADER_M_S * DT_S)
     }
 
-    fn turn(&mut self, numbers: &mut Numbers) {
+    fn turn(&mut self, numbers: &mut RandomNumbers) {
         self.heading_rad += numbers.within(-1.5, 1.5);
     }
 }
 
 fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
-    let mut numbers = Numbers { streams: Streams::new(Seed(seed)), next: 0 };
+    let mut numbers = RandomNumbers { streams: Streams::new(Seed(seed)), next: 0 };
     let mut chain = chain()?;
     let mut obstacles = Obstacles::new(discs(cell, &chain, &mut numbers), 1.0)?;
     let slave_step_max_m = cell.limit_m_s * DT_S;
@@ -177,8 +179,9 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
         Reaction::None => 0.0,
         Reaction::Escape(ticks) => ticks,
     };
-    let usual = Escape::new(DT_S, cell.limit_m_s);
-    let mut escaper = Escaper::new(Escape { ticks_ahead, method: Method::Literal, ..usual });
+    let usual = EscapeRules::new(DT_S, cell.limit_m_s);
+    let mut escaper =
+        Escaper::new(EscapeRules { ticks_ahead, method: EscapeMethod::Literal, ..usual });
     let mut leader = Leader { heading_rad: 0.0 };
     for _ in 0..TICKS {
         let start = chain.points().to_vec();
@@ -202,7 +205,7 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
                 &obstacles,
                 &mut propagator,
                 &start,
-                &mut WayOut::default(),
+                &mut EscapePlan::default(),
             )?;
             tally.capped += escaped.capped;
         }

@@ -69,7 +69,7 @@ pub mod experiment;
 mod problems;
 pub mod worlds;
 
-pub use problems::{MOST as MOST_PROBLEMS, problems};
+pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_import as import;

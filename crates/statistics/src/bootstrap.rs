@@ -14,11 +14,11 @@ use sidestep_kernel::{EntityId, Seed};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// The purpose of draws that choose the members of a resample.
-const RESAMPLE: Purpose = Purpose(0xB007);
+const RESAMPLE_PURPOSE: Purpose = Purpose(0xB007);
 
 /// Number of values chosen from one stream. A stream has 2^18 words before it repeats, and choosing
 /// one of `n` takes less than two on average.
-const STREAM: usize = 1 << 16;
+const MAX_VALUES_PER_STREAM: usize = 1 << 16;
 
 /// The settings of a bootstrap interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,7 @@ impl Bootstrap {
         // The mean of deviations, because it loses no digits and the jackknife has a closed form.
         let deviations: Vec<f64> = values.iter().map(|v| v - center).collect();
         let mean_of = |chosen: &[f64]| Some(chosen.iter().sum::<f64>() / chosen.len() as f64);
-        let interval = self.corrected(&deviations, 0.0, acceleration(&deviations), mean_of)?;
+        let interval = self.bca_interval(&deviations, 0.0, acceleration(&deviations), mean_of)?;
         Some(Interval { low: center + interval.low, high: center + interval.high })
     }
 
@@ -79,11 +79,11 @@ impl Bootstrap {
         let jackknife: Vec<f64> = (0..items.len()).map(without).collect::<Option<_>>()?;
         let center = mean(&jackknife)?;
         let influences: Vec<f64> = jackknife.iter().map(|v| center - v).collect();
-        self.corrected(items, estimate, acceleration(&influences), statistic)
+        self.bca_interval(items, estimate, acceleration(&influences), statistic)
     }
 
     /// Returns the corrected percentiles of `statistic` over the resamples.
-    fn corrected<T: Copy>(
+    fn bca_interval<T: Copy>(
         &self,
         items: &[T],
         estimate: f64,
@@ -109,9 +109,9 @@ impl Bootstrap {
         let ties = resampled.partition_point(|v| *v <= estimate + rounding) - below;
         let share = (below as f64 + 0.5 * ties as f64) / f64::from(self.resamples);
         let normal = Normal::standard();
-        let z0 = inverse(&normal, share)?;
+        let z0 = inverse_cdf(&normal, share)?;
         let end = |p: f64| {
-            let z = z0 + inverse(&normal, p)?;
+            let z = z0 + inverse_cdf(&normal, p)?;
             let stretch = 1.0 - acceleration * z;
             (stretch > 0.0).then_some(())?;
             order_statistic(&resampled, normal.cdf(z0 + z / stretch))
@@ -124,10 +124,10 @@ impl Bootstrap {
     fn resample<T: Copy>(&self, items: &[T], resample: EntityId, chosen: &mut Vec<T>) {
         chosen.clear();
         let (streams, n) = (Streams::new(self.seed), items.len() as u32);
-        for (k, start) in (0..items.len()).step_by(STREAM).enumerate() {
-            let mut draws = streams.draws(resample, k as u64, RESAMPLE);
-            let count = STREAM.min(items.len() - start);
-            chosen.extend((0..count).map(|_| items[draws.below(n) as usize]));
+        for (k, start) in (0..items.len()).step_by(MAX_VALUES_PER_STREAM).enumerate() {
+            let mut draws = streams.draws(resample, k as u64, RESAMPLE_PURPOSE);
+            let count = MAX_VALUES_PER_STREAM.min(items.len() - start);
+            chosen.extend((0..count).map(|_| items[draws.uniform_below(n) as usize]));
         }
     }
 }
@@ -143,7 +143,7 @@ fn acceleration(influences: &[f64]) -> f64 {
     sum(unit().map(|v| v * v * v)) / (6.0 * square * square.sqrt())
 }
 
-fn inverse(normal: &Normal, p: f64) -> Option<f64> {
+fn inverse_cdf(normal: &Normal, p: f64) -> Option<f64> {
     (p > 0.0 && p < 1.0).then(|| normal.inverse_cdf(p))
 }
 
@@ -156,7 +156,7 @@ fn order_statistic(sorted: &[f64], p: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::close;
+    use super::super::testing::assert_close;
     use super::super::{mean_interval, sample_sd};
     use super::*;
     use proptest::prelude::*;
@@ -179,11 +179,11 @@ mod tests {
         // Table 14.2: estimate 171.5, 90 % BCa interval [115.8, 259.6] of 2,000 resamples. The
         // standard errors of ends of that many resamples are about 1.3 and 3: within four of
         // those of a difference.
-        close(variance(&SPATIAL).unwrap(), 171.5, 0.05);
+        assert_close(variance(&SPATIAL).unwrap(), 171.5, 0.05);
         let bootstrap = Bootstrap { level: 0.90, resamples: 20_000, ..Bootstrap::default() };
         let interval = bootstrap.interval(&SPATIAL, variance).unwrap();
-        close(interval.low, 115.8, 5.0);
-        close(interval.high, 259.6, 12.0);
+        assert_close(interval.low, 115.8, 5.0);
+        assert_close(interval.high, 259.6, 12.0);
         let mut rest = SPATIAL.to_vec();
         let mut without = |k: usize| {
             let value = rest.remove(k);
@@ -194,7 +194,7 @@ mod tests {
         let jackknife: Vec<f64> = (0..26).map(&mut without).collect();
         let center = mean(&jackknife).unwrap();
         let influences: Vec<f64> = jackknife.iter().map(|v| center - v).collect();
-        close(acceleration(&influences), 0.061, 0.0005);
+        assert_close(acceleration(&influences), 0.061, 0.0005);
     }
 
     #[test]
@@ -202,12 +202,12 @@ mod tests {
         let bootstrap = Bootstrap::default();
         let (own, general) =
             (bootstrap.mean(&SPATIAL).unwrap(), bootstrap.interval(&SPATIAL, mean).unwrap());
-        close(own.low, general.low, 1e-9);
-        close(own.high, general.high, 1e-9);
+        assert_close(own.low, general.low, 1e-9);
+        assert_close(own.high, general.high, 1e-9);
         assert_eq!(bootstrap.mean(&SPATIAL), Some(own), "the same bits each time");
         let other = Bootstrap { seed: Seed(1), ..bootstrap }.mean(&SPATIAL).unwrap();
         assert_ne!(other, own);
-        close(other.low, own.low, 0.7);
+        assert_close(other.low, own.low, 0.7);
         let student = mean_interval(&SPATIAL).unwrap();
         assert!((0.85..1.0).contains(&(own.half_width() / student.half_width())));
     }
@@ -235,15 +235,15 @@ mod tests {
 
     #[test]
     fn more_values_than_a_stream_has_words_for_are_drawn_from_several() {
-        let items: Vec<u32> = (0..(3 * STREAM as u32 + 5)).collect();
+        let items: Vec<u32> = (0..(3 * MAX_VALUES_PER_STREAM as u32 + 5)).collect();
         let mut chosen = Vec::new();
         Bootstrap::default().resample(&items, 4, &mut chosen);
         assert_eq!(chosen.len(), items.len());
-        assert_ne!(chosen[..100], chosen[STREAM..STREAM + 100]);
+        assert_ne!(chosen[..100], chosen[MAX_VALUES_PER_STREAM..MAX_VALUES_PER_STREAM + 100]);
         let mut distinct = chosen;
         distinct.sort_unstable();
         distinct.dedup();
-        close(distinct.len() as f64 / items.len() as f64, 1.0 - math::exp(-1.0), 0.01);
+        assert_close(distinct.len() as f64 / items.len() as f64, 1.0 - math::exp(-1.0), 0.01);
     }
 
     /// Share of 1,000 samples with an interval that contains the mean of their distribution.

@@ -29,7 +29,7 @@ impl Interval {
         0.5 * self.high - 0.5 * self.low
     }
 
-    pub(super) fn around(center: f64, half_width: f64) -> Self {
+    pub(super) fn from_center(center: f64, half_width: f64) -> Self {
         Self { low: center - half_width, high: center + half_width }
     }
 }
@@ -83,10 +83,10 @@ pub fn clopper_pearson(successes: u64, n: u64) -> Interval {
 /// (0, 1), after `successes` in `n` trials.
 ///
 /// Below 0.05 where the interval of [`clopper_pearson`] excludes `share`.
-pub fn share_p_value(successes: u64, n: u64, share: f64) -> f64 {
+pub fn proportion_p_value(successes: u64, n: u64, share: f64) -> f64 {
     let (k, n) = (successes as usize, n as usize);
-    let at_least = if k == 0 { 1.0 } else { 1.0 - at_most(k - 1, n, share) };
-    (2.0 * at_most(k, n, share).min(at_least)).min(1.0)
+    let at_least = if k == 0 { 1.0 } else { 1.0 - binomial_cdf(k - 1, n, share) };
+    (2.0 * binomial_cdf(k, n, share).min(at_least)).min(1.0)
 }
 
 /// Returns the two-sided p-value of Student's test that a mean is `value`, from the 95 % interval
@@ -139,7 +139,7 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     }
     let (center, sd) = (mean(values)?, sample_sd(values)?);
     let t = student_t(values.len() - 1);
-    Some(Interval::around(center, t * (sd / (values.len() as f64).sqrt())))
+    Some(Interval::from_center(center, t * (sd / (values.len() as f64).sqrt())))
 }
 
 /// Returns Student's 95 % interval for the mean of `a[i] - b[i]`: two treatments of the same cases.
@@ -178,7 +178,7 @@ pub fn runs_for_half_width(sd: f64, half_width: f64) -> Option<u64> {
 }
 
 /// Returns the probability of at most `k` successes in `n` trials of probability `q`.
-pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
+pub(super) fn binomial_cdf(k: usize, n: usize, q: f64) -> f64 {
     if k >= n {
         return 1.0;
     }
@@ -187,7 +187,7 @@ pub(super) fn at_most(k: usize, n: usize, q: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::close;
+    use super::super::testing::assert_close;
     use super::*;
     use proptest::prelude::*;
 
@@ -195,11 +195,11 @@ mod tests {
     fn wilson_gives_the_published_interval() {
         // R: prop.test(c(81), 263, correct = FALSE); Newcombe 1998, table I.
         let interval = wilson(81.0, 263.0);
-        close(interval.low, 0.2553, 5e-5);
-        close(interval.high, 0.3662, 5e-5);
+        assert_close(interval.low, 0.2553, 5e-5);
+        assert_close(interval.high, 0.3662, 5e-5);
         let none = wilson(0.0, 20.0);
         assert_eq!(none.low, 0.0);
-        close(none.high, 0.1611, 5e-5);
+        assert_close(none.high, 0.1611, 5e-5);
         assert_eq!(wilson(20.0, 20.0).high, 1.0);
         assert_eq!(wilson(0.0, 0.0), Interval { low: 0.0, high: 1.0 });
     }
@@ -208,13 +208,13 @@ mod tests {
     fn clopper_pearson_gives_the_published_interval() {
         // Newcombe 1998, table I, method 5.
         let interval = clopper_pearson(81, 263);
-        close(interval.low, 0.2527, 5e-5);
-        close(interval.high, 0.3676, 5e-5);
+        assert_close(interval.low, 0.2527, 5e-5);
+        assert_close(interval.high, 0.3676, 5e-5);
         let none = clopper_pearson(0, 20);
         assert_eq!(none.low, 0.0);
-        close(none.high, 0.1684, 5e-5);
+        assert_close(none.high, 0.1684, 5e-5);
         let all = clopper_pearson(20, 20);
-        close(all.low, 0.8316, 5e-5);
+        assert_close(all.low, 0.8316, 5e-5);
         assert_eq!((all.high, clopper_pearson(0, 0).high), (1.0, 1.0));
     }
 
@@ -229,20 +229,20 @@ mod tests {
             (29, 2.045_230),
             (120, 1.979_930),
         ];
-        table.iter().for_each(|&(freedom, t)| close(student_t(freedom), t, 1e-6));
+        table.iter().for_each(|&(freedom, t)| assert_close(student_t(freedom), t, 1e-6));
         // The library's inverse and the expansion meet: R gives qt(0.975, 99:100).
-        close(student_t(99), 1.984_216_95, 2e-8);
-        close(student_t(100), 1.983_971_52, 2e-8);
-        close(student_t(100_000), 1.959_987_71, 1e-8);
-        close(student_t(usize::MAX), Z_975, 1e-12);
+        assert_close(student_t(99), 1.984_216_95, 2e-8);
+        assert_close(student_t(100), 1.983_971_52, 2e-8);
+        assert_close(student_t(100_000), 1.959_987_71, 1e-8);
+        assert_close(student_t(usize::MAX), Z_975, 1e-12);
     }
 
     #[test]
     fn the_mean_of_five_values_has_students_interval() {
         // t(4, 0.975) = 2.776445; sd = sqrt(2.5).
         let interval = mean_interval(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
-        close(interval.high - 3.0, 2.776_445 * (2.5_f64 / 5.0).sqrt(), 1e-6);
-        close(3.0 - interval.low, interval.high - 3.0, 1e-12);
+        assert_close(interval.high - 3.0, 2.776_445 * (2.5_f64 / 5.0).sqrt(), 1e-6);
+        assert_close(3.0 - interval.low, interval.high - 3.0, 1e-12);
         assert_eq!(mean_interval(&[1.0]), None);
         assert_eq!(mean_interval(&[2.0, 2.0]), Some(Interval { low: 2.0, high: 2.0 }));
         assert_eq!(mean_interval(&[0.1; 7]), Some(Interval { low: 0.1, high: 0.1 }));
@@ -273,10 +273,10 @@ mod tests {
     fn p_values_from_an_interval_are_those_of_the_test() {
         // R: t.test(c(1, 2, 3, 4, 5), mu = 1): 0.04742; binom.test(8, 10, 0.5): 0.1094.
         let interval = mean_interval(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
-        close(mean_p_value(interval, 5, 1.0), 0.047_421, 1e-6);
-        close(mean_p_value(interval, 5, 3.0), 1.0, 0.0);
-        close(share_p_value(8, 10, 0.5), 0.109_375, 1e-9);
-        close(share_p_value(0, 10, 0.5), 2.0 / 1024.0, 1e-9);
+        assert_close(mean_p_value(interval, 5, 1.0), 0.047_421, 1e-6);
+        assert_close(mean_p_value(interval, 5, 3.0), 1.0, 0.0);
+        assert_close(proportion_p_value(8, 10, 0.5), 0.109_375, 1e-9);
+        assert_close(proportion_p_value(0, 10, 0.5), 2.0 / 1024.0, 1e-9);
         let sure = Interval { low: 2.0, high: 2.0 };
         assert_eq!([1.0, 2.0].map(|value| mean_p_value(sure, 7, value)), [0.0, 1.0]);
     }
@@ -306,7 +306,7 @@ mod tests {
             let interval = mean_interval(&values).unwrap();
             let p = mean_p_value(interval, values.len(), 0.0);
             prop_assert!((p - 0.05).abs() < 1e-6 || (p > 0.05) == interval.contains(0.0), "{p}");
-            let p = share_p_value(hits, n, share);
+            let p = proportion_p_value(hits, n, share);
             let excluded = !clopper_pearson(hits, n).contains(share);
             prop_assert!((p - 0.05).abs() < 1e-6 || (p < 0.05) == excluded, "{p}");
         }

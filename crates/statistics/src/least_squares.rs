@@ -19,7 +19,7 @@ pub struct Fit {
 
 /// A pivot below this share of its column's square means that the column is a combination of
 /// others, so its coefficient cannot be determined.
-const SINGULAR: f64 = 1e-10;
+const MIN_PIVOT_FRACTION: f64 = 1e-10;
 
 impl Fit {
     /// Fits `y` (`n`) to the rows of `x` (`n` x `k`).
@@ -39,7 +39,7 @@ impl Fit {
         }
         let scaled = |i: usize, j: usize| dot(x, i, j) / (lengths[i] * lengths[j]);
         let gram: Vec<Vec<f64>> = (0..k).map(|i| (0..k).map(|j| scaled(i, j)).collect()).collect();
-        let inverse = inverse(gram)?;
+        let inverse = invert(gram)?;
         let moment =
             |j: usize| x.iter().zip(y).map(|(row, y)| row[j] * y).sum::<f64>() / lengths[j];
         let moments: Vec<f64> = (0..k).map(moment).collect();
@@ -48,9 +48,9 @@ impl Fit {
         };
         let coefficients: Vec<f64> = (0..k).map(coefficient).collect();
         let spread = |j: usize| inverse[j][j].sqrt() / lengths[j];
-        let residual = residual_square(x, y, &coefficients);
+        let residual = residual_sum_of_squares(x, y, &coefficients);
         let intervals = intervals(&coefficients, residual, n, spread);
-        let r_squared = 1.0 - residual / variation(y).max(f64::MIN_POSITIVE);
+        let r_squared = 1.0 - residual / total_sum_of_squares(y).max(f64::MIN_POSITIVE);
         Some(Self { coefficients, intervals, r_squared, n })
     }
 
@@ -64,12 +64,12 @@ fn dot(x: &[Vec<f64>], i: usize, j: usize) -> f64 {
     x.iter().map(|row| row[i] * row[j]).sum()
 }
 
-fn residual_square(x: &[Vec<f64>], y: &[f64], coefficients: &[f64]) -> f64 {
+fn residual_sum_of_squares(x: &[Vec<f64>], y: &[f64], coefficients: &[f64]) -> f64 {
     let predicted = |row: &[f64]| row.iter().zip(coefficients).map(|(x, c)| x * c).sum::<f64>();
     x.iter().zip(y).map(|(row, y)| (y - predicted(row)) * (y - predicted(row))).sum()
 }
 
-fn variation(y: &[f64]) -> f64 {
+fn total_sum_of_squares(y: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len() as f64;
     y.iter().map(|v| (v - mean) * (v - mean)).sum()
 }
@@ -91,11 +91,11 @@ fn intervals(
 
 /// Returns the inverse of a symmetric positive matrix with ones on its diagonal, by Gauss and
 /// Jordan.
-fn inverse(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
+fn invert(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     let k = a.len();
     for pivot in 0..k {
         let divisor = a[pivot][pivot];
-        if divisor < SINGULAR {
+        if divisor < MIN_PIVOT_FRACTION {
             return None;
         }
         // In place: the column of the identity takes the place of the column it removes.

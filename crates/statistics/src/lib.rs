@@ -49,21 +49,21 @@ mod stopping;
 
 pub use bootstrap::Bootstrap;
 pub use interval::{
-    Interval, clopper_pearson, mean_interval, mean_p_value, paired_difference, runs_for_half_width,
-    share_p_value, wilson,
+    Interval, clopper_pearson, mean_interval, mean_p_value, paired_difference, proportion_p_value,
+    runs_for_half_width, wilson,
 };
 pub use moments::{Moments, Sample, mean, percentile, sample_sd};
 pub use paired::{Pairs, holm};
 pub use quantile::{QuantileInterval, quantile_interval, runs_for_quantile};
 pub use rank::{Correlation, rank_correlation};
-pub use stopping::{Next, Reason, StoppingRule};
+pub use stopping::{StopDecision, StopReason, StoppingRule};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Returns the probability of a chi-square statistic at least this large if the model holds.
 ///
 /// Without degrees of freedom nothing can deviate, and it returns 1.
-pub fn chi_square_p(statistic: f64, degrees_of_freedom: usize) -> f64 {
+pub fn chi_square_p_value(statistic: f64, degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 1.0;
     }
@@ -74,21 +74,21 @@ pub fn chi_square_p(statistic: f64, degrees_of_freedom: usize) -> f64 {
 #[cfg(test)]
 pub(crate) mod testing {
     /// Fails unless `a` is within `tolerance` of `b`.
-    pub(crate) fn close(a: f64, b: f64, tolerance: f64) {
+    pub(crate) fn assert_close(a: f64, b: f64, tolerance: f64) {
         assert!((a - b).abs() <= tolerance, "{a} is not {b}");
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::testing::close;
+    use super::testing::assert_close;
     use super::*;
 
     #[test]
     fn chi_square_tails_match_the_tables() {
-        close(chi_square_p(3.841_459, 1), 0.05, 1e-7);
-        close(chi_square_p(18.307_038, 10), 0.05, 1e-7);
-        close(chi_square_p(1000.0, 2), 0.0, 1e-100);
-        assert_eq!(chi_square_p(5.0, 0), 1.0);
+        assert_close(chi_square_p_value(3.841_459, 1), 0.05, 1e-7);
+        assert_close(chi_square_p_value(18.307_038, 10), 0.05, 1e-7);
+        assert_close(chi_square_p_value(1000.0, 2), 0.0, 1e-100);
+        assert_eq!(chi_square_p_value(5.0, 0), 1.0);
     }
 }

@@ -16,7 +16,7 @@ pub struct Sample {
 
 impl Sample {
     /// Creates the sample of these runs.
-    pub fn of(runs: impl IntoIterator<Item = Option<f64>>) -> Self {
+    pub fn from_runs(runs: impl IntoIterator<Item = Option<f64>>) -> Self {
         let mut sample = Self::default();
         for value in runs {
             match value {
@@ -79,13 +79,13 @@ pub fn mean(values: &[f64]) -> Option<f64> {
 /// Returns the standard deviation of a sample (divisor `n - 1`); `None` for fewer than two values.
 /// For equal values it is exactly 0.
 pub fn sample_sd(values: &[f64]) -> Option<f64> {
-    let (squares, scale) = squares(values)?;
+    let (squares, scale) = sum_of_squares(values)?;
     (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt() * scale)
 }
 
 /// Returns the sum of squared deviations from the mean in units of `scale * scale`, and that scale;
 /// `None` without values.
-fn squares(values: &[f64]) -> Option<(f64, f64)> {
+fn sum_of_squares(values: &[f64]) -> Option<(f64, f64)> {
     if is_constant(values) {
         return values.first().map(|_| (0.0, 1.0));
     }
@@ -132,10 +132,10 @@ pub struct Moments {
 
 impl Moments {
     /// Returns the moments of `values`; `None` without values.
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub fn from_values(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
-        let (squares, scale) = squares(&sorted)?;
+        let (squares, scale) = sum_of_squares(&sorted)?;
         Some(Self {
             n: sorted.len(),
             mean: mean(&sorted)?,
@@ -151,17 +151,17 @@ impl Moments {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::close;
+    use super::super::testing::assert_close;
     use super::*;
     use proptest::prelude::*;
 
     #[test]
     fn moments_have_their_divisors() {
-        let moments = Moments::of([4.0, 1.0, 2.0]).unwrap();
+        let moments = Moments::from_values([4.0, 1.0, 2.0]).unwrap();
         assert_eq!((moments.n, moments.p50), (3, 2.0));
-        close(moments.sd, (14.0_f64 / 9.0).sqrt(), 1e-12);
-        close(sample_sd(&[4.0, 1.0, 2.0]).unwrap(), (7.0_f64 / 3.0).sqrt(), 1e-12);
-        assert!(Moments::of([]).is_none());
+        assert_close(moments.sd, (14.0_f64 / 9.0).sqrt(), 1e-12);
+        assert_close(sample_sd(&[4.0, 1.0, 2.0]).unwrap(), (7.0_f64 / 3.0).sqrt(), 1e-12);
+        assert!(Moments::from_values([]).is_none());
         assert_eq!((mean(&[]), sample_sd(&[1.0])), (None, None));
     }
 
@@ -173,8 +173,8 @@ mod tests {
         for base in [1_000_000.0, 10_000_000.0] {
             let mut values = vec![base + 0.2];
             (0..500).for_each(|_| values.extend([base + 0.1, base + 0.3]));
-            close(mean(&values).unwrap(), base + 0.2, 2e-9);
-            close(sample_sd(&values).unwrap(), 0.1, 1e-8);
+            assert_close(mean(&values).unwrap(), base + 0.2, 2e-9);
+            assert_close(sample_sd(&values).unwrap(), 0.1, 1e-8);
         }
     }
 
@@ -184,27 +184,27 @@ mod tests {
         assert_eq!(mean(&[f64::MAX, f64::MAX, -f64::MAX]), Some(f64::MAX / 3.0));
         for unit in [1e-300, 1.0, 1e300] {
             let values = [1.0 * unit, 2.0 * unit, 4.0 * unit];
-            close(mean(&values).unwrap() / unit, 7.0 / 3.0, 1e-15 * 3.0);
-            close(sample_sd(&values).unwrap() / unit, (7.0_f64 / 3.0).sqrt(), 1e-15 * 3.0);
+            assert_close(mean(&values).unwrap() / unit, 7.0 / 3.0, 1e-15 * 3.0);
+            assert_close(sample_sd(&values).unwrap() / unit, (7.0_f64 / 3.0).sqrt(), 1e-15 * 3.0);
         }
     }
 
     #[test]
     fn what_is_no_finite_number_is_counted_as_missing() {
         let runs = [Some(1.0), None, Some(f64::NAN), Some(f64::INFINITY), Some(3.0)];
-        let sample = Sample::of(runs);
+        let sample = Sample::from_runs(runs);
         assert_eq!(
             (sample.values.as_slice(), sample.missing, sample.not_finite),
             (&[1.0, 3.0][..], 3, 2)
         );
-        assert_eq!(Sample::of([Some(2.0), Some(-1.0)]).sorted(), [-1.0, 2.0]);
+        assert_eq!(Sample::from_runs([Some(2.0), Some(-1.0)]).sorted(), [-1.0, 2.0]);
     }
 
     proptest! {
         #[test]
         fn no_values_make_the_moments_panic(values in prop::collection::vec(prop::num::f64::ANY, 0..20)) {
-            let _ = (mean(&values), sample_sd(&values), Moments::of(values.iter().copied()));
-            let sample = Sample::of(values.iter().map(|v| Some(*v)));
+            let _ = (mean(&values), sample_sd(&values), Moments::from_values(values.iter().copied()));
+            let sample = Sample::from_runs(values.iter().map(|v| Some(*v)));
             if let Some(mean) = mean(&sample.values) {
                 prop_assert!(mean.is_finite());
                 prop_assert!(sample_sd(&sample.values).is_none_or(|sd| sd >= 0.0));
@@ -218,7 +218,7 @@ mod tests {
             let equal = vec![value; n];
             prop_assert_eq!(mean(&equal), Some(value));
             prop_assert!(n < 2 || sample_sd(&equal) == Some(0.0));
-            let sorted = Sample::of(more.iter().map(|v| Some(*v))).sorted();
+            let sorted = Sample::from_runs(more.iter().map(|v| Some(*v))).sorted();
             let mean = mean(&more).unwrap();
             prop_assert!(sorted[0] <= mean && mean <= sorted[sorted.len() - 1]);
         }

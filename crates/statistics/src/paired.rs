@@ -1,7 +1,7 @@
 //! Two treatments of the same cases.
 
 use super::Bootstrap;
-use super::interval::at_most;
+use super::interval::binomial_cdf;
 use super::interval::{Interval, mean_interval, student_p_value, student_t};
 use super::moments::{mean, sample_sd, sum};
 
@@ -16,7 +16,7 @@ pub struct Pairs {
 impl Pairs {
     /// Creates the pairs `(a[i], b[i])` of which both have a finite value; all others, and the rest
     /// of the longer list, count as incomplete.
-    pub fn of(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
+    pub fn from_columns(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
         let finite = |value: &Option<f64>| value.filter(|v| v.is_finite());
         let complete = |(a, b)| Some((finite(a)?, finite(b)?));
         let pairs: Vec<(f64, f64)> = a.iter().zip(b).filter_map(complete).collect();
@@ -55,7 +55,7 @@ impl Pairs {
     /// value is negative (a ratio of signed quantities means little), with fewer than two pairs,
     /// and where the interval of the baseline's mean contains 0, so that no factor is excluded.
     pub fn ratio(&self) -> Option<(f64, Interval)> {
-        let (a, b) = self.sides();
+        let (a, b) = self.columns();
         if self.n() < 2 || self.pairs.iter().any(|(a, b)| *a < 0.0 || *b < 0.0) {
             return None;
         }
@@ -99,7 +99,7 @@ impl Pairs {
     }
 
     /// Returns the number of pairs in which `a` is lower than `b`, equal, and higher.
-    pub fn signs(&self) -> (usize, usize, usize) {
+    pub fn sign_counts(&self) -> (usize, usize, usize) {
         let lower = self.pairs.iter().filter(|(a, b)| a < b).count();
         let higher = self.pairs.iter().filter(|(a, b)| a > b).count();
         (lower, self.n() - lower - higher, higher)
@@ -121,12 +121,12 @@ impl Pairs {
     /// Returns the two-sided p-value of the exact sign test: among pairs that differ, `a` is as
     /// often lower as higher. 1 where none differs; `None` without pairs.
     pub fn sign_p_value(&self) -> Option<f64> {
-        let (lower, _, higher) = self.signs();
-        let rarer = at_most(lower.min(higher), lower + higher, 0.5);
+        let (lower, _, higher) = self.sign_counts();
+        let rarer = binomial_cdf(lower.min(higher), lower + higher, 0.5);
         (self.n() > 0).then_some((2.0 * rarer).min(1.0))
     }
 
-    fn sides(&self) -> (Vec<f64>, Vec<f64>) {
+    fn columns(&self) -> (Vec<f64>, Vec<f64>) {
         self.pairs.iter().copied().unzip()
     }
 }
@@ -152,7 +152,7 @@ pub fn holm(p_values: &[Option<f64>]) -> Vec<Option<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::close;
+    use super::super::testing::assert_close;
     use super::*;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
@@ -167,20 +167,20 @@ mod tests {
     fn sleep() -> Pairs {
         let a = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0];
         let b = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4];
-        Pairs::of(&some(&a), &some(&b))
+        Pairs::from_columns(&some(&a), &some(&b))
     }
 
     #[test]
     fn students_sleep_gives_what_r_gives() {
         // R: t.test(extra ~ group, data = sleep, paired = TRUE); binom.test(0, 9).
         let pairs = sleep();
-        close(pairs.difference().unwrap(), -1.58, 1e-12);
+        assert_close(pairs.difference().unwrap(), -1.58, 1e-12);
         let interval = pairs.difference_interval().unwrap();
-        close(interval.low, -2.459_885_8, 1e-7);
-        close(interval.high, -0.700_114_2, 1e-7);
-        close(pairs.p_value().unwrap(), 0.002_832_89, 1e-7);
-        assert_eq!(pairs.signs(), (9, 1, 0));
-        close(pairs.sign_p_value().unwrap(), 0.003_906_25, 1e-12);
+        assert_close(interval.low, -2.459_885_8, 1e-7);
+        assert_close(interval.high, -0.700_114_2, 1e-7);
+        assert_close(pairs.p_value().unwrap(), 0.002_832_89, 1e-7);
+        assert_eq!(pairs.sign_counts(), (9, 1, 0));
+        assert_close(pairs.sign_p_value().unwrap(), 0.003_906_25, 1e-12);
         assert_eq!(pairs.ratio(), None, "some are negative");
         let bootstrap = pairs.difference_bootstrap(&Bootstrap::default()).unwrap();
         assert!(bootstrap.contains(-1.58) && bootstrap.high < 0.0);
@@ -190,20 +190,20 @@ mod tests {
     fn only_complete_finite_pairs_count() {
         let a = [Some(1.0), None, Some(f64::NAN), Some(4.0), Some(9.0)];
         let b = [Some(2.0), Some(1.0), Some(1.0), Some(f64::INFINITY)];
-        let pairs = Pairs::of(&a, &b);
-        assert_eq!((pairs.n(), pairs.incomplete(), pairs.signs()), (1, 4, (1, 0, 0)));
+        let pairs = Pairs::from_columns(&a, &b);
+        assert_eq!((pairs.n(), pairs.incomplete(), pairs.sign_counts()), (1, 4, (1, 0, 0)));
         assert_eq!(
             (pairs.p_value(), pairs.difference_interval(), pairs.ratio()),
             (None, None, None)
         );
-        assert_eq!(Pairs::of(&[], &[]).sign_p_value(), None);
+        assert_eq!(Pairs::from_columns(&[], &[]).sign_p_value(), None);
     }
 
     #[test]
     fn differences_without_spread_have_no_p_value_but_none() {
-        assert_eq!(Pairs::of(&some(&[1.0; 5]), &some(&[1.0; 5])).p_value(), Some(1.0));
-        assert_eq!(Pairs::of(&some(&[1.0; 5]), &some(&[2.0; 5])).p_value(), None);
-        let sure = Pairs::of(&some(&[1.0; 5]), &some(&[2.0; 5])).ratio().unwrap();
+        assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[1.0; 5])).p_value(), Some(1.0));
+        assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).p_value(), None);
+        let sure = Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).ratio().unwrap();
         assert_eq!(sure, (0.5, Interval { low: 0.5, high: 0.5 }));
     }
 
@@ -214,7 +214,7 @@ mod tests {
         let expected = [Some(0.03), Some(0.06), None, Some(0.06), Some(0.02)];
         for (a, e) in adjusted.iter().zip(expected) {
             assert_eq!(a.is_some(), e.is_some());
-            close(a.unwrap_or(0.0), e.unwrap_or(0.0), 1e-12);
+            assert_close(a.unwrap_or(0.0), e.unwrap_or(0.0), 1e-12);
         }
         assert_eq!(holm(&[Some(f64::NAN), None]), [None, None]);
         assert_eq!(holm(&[Some(0.9), Some(0.8)]), [Some(1.0), Some(1.0)]);
@@ -232,14 +232,15 @@ mod tests {
             let mut treated =
                 || -> Vec<_> { case.iter().map(|c| Some(c + normal(&mut draws))).collect() };
             let baseline = treated();
-            let pairs: Vec<Pairs> = (0..5).map(|_| Pairs::of(&treated(), &baseline)).collect();
+            let pairs: Vec<Pairs> =
+                (0..5).map(|_| Pairs::from_columns(&treated(), &baseline)).collect();
             ratios += usize::from(pairs[0].ratio().unwrap().1.contains(1.0));
             let p: Vec<_> = pairs.iter().map(Pairs::p_value).collect();
             wrong += usize::from(holm(&p).iter().any(|p| p.unwrap() < 0.05));
         }
         let (ratios, wrong) = (ratios as f64 / 2000.0, wrong as f64 / 2000.0);
         println!("Fieller covers {ratios}; families with an error {wrong}");
-        close(ratios, 0.95, 0.02);
+        assert_close(ratios, 0.95, 0.02);
         assert!(wrong < 0.07, "{wrong}");
     }
 
@@ -249,8 +250,8 @@ mod tests {
             pairs in prop::collection::vec((50.0_f64..60.0, 80.0_f64..100.0), 3..30),
         ) {
             let (a, b): (Vec<_>, Vec<_>) = pairs.into_iter().map(|(a, b)| (Some(a), Some(b))).unzip();
-            let (ratio, interval) = Pairs::of(&a, &b).ratio().unwrap();
-            let (other, inverse) = Pairs::of(&b, &a).ratio().unwrap();
+            let (ratio, interval) = Pairs::from_columns(&a, &b).ratio().unwrap();
+            let (other, inverse) = Pairs::from_columns(&b, &a).ratio().unwrap();
             prop_assert!((ratio * other - 1.0).abs() < 1e-12 && interval.contains(ratio));
             prop_assert!((interval.low * inverse.high - 1.0).abs() < 1e-9);
             prop_assert!((interval.high * inverse.low - 1.0).abs() < 1e-9);
@@ -261,7 +262,7 @@ mod tests {
             a in prop::collection::vec(prop::option::of(prop::num::f64::ANY), 0..8),
             b in prop::collection::vec(prop::option::of(prop::num::f64::ANY), 0..8),
         ) {
-            let pairs = Pairs::of(&a, &b);
+            let pairs = Pairs::from_columns(&a, &b);
             let few = Bootstrap { resamples: 50, ..Bootstrap::default() };
             let _ = (pairs.difference(), pairs.difference_interval(), pairs.ratio(), pairs.p_value());
             let _ = (pairs.difference_bootstrap(&few), pairs.ratio_bootstrap(&few), pairs.sign_p_value());

@@ -1,6 +1,6 @@
 //! Percentiles, and distribution-free intervals of them.
 
-use super::interval::{Interval, Z_975, at_most};
+use super::interval::{Interval, Z_975, binomial_cdf};
 use serde::Serialize;
 use sidestep_kernel::math;
 
@@ -17,11 +17,11 @@ pub struct QuantileInterval {
 }
 
 /// The largest probability of a miss on either side.
-const TAIL: f64 = 0.025;
+const MAX_TAIL_PROBABILITY: f64 = 0.025;
 
 /// Above this many values the ranks are those of the normal approximation, widened outward to whole
 /// ranks, because the library's incomplete beta function converges too slowly there.
-const EXACT: usize = 10_000;
+const MAX_EXACT_VALUES: usize = 10_000;
 
 /// Returns an interval of the `q`-quantile of the distribution that the values of `sorted` come
 /// from, of any kind, by order statistics (Conover, Practical Nonparametric Statistics, 3.2):
@@ -34,12 +34,12 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
     if !(q > 0.0 && q < 1.0) || n == 0 {
         return None;
     }
-    let (low, high) = if n <= EXACT { exact_ranks(n, q)? } else { normal_ranks(n, q)? };
+    let (low, high) = if n <= MAX_EXACT_VALUES { exact_ranks(n, q)? } else { normal_ranks(n, q)? };
     let interval = Interval { low: sorted[low - 1], high: sorted[high - 1] };
-    let coverage = if n <= EXACT {
-        at_most(high - 1, n, q) - at_most(low - 1, n, q)
+    let coverage = if n <= MAX_EXACT_VALUES {
+        binomial_cdf(high - 1, n, q) - binomial_cdf(low - 1, n, q)
     } else {
-        1.0 - 2.0 * TAIL
+        1.0 - 2.0 * MAX_TAIL_PROBABILITY
     };
     Some(QuantileInterval { interval, ranks: (low, high), coverage })
 }
@@ -48,7 +48,7 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
 /// median, 72 for the 5th and 95th percentile. `None` for `q` outside (0, 1).
 pub fn runs_for_quantile(q: f64) -> Option<usize> {
     let inner = q.max(1.0 - q);
-    (q > 0.0 && q < 1.0).then(|| (math::ln(TAIL) / math::ln(inner)).ceil() as usize)
+    (q > 0.0 && q < 1.0).then(|| (math::ln(MAX_TAIL_PROBABILITY) / math::ln(inner)).ceil() as usize)
 }
 
 /// Returns the smallest rank from 1 on that `holds`, or `n + 1`; where it holds for a rank, it
@@ -64,8 +64,8 @@ fn first_rank(n: usize, holds: impl Fn(usize) -> bool) -> usize {
 
 fn exact_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
     // Fewer than `low` values lie below the quantile, or at least `high` do, with at most TAIL.
-    let low = first_rank(n, |rank| at_most(rank - 1, n, q) > TAIL) - 1;
-    let high = first_rank(n, |rank| at_most(rank - 1, n, q) >= 1.0 - TAIL);
+    let low = first_rank(n, |rank| binomial_cdf(rank - 1, n, q) > MAX_TAIL_PROBABILITY) - 1;
+    let high = first_rank(n, |rank| binomial_cdf(rank - 1, n, q) >= 1.0 - MAX_TAIL_PROBABILITY);
     (low >= 1 && high <= n).then_some((low, high))
 }
 
@@ -79,7 +79,7 @@ fn normal_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::super::moments::percentile;
-    use super::super::testing::close;
+    use super::super::testing::assert_close;
     use super::*;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
@@ -108,8 +108,8 @@ mod tests {
             assert_eq!(found.ranks, (low, n + 1 - low), "n = {n}");
         }
         // 1 - 2 * 0.5^6 and 1 - 22 * 0.5^10.
-        close(quantile_interval(&ranks(6), 0.5).unwrap().coverage, 0.968_75, 1e-12);
-        close(quantile_interval(&ranks(10), 0.5).unwrap().coverage, 0.978_515_625, 1e-12);
+        assert_close(quantile_interval(&ranks(6), 0.5).unwrap().coverage, 0.968_75, 1e-12);
+        assert_close(quantile_interval(&ranks(10), 0.5).unwrap().coverage, 0.978_515_625, 1e-12);
     }
 
     #[test]
@@ -128,7 +128,10 @@ mod tests {
     #[test]
     fn approximate_ranks_continue_the_exact_ones() {
         for q in [0.05, 0.5, 0.75] {
-            let (exact, normal) = (exact_ranks(EXACT, q).unwrap(), normal_ranks(EXACT, q).unwrap());
+            let (exact, normal) = (
+                exact_ranks(MAX_EXACT_VALUES, q).unwrap(),
+                normal_ranks(MAX_EXACT_VALUES, q).unwrap(),
+            );
             assert!(exact.0.abs_diff(normal.0) <= 2 && exact.1.abs_diff(normal.1) <= 2);
         }
         assert!(quantile_interval(&ranks(100_000), 0.5).is_some());
@@ -148,8 +151,8 @@ mod tests {
             told = found.coverage;
             found.interval.contains(0.5)
         });
-        close(covered.count() as f64 / f64::from(samples), told, 4.0 * 0.0045);
-        close(told, 0.958_6, 1e-4);
+        assert_close(covered.count() as f64 / f64::from(samples), told, 4.0 * 0.0045);
+        assert_close(told, 0.958_6, 1e-4);
     }
 
     proptest! {

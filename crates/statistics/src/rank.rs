@@ -51,7 +51,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::close;
+    use crate::testing::assert_close;
 
     #[test]
     fn ranks_count_and_not_distances() {
@@ -69,7 +69,7 @@ mod tests {
         let hours = [2.0, 20.0, 28.0, 27.0, 50.0, 29.0, 7.0, 17.0, 6.0, 12.0];
         let pairs: Vec<(f64, f64)> = iq.into_iter().zip(hours).collect();
         let found = rank_correlation(&pairs).expect("a correlation");
-        close(found.value, 1.0 - 6.0 * 194.0 / 990.0, 1e-12);
+        assert_close(found.value, 1.0 - 6.0 * 194.0 / 990.0, 1e-12);
         let interval = found.interval.expect("of ten pairs");
         assert!(interval.contains(0.0) && interval.contains(found.value), "{interval:?}");
     }

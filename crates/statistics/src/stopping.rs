@@ -35,7 +35,7 @@ use serde::Serialize;
 /// The number of equal values from which on they are believed: by the rule of three (`3 / n`) at
 /// most about 5 % of all runs then differ. Before, an interval without width is no evidence of
 /// anything.
-const CONSTANT: usize = 60;
+const MIN_CONSTANT_RUNS: usize = 60;
 
 /// A rule that ends the runs at a half-width of Student's 95 % interval of the mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -53,17 +53,17 @@ pub struct StoppingRule {
 /// The answer of a [`StoppingRule`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Next {
+pub enum StopDecision {
     /// Run until there are this many runs in total, then ask again.
     Run(usize),
     /// The first runs, of this number, are the result; those beyond are not part of it.
-    Enough(usize, Reason),
+    Enough(usize, StopReason),
 }
 
 /// The reason why runs are enough.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reason {
+pub enum StopReason {
     /// The interval is as narrow as the target.
     Reached,
     /// All values are equal, and there are enough of them (60) to believe it.
@@ -81,9 +81,9 @@ pub enum Reason {
     Seedless,
 }
 
-impl Reason {
+impl StopReason {
     /// Returns the reason in words.
-    pub fn words(self) -> &'static str {
+    pub fn describe(self) -> &'static str {
         match self {
             Self::Reached => "the interval is as narrow as wanted",
             Self::Constant => "all values are equal",
@@ -105,65 +105,73 @@ impl StoppingRule {
     /// A function of the values alone: it goes through the rounds from the first run on, for any
     /// number of values. The result therefore does not depend on the number of workers, on how far
     /// they ran ahead, or on whether a sweep was killed in the middle of a round.
-    pub fn next(&self, values: &[Option<f64>]) -> Next {
-        self.next_of(&[values])
+    pub fn decide(&self, values: &[Option<f64>]) -> StopDecision {
+        self.decide_columns(&[values])
     }
 
     /// Returns the next step for several columns at once (metrics, or variants that are run side by
     /// side): enough when all are, with the worst reason. Only runs that all columns have count.
     ///
     /// Without columns nothing is asked for, and the first round is enough.
-    pub fn next_of(&self, columns: &[&[Option<f64>]]) -> Next {
+    pub fn decide_columns(&self, columns: &[&[Option<f64>]]) -> StopDecision {
         let there = columns.iter().map(|c| c.len()).min().unwrap_or(usize::MAX);
         let mut total = self.min_runs.max(2).min(self.max_runs);
         loop {
             if there < total {
-                return Next::Run(total);
+                return StopDecision::Run(total);
             }
-            let looks: Vec<Next> = columns.iter().map(|c| self.look(&c[..total])).collect();
+            let looks: Vec<StopDecision> =
+                columns.iter().map(|c| self.decide_round(&c[..total])).collect();
             let more = looks.iter().filter_map(|look| match look {
-                Next::Run(total) => Some(*total),
-                Next::Enough(..) => None,
+                StopDecision::Run(total) => Some(*total),
+                StopDecision::Enough(..) => None,
             });
             let reasons = looks.iter().filter_map(|look| match look {
-                Next::Enough(_, reason) => Some(*reason),
-                Next::Run(_) => None,
+                StopDecision::Enough(_, reason) => Some(*reason),
+                StopDecision::Run(_) => None,
             });
             match more.max() {
                 Some(more) => total = more,
-                None => return Next::Enough(total, reasons.max().unwrap_or(Reason::Reached)),
+                None => {
+                    return StopDecision::Enough(
+                        total,
+                        reasons.max().unwrap_or(StopReason::Reached),
+                    );
+                }
             }
         }
     }
 
     /// Decides at the end of a round.
-    fn look(&self, values: &[Option<f64>]) -> Next {
+    fn decide_round(&self, values: &[Option<f64>]) -> StopDecision {
         let runs = values.len();
-        let sample = Sample::of(values.iter().copied()).values;
-        match self.verdict(&sample) {
-            Some(reason) => Next::Enough(runs, reason),
-            None if runs >= self.max_runs => Next::Enough(runs, self.excuse(&sample)),
-            None => Next::Run(self.round(runs, &sample)),
+        let sample = Sample::from_runs(values.iter().copied()).values;
+        match self.reason_before_max(&sample) {
+            Some(reason) => StopDecision::Enough(runs, reason),
+            None if runs >= self.max_runs => {
+                StopDecision::Enough(runs, self.reason_at_max(&sample))
+            }
+            None => StopDecision::Run(self.next_round_end(runs, &sample)),
         }
     }
 
-    fn verdict(&self, sample: &[f64]) -> Option<Reason> {
+    fn reason_before_max(&self, sample: &[f64]) -> Option<StopReason> {
         let interval = mean_interval(sample)?;
         if is_constant(sample) {
-            return (sample.len() >= CONSTANT).then_some(Reason::Constant);
+            return (sample.len() >= MIN_CONSTANT_RUNS).then_some(StopReason::Constant);
         }
         let reached = interval.half_width() <= self.target(sample);
         // A target of 0 is only reached by values that never vary.
-        reached.then_some(Reason::Reached)
+        reached.then_some(StopReason::Reached)
     }
 
-    fn excuse(&self, sample: &[f64]) -> Reason {
+    fn reason_at_max(&self, sample: &[f64]) -> StopReason {
         match mean_interval(sample) {
-            None => Reason::TooFewValues,
+            None => StopReason::TooFewValues,
             // No share of a mean that may be 0 is narrow enough.
-            Some(interval) if self.relative && interval.contains(0.0) => Reason::MeanNearZero,
+            Some(interval) if self.relative && interval.contains(0.0) => StopReason::MeanNearZero,
             // Too wide, or without width but from too few runs to be called constant.
-            Some(_) => Reason::Maximum,
+            Some(_) => StopReason::Maximum,
         }
     }
 
@@ -175,9 +183,9 @@ impl StoppingRule {
 
     /// Returns the end of the next round: the number that the spread so far predicts, at least half
     /// as much again and at most twice the present number.
-    fn round(&self, runs: usize, sample: &[f64]) -> usize {
+    fn next_round_end(&self, runs: usize, sample: &[f64]) -> usize {
         let values = if is_constant(sample) {
-            Some(CONSTANT as u64)
+            Some(MIN_CONSTANT_RUNS as u64)
         } else {
             sample_sd(sample).and_then(|sd| runs_for_half_width(sd, self.target(sample)))
         };
@@ -207,43 +215,52 @@ mod tests {
 
     #[test]
     fn the_first_look_is_after_the_first_round() {
-        assert_eq!(ABSOLUTE.next(&[]), Next::Run(10));
-        assert_eq!(ABSOLUTE.next(&[Some(1.0); 9]), Next::Run(10));
-        assert_eq!(StoppingRule { min_runs: 0, ..ABSOLUTE }.next(&[]), Next::Run(2));
-        assert_eq!(StoppingRule { max_runs: 5, ..ABSOLUTE }.next(&[]), Next::Run(5));
+        assert_eq!(ABSOLUTE.decide(&[]), StopDecision::Run(10));
+        assert_eq!(ABSOLUTE.decide(&[Some(1.0); 9]), StopDecision::Run(10));
+        assert_eq!(StoppingRule { min_runs: 0, ..ABSOLUTE }.decide(&[]), StopDecision::Run(2));
+        assert_eq!(StoppingRule { max_runs: 5, ..ABSOLUTE }.decide(&[]), StopDecision::Run(5));
         assert_eq!(
-            StoppingRule { max_runs: 0, ..ABSOLUTE }.next(&[]),
-            Next::Enough(0, Reason::TooFewValues)
+            StoppingRule { max_runs: 0, ..ABSOLUTE }.decide(&[]),
+            StopDecision::Enough(0, StopReason::TooFewValues)
         );
-        assert_eq!(ABSOLUTE.next_of(&[]), Next::Enough(10, Reason::Reached));
+        assert_eq!(ABSOLUTE.decide_columns(&[]), StopDecision::Enough(10, StopReason::Reached));
     }
 
     #[test]
     fn equal_values_are_believed_after_sixty() {
-        assert_eq!(ABSOLUTE.next(&[Some(1.0); 59]), Next::Run(60));
-        assert_eq!(ABSOLUTE.next(&[Some(1.0); 60]), Next::Enough(60, Reason::Constant));
+        assert_eq!(ABSOLUTE.decide(&[Some(1.0); 59]), StopDecision::Run(60));
+        assert_eq!(
+            ABSOLUTE.decide(&[Some(1.0); 60]),
+            StopDecision::Enough(60, StopReason::Constant)
+        );
         let relative = StoppingRule { relative: true, max_runs: 20, ..ABSOLUTE };
-        assert_eq!(relative.next(&[Some(0.0); 20]), Next::Enough(20, Reason::MeanNearZero));
-        assert_eq!(relative.next(&[Some(2.0); 20]), Next::Enough(20, Reason::Maximum));
+        assert_eq!(
+            relative.decide(&[Some(0.0); 20]),
+            StopDecision::Enough(20, StopReason::MeanNearZero)
+        );
+        assert_eq!(
+            relative.decide(&[Some(2.0); 20]),
+            StopDecision::Enough(20, StopReason::Maximum)
+        );
     }
 
     #[test]
     fn a_mean_near_zero_runs_to_the_maximum_and_says_so() {
         let rule = StoppingRule { half_width: 0.05, relative: true, min_runs: 10, max_runs: 300 };
         let values: Vec<_> = (0..300).map(|i| Some(if i % 2 == 0 { 1.0 } else { -1.0 })).collect();
-        assert_eq!(rule.next(&values), Next::Enough(300, Reason::MeanNearZero));
+        assert_eq!(rule.decide(&values), StopDecision::Enough(300, StopReason::MeanNearZero));
     }
 
     #[test]
     fn runs_without_a_value_are_made_up_for() {
         let nothing = vec![None; 1000];
-        assert_eq!(ABSOLUTE.next(&nothing), Next::Enough(1000, Reason::TooFewValues));
+        assert_eq!(ABSOLUTE.decide(&nothing), StopDecision::Enough(1000, StopReason::TooFewValues));
         let half: Vec<_> = drawn(1, 1000, normal)
             .into_iter()
             .enumerate()
             .map(|(i, v)| v.filter(|_| i % 2 == 0))
             .collect();
-        let Next::Enough(runs, Reason::Reached) = ABSOLUTE.next(&half) else {
+        let StopDecision::Enough(runs, StopReason::Reached) = ABSOLUTE.decide(&half) else {
             panic!("not reached")
         };
         assert!((100..=300).contains(&runs), "{runs}");
@@ -252,10 +269,12 @@ mod tests {
     #[test]
     fn columns_go_on_until_the_last_of_them_is_narrow() {
         let (wide, narrow) = (drawn(1, 1000, normal), drawn(2, 1000, |d| 0.01 * normal(d)));
-        let Next::Enough(alone, Reason::Reached) = ABSOLUTE.next(&narrow) else { panic!() };
-        let both = ABSOLUTE.next_of(&[&narrow, &wide]);
+        let StopDecision::Enough(alone, StopReason::Reached) = ABSOLUTE.decide(&narrow) else {
+            panic!()
+        };
+        let both = ABSOLUTE.decide_columns(&[&narrow, &wide]);
         assert_eq!(alone, 10);
-        assert_eq!(both, ABSOLUTE.next(&wide));
+        assert_eq!(both, ABSOLUTE.decide(&wide));
     }
 
     /// Share of intervals at the stop that contain the mean, over 4,000 sweeps, and their mean
@@ -265,8 +284,10 @@ mod tests {
         let sweeps = 4000;
         for case in 0..sweeps {
             let values = drawn(case, rule.max_runs, &draw);
-            let Next::Enough(runs, _) = rule.next(&values) else { panic!("all runs are there") };
-            let sample = Sample::of(values[..runs].iter().copied()).values;
+            let StopDecision::Enough(runs, _) = rule.decide(&values) else {
+                panic!("all runs are there")
+            };
+            let sample = Sample::from_runs(values[..runs].iter().copied()).values;
             held += usize::from(mean_interval(&sample).unwrap().contains(truth));
             total += runs;
         }
@@ -305,11 +326,11 @@ mod tests {
             relative: bool,
         ) {
             let rule = StoppingRule { half_width, relative, min_runs: 10, max_runs: 200 };
-            let last = rule.next(&values);
-            let Next::Enough(end, _) = last else { panic!("all runs are there") };
+            let last = rule.decide(&values);
+            let StopDecision::Enough(end, _) = last else { panic!("all runs are there") };
             for there in 0..=200 {
-                match rule.next(&values[..there]) {
-                    Next::Run(total) => prop_assert!(there < total && total <= end),
+                match rule.decide(&values[..there]) {
+                    StopDecision::Run(total) => prop_assert!(there < total && total <= end),
                     enough => prop_assert!(there >= end && enough == last),
                 }
             }
@@ -321,9 +342,9 @@ mod tests {
             half_width in prop::num::f64::ANY, relative: bool, min_runs in 0_usize..50, max_runs in 0_usize..50,
         ) {
             let rule = StoppingRule { half_width, relative, min_runs, max_runs };
-            match rule.next(&values) {
-                Next::Run(total) => prop_assert!(total > values.len() && total <= max_runs),
-                Next::Enough(runs, _) => prop_assert!(runs <= values.len()),
+            match rule.decide(&values) {
+                StopDecision::Run(total) => prop_assert!(total > values.len() && total <= max_runs),
+                StopDecision::Enough(runs, _) => prop_assert!(runs <= values.len()),
             }
         }
     }

@@ -1,12 +1,12 @@
 //! Arms of robot models: the options that choose one and its posture, and both as text and JSON.
 
 use super::arm_picture::ArmPicture;
-use crate::console::{aligned, fixed};
+use crate::console::{align_pairs, format_fixed};
 use clap::Args;
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::worlds::chain::kinematics::{
-    ArmFiles, ChosenArm, Pose, Rod, Sphere, Variable, Vector,
+    ArmFiles, ArmSelection, Dof, SkeletonRod, Sphere, Transform, Vector,
 };
 use std::path::PathBuf;
 
@@ -44,7 +44,7 @@ pub(crate) struct ArmArgs {
 
 /// An arm in a posture.
 pub(crate) struct Arm {
-    pub(crate) chosen: ChosenArm,
+    pub(crate) chosen: ArmSelection,
     pub(crate) values: Vec<f64>,
 }
 
@@ -56,7 +56,7 @@ impl ArmArgs {
     pub(crate) fn load(&self) -> Result<Arm, InputError> {
         let chosen = self.files().load()?;
         let (place, values) = match &self.joints {
-            Some(text) => ("--joints", numbers("--joints", text)?),
+            Some(text) => ("--joints", parse_numbers("--joints", text)?),
             None => ("--posture", chosen.posture(self.posture.as_deref())?),
         };
         chosen.chain.check_count(place, &values)?;
@@ -78,7 +78,7 @@ impl ArmArgs {
 ///
 /// # Errors
 /// When a word is not a number.
-pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> {
+pub(crate) fn parse_numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> {
     let words = text.split(',').map(str::trim).filter(|_| !text.trim().is_empty());
     let number = |word: &str| {
         word.parse().map_err(|_| {
@@ -91,7 +91,7 @@ pub(crate) fn numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> 
 
 /// The posture of an arm and the positions that follow from it.
 #[derive(Debug, Serialize)]
-pub(crate) struct Placed {
+pub(crate) struct ArmPositions {
     robot: String,
     base_link: String,
     tip_link: String,
@@ -102,16 +102,16 @@ pub(crate) struct Placed {
     /// Joint values from the base out, in rad or m, as `--joints` takes them.
     joints: Vec<f64>,
     /// The joints that these values belong to, in the same order.
-    joint_info: Vec<JointPlaced>,
+    joint_info: Vec<JointPosition>,
     /// Names of joints outside their limits, including those that mimic others.
     pub(crate) outside_limits: Vec<String>,
     /// Positions of the connectors in m, from the base out.
     connectors: Vec<Vector>,
-    rods: Vec<RodSize>,
+    rods: Vec<RodLimits>,
 }
 
 #[derive(Debug, Serialize)]
-struct JointPlaced {
+struct JointPosition {
     name: String,
     value: f64,
     unit: &'static str,
@@ -121,35 +121,40 @@ struct JointPlaced {
 
 /// Shortest and longest length in m of the rod between two connectors; null where it has no limit.
 #[derive(Debug, Serialize)]
-struct RodSize {
+struct RodLimits {
     min_m: f64,
     max_m: Option<f64>,
 }
 
 impl Arm {
     /// Returns the positions of the arm at these joint values.
-    pub(crate) fn at(&self, values: &[f64]) -> Placed {
+    pub(crate) fn positions(&self, values: &[f64]) -> ArmPositions {
         let chain = &self.chosen.chain;
         let frames = chain.forward(values);
         let skeleton = chain.skeleton();
-        let Pose { rotation, origin_m } = frames.tip;
-        Placed {
+        let Transform { rotation, origin_m } = frames.tip;
+        ArmPositions {
             robot: self.chosen.model.name.clone(),
             base_link: chain.base.clone(),
             tip_link: chain.tip.clone(),
             tip: origin_m,
             rotation,
             joints: values.to_vec(),
-            joint_info: chain.variables.iter().zip(values).map(|(v, &q)| joint(v, q)).collect(),
+            joint_info: chain
+                .variables
+                .iter()
+                .zip(values)
+                .map(|(v, &q)| joint_position(v, q))
+                .collect(),
             outside_limits: chain.outside_limits(values).into_iter().map(str::to_owned).collect(),
             connectors: chain.connectors(&skeleton, &frames),
-            rods: skeleton.rods.iter().map(rod).collect(),
+            rods: skeleton.rods.iter().map(rod_limits).collect(),
         }
     }
 }
 
-fn joint(variable: &Variable, value: f64) -> JointPlaced {
-    JointPlaced {
+fn joint_position(variable: &Dof, value: f64) -> JointPosition {
+    JointPosition {
         name: variable.name.clone(),
         value,
         unit: variable.motion.unit(),
@@ -157,11 +162,11 @@ fn joint(variable: &Variable, value: f64) -> JointPlaced {
     }
 }
 
-fn rod(rod: &Rod) -> RodSize {
-    RodSize { min_m: rod.min_m, max_m: rod.max_m.is_finite().then_some(rod.max_m) }
+fn rod_limits(rod: &SkeletonRod) -> RodLimits {
+    RodLimits { min_m: rod.min_m, max_m: rod.max_m.is_finite().then_some(rod.max_m) }
 }
 
-impl Placed {
+impl ArmPositions {
     /// Returns the arm as a picture, with the target of its tip and the obstacles.
     pub(crate) fn picture<'a>(
         &'a self,
@@ -174,37 +179,37 @@ impl Placed {
     /// Returns the positions as text for people.
     pub(crate) fn text(&self) -> String {
         let joints: Vec<_> =
-            self.joint_info.iter().map(|j| (j.name.clone(), joint_words(j))).collect();
+            self.joint_info.iter().map(|j| (j.name.clone(), joint_text(j))).collect();
         let last = self.connectors.len() - 1;
         let name = |i: usize| if i == last { "tip".into() } else { format!("connector {i}") };
-        let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), meters(p)));
+        let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), format_point(p)));
         let points: Vec<_> = points.collect();
         format!(
             "{} from {} to {}\n{}Connectors\n{}",
             self.robot,
             self.base_link,
             self.tip_link,
-            aligned(&joints),
-            aligned(&points)
+            align_pairs(&joints),
+            align_pairs(&points)
         )
     }
 }
 
-fn joint_words(joint: &JointPlaced) -> String {
+fn joint_text(joint: &JointPosition) -> String {
     let limits = match joint.limits {
         Some([lower, upper]) => format!("{lower:.4} to {upper:.4}"),
         None => "no limits".into(),
     };
-    format!("{:>9} {:<3}  ({limits})", fixed(joint.value, 4), joint.unit)
+    format!("{:>9} {:<3}  ({limits})", format_fixed(joint.value, 4), joint.unit)
 }
 
 /// Formats numbers with six decimals in aligned columns.
-pub(crate) fn in_micros(numbers: &[f64]) -> String {
-    let columns = numbers.iter().map(|x| format!("{:>10}", fixed(*x, 6)));
+pub(crate) fn format_numbers(numbers: &[f64]) -> String {
+    let columns = numbers.iter().map(|x| format!("{:>10}", format_fixed(*x, 6)));
     columns.collect::<Vec<_>>().join(" ")
 }
 
 /// Formats a position in m in aligned columns.
-pub(crate) fn meters(p: &Vector) -> String {
-    format!("{} m", in_micros(p))
+pub(crate) fn format_point(p: &Vector) -> String {
+    format!("{} m", format_numbers(p))
 }

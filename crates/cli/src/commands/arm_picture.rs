@@ -1,17 +1,17 @@
 //! An arm in a posture as a picture.
 
 use crate::exit::Failure;
-use sidestep::kernel::view::{Body, Frame, Kind, Pose, Scenery, Shape};
+use sidestep::kernel::view::{Body, BodyKind, Frame, Pose, Scenery, Shape};
 use sidestep::worlds::chain::kinematics::{Sphere, Vector};
-use sidestep_draw::{Options, draw};
+use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::Path;
 
 /// Drawn thickness of links, and radius of connectors, as parts of the arm's length.
-const THICKNESS: f64 = 0.012;
-const RADIUS: f64 = 0.014;
+const THICKNESS_FRACTION: f64 = 0.012;
+const RADIUS_FRACTION: f64 = 0.014;
 /// Drawn radius of a target, as a part of the arm's length.
-const TARGET: f64 = 0.02;
+const TARGET_FRACTION: f64 = 0.02;
 
 /// The content of a picture.
 pub(crate) struct ArmPicture<'a> {
@@ -38,11 +38,11 @@ impl ArmPicture<'_> {
             cycle_s: 1.0,
             floor: None,
             bodies: self.still(length_m),
-            names: vec![(Kind::Connector, 0, self.robot.into())],
+            names: vec![(BodyKind::Connector, 0, self.robot.into())],
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };
         let caption = "Positions in m in the frame of the base.";
-        let svg = draw(&scenery, &frame, &[], &Options::page(&scenery, caption))?;
+        let svg = draw(&scenery, &frame, &[], &PictureOptions::page(&scenery, caption))?;
         write_png(path, &svg)
     }
 
@@ -56,24 +56,27 @@ impl ArmPicture<'_> {
     }
 
     fn arm(&self, length_m: f64) -> Vec<Body> {
-        let line =
-            Shape::Line { points_m: self.connectors.to_vec(), thickness_m: THICKNESS * length_m };
-        let ball = Shape::Sphere { radius_m: RADIUS * length_m };
-        let connector = |(part, at_m): (u32, &Vector)| {
-            Body::new(Kind::Connector, 0, Pose::at(*at_m), ball.clone()).part(part)
+        let line = Shape::Line {
+            points_m: self.connectors.to_vec(),
+            thickness_m: THICKNESS_FRACTION * length_m,
         };
-        let links = Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), line);
+        let ball = Shape::Sphere { radius_m: RADIUS_FRACTION * length_m };
+        let connector = |(part, at_m): (u32, &Vector)| {
+            Body::new(BodyKind::Connector, 0, Pose::from_position(*at_m), ball.clone())
+                .with_part(part)
+        };
+        let links = Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), line);
         std::iter::once(links).chain((0..).zip(self.connectors).map(connector)).collect()
     }
 
     fn still(&self, length_m: f64) -> Vec<Body> {
         let sphere = |(number, it): (u32, &Sphere)| {
             let ball = Shape::Sphere { radius_m: it.radius_m };
-            Body::new(Kind::Obstacle, number, Pose::at(it.center_m), ball)
+            Body::new(BodyKind::Obstacle, number, Pose::from_position(it.center_m), ball)
         };
         let target = self.target.map(|at_m| {
-            let ball = Shape::Sphere { radius_m: TARGET * length_m };
-            Body::new(Kind::Goal, 0, Pose::at(at_m), ball).part(0)
+            let ball = Shape::Sphere { radius_m: TARGET_FRACTION * length_m };
+            Body::new(BodyKind::Goal, 0, Pose::from_position(at_m), ball).with_part(0)
         });
         (0..).zip(self.obstacles).map(sphere).chain(target).collect()
     }

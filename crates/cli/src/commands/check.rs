@@ -1,15 +1,15 @@
 //! `sidestep check`: validates a scenario and describes it.
 
-use crate::console::{Console, aligned};
+use crate::console::{Console, align_pairs};
 use crate::exit::{ExitCode, Failure};
-use crate::plan::ScenarioArgs;
+use crate::scenario_args::ScenarioArgs;
 use crate::worlds;
 use clap::Args;
 use serde_json::Value;
 use sidestep::MOST_PROBLEMS;
 use sidestep::kernel::InputError;
-use sidestep::kernel::words::Said;
-use sidestep::scenario::{Compiled, Foreign, Remark, Source};
+use sidestep::kernel::text::Description;
+use sidestep::scenario::{CompiledScenario, ImportedScenario, Remark, Source};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -36,29 +36,29 @@ pub(crate) struct CheckArgs {
 /// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = worlds().translate(&args.scenario.file)?;
-    if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
+    if let Some(ImportedScenario { scenario: Err(error), json, lines }) = foreign {
         // The report lists the contents of the file, and the error says why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || aligned(&lines))?;
+        console.print_result(&json, || align_pairs(&lines))?;
         return Err(error.into());
     }
     let (source, compiled) = match args.scenario.compile() {
         Ok(right) => right,
-        Err(first) => return tell_all(args, first, console),
+        Err(first) => return print_all_errors(args, first, console),
     };
     let mut found = compiled.contents(&source);
     if let Some(foreign) = foreign {
         if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), foreign.json) {
             all.extend(more);
         }
-        found.text.push_str(&aligned(&foreign.lines));
+        found.text.push_str(&align_pairs(&foreign.lines));
     }
     measure_memory(&source, compiled.as_ref(), &mut found);
     let remarks = compiled.remarks();
     found.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
-    console.result(&found.json, || heading + &found.text + &in_words(&remarks))?;
+    console.print_result(&found.json, || heading + &found.text + &format_remarks(&remarks))?;
     Ok(ExitCode::Done)
 }
 
@@ -66,7 +66,11 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
 ///
 /// # Errors
 /// When that is the only one.
-fn tell_all(args: &CheckArgs, first: InputError, console: Console) -> Result<ExitCode, Failure> {
+fn print_all_errors(
+    args: &CheckArgs,
+    first: InputError,
+    console: Console,
+) -> Result<ExitCode, Failure> {
     let all = args.scenario.problems().unwrap_or_default();
     if all.len() < 2 {
         return Err(all.into_iter().next().unwrap_or(first).into());
@@ -78,11 +82,12 @@ fn tell_all(args: &CheckArgs, first: InputError, console: Console) -> Result<Exi
 }
 
 /// Adds the memory that a run takes: that of this process, because a run begins in the same way.
-fn measure_memory(source: &Source, compiled: &dyn Compiled, found: &mut Said) {
+fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, found: &mut Description) {
     // Kept until the memory is measured.
     let _run = compiled.start(source, 1);
     let Some(bytes) = peak_bytes() else { return };
-    let recorded = bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.bodies() as u64;
+    let recorded =
+        bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.body_count() as u64;
     found.json["memory_bytes"] = bytes.into();
     found.json["recorded_memory_bytes"] = recorded.into();
     let mb = |bytes: u64| bytes.div_ceil(1_000_000);
@@ -100,7 +105,7 @@ fn peak_bytes() -> Option<u64> {
 }
 
 /// Returns remarks as text: severity and key on a line, and the text below.
-fn in_words(remarks: &[Remark]) -> String {
+fn format_remarks(remarks: &[Remark]) -> String {
     let one = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
     remarks.iter().map(one).collect()
 }

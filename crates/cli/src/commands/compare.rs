@@ -1,12 +1,12 @@
 //! `sidestep compare`: collision avoidance methods on the same traffic, side by side.
 
-use crate::console::{Console, LINE_COLS, in_columns, wrapped};
+use crate::console::{Console, LINE_COLS, format_columns, wrap};
 use crate::exit::{ExitCode, Failure};
-use crate::plan::{ScenarioArgs, WorkersArg, of_world};
-use crate::progress::Stages;
+use crate::progress::StageProgress;
+use crate::scenario_args::{ScenarioArgs, WorkersArg, downcast_scenario};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use sidestep::worlds::airspace::scenario::Compiled;
+use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_document::Table;
 use sidestep_papers::methods::{SeedSpan, compare as run_all, table};
@@ -28,7 +28,7 @@ pub(crate) struct CompareArgs {
 
     /// Methods to compare, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,none")]
-    methods: Vec<Name>,
+    methods: Vec<MethodName>,
 
     /// Number of runs of each method, with consecutive seeds from the scenario's on
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
@@ -37,7 +37,7 @@ pub(crate) struct CompareArgs {
 
 /// The collision avoidance methods.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Name {
+enum MethodName {
     /// Probability collectives
     Pc,
     /// Optimal reciprocal collision avoidance (ORCA)
@@ -48,7 +48,7 @@ enum Name {
     None,
 }
 
-impl Name {
+impl MethodName {
     fn method(self) -> Method {
         match self {
             Self::Pc => Method::Pc,
@@ -65,17 +65,17 @@ impl Name {
 /// When the scenario is wrong, or of another world.
 pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let compiled: &Compiled = of_world(compiled.as_ref(), &source, "airspace")?;
+    let compiled: &CompiledAirspace = downcast_scenario(compiled.as_ref(), &source, "airspace")?;
     let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
-    let stages = Stages::new(console);
+    let stages = StageProgress::new(console);
     let seeds = SeedSpan { first: compiled.seed, runs: args.runs as usize };
     let workers = args.workers.count();
     let results =
-        run_all(&source, &methods, seeds, workers, &mut |what, share| stages.at(what, share));
+        run_all(&source, &methods, seeds, workers, &mut |what, share| stages.set(what, share));
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });
-    console.result(&json, || text(&table(&compiled.name, &results)))?;
+    console.print_result(&json, || text(&table(&compiled.name, &results)))?;
     Ok(ExitCode::Done)
 }
 
@@ -83,6 +83,6 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
 fn text(table: &Table) -> String {
     let title =
         if table.title.is_empty() { String::new() } else { format!("# {}\n\n", table.title) };
-    let note = wrapped(&table.note, LINE_COLS).join("\n");
-    format!("{title}{}\n{note}\n", in_columns(table))
+    let note = wrap(&table.note, LINE_COLS).join("\n");
+    format!("{title}{}\n{note}\n", format_columns(table))
 }

@@ -23,7 +23,7 @@ pub(crate) struct CompletionsArgs {
 
 /// The result for programs.
 #[derive(Debug, Serialize)]
-struct Printed {
+struct CompletionsOutput {
     shell: String,
     script: String,
 }
@@ -36,7 +36,7 @@ pub(crate) fn completions(args: &CompletionsArgs, console: Console) -> Result<Ex
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut args::command(), "sidestep", &mut script);
     let script = String::from_utf8(script).expect("scripts are text");
-    let printed = Printed { shell: args.shell.to_string(), script };
-    console.result(&printed, || printed.script.clone())?;
+    let printed = CompletionsOutput { shell: args.shell.to_string(), script };
+    console.print_result(&printed, || printed.script.clone())?;
     Ok(ExitCode::Done)
 }

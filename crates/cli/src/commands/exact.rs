@@ -1,16 +1,16 @@
 //! `sidestep exact`: the Markov chain of one robot, computed instead of simulated.
 
-use crate::console::{Console, aligned, grouped};
+use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
-use crate::plan::{ScenarioArgs, of_world};
+use crate::scenario_args::{ScenarioArgs, downcast_scenario};
 use clap::Args;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::exact::{
-    Beam, Comparison, Model, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
+    Beam, Comparison, MarkovModel, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
 };
 use sidestep::worlds::robots::scenario::Compiled;
-use sidestep_session::replace;
+use sidestep_session::write_atomically;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -105,10 +105,10 @@ impl ExportArgs {
 /// When the scenario is wrong or is not a Markov chain, or the export cannot be written.
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
-    let compiled: &Compiled = of_world(compiled.as_ref(), &source, "robots")?;
+    let compiled: &Compiled = downcast_scenario(compiled.as_ref(), &source, "robots")?;
     // A scenario without a name is named by its file.
     let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
-    let model = Model::new(compiled).map_err(in_file)?;
+    let model = MarkovModel::new(compiled).map_err(in_file)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;
     if let Some(runs) = args.runs {
@@ -116,7 +116,7 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
         summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
-    console.result(&summary, || text(&summary, named(compiled, &source)))?;
+    console.print_result(&summary, || text(&summary, scenario_name(compiled, &source)))?;
     Ok(match summary.comparison {
         None | Some(Comparison { agrees: Some(true), .. }) => ExitCode::Done,
         // Runs that are too few confirm nothing, and the user who asked for them wants to know.
@@ -124,19 +124,19 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
     })
 }
 
-fn named<'a>(compiled: &'a Compiled, source: &'a Source) -> &'a str {
+fn scenario_name<'a>(compiled: &'a Compiled, source: &'a Source) -> &'a str {
     if compiled.name.is_empty() { &source.place } else { &compiled.name }
 }
 
-fn export(model: &Model, args: &ExportArgs) -> Result<Option<PomdpSize>, Failure> {
+fn export(model: &MarkovModel, args: &ExportArgs) -> Result<Option<PomdpSize>, Failure> {
     let Some(path) = &args.pomdp else { return Ok(None) };
-    let pomdp = model.pomdp(&args.options()).map_err(named_as_typed)?;
-    replace(path, |file| write!(file, "{pomdp}"))?;
+    let pomdp = model.pomdp(&args.options()).map_err(with_option_name)?;
+    write_atomically(path, |file| write!(file, "{pomdp}"))?;
     Ok(Some(pomdp.size()))
 }
 
 /// Replaces the library's name of an option by `--beam`, which includes it here.
-fn named_as_typed(error: InputError) -> InputError {
+fn with_option_name(error: InputError) -> InputError {
     match error.place() {
         "--sensor" => InputError::new("--beam", error.cause(), error.remedy()),
         _ => error,
@@ -145,38 +145,38 @@ fn named_as_typed(error: InputError) -> InputError {
 
 fn text(summary: &Summary, name: &str) -> String {
     let mut lines = vec![
-        line("poses", grouped(summary.poses as u64)),
-        line("actions", summary.actions.join(", ")),
-        line("outcomes", grouped(summary.outcomes as u64)),
-        line("policy", summary.policy.clone()),
-        line("chain", format!("{} states", grouped(summary.chain_states as u64))),
-        line("most visited", visited(summary)),
+        key_value("poses", group_thousands(summary.poses as u64)),
+        key_value("actions", summary.actions.join(", ")),
+        key_value("outcomes", group_thousands(summary.outcomes as u64)),
+        key_value("policy", summary.policy.clone()),
+        key_value("chain", format!("{} states", group_thousands(summary.chain_states as u64))),
+        key_value("most visited", visited_text(summary)),
     ];
-    lines.extend(summary.pomdp.map(|size| line("POMDP", pomdp_words(size))));
-    lines.extend(summary.comparison.map(|c| line("simulator", comparison_words(&c))));
-    format!("Exact chain of {name}\n{}", aligned(&lines))
+    lines.extend(summary.pomdp.map(|size| key_value("POMDP", pomdp_text(size))));
+    lines.extend(summary.comparison.map(|c| key_value("simulator", comparison_text(&c))));
+    format!("Exact chain of {name}\n{}", align_pairs(&lines))
 }
 
-fn line(name: &str, value: String) -> (String, String) {
+fn key_value(name: &str, value: String) -> (String, String) {
     (name.into(), value)
 }
 
-fn visited(summary: &Summary) -> String {
+fn visited_text(summary: &Summary) -> String {
     let boxes = summary.most_visited.iter();
     let words = boxes.map(|b| format!("[{}, {}] {:.2} %", b.col, b.row, 100.0 * b.share));
     words.collect::<Vec<_>>().join(", ")
 }
 
-fn pomdp_words(size: PomdpSize) -> String {
+fn pomdp_text(size: PomdpSize) -> String {
     format!(
         "{} states, {} actions, {} observations",
-        grouped(size.states as u64),
+        group_thousands(size.states as u64),
         size.actions,
-        grouped(size.observations as u64)
+        group_thousands(size.observations as u64)
     )
 }
 
-fn comparison_words(c: &Comparison) -> String {
+fn comparison_text(c: &Comparison) -> String {
     let verdict = match c.agrees {
         Some(true) => "agrees".to_string(),
         Some(false) => "DISAGREES".to_string(),
@@ -188,7 +188,7 @@ fn comparison_words(c: &Comparison) -> String {
         "{verdict}: total variation {:.4}, limit {:.4}, over {} runs of {} cycles",
         c.total_variation,
         c.limit,
-        grouped(c.runs.into()),
-        grouped(c.cycles)
+        group_thousands(c.runs.into()),
+        group_thousands(c.cycles)
     )
 }

@@ -1,16 +1,16 @@
 //! `sidestep export`: converts a recorded run to formats of other programs.
 
-use crate::console::{Console, grouped};
+use crate::console::{Console, group_thousands};
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::plan::WorkersArg;
-use crate::watch::Watch;
+use crate::scenario_args::WorkersArg;
 use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_session::export::{self, Export, Film, Written};
-use sidestep_session::{Recorded, shown};
+use sidestep_session::export::{self, AnimationOptions, ExportRequest, ExportResult};
+use sidestep_session::{RecordedRun, display_path};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -28,7 +28,7 @@ scenario; an export that includes the recorded end confirms the recorded digest 
 
 /// The output formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Form {
+enum ExportFormat {
     /// Tables as text (CSV)
     Csv,
     /// Tables as Parquet, one file each
@@ -49,7 +49,7 @@ enum Form {
     Mp4Frames,
 }
 
-impl Form {
+impl ExportFormat {
     fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
@@ -67,7 +67,7 @@ impl Form {
         matches!(self, Self::Csv | Self::Parquet)
     }
 
-    fn is_film(self) -> bool {
+    fn is_animation(self) -> bool {
         matches!(self, Self::Gif | Self::Mp4Frames)
     }
 
@@ -86,7 +86,7 @@ pub(crate) struct ExportArgs {
 
     /// Output format
     #[arg(long, value_name = "FORM", value_enum)]
-    to: Form,
+    to: ExportFormat,
 
     /// Output file or folder [default: beside DIR, with its name]
     #[arg(long, value_name = "PATH")]
@@ -132,33 +132,33 @@ pub(crate) struct ExportArgs {
 /// the recording.
 pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
     check_options(args)?;
-    let recorded = Recorded::open(worlds(), &args.recorded)?;
+    let recorded = RecordedRun::open(worlds(), &args.recorded)?;
     interrupt::listen()?;
     if args.to.is_table() && recorded.folder.is_some() && !recorded.is_complete {
         console.warn("the run is not complete: its rows end at the last checkpoint");
     }
-    match export::export(&recorded, &wanted(args), &Watch::new(console)) {
+    match export::export(&recorded, &export_request(args), &ConsoleWatcher::new(console)) {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
         written => {
-            report(args.to, &written?, console)?;
+            print_result(args.to, &written?, console)?;
             Ok(ExitCode::Done)
         }
     }
 }
 
-fn wanted(args: &ExportArgs) -> Export<'_> {
-    let film = Film { fps: args.fps, width_px: args.width };
+fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
+    let film = AnimationOptions { fps: args.fps, width_px: args.width };
     let form = match args.to {
-        Form::Csv => export::Form::Csv(args.table.clone()),
-        Form::Parquet => export::Form::Parquet(args.table.clone()),
-        Form::Mcap => export::Form::Mcap,
-        Form::RosBag => export::Form::RosBag,
-        Form::Svg => export::Form::Svg,
-        Form::Png => export::Form::Png { width_px: args.width },
-        Form::Gif => export::Form::Gif(film),
-        Form::Mp4Frames => export::Form::Frames(film),
+        ExportFormat::Csv => export::Format::Csv(args.table.clone()),
+        ExportFormat::Parquet => export::Format::Parquet(args.table.clone()),
+        ExportFormat::Mcap => export::Format::Mcap,
+        ExportFormat::RosBag => export::Format::RosBag,
+        ExportFormat::Svg => export::Format::Svg,
+        ExportFormat::Png => export::Format::Png { width_px: args.width },
+        ExportFormat::Gif => export::Format::Gif(film),
+        ExportFormat::Mp4Frames => export::Format::Frames(film),
     };
-    Export {
+    ExportRequest {
         form,
         out: args.out.as_deref(),
         replace: args.replace,
@@ -176,8 +176,8 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
         ("--until", args.until.is_some(), !form.is_picture()),
         ("--every", args.every.is_some(), !form.is_picture()),
         ("--table", args.table.is_some(), form.is_table()),
-        ("--fps", args.fps.is_some(), form.is_film()),
-        ("--width", args.width.is_some(), form.is_film() || form == Form::Png),
+        ("--fps", args.fps.is_some(), form.is_animation()),
+        ("--width", args.width.is_some(), form.is_animation() || form == ExportFormat::Png),
     ];
     match given.iter().find(|(_, is_given, has_meaning)| *is_given && !has_meaning) {
         None => Ok(()),
@@ -189,27 +189,32 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 }
 
 /// Prints which files were written.
-fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure> {
-    let Written { paths, is_confirmed, film } = written;
-    let shown: Vec<String> = paths.iter().map(shown).collect();
+fn print_result(
+    form: ExportFormat,
+    written: &ExportResult,
+    console: Console,
+) -> Result<(), Failure> {
+    let ExportResult { paths, is_confirmed, film } = written;
+    let shown: Vec<String> = paths.iter().map(display_path).collect();
     let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     let short = || names.clone();
-    console.result_or_short(&json, short, || {
+    console.print_result_or_short(&json, short, || {
         let confirmed = if *is_confirmed { "  its end has the recorded digest\n" } else { "" };
         let bytes: u64 =
             paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();
-        let size = format!("  {} bytes\n", grouped(bytes));
+        let size = format!("  {} bytes\n", group_thousands(bytes));
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
-        let film = film
-            .map_or(String::new(), |(pictures, fps)| film_words(form, pictures, fps, &paths[0]));
+        let film = film.map_or(String::new(), |(pictures, fps)| {
+            animation_text(form, pictures, fps, &paths[0])
+        });
         format!("{names}{size}{confirmed}{film}")
     })
 }
 
 /// Returns how long a film is, or how to join its frames.
-fn film_words(form: Form, pictures: usize, fps: u16, path: &Path) -> String {
-    if form == Form::Gif {
+fn animation_text(form: ExportFormat, pictures: usize, fps: u16, path: &Path) -> String {
+    if form == ExportFormat::Gif {
         return format!("  {pictures} pictures, {:.1} s\n", pictures as f64 / f64::from(fps));
     }
     let folder = path.display();

@@ -1,36 +1,36 @@
 //! The part that `run` and `resume` share: driving the run to its end, and its report.
 
 use crate::console::Console;
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::report::text;
-use crate::watch::Watch;
-use sidestep_session::{Journey, Status, Summary};
+use crate::report::summary_text;
+use sidestep_session::{ManagedRun, RunStatus, Summary};
 use std::path::Path;
 
 /// Drives the run to its end (or until Ctrl-C), and stores and prints the summary.
 ///
 /// # Errors
 /// When something cannot be stored.
-pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Failure> {
-    let summary = journey.travel(&Watch::new(console))?;
+pub(super) fn run_to_end(journey: ManagedRun, console: Console) -> Result<ExitCode, Failure> {
+    let summary = journey.run_to_end(&ConsoleWatcher::new(console))?;
     let short = || format!("{}\n", summary.digest);
-    console.result_or_short(&summary, short, || text(&summary))?;
-    Ok(ending(&summary, console))
+    console.print_result_or_short(&summary, short, || summary_text(&summary))?;
+    Ok(print_next_step(&summary, console))
 }
 
-fn ending(summary: &Summary, console: Console) -> ExitCode {
+fn print_next_step(summary: &Summary, console: Console) -> ExitCode {
     if let Some(folder) = summary.folder.as_deref().map(Path::display) {
         console.note(match summary.status {
-            Status::Complete => {
+            RunStatus::Complete => {
                 format!("Next: `sidestep report {folder}` writes a page with pictures and numbers.")
             }
-            Status::Incomplete => {
+            RunStatus::Incomplete => {
                 format!("The run is marked as incomplete; `sidestep resume {folder}` continues it.")
             }
         });
     }
-    match interrupt::requested() && summary.status == Status::Incomplete {
+    match interrupt::is_requested() && summary.status == RunStatus::Incomplete {
         true => ExitCode::Interrupted,
         false => ExitCode::Done,
     }

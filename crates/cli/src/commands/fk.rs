@@ -39,11 +39,11 @@ pub(crate) struct FkArgs {
 /// When a file, a link, the posture or the values are wrong.
 pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {
     let arm = args.arm.load()?;
-    let placed = arm.at(&arm.values);
+    let placed = arm.positions(&arm.values);
     if let Some(path) = &args.png {
         placed.picture(None, &[]).write(path)?;
     }
-    console.result(&placed, || placed.text())?;
+    console.print_result(&placed, || placed.text())?;
     if !placed.outside_limits.is_empty() {
         console.warn(format!("outside limits: {}", placed.outside_limits.join(", ")));
     }

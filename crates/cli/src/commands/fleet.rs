@@ -1,14 +1,14 @@
 //! `sidestep fleet`: a world with agents that are processes on a network.
 
-use crate::console::{Console, aligned, grouped};
+use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
-use crate::fleet_table::Shown;
-use crate::link::{LinkArgs, run};
-use crate::plan::ScenarioArgs;
+use crate::fleet_table::FleetTable;
+use crate::link::{LinkArgs, run_job};
+use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use sidestep::kernel::words::{Lines, line};
-use sidestep_session::fleet::{Clock, FleetJob, FleetNow, Job, Told, Topology};
+use sidestep::kernel::text::{KeyValues, key_value};
+use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -32,7 +32,7 @@ continues with `sidestep resume DIR`.";
 
 /// The course of time, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum ClockName {
+enum ClockArg {
     /// The server waits for every agent: the same results as in one process
     Lockstep,
     /// Each cycle is a deadline: a late airplane stays on its orbit, a late chain stands still
@@ -41,7 +41,7 @@ enum ClockName {
 
 /// The way from node to node, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum TopologyName {
+enum TopologyArg {
     /// Every node is connected to every other
     Mesh,
     /// All packets go through the server
@@ -61,16 +61,16 @@ pub(crate) struct FleetArgs {
     nodes: Option<usize>,
 
     /// Clock: how time passes
-    #[arg(long, value_enum, default_value_t = ClockName::Lockstep)]
-    clock: ClockName,
+    #[arg(long, value_enum, default_value_t = ClockArg::Lockstep)]
+    clock: ClockArg,
 
     /// Speed: seconds of the scenario per second of real time
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_speed)]
     speed: f64,
 
     /// Network topology: the way of packets from node to node
-    #[arg(long, value_enum, default_value_t = TopologyName::Mesh)]
-    topology: TopologyName,
+    #[arg(long, value_enum, default_value_t = TopologyArg::Mesh)]
+    topology: TopologyArg,
 
     /// Endpoint on which the server listens, e.g. tcp/10.0.0.1:7600; repeatable
     /// [default: any free port of this machine alone]
@@ -98,7 +98,7 @@ pub(crate) struct FleetArgs {
 }
 
 /// Parses a speed.
-fn speed(text: &str) -> Result<f64, String> {
+fn parse_speed(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.01..=1000.0).contains(x));
     number.ok_or_else(|| "give a number from 0.01 to 1000".into())
 }
@@ -108,23 +108,23 @@ fn speed(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When anything is wrong with its input, or the fleet comes to no end.
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
-    let mut shown = Shown::new(console, args.watch);
+    let mut shown = FleetTable::new(console, args.watch);
     let mut ended = None;
-    let done = run(&Job::Fleet(args.job()), |told| match told {
-        Told::Listens(endpoints) => {
+    let done = run_job(&Job::Fleet(args.job()), |told| match told {
+        LinkMessage::Listens(endpoints) => {
             // Lockstep is over before it could be watched, unless it waits for nodes.
-            if args.nodes.is_some() || args.clock == ClockName::Realtime {
+            if args.nodes.is_some() || args.clock == ClockArg::Realtime {
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
-        Told::Fleet(now) => shown.show(&now),
-        Told::Ended { summary, outcome, fleet } => ended = Some((summary, outcome, fleet)),
+        LinkMessage::Fleet(now) => shown.update(&now),
+        LinkMessage::Ended { summary, outcome, fleet } => ended = Some((summary, outcome, fleet)),
         // The caller has it already; the others are for watchers.
-        Told::Failed(_) | Told::Scene(_) | Told::Seen(_) => {}
+        LinkMessage::Failed(_) | LinkMessage::Scene(_) | LinkMessage::Seen(_) => {}
     });
     shown.clear();
     if let Some((summary, outcome, fleet)) = ended {
-        args.tell(&summary, outcome, &fleet, console)?;
+        args.print_results(&summary, outcome, &fleet, console)?;
     }
     match done {
         Ok(()) => Ok(ExitCode::Done),
@@ -144,15 +144,17 @@ impl FleetArgs {
     fn job(&self) -> FleetJob {
         let any = || vec![format!("{}/127.0.0.1:0", self.link.protocol())];
         FleetJob {
-            common: self.link.common(self.scenario.file.clone(), self.scenario.all_overrides()),
+            common: self
+                .link
+                .common_settings(self.scenario.file.clone(), self.scenario.all_overrides()),
             nodes: self.nodes,
             clock: match self.clock {
-                ClockName::Lockstep => Clock::Lockstep,
-                ClockName::Realtime => Clock::Realtime { speed: self.speed },
+                ClockArg::Lockstep => ClockMode::Lockstep,
+                ClockArg::Realtime => ClockMode::Realtime { speed: self.speed },
             },
             topology: match self.topology {
-                TopologyName::Mesh => Topology::Mesh,
-                TopologyName::Star => Topology::Star,
+                TopologyArg::Mesh => Topology::Mesh,
+                TopologyArg::Star => Topology::Star,
             },
             listen: if self.listen.is_empty() { any() } else { self.listen.clone() },
             out: self.out.clone(),
@@ -162,56 +164,57 @@ impl FleetArgs {
     }
 
     /// Prints the results.
-    fn tell(
+    fn print_results(
         &self,
         summary: &Value,
-        outcome: Lines,
-        fleet: &FleetNow,
+        outcome: KeyValues,
+        fleet: &FleetStatus,
         console: Console,
     ) -> Result<(), Failure> {
         let text = |key: &str| summary[key].as_str().unwrap_or_default().to_string();
         let short = || format!("{}\n", text("digest"));
         let lines = || {
-            let mut lines = vec![line("cycles", grouped(summary["cycles"].as_u64().unwrap_or(0)))];
+            let mut lines =
+                vec![key_value("cycles", group_thousands(summary["cycles"].as_u64().unwrap_or(0)))];
             lines.extend(outcome);
             lines.extend(self.network_lines(fleet));
-            lines.push(line("digest", text("digest")));
-            lines.extend(summary["folder"].as_str().map(|folder| line("results", folder)));
-            format!("{}, seed {}\n{}", text("name"), summary["seed"], aligned(&lines))
+            lines.push(key_value("digest", text("digest")));
+            lines.extend(summary["folder"].as_str().map(|folder| key_value("results", folder)));
+            format!("{}, seed {}\n{}", text("name"), summary["seed"], align_pairs(&lines))
         };
         let mut all = summary.clone();
         all["fleet"] = json!(fleet);
-        console.result_or_short(&all, short, lines)
+        console.print_result_or_short(&all, short, lines)
     }
 
-    fn network_lines(&self, fleet: &FleetNow) -> Lines {
-        let sum = |of: fn(&sidestep_session::fleet::NodeNow) -> u64| {
+    fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
+        let sum = |of: fn(&sidestep_session::fleet::NodeStatus) -> u64| {
             fleet.nodes.iter().map(of).sum::<u64>()
         };
-        let topology = if self.topology == TopologyName::Mesh { "mesh" } else { "star" };
-        let clock = if self.clock == ClockName::Lockstep { "lockstep" } else { "real time" };
+        let topology = if self.topology == TopologyArg::Mesh { "mesh" } else { "star" };
+        let clock = if self.clock == ClockArg::Lockstep { "lockstep" } else { "real time" };
         let restarted = sum(|node| node.lives.saturating_sub(1));
         let mut lines = vec![
-            line("nodes", format!("{} in a {topology}, {clock}", fleet.nodes.len())),
-            line(
+            key_value("nodes", format!("{} in a {topology}, {clock}", fleet.nodes.len())),
+            key_value(
                 "packets",
                 format!(
                     "{} sent, {} bytes",
-                    grouped(sum(|node| node.packets)),
-                    grouped(sum(|node| node.bytes))
+                    group_thousands(sum(|node| node.packets)),
+                    group_thousands(sum(|node| node.bytes))
                 ),
             ),
         ];
-        if self.clock == ClockName::Realtime {
+        if self.clock == ClockArg::Realtime {
             let late = format!(
                 "{} controls, {} cycles of the server",
-                grouped(sum(|node| node.late)),
-                grouped(fleet.late_cycles)
+                group_thousands(sum(|node| node.late)),
+                group_thousands(fleet.late_cycles)
             );
-            lines.push(line("late", late));
+            lines.push(key_value("late", late));
         }
         if restarted > 0 {
-            lines.push(line("restarted", format!("{restarted} nodes")));
+            lines.push(key_value("restarted", format!("{restarted} nodes")));
         }
         lines
     }

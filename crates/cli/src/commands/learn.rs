@@ -1,17 +1,17 @@
 //! `sidestep learn`: error distributions of a real robot, from its logs.
 
-use crate::console::{Console, LINE_COLS, wrapped};
+use crate::console::{Console, LINE_COLS, wrap};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, Subcommand};
 use serde::Serialize;
-use sidestep::import::bag::{Source, Wanted};
+use sidestep::import::bag::{PoseTopic, TopicSelection};
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
-use sidestep::learn::effector::{self, EffectorModel};
+use sidestep::learn::effector::{self, LearnedEffector};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, Scanner, SensorModel, SensorOptions, SensorProfile};
+use sidestep::learn::sensor::{self, LearnedSensor, Scanner, SensorOptions, SensorProfile};
 use sidestep::scenario::file::read_text;
-use sidestep_session::{csv_table, replace};
+use sidestep_session::{csv_table, write_atomically};
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -74,11 +74,11 @@ Odometry, PoseStamped, PoseWithCovarianceStamped, TransformStamped or TFMessage.
 #[command(after_help = EXAMPLES)]
 pub(crate) struct LearnArgs {
     #[command(subcommand)]
-    what: What,
+    what: LearnCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum LearnCommand {
     /// Learn the errors of a sensor: its readings against the truth
     Sensor(SensorArgs),
     /// Learn the errors of an effector: the real motion against the command
@@ -209,9 +209,9 @@ struct TopicArgs {
 }
 
 impl TopicArgs {
-    fn wanted(&self, scans: Option<&String>) -> Result<Wanted, InputError> {
-        let parse = |text: &Option<String>| text.as_deref().map(Source::parse).transpose();
-        Ok(Wanted {
+    fn topic_selection(&self, scans: Option<&String>) -> Result<TopicSelection, InputError> {
+        let parse = |text: &Option<String>| text.as_deref().map(PoseTopic::parse).transpose();
+        Ok(TopicSelection {
             odometry: parse(&self.odom)?,
             truth: parse(&self.truth)?.ok_or_else(no_log)?,
             scans: scans.cloned(),
@@ -260,21 +260,21 @@ struct TargetArgs {
 /// When a log, an option or the profile is wrong, or the profile cannot be written.
 pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Failure> {
     match &args.what {
-        What::Sensor(args) => {
+        LearnCommand::Sensor(args) => {
             let model = learn_sensor(args)?;
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_sensor(place, text, name, &model)
             };
             let assumed = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
-            tell(&model.report, &args.target.add("sensors", add)?, assumed, console)?;
+            print_report(&model.report, &args.target.add("sensors", add)?, assumed, console)?;
         }
-        What::Effector(args) => {
+        LearnCommand::Effector(args) => {
             let model = learn_effector(args, console)?;
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_effector(place, text, name, &model)
             };
             let assumed = || smoothing(&args.estimate);
-            tell(&model.report, &args.target.add("effectors", add)?, assumed, console)?;
+            print_report(&model.report, &args.target.add("effectors", add)?, assumed, console)?;
         }
     }
     Ok(ExitCode::Done)
@@ -282,13 +282,13 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
 
 /// Prints the result and `written`, the line about the profile, with the assumptions of the profile; if quiet,
 /// that line alone.
-fn tell(
+fn print_report(
     report: &(impl Serialize + Display),
     written: &str,
     assumed: impl FnOnce() -> String,
     console: Console,
 ) -> Result<(), Failure> {
-    console.result_or_short(
+    console.print_result_or_short(
         report,
         || written.to_owned(),
         || match written {
@@ -323,10 +323,10 @@ fn smoothing(estimate: &EstimateArgs) -> String {
 }
 
 fn indented(words: &str) -> String {
-    format!("  {}\n", wrapped(words, LINE_COLS - 2).join("\n  "))
+    format!("  {}\n", wrap(words, LINE_COLS - 2).join("\n  "))
 }
 
-fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {
+fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
     let default = SensorOptions::default();
     let options = SensorOptions {
         estimate: args.estimate.options(),
@@ -350,16 +350,16 @@ fn learn_scanner(
     args: &SensorArgs,
     bag: &Path,
     options: &SensorOptions,
-) -> Result<SensorModel, InputError> {
+) -> Result<LearnedSensor, InputError> {
     let scanner = Scanner {
         map: args.map.as_deref().ok_or_else(no_log)?,
         range_m: args.range,
         bearings_deg: args.bearings.as_deref(),
     };
-    sensor::from_bag(bag, &args.topics.wanted(args.scan.as_ref())?, &scanner, options)
+    sensor::from_bag(bag, &args.topics.topic_selection(args.scan.as_ref())?, &scanner, options)
 }
 
-fn learn_effector(args: &EffectorArgs, console: Console) -> Result<EffectorModel, InputError> {
+fn learn_effector(args: &EffectorArgs, console: Console) -> Result<LearnedEffector, InputError> {
     let options = args.estimate.options();
     let log = &args.log;
     if args.box_size_m.is_some() && log.mrclam.is_none() && log.bag.is_none() {
@@ -370,7 +370,7 @@ fn learn_effector(args: &EffectorArgs, console: Console) -> Result<EffectorModel
         (Some(folder), ..) => effector::from_mrclam(folder, box_m(0.25), &options),
         (_, Some(file), ..) => effector::from_carmen(file, &options),
         (_, _, Some(bag), ..) => {
-            effector::from_bag(bag, &args.topics.wanted(None)?, box_m(1.0), &options)
+            effector::from_bag(bag, &args.topics.topic_selection(None)?, box_m(1.0), &options)
         }
         (.., Some(file), _) => effector::from_csv(file, &options),
         (.., Some(folder)) => effector::learn_csv(&csv_table(folder, "motions")?, &options),
@@ -398,9 +398,9 @@ impl TargetArgs {
             false => profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy()),
         };
         let new = section(&path.display().to_string(), &text, &self.name)?;
-        replace(path, |file| file.write_all(new.as_bytes()))?;
+        write_atomically(path, |file| file.write_all(new.as_bytes()))?;
         let (name, path) = (&self.name, path.display());
-        Ok(match profile::has(&text, group, name) {
+        Ok(match profile::has_section(&text, group, name) {
             true => format!("Replaced `{name}` in {path}\n"),
             false => format!("Added `{name}` to {path}\n"),
         })

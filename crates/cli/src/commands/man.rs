@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::InputError;
-use sidestep_session::shown;
+use sidestep_session::display_path;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -34,7 +34,7 @@ pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure>
         InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
     })?;
     let said = || format!("Wrote manual pages to {}.\n", folder.display());
-    console.result(&json!({ "folder": shown(folder) }), said)?;
+    console.print_result(&json!({ "folder": display_path(folder) }), said)?;
     Ok(ExitCode::Done)
 }
 

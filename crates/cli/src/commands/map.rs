@@ -1,14 +1,14 @@
 //! `sidestep map`: a map as the simulator sees it.
 
-use crate::console::{Console, columns};
+use crate::console::{Console, terminal_columns};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use sidestep::import::{AsBoxes, map_file, pixel_map};
+use sidestep::import::{GridOptions, load_map, load_pixel_map};
 use sidestep::kernel::InputError;
 use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
-use sidestep_draw::{Options, draw};
+use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::{Path, PathBuf};
 
@@ -42,8 +42,8 @@ pub(crate) struct MapArgs {
     resolution_m: Option<f64>,
 
     /// Treatment of unmapped (unknown) boxes; in scenarios the default is wall
-    #[arg(long, value_enum, default_value_t = Unknown::Keep)]
-    unknown: Unknown,
+    #[arg(long, value_enum, default_value_t = UnknownArg::Keep)]
+    unknown: UnknownArg,
 
     /// Save a picture of the boxes to this PNG file
     #[arg(long, value_name = "OUT")]
@@ -55,25 +55,25 @@ pub(crate) struct MapArgs {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Unknown {
+enum UnknownArg {
     Wall,
     Free,
     Keep,
 }
 
-impl From<Unknown> for UnknownPolicy {
-    fn from(unknown: Unknown) -> Self {
+impl From<UnknownArg> for UnknownPolicy {
+    fn from(unknown: UnknownArg) -> Self {
         match unknown {
-            Unknown::Wall => Self::Wall,
-            Unknown::Free => Self::Free,
-            Unknown::Keep => Self::Keep,
+            UnknownArg::Wall => Self::Wall,
+            UnknownArg::Free => Self::Free,
+            UnknownArg::Keep => Self::Keep,
         }
     }
 }
 
 /// Size and number of pixels of the file, and of boxes.
 #[derive(Debug, Serialize)]
-struct Counts {
+struct MapCounts {
     width: u32,
     height: u32,
     free: usize,
@@ -97,17 +97,18 @@ pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure>
     if let Some(png) = &args.png {
         draw_boxes(&map, &args.file, png)?;
     }
-    let width = args.width.unwrap_or_else(columns);
-    console.result(&counts, || map.to_text_with_rulers(width.into()) + &words(&counts))?;
+    let width = args.width.unwrap_or_else(terminal_columns);
+    console
+        .print_result(&counts, || map.to_text_with_rulers(width.into()) + &counts_text(&counts))?;
     Ok(ExitCode::Done)
 }
 
-fn read(args: &MapArgs) -> Result<(Counts, GridMap), InputError> {
+fn read(args: &MapArgs) -> Result<(MapCounts, GridMap), InputError> {
     let policy = args.unknown.into();
-    let Some(pixels) = pixel_map(&args.file, args.resolution_m)? else {
+    let Some(pixels) = load_pixel_map(&args.file, args.resolution_m)? else {
         let (resolution_m, unknown) = (args.resolution_m, UnknownPolicy::Keep);
-        let boxes = AsBoxes { box_size_m: args.box_size_m, resolution_m, unknown };
-        let map = map_file(&args.file, boxes)?;
+        let boxes = GridOptions { box_size_m: args.box_size_m, resolution_m, unknown };
+        let map = load_map(&args.file, boxes)?;
         let pixels = map.counts();
         let map = map.with_unknown(policy);
         return Ok((counts(&map, (map.width(), map.height()), pixels, map.box_size_m), map));
@@ -122,8 +123,8 @@ fn counts(
     (width, height): (u32, u32),
     pixels: CellCounts,
     resolution_m: f64,
-) -> Counts {
-    Counts {
+) -> MapCounts {
+    MapCounts {
         width,
         height,
         free: pixels.free,
@@ -139,7 +140,7 @@ fn counts(
     }
 }
 
-fn words(c: &Counts) -> String {
+fn counts_text(c: &MapCounts) -> String {
     format!(
         "{} x {} pixels of {} m: {} free, {} occupied, {} unknown\n\
          {} x {} boxes of {} m: {} free, {} wall, {} unknown\n",
@@ -163,11 +164,11 @@ fn draw_boxes(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
         name: file.file_name().unwrap_or_default().display().to_string(),
         dimensions: 2,
         cycle_s: 1.0,
-        floor: Some(map.floor()),
+        floor: Some(map.occupancy_grid()),
         bodies: Vec::new(),
         names: Vec::new(),
     };
     let caption = format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m);
-    let svg = draw(&scenery, &Frame::default(), &[], &Options::page(&scenery, caption))?;
+    let svg = draw(&scenery, &Frame::default(), &[], &PictureOptions::page(&scenery, caption))?;
     write_png(png, &svg)
 }

@@ -7,8 +7,8 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::json;
 use sidestep::kernel::InputError;
-use sidestep::scenario::Kind;
-use sidestep_session::shown;
+use sidestep::scenario::WorldType;
+use sidestep_session::display_path;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub(crate) struct NewArgs {
     /// World of the scenario
-    #[arg(value_name = "WORLD", value_parser = names())]
+    #[arg(value_name = "WORLD", value_parser = world_names())]
     world: String,
 
     /// Output file; an existing one is never overwritten [default: WORLD.toml]
@@ -32,8 +32,8 @@ pub(crate) struct NewArgs {
 }
 
 /// The names of the worlds, each with a description.
-pub(crate) fn names() -> PossibleValuesParser {
-    let named = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
+pub(crate) fn world_names() -> PossibleValuesParser {
+    let named = |kind: &&dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
     PossibleValuesParser::new(worlds().0.iter().map(named))
 }
 
@@ -42,13 +42,13 @@ pub(crate) fn names() -> PossibleValuesParser {
 /// # Errors
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
-    let kind = worlds().named(&args.world).expect("the parser takes these names alone");
+    let kind = worlds().find(&args.world).expect("the parser takes these names alone");
     let default = || PathBuf::from(format!("{}.toml", kind.name()));
     let path = args.file.clone().unwrap_or_else(default);
     write_new(&path, kind.default_scenario())?;
     let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
-    let json = json!({ "file": shown(&path), "world": args.world });
-    console.result(&json, || format!("Wrote {}\n{next}", path.display()))?;
+    let json = json!({ "file": display_path(&path), "world": args.world });
+    console.print_result(&json, || format!("Wrote {}\n{next}", path.display()))?;
     Ok(ExitCode::Done)
 }
 

@@ -2,8 +2,8 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::link::{LinkArgs, run};
-use crate::plan::ScenarioArgs;
+use crate::link::{LinkArgs, run_job};
+use crate::scenario_args::ScenarioArgs;
 use clap::{ArgGroup, Args};
 use serde_json::json;
 use sidestep::kernel::EntityId;
@@ -79,13 +79,15 @@ impl NodeArgs {
 /// When anything is wrong with its input, or the server is not there.
 pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failure> {
     let job = NodeJob {
-        common: args.link.common(args.scenario.file.clone(), args.scenario.all_overrides()),
+        common: args
+            .link
+            .common_settings(args.scenario.file.clone(), args.scenario.all_overrides()),
         agent: args.agent(),
         connect: args.connect.clone(),
         listen: args.listen.clone(),
         patience_s: args.patience.clamp(0.1, 86_400.0),
     };
-    run(&Job::Node(job), |_| {})?;
+    run_job(&Job::Node(job), |_| {})?;
     let agent = args.agent();
     let words =
         || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun());
@@ -95,6 +97,6 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
             json!({ "chain": chain, "connector": connector })
         }
     };
-    console.result_or_short(&result, String::new, words)?;
+    console.print_result_or_short(&result, String::new, words)?;
     Ok(ExitCode::Done)
 }

@@ -1,15 +1,15 @@
 //! `sidestep replay`: a recorded run computed again, to its end or up to any cycle.
 
-use crate::console::{Console, grouped};
+use crate::console::{Console, group_thousands};
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::plan::WorkersArg;
-use crate::watch::Watch;
+use crate::scenario_args::WorkersArg;
 use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::Cycle;
-use sidestep_session::{Recorded, Replayed, replay_all, replay_to};
+use sidestep_session::{RecordedRun, ReplayReport, replay_all, replay_to};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -54,8 +54,8 @@ pub(crate) struct ReplayArgs {
 /// # Errors
 /// When the folder or the cycle is wrong, or the state differs from the recorded one.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
-    let recorded = Recorded::open(worlds(), &args.recorded)?;
-    let (workers, watch) = (args.workers.count(), Watch::new(console));
+    let recorded = RecordedRun::open(worlds(), &args.recorded)?;
+    let (workers, watch) = (args.workers.count(), ConsoleWatcher::new(console));
     interrupt::listen()?;
     let replayed = match args.cycle {
         Some(cycle) => replay_to(&recorded, cycle, workers, &watch),
@@ -69,14 +69,14 @@ pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Fa
         replayed.draw(&recorded, png)?;
     }
     match args.cycle {
-        Some(_) => show_moment(&replayed, args.all, console)?,
-        None => show_end(&replayed, recorded.is_complete, console)?,
+        Some(_) => print_cycle(&replayed, args.all, console)?,
+        None => print_end(&replayed, recorded.is_complete, console)?,
     }
     Ok(ExitCode::Done)
 }
 
-fn show_end(replayed: &Replayed, is_complete: bool, console: Console) -> Result<(), Failure> {
-    let Replayed { run, effort, .. } = replayed;
+fn print_end(replayed: &ReplayReport, is_complete: bool, console: Console) -> Result<(), Failure> {
+    let ReplayReport { run, effort, .. } = replayed;
     let digest = run.digest().to_string();
     let json = json!({
         "cycle": run.cycle(),
@@ -86,31 +86,31 @@ fn show_end(replayed: &Replayed, is_complete: bool, console: Console) -> Result<
         "wall_s": effort.wall.as_secs_f64(),
     });
     let short = || format!("{digest}\n");
-    console.result_or_short(&json, short, || {
-        let cycles = grouped(run.cycle());
+    console.print_result_or_short(&json, short, || {
+        let cycles = group_thousands(run.cycle());
         format!("Confirmed: {cycles} cycles come to the recorded digest\n  digest {digest}\n")
     })
 }
 
 /// Lines of a state that are printed unless all are asked for: a heading, and some bodies.
-const SHOWN: usize = 11;
+const MAX_STATE_LINES: usize = 11;
 
 /// Returns the first lines of a state in words, and how to see the others.
-fn beginning(text: &str) -> String {
+fn first_lines(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
-    match lines.len().saturating_sub(SHOWN) {
+    match lines.len().saturating_sub(MAX_STATE_LINES) {
         // A line that counts a single one takes the room of that one.
         0 | 1 => text.into(),
         more => format!(
             "{}\n  and {} more rows: --all\n",
-            lines[..SHOWN].join("\n"),
-            grouped(more as u64)
+            lines[..MAX_STATE_LINES].join("\n"),
+            group_thousands(more as u64)
         ),
     }
 }
 
-fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) -> Result<(), Failure> {
-    let Replayed { run, compared_poses, .. } = replayed;
+fn print_cycle(replayed: &ReplayReport, shows_all: bool, console: Console) -> Result<(), Failure> {
+    let ReplayReport { run, compared_poses, .. } = replayed;
     let poses = run.poses();
     let digest = run.digest().to_string();
     let json = json!({
@@ -120,13 +120,13 @@ fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) -> Result
         "bodies": poses.json,
     });
     let short = || format!("{digest}\n");
-    console.result_or_short(&json, short, || {
+    console.print_result_or_short(&json, short, || {
         let compared = match *compared_poses {
             0 => "no pose of this cycle is recorded".into(),
-            n => format!("equal to the {} recorded poses", grouped(n as u64)),
+            n => format!("equal to the {} recorded poses", group_thousands(n as u64)),
         };
-        let state = if shows_all { poses.text } else { beginning(&poses.text) };
-        format!("Cycle {}: {compared}\n{state}  digest {digest}\n", grouped(run.cycle()))
+        let state = if shows_all { poses.text } else { first_lines(&poses.text) };
+        format!("Cycle {}: {compared}\n{state}  digest {digest}\n", group_thousands(run.cycle()))
     })
 }
 
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn a_long_state_is_told_by_its_beginning_and_how_many_rows_follow() {
         let text = |rows: usize| (0..rows).map(|k| format!("  row {k}\n")).collect::<String>();
-        assert_eq!(beginning(&text(12)), text(12));
-        assert_eq!(beginning(&text(93)), text(11) + "  and 82 more rows: --all\n");
+        assert_eq!(first_lines(&text(12)), text(12));
+        assert_eq!(first_lines(&text(93)), text(11) + "  and 82 more rows: --all\n");
     }
 }

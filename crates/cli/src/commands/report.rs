@@ -1,17 +1,17 @@
 //! `sidestep report`: a report of a run or a sweep, as a page and as Markdown.
 
 use crate::console::Console;
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
-use crate::pages::{Pages, Raster};
-use crate::watch::Watch;
+use crate::report_files::{PngOutput, ReportFiles};
 use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
-use sidestep_report::{Print, SvgFile};
+use sidestep_report::{PrintStyle, SvgFile};
 use sidestep_session::report::document;
-use sidestep_session::{replace, shown, write_png};
+use sidestep_session::{display_path, write_atomically, write_png};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -47,7 +47,7 @@ pub(crate) struct ReportArgs {
 struct PrintArgs {
     /// Also write every figure to a file of its own, without title, in these formats: svg, png
     #[arg(long = "figure", value_name = "FORM,...", value_delimiter = ',')]
-    forms: Vec<Form>,
+    forms: Vec<FigureFormat>,
 
     /// Width and height of these figures in mm
     #[arg(long, value_name = "WxH", default_value = "85x60", requires = "forms")]
@@ -64,7 +64,7 @@ struct PrintArgs {
 
 /// Formats of figures for print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Form {
+enum FigureFormat {
     Svg,
     Png,
     /// Refused, with a way to get it.
@@ -78,12 +78,12 @@ enum Form {
 /// When the folder holds nothing to report, something in it is damaged, or the report cannot be
 /// written.
 pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
-    let pages = pages(args)?;
+    let pages = report_files(args)?;
     args.print.figures()?;
-    let document = document(worlds(), &args.folder, &Watch::new(console))?;
+    let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
     let figures = args.print.figures()?;
     figures.iter().try_for_each(|print| check_labels(print, &document))?;
-    pages.store(&document, Raster::None)?;
+    pages.store(&document, PngOutput::None)?;
     let figures = figures.map(|print| args.print.store(&print, &document, &pages)).transpose()?;
     let (html, markdown) = (pages.html.display(), pages.markdown());
     let shown = figures.as_ref().map(|folder| folder.display().to_string());
@@ -93,7 +93,7 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
         "figures": shown,
     });
     let more = shown.map_or(String::new(), |folder| format!("{folder}\n"));
-    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
+    console.print_result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
     Ok(ExitCode::Done)
 }
 
@@ -102,8 +102,8 @@ impl PrintArgs {
     ///
     /// # Errors
     /// When a size, a label or a format is wrong.
-    fn figures(&self) -> Result<Option<Print>, InputError> {
-        if self.forms.contains(&Form::Pdf) {
+    fn figures(&self) -> Result<Option<PrintStyle>, InputError> {
+        if self.forms.contains(&FigureFormat::Pdf) {
             let remedy = "write svg, of which `rsvg-convert -f pdf` or Inkscape make PDF";
             return Err(InputError::new("--figure", "no figure is written as PDF", remedy));
         }
@@ -114,24 +114,30 @@ impl PrintArgs {
             let cause = format!("is {} pt", self.figure_font);
             return Err(InputError::new("--figure-font", cause, "give 4 to 40"));
         }
-        let labels = self.labels.iter().map(|label| renamed(label)).collect::<Result<_, _>>()?;
-        let size_mm = size_mm(&self.figure_size)?;
-        Ok(Some(Print { size_mm, font_pt: self.figure_font, labels }))
+        let labels =
+            self.labels.iter().map(|label| parse_label(label)).collect::<Result<_, _>>()?;
+        let size_mm = parse_size_mm(&self.figure_size)?;
+        Ok(Some(PrintStyle { size_mm, font_pt: self.figure_font, labels }))
     }
 
     /// Writes the figures beside the page, and returns their folder.
     ///
     /// # Errors
     /// When something cannot be drawn or written.
-    fn store(&self, print: &Print, document: &Document, pages: &Pages) -> Result<PathBuf, Failure> {
+    fn store(
+        &self,
+        print: &PrintStyle,
+        document: &Document,
+        pages: &ReportFiles,
+    ) -> Result<PathBuf, Failure> {
         let folder = pages.html.with_file_name(format!("{}-print", pages.stem()));
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::cannot_write(&folder, &e))?;
         for SvgFile { stem, svg } in print.figures(document)? {
             let at = |ending: &str| folder.join(format!("{stem}.{ending}"));
-            if self.forms.contains(&Form::Svg) {
-                replace(&at("svg"), |file| file.write_all(svg.as_bytes()))?;
+            if self.forms.contains(&FigureFormat::Svg) {
+                write_atomically(&at("svg"), |file| file.write_all(svg.as_bytes()))?;
             }
-            if self.forms.contains(&Form::Png) {
+            if self.forms.contains(&FigureFormat::Png) {
                 write_png(&at("png"), &svg)?;
             }
         }
@@ -143,14 +149,14 @@ impl PrintArgs {
 ///
 /// # Errors
 /// When one is in none; the error names the first.
-fn check_labels(print: &Print, document: &Document) -> Result<(), InputError> {
-    let Some(label) = print.unused(document).first().copied() else { return Ok(()) };
+fn check_labels(print: &PrintStyle, document: &Document) -> Result<(), InputError> {
+    let Some(label) = print.unused_labels(document).first().copied() else { return Ok(()) };
     let cause = format!("no figure has the words `{label}`");
     Err(InputError::new("--label", cause, "write them as the figure's axis or legend does"))
 }
 
 /// Reads width and height in mm.
-fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
+fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
     let side = |side: &str| side.trim().parse::<f64>().ok();
     let sides: Vec<Option<f64>> = text.split('x').map(side).collect();
     match sides[..] {
@@ -167,7 +173,7 @@ fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
 }
 
 /// Reads words and their replacements.
-fn renamed(text: &str) -> Result<(String, String), InputError> {
+fn parse_label(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {
         let cause = format!("`{text}` names no words");
@@ -180,14 +186,14 @@ fn renamed(text: &str) -> Result<(String, String), InputError> {
 ///
 /// # Errors
 /// When the page's name does not end in `.html` or `.htm`.
-fn pages(args: &ReportArgs) -> Result<Pages, InputError> {
+fn report_files(args: &ReportArgs) -> Result<ReportFiles, InputError> {
     let html = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
     let ending = html.extension().and_then(|e| e.to_str());
-    let stem = html.file_stem().map(shown);
+    let stem = html.file_stem().map(display_path);
     let (Some("html" | "htm"), Some(stem)) = (ending, stem) else {
         let cause = "the page is HTML, and Markdown is written beside it";
         return Err(InputError::new(html.display(), cause, "give a name that ends in .html"));
     };
     let pictures = format!("{stem}-figures");
-    Ok(Pages { html, pictures })
+    Ok(ReportFiles { html, pictures })
 }

@@ -1,17 +1,17 @@
 //! `sidestep resume`: continues a run or a sweep that was stopped or killed.
 
-use super::finish::travel;
-use crate::console::{Console, grouped};
+use super::finish::run_to_end;
+use crate::console::{Console, group_thousands};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::plan::WorkersArg;
-use crate::sweep::go_on;
+use crate::scenario_args::WorkersArg;
+use crate::sweep::run_remaining;
 use crate::worlds;
 use clap::Args;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_record::{RunView, Status};
+use sidestep_record::{RunReader, Status};
 use sidestep_session::sweep::Folder;
-use sidestep_session::{Journey, stored_summary};
+use sidestep_session::{ManagedRun, read_summary};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -48,28 +48,28 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     if Folder::is_at(&args.folder) {
         return resume_sweep(args, console);
     }
-    let view = RunView::open(&args.folder)?;
+    let view = RunReader::open(&args.folder)?;
     if view.manifest.status == Status::Complete && args.cycles.is_none() {
-        return nothing_left(&view, console);
+        return print_finished(&view, console);
     }
     let workers = args.workers.count();
     interrupt::listen()?;
-    let journey = Journey::resume(worlds(), &args.folder, workers, args.cycles)?;
-    let cycle = grouped(journey.cycle());
+    let journey = ManagedRun::resume(worlds(), &args.folder, workers, args.cycles)?;
+    let cycle = group_thousands(journey.cycle());
     console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
-    travel(journey, console)
+    run_to_end(journey, console)
 }
 
 /// Prints the results of a finished run: a user who resumes all runs need not know which had ended.
-fn nothing_left(view: &RunView, console: Console) -> Result<ExitCode, Failure> {
+fn print_finished(view: &RunReader, console: Console) -> Result<ExitCode, Failure> {
     let folder = view.path.display();
-    let cycles = grouped(view.manifest.cycles_done);
+    let cycles = group_thousands(view.manifest.cycles_done);
     console.note(format!(
         "{folder} is complete ({cycles} cycles): nothing is left to run. `sidestep report {folder}` writes \
          its page."
     ));
     let digest = view.manifest.digest.as_deref().unwrap_or_default();
-    console.result(&stored_summary(&view.path)?, || format!("{digest}\n"))?;
+    console.print_result(&read_summary(&view.path)?, || format!("{digest}\n"))?;
     Ok(ExitCode::Done)
 }
 
@@ -78,5 +78,5 @@ fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure
         let remedy = "leave --cycles out: the runs of a sweep go to their ends";
         return Err(InputError::new("--cycles", "this is the folder of a sweep", remedy).into());
     }
-    go_on(&Folder::open(&args.folder)?, args.workers.count(), console)
+    run_remaining(&Folder::open(&args.folder)?, args.workers.count(), console)
 }

@@ -1,18 +1,18 @@
 //! `sidestep run`: scenario -> cycles -> report.
 
-use super::finish::travel;
-use super::sweep::many_runs;
-use crate::console::{Console, LINE_COLS, wrapped};
+use super::finish::run_to_end;
+use super::sweep::run_sweep;
+use crate::console::{Console, LINE_COLS, wrap};
 use crate::exit::{ExitCode, Failure};
+use crate::foxglove;
 use crate::interrupt;
-use crate::plan::{ScenarioArgs, WorkersArg};
-use crate::sweep::ManyArgs;
-use crate::viewers;
+use crate::scenario_args::{ScenarioArgs, WorkersArg};
+use crate::sweep::ReplicationArgs;
 use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::{Remark, Severity};
-use sidestep_session::{Journey, Keep, ViewersAt};
+use sidestep_session::{ManagedRun, OutputPaths, ViewerAddress};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -55,8 +55,8 @@ pub(crate) struct RunArgs {
 
     /// Show the run live in Foxglove and Lichtblick ("Open connection", Foxglove WebSocket), which may
     /// pause it and set its speed; until then it runs as fast as it can
-    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
-    foxglove: Option<ViewersAt>,
+    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewerAddress))]
+    foxglove: Option<ViewerAddress>,
 
     /// Overwrite an earlier run in DIR, and FILE
     #[arg(long, requires = "written")]
@@ -64,7 +64,7 @@ pub(crate) struct RunArgs {
 
     // Last, because its heading is that of all options that follow.
     #[command(flatten)]
-    many: ManyArgs,
+    many: ReplicationArgs,
 }
 
 /// Runs the command.
@@ -72,7 +72,7 @@ pub(crate) struct RunArgs {
 /// # Errors
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
-    if args.many.is_asked() {
+    if args.many.is_requested() {
         if args.foxglove.is_some() {
             let remedy = "leave it out, or run one of them alone";
             return Err(
@@ -86,38 +86,42 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
         }
         let workers = args.workers.count();
         let ScenarioArgs { file, changes } = &args.scenario;
-        return many_runs(file, changes, &args.many, args.out.as_deref(), workers, console);
+        return run_sweep(file, changes, &args.many, args.out.as_deref(), workers, console);
     }
-    args.many.check_one_run()?;
+    args.many.check_single_run()?;
     let (source, compiled) = args.scenario.compile()?;
-    warn_of(&compiled.remarks(), console);
+    print_warnings(&compiled.remarks(), console);
     let told = worlds().translate(&args.scenario.file)?;
     let workers = args.workers.count();
-    let keep = Keep {
+    let keep = OutputPaths {
         folder: args.out.as_deref(),
         mcap: args.mcap.as_deref().map(|file| (file, args.mcap_every)),
         replace: args.replace,
     };
     interrupt::listen()?;
     // Before anything is written.
-    let viewers = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
-    let mut journey = Journey::start(compiled.as_ref(), &source, workers, keep, told)?;
+    let viewers = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
+    let mut journey = ManagedRun::start(compiled.as_ref(), &source, workers, keep, told)?;
     if let Some(at) = &viewers {
-        serve(&mut journey, at, console)?;
+        serve_viewers(&mut journey, at, console)?;
     }
-    travel(journey, console)
+    run_to_end(journey, console)
 }
 
 /// Starts to show a run to viewers, and says where.
-fn serve(journey: &mut Journey, at: &ViewersAt, console: Console) -> Result<(), Failure> {
-    journey.show(at)?;
-    viewers::tell(at, console);
+fn serve_viewers(
+    journey: &mut ManagedRun,
+    at: &ViewerAddress,
+    console: Console,
+) -> Result<(), Failure> {
+    journey.serve_viewers(at)?;
+    foxglove::print_address(at, console);
     Ok(())
 }
 
 /// Prints the warnings of `sidestep check`, too: few users want a run to which they apply.
-fn warn_of(remarks: &[Remark], console: Console) {
+fn print_warnings(remarks: &[Remark], console: Console) {
     for remark in remarks.iter().filter(|remark| remark.severity == Severity::Warning) {
-        console.warn(wrapped(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));
+        console.warn(wrap(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));
     }
 }

@@ -7,8 +7,8 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 use sidestep::kernel::InputError;
-use sidestep::scenario::Kind;
-use sidestep_session::shown;
+use sidestep::scenario::WorldType;
+use sidestep_session::display_path;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -26,7 +26,7 @@ if it knows TOML by taplo (Even Better TOML for VS Code, and others).";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct SchemaArgs {
     /// World of the scenarios, or another kind of file [default: any world, by the key `world`]
-    #[arg(value_name = "WORLD", value_parser = names())]
+    #[arg(value_name = "WORLD", value_parser = schema_names())]
     of: Option<String>,
 
     /// Output file, which is replaced [default: standard output]
@@ -35,17 +35,17 @@ pub(crate) struct SchemaArgs {
 }
 
 /// The word for sweep files.
-const SWEEP: &str = "sweep";
+const SWEEP_NAME: &str = "sweep";
 
 /// Returns files beside scenarios, each with a word for it and its schema.
 fn other_files() -> Vec<(&'static str, Value)> {
     let own = worlds().0.iter().flat_map(|kind| kind.other_files());
-    own.chain([(SWEEP, sidestep::experiment::sweep::file::schema())]).collect()
+    own.chain([(SWEEP_NAME, sidestep::experiment::sweep::file::schema())]).collect()
 }
 
 /// The names of the worlds, and the words for other files.
-fn names() -> PossibleValuesParser {
-    let world = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
+fn schema_names() -> PossibleValuesParser {
+    let world = |kind: &&dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
     let other = |(word, schema): &(&'static str, Value)| {
         PossibleValue::new(*word).help(schema["title"].as_str().unwrap_or_default().to_string())
     };
@@ -64,18 +64,18 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
     let schema = schema.expect("the parser takes these names alone");
     let text = format!("{schema:#}\n");
     match &args.out {
-        None => console.result(&schema, || text)?,
+        None => console.print_result(&schema, || text)?,
         Some(file) => {
             write(file, &text)?;
-            let written = serde_json::json!({ "file": shown(file), "of": args.of });
-            console.result(&written, || told(file, &schema))?;
+            let written = serde_json::json!({ "file": display_path(file), "of": args.of });
+            console.print_result(&written, || schema_comment(file, &schema))?;
         }
     }
     Ok(ExitCode::Done)
 }
 
 /// Returns the line by which editors find the schema.
-fn told(file: &Path, schema: &Value) -> String {
+fn schema_comment(file: &Path, schema: &Value) -> String {
     let title = schema["title"].as_str().unwrap_or_default();
     let file = file.display();
     format!("Wrote {file}: {title}\nBegin such files with the line\n  #:schema {file}\n")

@@ -3,15 +3,15 @@
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::fleet_watch;
+use crate::foxglove;
 use crate::interrupt;
 use crate::link::TlsArgs;
-use crate::plan::WorkersArg;
-use crate::viewers;
+use crate::scenario_args::WorkersArg;
 use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep_server::{Options, Studio};
-use sidestep_session::ViewersAt;
+use sidestep_session::ViewerAddress;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -30,7 +30,7 @@ The page may read what lies below the folders that are named, the folders of the
 named, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
 
 /// The time between two looks at whether to end.
-const LOOK: Duration = Duration::from_millis(50);
+const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Watch, steer, replay and edit in the browser.
 #[derive(Debug, Args)]
@@ -59,8 +59,8 @@ pub(crate) struct StudioArgs {
 
     /// Also show the scenario or recording opened last in Foxglove and Lichtblick, which may play,
     /// pause and seek
-    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
-    foxglove: Option<ViewersAt>,
+    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewerAddress))]
+    foxglove: Option<ViewerAddress>,
 
     #[command(flatten)]
     workers: WorkersArg,
@@ -75,13 +75,13 @@ pub(crate) struct StudioArgs {
 /// When a named file or folder is not there, a fleet does not answer, or the port cannot be had.
 pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
-    let foxglove = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
-    let (named, fleets) = fleet_watch::divided(&args.named);
-    let watch = |endpoint: &String| fleet_watch::watch(endpoint, args.tls.files());
+    let foxglove = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
+    let (named, fleets) = fleet_watch::split_endpoints(&args.named);
+    let watch = |endpoint: &String| fleet_watch::start_watching(endpoint, args.tls.files());
     let screens = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
     let studio = Studio::start(Options {
         worlds: worlds(),
-        program: format!("sidestep {}", sidestep_session::build()),
+        program: format!("sidestep {}", sidestep_session::build_id()),
         named,
         host: args.addr.clone(),
         port: args.port,
@@ -91,16 +91,16 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
         screens,
     })?;
     if let Some(at) = &foxglove {
-        viewers::tell(at, console);
+        foxglove::print_address(at, console);
     }
-    invite(&studio, args.no_open, console)?;
+    announce(&studio, args.no_open, console)?;
     wait_for_end(&studio)?;
     drop(studio);
     Ok(ExitCode::Done)
 }
 
 /// Tells the address of the studio and whether others can reach it, and opens it in a browser where that is safe.
-fn invite(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
+fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(
@@ -108,10 +108,10 @@ fn invite(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failur
              and read what it may read; what is sent is not encrypted",
         );
     }
-    if studio.is_open_to_others() && studio.is_named_for_itself() {
+    if studio.is_open_to_others() && studio.has_local_address() {
         console.note("Others put this machine's name or number into the address.");
     }
-    console.result_or_short(
+    console.print_result_or_short(
         &json!({ "url": url }),
         || format!("{url}\n"),
         || format!("The studio is at {url}\nCtrl-C ends it.\n"),
@@ -120,25 +120,25 @@ fn invite(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failur
     match (no_open, studio.is_open_to_others()) {
         (true, _) => {}
         (false, true) => console.note("Open the address yourself: it has the token in it."),
-        (false, false) => open(&url, console),
+        (false, false) => open_browser(&url, console),
     }
     Ok(())
 }
 
 /// Waits until the command is interrupted.
 fn wait_for_end(studio: &Studio) -> Result<(), Failure> {
-    while !interrupt::requested() {
+    while !interrupt::is_requested() {
         if studio.has_ended() {
             let remedy = "please report it with the lines above";
-            return Err(Failure::stopped("the server has ended by itself, which is a bug", remedy));
+            return Err(Failure::other("the server has ended by itself, which is a bug", remedy));
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(STOP_POLL_INTERVAL);
     }
     Ok(())
 }
 
 /// Opens a page in the user's browser, if there is one.
-fn open(url: &str, console: Console) {
+fn open_browser(url: &str, console: Console) {
     let (program, args): (&str, &[&str]) = match () {
         () if cfg!(windows) => ("cmd", &["/c", "start", ""]),
         () if cfg!(target_os = "macos") => ("open", &[]),

@@ -1,17 +1,19 @@
 //! `sidestep sweep`: many variants of a scenario, each with many seeds.
 
-use crate::console::{Console, aligned, grouped};
+use crate::console::{Console, align_pairs, group_thousands};
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::plan::{ChangeArgs, WorkersArg};
-use crate::sweep::{ManyArgs, Told, go_on, tell, tell_share, tell_status};
-use crate::watch::Watch;
+use crate::scenario_args::{ChangeArgs, WorkersArg};
+use crate::sweep::{
+    ReplicationArgs, SweepOutput, print_results, print_share, print_status, run_remaining,
+};
 use crate::worlds;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::{Plan, Shard};
 use sidestep::kernel::InputError;
-use sidestep_session::shown;
+use sidestep_session::display_path;
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
@@ -39,7 +41,7 @@ continues where a killed one stopped, as does `sidestep resume DIR`; no finished
 #[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(crate) struct SweepArgs {
     #[command(subcommand)]
-    step: Option<Step>,
+    step: Option<SweepCommand>,
 
     /// Sweep file or scenario
     #[arg(value_name = "FILE")]
@@ -57,11 +59,11 @@ pub(crate) struct SweepArgs {
 
     // Last, because its heading is that of all options that follow.
     #[command(flatten)]
-    many: ManyArgs,
+    many: ReplicationArgs,
 }
 
 #[derive(Debug, Subcommand)]
-enum Step {
+enum SweepCommand {
     /// Plan a sweep for a cluster: check all variants and list the runs
     Plan(Box<PlanArgs>),
     /// Run one share (shard) of a planned sweep
@@ -90,7 +92,7 @@ struct PlanArgs {
 
     // Last, because its heading is that of all options that follow.
     #[command(flatten)]
-    many: ManyArgs,
+    many: ReplicationArgs,
 }
 
 #[derive(Debug, Args)]
@@ -121,12 +123,12 @@ struct FolderArgs {
 pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Failure> {
     let SweepArgs { step, file, changes, many, workers, out } = args;
     match (step, file) {
-        (Some(Step::Plan(args)), _) => plan(args, console),
-        (Some(Step::Run(args)), _) => share(args, console),
-        (Some(Step::Status(args)), _) => status(args, console),
-        (Some(Step::Collect(args)), _) => collect(args, console),
+        (Some(SweepCommand::Plan(args)), _) => plan(args, console),
+        (Some(SweepCommand::Run(args)), _) => share(args, console),
+        (Some(SweepCommand::Status(args)), _) => status(args, console),
+        (Some(SweepCommand::Collect(args)), _) => collect(args, console),
         (None, Some(file)) => {
-            many_runs(file, changes, many, out.as_deref(), workers.count(), console)
+            run_sweep(file, changes, many, out.as_deref(), workers.count(), console)
         }
         (None, None) => {
             let remedy = "name a sweep file or a scenario; see `sidestep sweep --help`";
@@ -139,69 +141,75 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
 ///
 /// # Errors
 /// When the sweep or the folder is wrong, or results cannot be stored.
-pub(super) fn many_runs(
+pub(super) fn run_sweep(
     file: &Path,
     changes: &ChangeArgs,
-    many: &ManyArgs,
+    many: &ReplicationArgs,
     out: Option<&Path>,
     workers: usize,
     console: Console,
 ) -> Result<ExitCode, Failure> {
     let wanted = many.sweep(file, changes)?;
     interrupt::listen()?;
-    let watch = Watch::new(console);
+    let watch = ConsoleWatcher::new(console);
     let Some(out) = out else {
-        let (plan, ended) = sweep::in_memory(worlds(), &wanted, workers, &watch)?;
-        return tell(Told { plan: &plan, folder: None, console }, ended, "");
+        let (plan, ended) = sweep::run_in_memory(worlds(), &wanted, workers, &watch)?;
+        return print_results(SweepOutput { plan: &plan, folder: None, console }, ended, "");
     };
-    go_on(&sweep::planned_or_there(worlds(), &wanted, out, workers, &watch)?, workers, console)
+    run_remaining(
+        &sweep::open_or_create(worlds(), &wanted, out, workers, &watch)?,
+        workers,
+        console,
+    )
 }
 
 fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
     let (folder, workers) = (Folder::open(&args.folder)?, args.workers.count());
     interrupt::listen()?;
-    let ended = sweep::share(worlds(), &folder, args.shard, workers, &Watch::new(console))?;
-    let told = Told { plan: folder.plan(), folder: Some(&folder), console };
-    tell_share(told, args.shard, ended)
+    let ended =
+        sweep::run_share(worlds(), &folder, args.shard, workers, &ConsoleWatcher::new(console))?;
+    let told = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
+    print_share(told, args.shard, ended)
 }
 
 fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    let ended = sweep::collect(&folder, &Watch::new(console))?;
-    let told = Told { plan: folder.plan(), folder: Some(&folder), console };
-    tell(told, ended, "The runs are collected already.")
+    let ended = sweep::collect(&folder, &ConsoleWatcher::new(console))?;
+    let told = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
+    print_results(told, ended, "The runs are collected already.")
 }
 
 fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    tell_status(&folder, &sweep::status(&folder)?, console)?;
+    print_status(&folder, &sweep::read_status(&folder)?, console)?;
     Ok(ExitCode::Done)
 }
 
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     let wanted = args.many.sweep(&args.file, &args.changes)?;
     interrupt::listen()?;
-    let (workers, watch) = (args.workers.count(), Watch::new(console));
-    let folder = sweep::planned(worlds(), &wanted, &args.out, workers, &watch)?;
+    let (workers, watch) = (args.workers.count(), ConsoleWatcher::new(console));
+    let folder = sweep::create(worlds(), &wanted, &args.out, workers, &watch)?;
     let plan = folder.plan();
     let json = json!({
-        "folder": shown(&args.out),
+        "folder": display_path(&args.out),
         "variants": plan.variants.len(),
         "replicates": plan.replicates,
         "cells": plan.runs(),
         "agents": plan.agents,
     });
-    console.result_or_short(&json, String::new, || aligned(&planned(plan, &args.out)))?;
+    console
+        .print_result_or_short(&json, String::new, || align_pairs(&plan_lines(plan, &args.out)))?;
     Ok(ExitCode::Done)
 }
 
 /// Returns the plan in words, and the commands that run it. Where a precision ends the sweep it has no shares,
 /// because the rule takes all runs to be seen.
-fn planned(plan: &Plan, out: &Path) -> Vec<(String, String)> {
-    let (dir, all) = (out.display(), grouped(plan.runs()));
+fn plan_lines(plan: &Plan, out: &Path) -> Vec<(String, String)> {
+    let (dir, all) = (out.display(), group_thousands(plan.runs()));
     let most = if plan.until.is_some() { "at most " } else { "" };
     let mut lines = vec![
-        ("variants", grouped(plan.variants.len() as u64)),
+        ("variants", group_thousands(plan.variants.len() as u64)),
         ("runs", format!("{most}{} of each, {most}{all} in all", plan.replicates)),
     ];
     lines.extend(match plan.until.is_some() {

@@ -5,31 +5,31 @@
 //! status.rs   how far it is
 //! ```
 
-mod ask;
-mod say;
+mod args;
+mod output;
 mod status;
 
 use crate::console::Console;
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::watch::Watch;
 use crate::worlds;
-pub(crate) use ask::ManyArgs;
-pub(crate) use say::{Told, tell, tell_share};
+pub(crate) use args::ReplicationArgs;
+pub(crate) use output::{SweepOutput, print_results, print_share};
 use sidestep_session::sweep::{self, Folder};
-pub(crate) use status::tell_status;
+pub(crate) use status::print_status;
 
 /// Runs all cells of a sweep's folder that are not finished.
 ///
 /// # Errors
 /// When runs cannot be read or stored.
-pub(crate) fn go_on(
+pub(crate) fn run_remaining(
     folder: &Folder,
     workers: usize,
     console: Console,
 ) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
-    let ended = sweep::go_on(worlds(), folder, workers, &Watch::new(console))?;
-    let told = Told { plan: folder.plan(), folder: Some(folder), console };
-    tell(told, ended, "All runs are finished already.")
+    let ended = sweep::run_remaining(worlds(), folder, workers, &ConsoleWatcher::new(console))?;
+    let told = SweepOutput { plan: folder.plan(), folder: Some(folder), console };
+    print_results(told, ended, "All runs are finished already.")
 }

@@ -1,27 +1,27 @@
 //! The state of a sweep that other processes run, as text and as JSON.
 
-use super::say::counted;
-use crate::console::{Console, aligned, duration, grouped};
+use super::output::format_count;
+use crate::console::{Console, align_pairs, format_duration, group_thousands};
 use crate::exit::Failure;
 use serde_json::json;
-use sidestep_session::shown;
-use sidestep_session::sweep::{Folder, ShareStatus, Status};
+use sidestep_session::display_path;
+use sidestep_session::sweep::{Folder, ShareStatus, SweepStatus};
 
 /// Largest number of failed runs that are listed.
-const NAMED: usize = 5;
+const MAX_LISTED_FAILURES: usize = 5;
 
 /// Prints how far a sweep is.
 ///
 /// # Errors
 /// When that cannot be written.
-pub(crate) fn tell_status(
+pub(crate) fn print_status(
     folder: &Folder,
-    status: &Status,
+    status: &SweepStatus,
     console: Console,
 ) -> Result<(), Failure> {
     let plan = folder.plan();
     let mut json =
-        json!({ "folder": shown(folder.path()), "name": plan.name, "world": plan.world });
+        json!({ "folder": display_path(folder.path()), "name": plan.name, "world": plan.world });
     if let (Some(all), Ok(serde_json::Value::Object(told))) =
         (json.as_object_mut(), serde_json::to_value(status))
     {
@@ -29,28 +29,28 @@ pub(crate) fn tell_status(
     }
     let of = if status.until_precise && !status.is_complete { "of at most" } else { "of" };
     let short = || format!("{} {of} {}\n", status.runs, status.of);
-    console.result_or_short(&json, short, || {
+    console.print_result_or_short(&json, short, || {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
-        let (runs, all) = (grouped(status.runs), counted(status.of as usize, "run"));
-        format!("# {name}: {runs} {of} {all}\n\n{}", aligned(&lines(folder, status)))
+        let (runs, all) = (group_thousands(status.runs), format_count(status.of as usize, "run"));
+        format!("# {name}: {runs} {of} {all}\n\n{}", align_pairs(&lines(folder, status)))
     })
 }
 
-fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
+fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
     let path = folder.path().display();
     let mut lines: Vec<(String, String)> = Vec::new();
     let mut line = |name: &str, words: String| lines.push((name.to_string(), words));
     for share in &status.shares {
-        line(&format!("share {}", share.share), share_words(share));
+        line(&format!("share {}", share.share), share_text(share));
     }
     if let Some(rate) = status.runs_per_s.filter(|_| !status.is_complete) {
         line("rate", format!("{rate:.3} runs a second of late"));
     }
     if let Some(left_s) = status.left_s.filter(|_| !status.is_complete) {
-        line("time left", duration(left_s));
+        line("time left", format_duration(left_s));
     }
-    line("failed", grouped(status.failed as u64));
-    for failure in status.failures.iter().take(NAMED) {
+    line("failed", group_thousands(status.failed as u64));
+    for failure in status.failures.iter().take(MAX_LISTED_FAILURES) {
         line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
     }
     let is_all = status.runs == status.of;
@@ -65,11 +65,11 @@ fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
     lines
 }
 
-fn share_words(share: &ShareStatus) -> String {
-    let runs = format!("{} of {}", grouped(share.runs), grouped(share.of));
+fn share_text(share: &ShareStatus) -> String {
+    let runs = format!("{} of {}", group_thousands(share.runs), group_thousands(share.of));
     match share.idle_s {
         _ if share.is_done => format!("{runs}, done"),
-        Some(idle_s) => format!("{runs}, the last {} ago", duration(idle_s)),
+        Some(idle_s) => format!("{runs}, the last {} ago", format_duration(idle_s)),
         None => runs,
     }
 }

@@ -1,6 +1,6 @@
 //! The airspace world by the real command: run, record, replay, compare, other programs' files.
 
-use crate::support::{Place, names};
+use crate::support::{TestFolder, names};
 use serde_json::Value;
 
 const SIX: &str = "format = 1\nworld = \"airspace\"\nname = \"Six\"\n\
@@ -8,7 +8,7 @@ const SIX: &str = "format = 1\nworld = \"airspace\"\nname = \"Six\"\n\
 
 #[test]
 fn a_run_ends_when_all_have_arrived_and_says_what_came_of_it() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let told = place.json(&["run", "six.toml", "--out", "six"]);
     let metrics = &told["metrics"];
@@ -38,7 +38,7 @@ fn a_run_ends_when_all_have_arrived_and_says_what_came_of_it() {
 
 #[test]
 fn every_deployment_gives_the_digest_of_one_process() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let digest = |deployment: &str| {
         let set = format!("airspace.deployment={deployment}");
@@ -55,7 +55,7 @@ fn every_deployment_gives_the_digest_of_one_process() {
 /// by the traffic that it sees.
 #[test]
 fn trouble_on_the_network_is_told_and_recorded_and_nobody_comes_too_near() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let silent = "airspace.network.silent=[{airplane=2,from_s=150.0}]";
     let set = |key: &'static str| ["--set", key];
@@ -81,7 +81,7 @@ fn trouble_on_the_network_is_told_and_recorded_and_nobody_comes_too_near() {
 
 #[test]
 fn methods_are_compared_on_the_same_traffic() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let args = [
         "compare",
@@ -109,7 +109,7 @@ fn methods_are_compared_on_the_same_traffic() {
 
 #[test]
 fn seeds_that_run_over_are_told_as_such() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let last = ["compare", "six.toml", "--methods", "none", "--seed", "9223372036854775807"];
     let told = place.run(&[&last[..], &["--runs", "2"]].concat());
@@ -121,7 +121,7 @@ fn seeds_that_run_over_are_told_as_such() {
 
 #[test]
 fn the_advice_to_fly_methods_without_the_shield_is_accepted() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("six.toml", SIX);
     let compare = ["compare", "six.toml", "--methods", "none", "--runs", "1"];
     let words = |args: &[&str]| {
@@ -138,7 +138,7 @@ fn the_advice_to_fly_methods_without_the_shield_is_accepted() {
 
 #[test]
 fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write(
         "two.scn",
         "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n\
@@ -208,7 +208,7 @@ fn head_on_csv() -> String {
 
 #[test]
 fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("tracks.csv", head_on_csv() + "1000000,c,,1.0,0.0,35000,540,90,\n");
     let replayed = place.json(&["run", "tracks.csv", "--out", "replayed"]);
     let metrics = &replayed["metrics"];
@@ -246,7 +246,7 @@ fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
 
 #[test]
 fn commands_of_a_bluesky_file_are_flown_at_their_times() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write(
         "told.scn",
         "00:00:00.00>CRE A1,B744,0,0,90,FL200,250\n00:00:00.00>DEST A1 0,1.0\n\
@@ -278,7 +278,7 @@ fn commands_of_a_bluesky_file_are_flown_at_their_times() {
 /// A run is driven in slices, the first of one cycle.
 #[test]
 fn a_run_that_is_over_where_a_slice_ends_is_recorded_all_the_same() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let rows: Vec<String> = head_on_csv().lines().take(5).map(|row| format!("{row}\n")).collect();
     place.write("short.csv", rows.concat());
     assert_eq!(place.json(&["run", "short.csv", "--out", "short"])["cycles"], 1);

@@ -2,7 +2,7 @@
 //! wrong is refused with place, cause and remedy.
 
 use crate::readers::{has, script};
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -50,8 +50,8 @@ const TRUTH: [&str; 2] = ["--truth", "/robot_0/ground_truth"];
 const SCANS: [&str; 4] = ["--scan", "/robot_0/eye", "--map", "bag/map.yaml"];
 
 /// A bag exported from a run of the hall.
-fn exported(cycles: &str) -> Place {
-    let place = Place::new();
+fn exported(cycles: &str) -> TestFolder {
+    let place = TestFolder::new();
     place.write("hall.toml", hall());
     place.json(&["run", "hall.toml", "--cycles", cycles, "--out", "r"]);
     let written = place.json(&["export", "r", "--to", "rosbag", "--out", "bag"]);
@@ -143,7 +143,7 @@ fn equal_runs_give_equal_bags_and_other_worlds_none() {
 
 #[test]
 fn the_bag_of_the_examples_is_what_its_commands_make() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let examples = sidestep_testing::root().join("examples");
     let building = examples.join("building.toml");
     let one = ["robots.0.count=1", "robots.1.count=0", "people.count=0"];
@@ -212,7 +212,7 @@ fn a_bag_of_another_program_gives_its_robots_wheels_back() {
     if !has("numpy, rosbags") {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let said = script("write_bag.py", &[Path::new("wheels"), &place.path("drive")]);
     let learn = ["learn", "effector", "--bag", "drive", "--box", "0.5"];
     let wheels = place.json(&[&learn[..], &["--odom", "/odom", "--truth", "/vicon/pose"]].concat());
@@ -232,7 +232,7 @@ fn a_bag_of_another_program_gives_its_scanner_back() {
     if !has("numpy, rosbags") {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let said = script("write_bag.py", &[Path::new("scanner"), &place.path("rounds")]);
     let at = ["--truth", "/tf:map:base_link", "--scan", "/scan", "--map", "room.yaml"];
     let eye = place.json(&[&["learn", "sensor", "--bag", "rounds"][..], &at].concat());

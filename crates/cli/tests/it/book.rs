@@ -3,7 +3,7 @@
 //! Commands are the lines of blocks in the language `sh` that begin with `sidestep` or
 //! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -109,7 +109,7 @@ fn commands_are_found_in_blocks_of_shell_only() {
 
 #[test]
 fn the_chapter_of_columns_has_every_column_of_a_sweep() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&[
         "sweep",
         "s.toml",
@@ -123,7 +123,7 @@ fn the_chapter_of_columns_has_every_column_of_a_sweep() {
     let chapter = std::fs::read_to_string(root().join("docs/src/columns.md")).expect("the chapter");
     for table in ["results", "timings", "cells"] {
         let path = place.path(&format!("d/{table}.parquet"));
-        let read = sidestep_record::whole::read::<Value>(&path).expect("a table");
+        let read = sidestep_record::run_table::read::<Value>(&path).expect("a table");
         for column in read.columns.iter().filter(|column| column.role != "parameter") {
             // Metrics that are maps or lists have a column for each key, or for their length.
             let map = column.name.find("_by_").and_then(|_| column.name.split('.').next());

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Longest time that a busy machine may take for a page.
-const PATIENCE: Duration = Duration::from_secs(240);
+const PAGE_TIMEOUT: Duration = Duration::from_secs(240);
 
 /// A script that inspects the page, acts like a reader, and leaves its findings in the page.
 const PROBE: &str = include_str!("browser.js");
@@ -89,10 +89,10 @@ impl Browser {
             if let Some(status) = child.try_wait().expect("a status") {
                 break status;
             }
-            if started.elapsed() > PATIENCE {
+            if started.elapsed() > PAGE_TIMEOUT {
                 let _ = child.kill();
                 let _ = child.wait();
-                panic!("the browser did not end within {PATIENCE:?}");
+                panic!("the browser did not end within {PAGE_TIMEOUT:?}");
             }
             std::thread::sleep(Duration::from_millis(20));
         };

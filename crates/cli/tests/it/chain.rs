@@ -1,6 +1,6 @@
 //! The world of chains by the real command: run, record, replay, resume, pictures.
 
-use crate::support::{Place, names, wait_for};
+use crate::support::{TestFolder, names, wait_for};
 use serde_json::{Value, json};
 use sidestep_record::read_table;
 use std::path::Path;
@@ -50,8 +50,8 @@ speed_m_s = 0.3
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain");
 
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("two.toml", TWO);
     place
 }
@@ -230,7 +230,7 @@ fn a_run_folder_needs_no_other_file() {
         ("arm.toml", ARM, &[("a.urdf", URDF)]),
     ];
     for (name, text, inputs) in files {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.write(name, text);
         inputs.iter().for_each(|(file, content)| place.write(file, content));
         let told = place.json(&["run", name, "--out", "r"]);
@@ -249,7 +249,7 @@ fn a_run_folder_needs_no_other_file() {
 
 #[test]
 fn every_scenario_of_chains_that_is_shipped_is_right_and_penetrates_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let files: Vec<String> =
         names(Path::new(FOLDER)).into_iter().filter(|n| n.ends_with(".toml")).collect();
     assert!(files.len() >= 5, "{files:?}");
@@ -268,17 +268,17 @@ fn every_scenario_of_chains_that_is_shipped_is_right_and_penetrates_nothing() {
 fn missing_parts_of_a_broken_chain_are_told_by_their_number() {
     let scenario = format!("{FOLDER}/broken.toml");
     let wide = ["run", &scenario, "--set", "chains.0.changes.0.apart_m=[-3.0, 0.0]"];
-    let told = Place::new().json(&[&wide[..], &["--cycles", "200"]].concat());
+    let told = TestFolder::new().json(&[&wide[..], &["--cycles", "200"]].concat());
     let metrics = &told["metrics"];
     assert_eq!(metrics["not_reformed"], 1);
     assert_eq!(metrics["missing_parts"], 3, "3 m of rods of 1.1 m");
-    let words = Place::new().run(&[&wide[..], &["--cycles", "200"]].concat()).out();
+    let words = TestFolder::new().run(&[&wide[..], &["--cycles", "200"]].concat()).out();
     assert!(words.contains("1 times; 3 parts are missing"), "{words}");
 }
 
 #[test]
 fn a_broken_chain_is_whole_in_the_end_and_goes_on() {
-    let told = Place::new().json(&["run", &format!("{FOLDER}/broken.toml")]);
+    let told = TestFolder::new().json(&["run", &format!("{FOLDER}/broken.toml")]);
     let metrics = &told["metrics"];
     assert_eq!((&metrics["reformed"], &metrics["progress"]), (&json!(1), &json!(1.0)), "{metrics}");
     assert!(metrics["max_rod_violation_m"].as_f64() <= Some(1e-9), "{metrics}");
@@ -294,7 +294,7 @@ fn a_run_of_no_cycles_and_a_chain_of_one_connector_are_runs() {
 
 #[test]
 fn a_team_of_agents_runs_is_recorded_and_replayed_and_says_who_was_lost() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let team = format!("{FOLDER}/team.toml");
     assert_eq!(place.json(&["check", &team])["deployment"], "team");
     assert!(place.run(&["check", &team]).out().contains("an agent per connector"));

@@ -1,7 +1,7 @@
 //! E1 for chains: wrong input is an error with file, line, column, cause and remedy; exit code
 //! 2, nothing written.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 
 const RIGHT: &str = r#"format = 1
 world = "chain"
@@ -28,7 +28,7 @@ speed_m_s = 0.5
 
 /// Runs the command, checks that the input is refused and that nothing was written, and returns the
 /// error.
-fn refused(place: &Place, name: &str, more: &[&str]) -> String {
+fn refused(place: &TestFolder, name: &str, more: &[&str]) -> String {
     let before = place.names();
     let mut told = String::new();
     for command in [&["run", "c.toml", "--out", "out"][..], &["check", "c.toml"]] {
@@ -135,7 +135,7 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
 #[test]
 fn a_wrong_scenario_is_refused_where_it_is_wrong() {
     for (name, find, replace, said) in TABLE {
-        let place = Place::new();
+        let place = TestFolder::new();
         assert!(RIGHT.contains(find), "{name}");
         place.write("c.toml", RIGHT.replacen(find, replace, 1));
         let err = refused(&place, name, &[]);
@@ -146,7 +146,7 @@ fn a_wrong_scenario_is_refused_where_it_is_wrong() {
 
 #[test]
 fn chains_that_begin_in_each_other_are_refused_unless_they_may() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let other = "[[chains]]\nconnectors = 4\nat_m = [-1.5, 1.0]\nalong = [0.0, -1.0]\nrod_m = 1.0\n\
                  radius_m = 0.1\n[[chains.tasks]]\nkind = \"rest\"\n";
     place.write("c.toml", format!("{RIGHT}{other}"));
@@ -176,7 +176,7 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
         ("dance 3", "dance"),
         ("wait -1", "script:1:6"),
     ] {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.write("c.toml", format!("{SCRIPTED}script = \"{script}\"\n"));
         let err = refused(&place, script, &[]);
         assert!(err.contains(said), "{script}: {err}");
@@ -188,7 +188,7 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
         let err = refused(&place, script, &[]);
         assert!(has_position(&err, "way.txt"), "{script}: {err}");
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("c.toml", SCRIPTED);
     assert!(refused(&place, "no script", &[]).contains("needs one script"));
     place.write("c.toml", format!("{SCRIPTED}script_file = \"gone.txt\"\n"));
@@ -211,7 +211,7 @@ fn an_error_of_a_key_points_at_the_key_not_at_its_section() {
         ("[[obstacles]]", "size_m = [nan, 1.0]"),
         ("[[obstacles]]", "corners_m = [[0.0, 0.0]]"),
     ] {
-        let place = Place::new();
+        let place = TestFolder::new();
         let with = format!("{header}\n{line}\n");
         let text = match RIGHT.contains(header) {
             true => RIGHT.replacen(&format!("{header}\n"), &with, 1),
@@ -227,7 +227,7 @@ fn an_error_of_a_key_points_at_the_key_not_at_its_section() {
 /// All scripts are checked with the first one, not in the middle of a run.
 #[test]
 fn every_script_is_tried_before_a_run_begins() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let second = "script = \"forward 1\"\n[[chains.tasks]]\nkind = \"script\"\nscript = \"to go forward 0 go end go\"\n";
     let text = SCRIPTED.replace("[chains.tasks]", "[[chains.tasks]]");
     place.write("c.toml", format!("{text}{second}"));
@@ -237,7 +237,7 @@ fn every_script_is_tried_before_a_run_begins() {
 #[test]
 fn wrong_grounds_are_named() {
     let ground = |what: &str| format!("{RIGHT}[ground]\n{what}\n");
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("c.toml", ground("map = \"gone.yaml\""));
     assert!(refused(&place, "no map", &[]).contains("gone.yaml"));
     place.write("m.yaml", "image: gone.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
@@ -281,13 +281,13 @@ fn wrong_models_of_arms_are_named() {
         ("no robot", "<world/>".into(), "a.urdf"),
         ("two roots", urdf(axis, "<link name=\"alone\"/>"), "connect"),
     ] {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.write("c.toml", ARM);
         place.write("a.urdf", text);
         let err = refused(&place, name, &[]);
         assert!(err.contains(said), "{name}: {err}");
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("c.toml", ARM);
     assert!(refused(&place, "no file", &[]).contains("a.urdf"));
     let mesh = "<link name=\"base\"><visual><geometry><mesh filename=\"package://x/gone.dae\"/></geometry></visual></link>";

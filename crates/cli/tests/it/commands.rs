@@ -1,11 +1,11 @@
 //! The effects of each command, beyond its JSON.
 
-use crate::support::{Place, names};
+use crate::support::{TestFolder, names};
 use sidestep_record::read_table;
 
 #[test]
 fn a_recorded_run_leaves_what_the_readme_lists() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let ended = place.run(&["run", "s.toml", "--out", "deep/r"]);
     assert_eq!(ended.code(), 0, "{}", ended.err());
     let next = "Next: `sidestep report deep/r` writes a page with pictures and numbers.\n";
@@ -31,7 +31,7 @@ fn a_recorded_run_leaves_what_the_readme_lists() {
 
 #[test]
 fn the_report_names_what_a_person_asks_for() {
-    let out = Place::new().run(&["run", "s.toml", "--out", "r"]).out();
+    let out = TestFolder::new().run(&["run", "s.toml", "--out", "r"]).out();
     for word in ["robots", "cycles", "contacts", "trips", "coverage", "largest", "digest", "r\n"] {
         assert!(out.contains(word), "{word}: {out}");
     }
@@ -39,14 +39,14 @@ fn the_report_names_what_a_person_asks_for() {
 
 #[test]
 fn quiet_keeps_to_the_digest() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let digest = place.json(&["run", "s.toml"])["digest"].as_str().expect("text").to_string();
     assert_eq!(place.run(&["run", "s.toml", "--quiet"]).out(), format!("{digest}\n"));
 }
 
 #[test]
 fn an_existing_run_is_replaced_only_when_asked() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     let before = place.read("r/run.json");
     let again = place.run(&["run", "s.toml", "--out", "r", "--seed", "6"]);
@@ -57,7 +57,7 @@ fn an_existing_run_is_replaced_only_when_asked() {
 
 #[test]
 fn a_folder_with_something_else_is_left_alone() {
-    let place = Place::new();
+    let place = TestFolder::new();
     std::fs::create_dir(place.path("mine")).expect("made");
     place.write("mine/letter.txt", "dear");
     for more in [&[][..], &["--replace"]] {
@@ -69,7 +69,7 @@ fn a_folder_with_something_else_is_left_alone() {
 
 #[test]
 fn a_replay_agrees_with_the_record_at_every_cycle_asked() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let digest = place.json(&["run", "s.toml", "--out", "r"])["digest"].clone();
     for cycle in ["0", "1", "699", "700", "2999"] {
         let replay = place.json(&["replay", "r", "--cycle", cycle, "--workers", "2"]);
@@ -83,7 +83,7 @@ fn a_replay_agrees_with_the_record_at_every_cycle_asked() {
 
 #[test]
 fn a_replay_of_changed_rows_says_so() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     place.json(&["run", "s.toml", "--out", "other", "--seed", "6"]);
     std::fs::remove_dir_all(place.path("r/trajectories")).expect("removed");
@@ -96,7 +96,7 @@ fn a_replay_of_changed_rows_says_so() {
 #[test]
 fn new_writes_a_scenario_that_runs_and_overwrites_nothing() {
     for world in ["robots", "airspace", "chain"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         assert_eq!(place.run(&["new", world, "n.toml"]).code(), 0);
         assert_eq!(place.run(&["check", "n.toml"]).code(), 0);
         assert_eq!(place.run(&["run", "n.toml", "--cycles", "20"]).code(), 0);
@@ -110,7 +110,7 @@ fn new_writes_a_scenario_that_runs_and_overwrites_nothing() {
 #[test]
 fn every_scenario_that_is_shipped_runs() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/robots");
-    let place = Place::new();
+    let place = TestFolder::new();
     let files: Vec<String> =
         names(folder.as_ref()).into_iter().filter(|n| n.ends_with(".toml")).collect();
     assert!(files.len() >= 4, "{files:?}");
@@ -123,7 +123,7 @@ fn every_scenario_that_is_shipped_runs() {
 
 #[test]
 fn map_draws_to_the_terminal_and_to_a_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("m.txt", "####\n#..#\n#.?#\n####\n");
     let ended = place.run(&["map", "m.txt", "--box", "0.5", "--png", "m.png"]);
     let drawn = "  ####\n  #..#\n  #.?#\n0 ####\n  0\n4 x 4 pixels";
@@ -135,7 +135,7 @@ fn map_draws_to_the_terminal_and_to_a_file() {
 
 #[test]
 fn a_reader_that_leaves_early_is_no_error() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let row = format!("{}\n", "#".repeat(200));
     place.write("m.txt", row.repeat(2000));
     let mut child = place.start(&["map", "m.txt", "--width", "200"]);

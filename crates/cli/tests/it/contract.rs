@@ -1,6 +1,6 @@
 //! The fixed keys of `--json`, which scripts rely on.
 
-use crate::support::{Place, SCENARIO};
+use crate::support::{SCENARIO, TestFolder};
 use serde_json::Value;
 
 /// Asserts that all of `keys` exist and none is null.
@@ -12,7 +12,7 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 
 #[test]
 fn run_says_what_was_promised() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let run = place.json(&["run", "s.toml"]);
     let words = [
         "digest",
@@ -39,7 +39,7 @@ fn run_says_what_was_promised() {
 
 #[test]
 fn the_book_has_every_word_of_a_summary_and_aliases_have_its_values() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--cycles", "50", "--out", "r", "--mcap", "r.mcap"]);
     let text = place.read("r/summary.json");
     let summary: Value = serde_json::from_str(&text).expect("JSON");
@@ -68,7 +68,7 @@ fn the_book_has_every_word_of_a_summary_and_aliases_have_its_values() {
 
 #[test]
 fn check_says_what_it_found() {
-    let found = Place::new().json(&["check", "s.toml"]);
+    let found = TestFolder::new().json(&["check", "s.toml"]);
     assert_keys(&found, &["name", "seed", "cycles", "regime", "map", "sensors", "memory_bytes"]);
     assert_eq!(found["map"]["width_boxes"], 24);
     assert_eq!(found["bodies"], serde_json::json!({ "door": 1, "person": 1, "robot": 3 }));
@@ -79,7 +79,7 @@ fn check_says_what_it_found() {
 
 #[test]
 fn check_says_what_will_surprise() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let slips = "[{ p = 0.4, path = \"F\" }, { p = 0.6, turn = -90 }]";
     let wheels = format!("\n[effectors.wheels]\nforward = {slips}\n");
     place.write("s.toml", SCENARIO.replacen("\"nomad\"", "\"wheels\"", 1) + &wheels);
@@ -96,7 +96,7 @@ fn check_says_what_will_surprise() {
 
 #[test]
 fn check_tells_the_memory_of_a_whole_process() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let head = "format = 1\nworld = \"robots\"\n[map.office]\nfloors = 20\ncorridors = 6\n";
     place.write("large.toml", format!("{head}[people]\ncount = 50000\n"));
     let bytes = |file: &str, key: &str| {
@@ -111,7 +111,7 @@ fn check_tells_the_memory_of_a_whole_process() {
 
 #[test]
 fn map_counts_pixels_and_boxes() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("m.yaml", "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
     place.write("m.pgm", "P2\n4 2\n255\n0 254 254 254\n254 254 205 254\n");
     let map = place.json(&["map", "m.yaml", "--box", "1.0"]);
@@ -126,7 +126,7 @@ fn map_counts_pixels_and_boxes() {
 
 #[test]
 fn replay_and_resume_speak_json_too() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     let replay = place.json(&["replay", "r", "--cycle", "42"]);
     assert_keys(&replay, &["cycle", "digest", "compared_poses", "bodies"]);
@@ -137,13 +137,13 @@ fn replay_and_resume_speak_json_too() {
 
 #[test]
 fn new_says_which_file_it_wrote() {
-    let place = Place::new();
+    let place = TestFolder::new();
     assert_eq!(place.json(&["new", "robots"])["file"], "robots.toml");
 }
 
 #[test]
 fn in_json_mode_errors_leave_standard_output_empty() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let ended = place.run(&["run", "missing.toml", "--json"]);
     assert_eq!((ended.code(), ended.out().as_str()), (2, ""));
     assert!(ended.err().starts_with("error: missing.toml"), "{}", ended.err());

@@ -1,20 +1,20 @@
 //! D1: same build, scenario, seed: identical bits for 1, 2, 3, 8 workers, recorded or not,
 //! resumed or not.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::Value;
 
 /// Enough robots that several workers share the work.
 const CROWD: [&str; 4] = ["--set", "robots.1.count=40", "--set", "people.count=20"];
 
-fn digest(place: &Place, more: &[&str]) -> Value {
+fn digest(place: &TestFolder, more: &[&str]) -> Value {
     let args = [&["run", "s.toml", "--cycles", "1500"], &CROWD[..], more].concat();
     place.json(&args)["digest"].clone()
 }
 
 #[test]
 fn the_number_of_workers_changes_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let alone = digest(&place, &["--workers", "1"]);
     for workers in ["2", "3", "8"] {
         assert_eq!(digest(&place, &["--workers", workers]), alone, "{workers} workers");
@@ -23,7 +23,7 @@ fn the_number_of_workers_changes_nothing() {
 
 #[test]
 fn recording_changes_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let plain = digest(&place, &[]);
     assert_eq!(digest(&place, &["--out", "a"]), plain);
     let calibration = ["--out", "b", "--set", "record.calibration=true"];
@@ -34,7 +34,7 @@ fn recording_changes_nothing() {
 
 #[test]
 fn another_seed_or_regime_is_another_run_and_options_win_over_set() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let run = |more: &[&str]| digest(&place, more);
     let seven = run(&["--seed", "7"]);
     assert_ne!(seven, run(&[]));
@@ -47,7 +47,7 @@ fn another_seed_or_regime_is_another_run_and_options_win_over_set() {
 
 #[test]
 fn the_resolved_scenario_runs_to_the_same_digest() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let first = digest(&place, &["--seed", "9", "--out", "a"]);
     assert!(place.read("a/scenario.toml").contains("seed = 9"));
     assert_eq!(place.json(&["run", "a/scenario.toml"])["digest"], first);
@@ -55,7 +55,7 @@ fn the_resolved_scenario_runs_to_the_same_digest() {
 
 #[test]
 fn a_run_folder_needs_no_other_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("m.txt", "##########\n#........#\n#..?.....#\n#........#\n##########\n");
     place.write("p.toml", "format = 1\nprofile = \"p\"\n[effectors.mine]\nforward = [{ p = 0.5, path = \"F\" }, { p = 0.5, path = \"\" }]\n");
     place.write("list.scen", "version 1\n0\tm.txt\t10\t5\t1\t1\t8\t3\t7.0\n");

@@ -1,11 +1,11 @@
 //! A full disk: the error describes how to replay the run, and the run continues once there is
 //! room.
 
-use crate::support::{Place, SmallDisk};
+use crate::support::{SmallDisk, TestFolder};
 
 #[test]
 fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let at = place.path("disk");
     let Some(disk) = SmallDisk::mount(&at, "200k") else {
         sidestep_testing::skip("this user may not mount a small disk");
@@ -25,7 +25,7 @@ fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {
 
 #[test]
 fn a_full_disk_fails_a_recording_for_viewers_and_keeps_no_space() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let at = place.path("disk");
     let Some(_disk) = SmallDisk::mount(&at, "200k") else {
         sidestep_testing::skip("this user may not mount a small disk");

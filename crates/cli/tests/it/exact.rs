@@ -1,13 +1,13 @@
 //! `exact`: the Markov chain of one robot, the comparison with the simulator, and the file for
 //! planners.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 
 const ONE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/robots/one-robot.toml");
 
 #[test]
 fn the_chain_is_told_and_the_simulator_agrees_with_it() {
-    let exact = Place::new().json(&["exact", ONE, "--runs", "1000", "--policy", "bounce"]);
+    let exact = TestFolder::new().json(&["exact", ONE, "--runs", "1000", "--policy", "bounce"]);
     assert!(exact["poses"].as_u64() > Some(100));
     assert_eq!(exact["comparison"]["agrees"], true);
     assert_eq!(exact["comparison"]["cycles"], 50);
@@ -16,7 +16,7 @@ fn the_chain_is_told_and_the_simulator_agrees_with_it() {
 
 #[test]
 fn runs_that_are_too_few_to_disagree_confirm_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let compare = |runs: &str| place.run(&["exact", ONE, "--runs", runs, "--cycles", "50"]);
     let few = compare("40");
     let told = few.out();
@@ -33,7 +33,7 @@ fn runs_that_are_too_few_to_disagree_confirm_nothing() {
 
 #[test]
 fn a_pomdp_is_exported_whole() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let args = ["exact", ONE, "--pomdp", "m.pomdp", "--goal", "14,6", "--beam", "sonar-8:0"];
     let exact = place.json(&args);
     let text = place.read("m.pomdp");
@@ -46,7 +46,7 @@ fn a_pomdp_is_exported_whole() {
 
 #[test]
 fn what_is_no_chain_is_refused_and_nothing_is_written() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for (args, reason) in [
         (vec!["exact", "s.toml"], "moves by itself"),
         (vec!["exact", ONE, "--set", "robots.count=2"], "count"),

@@ -1,10 +1,10 @@
 //! Exports of recorded runs, and runs computed again from their recordings.
 
-use crate::support::{Place, names};
+use crate::support::{TestFolder, names};
 use serde_json::json;
 
-fn recorded() -> Place {
-    let place = Place::new();
+fn recorded() -> TestFolder {
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--cycles", "400", "--out", "r", "--mcap", "r.mcap"]);
     place
 }
@@ -27,7 +27,7 @@ fn a_whole_run_is_computed_again_and_its_digest_confirmed() {
 
 #[test]
 fn a_recording_brings_the_files_of_its_scenario_along() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("floor.pgm", [&b"P5\n40 30\n255\n"[..], &[254; 40 * 30]].concat());
     place.write(
         "floor.yaml",

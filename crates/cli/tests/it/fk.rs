@@ -1,6 +1,6 @@
 //! `fk`: forward kinematics of robot models.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::{Value, json};
 
 /// Two links of 1 m in the plane, and a hand that slides out.
@@ -27,8 +27,8 @@ const SRDF: &str = r#"<robot name="arm">
 </robot>
 "#;
 
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("arm.urdf", ARM);
     place.write("arm.srdf", SRDF);
     place
@@ -153,7 +153,7 @@ fn shared_models_are_where_others_computed_them() {
         sidestep_testing::skip("../shared/data is not here");
         return;
     };
-    let place = Place::new();
+    let place = TestFolder::new();
     let all: Value = serde_json::from_str(&text).expect("JSON");
     for (name, expected) in all.as_object().expect("models") {
         let values = expected["q_test"].as_array().expect("values").iter();

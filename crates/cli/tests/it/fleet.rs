@@ -1,7 +1,7 @@
 //! Fleets: a process for each airplane, by the program `sidestep-link` where it is built.
 
 use crate::studio::Studio;
-use crate::support::{Ended, Place, requires, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, requires, signal, wait_for};
 use serde_json::json;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -19,8 +19,8 @@ pub(crate) fn is_there() -> bool {
     beside.is_file()
 }
 
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("ring.toml", RING);
     place
 }
@@ -97,9 +97,9 @@ fn ctrl_c_ends_a_fleet_in_good_order() {
     let child = place.start(&args);
     wait_for("the folder", || place.path("r/scenario.toml").exists());
     signal(&child, "INT");
-    let ended = Ended(child.wait_with_output().expect("ended"));
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
     assert_eq!(ended.code(), 130, "{}", ended.err());
-    let folder = sidestep_record::RunView::open(&place.path("r"));
+    let folder = sidestep_record::RunReader::open(&place.path("r"));
     assert!(folder.is_ok(), "it can be looked at: {:?}", folder.err());
 }
 
@@ -153,7 +153,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     assert_eq!((over["cycle"].as_f64(), nodes.len()), (alone["cycles"].as_f64(), 3), "{over}");
     assert!(nodes.iter().all(|node| node["flown"] == 12), "{nodes:?}");
     assert!(page.frames().iter().all(|frame| frame.starts_with(b"SSTF")));
-    let ended = Ended(fleet.wait_with_output().expect("it ends"));
+    let ended = CommandOutput(fleet.wait_with_output().expect("it ends"));
     assert_eq!(ended.code(), 0, "{}", ended.err());
     assert_eq!(node.wait_with_output().expect("it ends").status.code(), Some(0));
     assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
@@ -163,7 +163,8 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
 fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
     let place = place();
     let missing = place.command(&["studio", "--no-open", "tcp/127.0.0.1:9"]);
-    let ended = { missing }.env("SIDESTEP_LINK", "nowhere").output().map(Ended).expect("it starts");
+    let ended =
+        { missing }.env("SIDESTEP_LINK", "nowhere").output().map(CommandOutput).expect("it starts");
     assert_eq!(ended.code(), 2, "{}", ended.err());
     assert!(ended.err().contains("cargo install --path crates/link"), "{}", ended.err());
     if !is_there() {

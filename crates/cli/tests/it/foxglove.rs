@@ -1,7 +1,7 @@
 //! Foxglove and Lichtblick as viewers: they get the contents of a recording live, and no result depends on them.
 
 use crate::studio::Studio;
-use crate::support::{Place, signal};
+use crate::support::{TestFolder, signal};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::net::{TcpListener, TcpStream};
@@ -157,7 +157,7 @@ fn interrupted(child: Child) -> Value {
 
 #[test]
 fn a_run_is_seen_live_by_the_topics_of_a_recording_and_held_and_its_digest_is_the_same() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let port = free_port();
     let at = format!("127.0.0.1:{port}");
     let args = ["run", "s.toml", "--cycles", "1000000000", "--json", "--foxglove", &at];
@@ -191,7 +191,7 @@ fn a_run_is_seen_live_by_the_topics_of_a_recording_and_held_and_its_digest_is_th
 
 #[test]
 fn the_session_that_was_opened_last_is_seen_live_and_played_and_sought_from_there() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let digest = place.json(&["run", "s.toml"])["digest"].clone();
     let port = free_port();
     let at = format!("127.0.0.1:{port}");
@@ -216,7 +216,7 @@ fn the_session_that_was_opened_last_is_seen_live_and_played_and_sought_from_ther
 
 #[test]
 fn a_port_that_viewers_cannot_have_is_an_error_with_another_one_and_nothing_is_written() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let at = taken.local_addr().expect("bound").to_string();
     for args in [&["run", "s.toml", "--out", "run"][..], &["studio", "--no-open"]] {

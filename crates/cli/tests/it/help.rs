@@ -1,10 +1,10 @@
 //! Help texts, and arguments that no command accepts.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 
 #[test]
 fn every_command_has_help_with_examples() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for command in [
         "run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export",
         "sweep", "report", "fleet", "node",
@@ -27,7 +27,7 @@ fn wide(text: &str) -> Option<&str> {
 
 #[test]
 fn no_line_of_help_is_wider_than_80_columns_where_there_is_no_terminal() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let all = "run check new map learn exact fk ik resume replay export sweep compare report schema \
                completions man reproduce studio fleet node";
     for command in all.split_whitespace() {
@@ -42,7 +42,7 @@ fn no_line_of_help_is_wider_than_80_columns_where_there_is_no_terminal() {
 
 #[test]
 fn warnings_verdicts_and_advice_fit_into_80_columns_and_nothing_has_the_sign_of_zero() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");
     place.write("arm.urdf", std::fs::read_to_string(arm).expect("the arm"));
     let moves = "forward,1,0,0,no\n".repeat(9) + "forward,0,0,0,yes\nleft,0,0,89.9,no\n";
@@ -65,14 +65,14 @@ fn warnings_verdicts_and_advice_fit_into_80_columns_and_nothing_has_the_sign_of_
 
 #[test]
 fn the_help_names_the_exit_codes_and_the_version_is_told() {
-    let place = Place::new();
+    let place = TestFolder::new();
     assert!(place.run(&["--help"]).out().contains("130 interrupted"));
     assert_eq!(place.run(&["--version"]).out(), format!("sidestep {}\n", sidestep::BUILD));
 }
 
 #[test]
 fn wrong_words_are_wrong_input() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let wrong = [
         &["rnu", "s.toml"][..],
         &["run"],
@@ -96,7 +96,7 @@ fn wrong_words_are_wrong_input() {
 }
 
 /// Returns every command, and every step of one, as its words: the help lists them.
-fn all(place: &Place) -> Vec<Vec<String>> {
+fn all(place: &TestFolder) -> Vec<Vec<String>> {
     let mut found = vec![Vec::new()];
     let mut next = 0;
     while let Some(words) = found.get(next).cloned() {
@@ -114,14 +114,14 @@ fn all(place: &Place) -> Vec<Vec<String>> {
 }
 
 /// Returns the output of a command on a terminal of this many columns.
-fn at_width(place: &Place, args: &[&str], columns: &str) -> String {
+fn at_width(place: &TestFolder, args: &[&str], columns: &str) -> String {
     let output = place.command(args).env("COLUMNS", columns).output().expect("the binary starts");
     String::from_utf8(output.stdout).expect("text")
 }
 
 #[test]
 fn help_fits_80_columns_and_no_example_is_broken() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let all = all(&place);
     assert!(all.contains(&vec!["reproduce".into(), "agentfly".into()]), "{all:?}");
     for words in all {
@@ -140,7 +140,7 @@ fn help_fits_80_columns_and_no_example_is_broken() {
 
 #[test]
 fn help_of_help_is_help() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for args in [&["help", "--help"][..], &["help", "-h"], &["help"]] {
         let ended = place.run(args);
         assert_eq!((ended.code(), ended.out()), (0, place.run(&["--help"]).out()), "{args:?}");
@@ -149,7 +149,7 @@ fn help_of_help_is_help() {
 
 #[test]
 fn commands_are_listed_by_what_people_do() {
-    let help = Place::new().run(&["--help"]).out();
+    let help = TestFolder::new().run(&["--help"]).out();
     let places: Vec<usize> = [
         "Prepare:",
         "Run and look at it:",
@@ -167,7 +167,7 @@ fn commands_are_listed_by_what_people_do() {
 
 #[test]
 fn options_of_one_run_are_not_listed_under_many_runs() {
-    let help = Place::new().run(&["run", "--help"]).out();
+    let help = TestFolder::new().run(&["run", "--help"]).out();
     let many = help.find("Many runs:").expect("a heading");
     for option in ["--out <", "--mcap <", "--workers <", "--replace"] {
         assert!(help.find(option).expect(option) < many, "{option}");
@@ -176,7 +176,7 @@ fn options_of_one_run_are_not_listed_under_many_runs() {
 
 #[test]
 fn shells_complete_the_commands_and_manual_pages_are_written() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let script = place.run(&["completions", shell]);
         assert_eq!(script.code(), 0);

@@ -1,6 +1,6 @@
 //! `ik`: inverse kinematics of robot models.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::{Value, json};
 
 /// Shoulder (two axes that meet) and elbow: rods of 1 m; the shoulder does not turn all around.
@@ -22,8 +22,8 @@ const ARM: &str = r#"<robot name="arm">
 </robot>
 "#;
 
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("arm.urdf", ARM);
     place
 }
@@ -43,7 +43,7 @@ fn apart(a: &Value, b: [f64; 3]) -> f64 {
 }
 
 /// The JSON of an answer that is no.
-fn unreached(place: &Place, args: &[&str]) -> Value {
+fn unreached(place: &TestFolder, args: &[&str]) -> Value {
     let mut all = args.to_vec();
     all.push("--json");
     let ended = place.run(&all);
@@ -162,7 +162,7 @@ fn shared_arms_reach_where_their_forward_kinematics_has_been() {
         sidestep_testing::skip("../shared/data is not here");
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     for (name, values) in [
         ("chain/iiwa7.urdf", "0.3,-0.6,0.9,1.1,-0.4,0.7,0"),
         ("chain/panda.urdf", "0.3,-0.6,0.9,-1.1,-0.4,0.7,0"),

@@ -1,11 +1,11 @@
 //! `ik`: orientations, several postures, tables of targets.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::{Value, json};
 
 /// Six joints with offsets everywhere.
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("six.urdf", SIX);
     place
 }
@@ -45,7 +45,7 @@ fn joints(values: &Value) -> String {
 }
 
 /// The rotation of the tip at some joint values, row by row.
-fn rotation(place: &Place, values: &Value) -> Vec<f64> {
+fn rotation(place: &TestFolder, values: &Value) -> Vec<f64> {
     let fk = place.json(&["fk", "six.urdf", "--joints", &joints(values)]);
     assert_eq!(fk["outside_limits"], json!([]));
     let rows = fk["rotation"].as_array().expect("rows").iter();

@@ -1,11 +1,11 @@
 //! E1: wrong input is one error with file, line, column, cause and remedy; exit code 2,
 //! nothing written.
 
-use crate::support::{Place, SCENARIO};
+use crate::support::{SCENARIO, TestFolder};
 
 /// Runs the command, checks that the input is refused and that nothing was written, and returns the
 /// error.
-fn refused(place: &Place, file: &str, more: &[&str]) -> String {
+fn refused(place: &TestFolder, file: &str, more: &[&str]) -> String {
     let before = place.names();
     let ended = place.run(&[&["run", file, "--out", "out"], more].concat());
     let err = ended.err();
@@ -65,7 +65,7 @@ const TABLE: [(&str, &str, &str, &[&str]); 17] = [
 #[test]
 fn a_wrong_scenario_is_refused_where_it_is_wrong() {
     for (name, find, replace, said) in TABLE {
-        let place = Place::new();
+        let place = TestFolder::new();
         assert!(SCENARIO.contains(find), "{name}");
         let mut text = SCENARIO.replacen(find, replace, 1);
         if name == "map without free boxes" {
@@ -87,7 +87,7 @@ fn has_position(err: &str, file: &str) -> bool {
 
 #[test]
 fn a_row_that_does_not_sum_to_one_says_by_how_much() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sensor = "\n[sensors.mine]\nbearings_deg = [0]\nrange_m = 2.0\nobservations = [\"nothing\", \"something\"]\ndesignates = { wall = \"something\", door = \"something\", person = \"something\", robot = \"something\" }\n[sensors.mine.confusion]\nnothing = [0.9, 0.2]\nsomething = [0.0, 1.0]\n";
     place.write("s.toml", SCENARIO.replace("bumper-4", "mine") + sensor);
     let err = refused(&place, "s.toml", &[]);
@@ -97,7 +97,7 @@ fn a_row_that_does_not_sum_to_one_says_by_how_much() {
 
 #[test]
 fn an_error_stands_where_it_stands_in_the_file_whatever_is_set() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("s.toml", SCENARIO.replace("seed = 5\n", "").replace("sonar-8", "sonar-9"));
     let plain = refused(&place, "s.toml", &[]);
     assert_eq!(refused(&place, "s.toml", &["--seed", "7"]), plain);
@@ -106,7 +106,7 @@ fn an_error_stands_where_it_stands_in_the_file_whatever_is_set() {
 
 #[test]
 fn check_tells_all_errors_and_their_number() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let wrong = SCENARIO.replace("seed = 5", "seed = \"five\"").replace("sonar-8", "sonar-9");
     place.write("s.toml", wrong.replace("cycles = 3000", "cylces = 3000"));
     let ended = place.run(&["check", "s.toml"]);
@@ -121,7 +121,7 @@ fn check_tells_all_errors_and_their_number() {
 
 #[test]
 fn a_wrong_override_is_named() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for wrong in ["seed", "seed.x=1", "robots.9.count=1", "nothing.at.all=1"] {
         let err = refused(&place, "s.toml", &["--set", wrong]);
         let key = wrong.split(['.', '=']).next().unwrap_or(wrong);
@@ -131,7 +131,7 @@ fn a_wrong_override_is_named() {
 
 #[test]
 fn a_missing_file_is_named() {
-    let place = Place::new();
+    let place = TestFolder::new();
     assert!(refused(&place, "missing.toml", &[]).contains("missing.toml"));
     place.write("m.toml", with_map("nowhere.yaml"));
     assert!(refused(&place, "m.toml", &[]).contains("nowhere.yaml"));
@@ -158,7 +158,7 @@ fn a_damaged_map_is_refused_by_run_and_by_map() {
         ("no image", YAML.replace("m.pgm", "gone.pgm"), PGM.into(), "gone.pgm"),
     ];
     for (name, yaml, pgm, said) in cases {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.write("m.yaml", yaml);
         place.write("m.pgm", pgm);
         place.write("m.toml", with_map("m.yaml"));
@@ -173,7 +173,7 @@ fn a_damaged_map_is_refused_by_run_and_by_map() {
 
 #[test]
 fn bytes_that_are_no_text_are_refused() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("b.toml", [0xff, 0xfe, 0x00, 0x80]);
     assert!(refused(&place, "b.toml", &[]).contains("b.toml"));
     place.write("e.toml", "");
@@ -182,7 +182,7 @@ fn bytes_that_are_no_text_are_refused() {
 
 #[test]
 fn a_folder_that_cannot_be_made_is_an_error_of_the_option() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("file", "");
     let ended = place.run(&["run", "s.toml", "--out", "file/r"]);
     assert_eq!(ended.code(), 2, "{}", ended.err());

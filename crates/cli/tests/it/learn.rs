@@ -1,6 +1,6 @@
 //! `learn`: counts equal those of an independent program, profiles are usable.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ fn row(counts: &Value, index: usize) -> Vec<u64> {
 fn a_sensor_from_mrclam_has_the_expected_counts() {
     let Some(folder) = shared("logs/mrclam7") else { return };
     let folder = folder.to_str().expect("text");
-    let learned = Place::new().json(&["learn", "sensor", "--mrclam", folder]);
+    let learned = TestFolder::new().json(&["learn", "sensor", "--mrclam", folder]);
     let expected = expected("mrclam7_dev_sensor.json");
     for key in ["correct", "distance_counts", "distance3_counts"] {
         assert_eq!(learned[key], expected[key], "{key}");
@@ -58,7 +58,7 @@ fn a_sensor_from_mrclam_has_the_expected_counts() {
 fn an_effector_from_mrclam_has_the_expected_transitions() {
     let Some(folder) = shared("logs/mrclam7") else { return };
     let folder = folder.to_str().expect("text");
-    let place = Place::new();
+    let place = TestFolder::new();
     let learned = place.json(&["learn", "effector", "--mrclam", folder, "--box", "0.1"]);
     let expected = &expected("mrclam7_dev_effector.json")["forward_0.1"];
     assert_eq!(learned["events"], expected["n"]);
@@ -76,7 +76,7 @@ fn an_effector_from_mrclam_has_the_expected_transitions() {
 fn an_effector_from_carmen_has_the_expected_slip() {
     let Some(log) = shared("logs/carmen/intel-corrected.log.gz") else { return };
     let learned =
-        Place::new().json(&["learn", "effector", "--carmen", log.to_str().expect("text")]);
+        TestFolder::new().json(&["learn", "effector", "--carmen", log.to_str().expect("text")]);
     let expected = expected("carmen_intel_dev.json");
     assert_eq!(learned["events"], expected["forward_one_box"]["n"]);
     close(&learned["lateral_slip_sd"], &expected["lateral_slip_ratio"]["sd"], 0.001);
@@ -90,7 +90,7 @@ const MOTIONS: &str = "action,ahead_boxes,left_boxes,turn_deg\n\
 
 #[test]
 fn one_profile_takes_sensor_and_effector_and_a_scenario_loads_it() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("readings.csv", READINGS);
     place.write("motions.csv", MOTIONS);
     let to = ["--profile", "p.toml", "--name"];
@@ -105,7 +105,7 @@ fn one_profile_takes_sensor_and_effector_and_a_scenario_loads_it() {
 
 #[test]
 fn a_name_that_stands_in_the_profile_is_told_to_be_replaced_and_quiet_says_nothing_else() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("readings.csv", READINGS);
     place.write("motions.csv", MOTIONS);
     let learn = |what: &str, csv: &str| {
@@ -122,7 +122,7 @@ fn a_name_that_stands_in_the_profile_is_told_to_be_replaced_and_quiet_says_nothi
 
 #[test]
 fn a_wrong_log_or_profile_writes_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("readings.csv", READINGS);
     place.write("bad.csv", "action,ahead_boxes,left_boxes,turn_deg\nforward,x,0,0\n");
     place.write("no.toml", "seed = 1\n");
@@ -152,7 +152,7 @@ fn hall() -> String {
 
 #[test]
 fn what_a_calibrated_run_records_gives_its_tables_back() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("hall.toml", hall());
     place.json(&["run", "hall.toml", "--out", "r"]);
     let wheels = place.json(&["learn", "effector", "--run", "r"]);
@@ -170,7 +170,7 @@ fn what_a_calibrated_run_records_gives_its_tables_back() {
 
 #[test]
 fn a_run_without_calibration_says_how_to_record_it() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--cycles", "50", "--out", "plain"]);
     let refused = place.run(&["learn", "effector", "--run", "plain"]);
     assert_eq!(refused.code(), 2);

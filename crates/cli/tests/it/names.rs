@@ -1,7 +1,7 @@
 //! Files and folders with names that are no text (E1): nothing panics, and no run is lost for its name.
 #![cfg(target_os = "linux")]
 
-use crate::support::{Ended, Place, SCENARIO};
+use crate::support::{CommandOutput, SCENARIO, TestFolder};
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 
@@ -10,14 +10,14 @@ fn word(text: &str) -> OsString {
     OsString::from_vec(text.bytes().map(|b| if b == b'?' { 0xff } else { b }).collect())
 }
 
-fn run(place: &Place, line: &str) -> Ended {
+fn run(place: &TestFolder, line: &str) -> CommandOutput {
     let words = line.split(' ').map(word);
-    Ended(place.command(&[]).args(words).output().expect("the binary starts"))
+    CommandOutput(place.command(&[]).args(words).output().expect("the binary starts"))
 }
 
 #[test]
 fn every_command_takes_and_tells_names_that_are_no_text() {
-    let place = Place::new();
+    let place = TestFolder::new();
     std::fs::write(place.path("").join(word("q?.toml")), SCENARIO).expect("written");
     for (line, tells) in [
         ("run q?.toml --cycles 50 --out ou?t --mcap m?.mcap --json", "ou\u{fffd}t"),

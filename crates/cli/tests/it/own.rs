@@ -1,6 +1,6 @@
 //! A program with behaviors of its own, `examples/own_command.rs`, has the whole command line.
 
-use crate::support::{Ended, Place};
+use crate::support::{CommandOutput, TestFolder};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -12,19 +12,19 @@ robots = { count = 5, size = 2, sensors = ["sonar-8"], effector = "nomad", behav
 "#;
 
 /// A place with a scenario that names a behavior which `sidestep` itself does not have.
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("wall.toml", WALL);
     place
 }
 
 /// Runs the program of our own; cargo builds examples beside the tests.
-fn own(place: &Place, args: &[&str]) -> Ended {
+fn own(place: &TestFolder, args: &[&str]) -> CommandOutput {
     let folder = Path::new(env!("CARGO_BIN_EXE_sidestep")).parent().expect("a folder");
     let program = format!("own_command{}", std::env::consts::EXE_SUFFIX);
     let mut command = Command::new(folder.join("examples").join(program));
     command.args(args).current_dir(place.path("")).stdin(Stdio::null());
-    Ended(command.output().expect("the example is built"))
+    CommandOutput(command.output().expect("the example is built"))
 }
 
 #[test]

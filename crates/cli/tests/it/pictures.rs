@@ -1,6 +1,6 @@
 //! Pictures of runs of every world, by the real command.
 
-use crate::support::{Place, names};
+use crate::support::{TestFolder, names};
 use std::path::Path;
 
 const SCENARIOS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios");
@@ -25,7 +25,7 @@ fn px_per_unit(svg: &str, anchor: &str, coordinate: &str) -> f64 {
 
 #[test]
 fn every_shipped_scenario_is_drawn_with_a_meter_as_long_both_ways() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let mut drawn = 0;
     for world in ["robots", "chain", "airspace"] {
         let folder = format!("{SCENARIOS}/{world}");
@@ -62,7 +62,7 @@ fn of_class<'a>(svg: &'a str, class: &str) -> Vec<&'a str> {
 
 #[test]
 fn a_chain_shows_who_leads_and_where_to_go() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let scenario = "format = 1\nworld = \"chain\"\ncycles = 60\n\
                     [[chains]]\nconnectors = 7\nat_m = [0.0, 0.0]\nrod_m = 0.5\n\
                     [[chains.tasks]]\nkind = \"targets\"\nconnector = 6\nspeed_m_s = 1.0\n\
@@ -78,7 +78,7 @@ fn a_chain_shows_who_leads_and_where_to_go() {
 
 #[test]
 fn a_picture_in_space_has_numbers_on_its_axes() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let file = format!("{SCENARIOS}/chain/arm.toml");
     place.json(&["run", &file, "--set", "cycles=20", "--out", "r"]);
     let svg = place.read("r/trajectories.svg");
@@ -95,7 +95,7 @@ fn a_picture_in_space_has_numbers_on_its_axes() {
 
 #[test]
 fn recorded_traffic_is_drawn_with_callsigns_and_directions() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let scenario = "format = 1\nworld = \"airspace\"\ncycles = 40\n\
                     [[airplanes]]\ncallsign = \"KLM204\"\nat_m = [0, 0]\nheading_deg = 0\n\
                     way_points_m = [[9000, 0]]\n\
@@ -109,7 +109,7 @@ fn recorded_traffic_is_drawn_with_callsigns_and_directions() {
 
 #[test]
 fn airplanes_are_drawn_with_their_zones_starts_and_goals() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let file = format!("{SCENARIOS}/airspace/superconflict.toml");
     place.json(&["run", &file, "--set", "cycles=40", "--out", "r"]);
     let svg = place.read("r/trajectories.svg");

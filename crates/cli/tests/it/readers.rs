@@ -2,7 +2,7 @@
 //! interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or its modules are not here
 //! these tests are skipped, unless SIDESTEP_REQUIRE names `python`.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use serde_json::{Value, json};
 use sidestep_testing::python;
 use std::path::Path;
@@ -71,7 +71,7 @@ pub(crate) fn script(name: &str, args: &[&Path]) -> Value {
 }
 
 /// Runs a scenario, recorded in both ways, and reads the recording for viewers.
-fn recorded(place: &Place, scenario: &str, more: &[&str]) -> (Value, Value) {
+fn recorded(place: &TestFolder, scenario: &str, more: &[&str]) -> (Value, Value) {
     place.write("any.toml", scenario);
     let run = place.json(&["run", "any.toml", "--out", "r", "--mcap", "r.mcap"]);
     let (recording, table) = (place.path("r.mcap"), place.path("r/trajectories"));
@@ -113,7 +113,7 @@ fn the_mcap_library_reads_robots_where_the_table_has_them() {
     if !has(FOR_MCAP) {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let scenario = crate::support::SCENARIO.replace("cycles = 3000", "cycles = 200");
     // Robots 0 and 1 have two boxes a side, robot 2 one.
     let (run, read) = recorded(&place, &scenario, &["0.25", r#"{"0": 2, "1": 2, "2": 1}"#]);
@@ -133,7 +133,7 @@ fn the_mcap_library_reads_robots_on_a_turned_map_where_the_world_has_them() {
     if !has(FOR_MCAP) {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let scenario = crate::turned_maps::on_a_map(&place, 30.0, 100);
     let (_, read) = recorded(&place, &scenario, &["0.25", r#"{"0": 2, "1": 2, "2": 1}"#]);
     assert_eq!(read["compared"], 100 * 3);
@@ -146,7 +146,7 @@ fn the_mcap_library_reads_chains_where_the_table_has_them() {
     if !has(FOR_MCAP) {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let (run, read) = recorded(&place, CHAIN, &[]);
     check(&run, &read, 60);
     assert_eq!((&read["compared"], &read["rows"]), (&json!(60 * 8), &json!(60 * 8)));
@@ -158,7 +158,7 @@ fn the_mcap_library_reads_airplanes_where_the_table_has_them() {
     if !has(FOR_MCAP) {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     let (run, read) = recorded(&place, AIRSPACE, &[]);
     check(&run, &read, run["cycles"].as_u64().expect("a number"));
     assert_eq!(read["compared"], read["rows"]);
@@ -204,7 +204,7 @@ fn the_rows_of_a_run_give_its_separation_to_another_program() {
     if !has("numpy, pyarrow.parquet") {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("any.toml", TRAFFIC);
     let run = place.json(&["run", "any.toml", "--out", "r"]);
     let table = place.path("r/trajectories");
@@ -235,7 +235,7 @@ fn pyarrow_and_polars_read_tables_and_their_exports_alike() {
     if !has("polars, pyarrow.parquet") {
         return;
     }
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     place.json(&["export", "r", "--to", "parquet"]);
     place.json(&["export", "r", "--to", "csv"]);

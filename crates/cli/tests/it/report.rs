@@ -1,7 +1,7 @@
 //! `report`: a run folder of any world becomes a self-contained page, and Markdown.
 
 use crate::browser::{assert_sound, chromium};
-use crate::support::{Place, names};
+use crate::support::{TestFolder, names};
 use serde_json::Value;
 
 const SIX: &str = "format = 1\nworld = \"airspace\"\nname = \"Six </script> **of** them\"\n\
@@ -16,11 +16,11 @@ const CHAIN: &str = "format = 1\nworld = \"chain\"\nname = \"Wanderer\"\nseed = 
                      [[chains.tasks]]\nkind = \"wander\"\nspeed_m_s = 0.6\n";
 
 /// Largest size of a page in bytes that is fit to be sent around.
-const MOST_BYTES: usize = 400_000;
+const MAX_PAGE_BYTES: usize = 400_000;
 
 /// Returns a place with a recorded run of each world and its report.
-fn reported(scenario: &str) -> Place {
-    let place = Place::new();
+fn reported(scenario: &str) -> TestFolder {
+    let place = TestFolder::new();
     place.write("x.toml", scenario);
     place.json(&["run", "x.toml", "--out", "r"]);
     let told = place.json(&["report", "r"]);
@@ -43,7 +43,7 @@ fn a_run_of_every_world_becomes_a_page_and_its_twin() {
         let places = order.map(|head| text.find(head).unwrap_or_else(|| panic!("{head}: {text}")));
         assert!(places.is_sorted(), "the picture first, then numbers: {places:?}");
         assert!(!text.contains("not complete") && !text.contains("NaN"), "{text}");
-        assert!(place.read("r/report.html").len() < MOST_BYTES, "{name}");
+        assert!(place.read("r/report.html").len() < MAX_PAGE_BYTES, "{name}");
         let pictures = names(&place.path("r/report-figures"));
         for picture in &pictures {
             assert!(text.contains(&format!("(report-figures/{picture})")), "{picture}");
@@ -109,7 +109,7 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
 
 #[test]
 fn a_hypercube_is_drawn_as_points_in_its_box_and_has_no_baseline() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = "format = 1\nscenario = \"c.toml\"\nname = \"cube\"\nreplicates = 1\n\
                  metrics = [\"rotations\"]\n[set]\ncycles = 40\n\
                  [latin_hypercube]\nsamples = 12\nseed = 1\n[latin_hypercube.range]\n\
@@ -126,7 +126,7 @@ fn a_hypercube_is_drawn_as_points_in_its_box_and_has_no_baseline() {
 
 #[test]
 fn a_picture_of_thousands_of_balls_stays_small() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let scenario = "format = 1\nworld = \"chain\"\ncycles = 4\n[chain]\ndimensions = 3\n\
                     [[fields]]\nlo_m = [-9.0, -9.0, -9.0]\nhi_m = [9.0, 9.0, 9.0]\npart = 0.1\n\
                     radius_m = 0.3\n[[chains]]\nconnectors = 12\nat_m = [0.0, 0.0, 0.0]\nrod_m = 0.3\n\
@@ -134,7 +134,7 @@ fn a_picture_of_thousands_of_balls_stays_small() {
     place.write("balls.toml", scenario);
     place.json(&["run", "balls.toml", "--out", "r"]);
     place.json(&["report", "r"]);
-    assert!(place.read("r/report.html").len() < MOST_BYTES);
+    assert!(place.read("r/report.html").len() < MAX_PAGE_BYTES);
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn the_same_run_gives_the_same_report_and_leaves_no_half_file() {
 
 #[test]
 fn a_run_that_was_stopped_is_marked_and_says_how_to_go_on() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     let whole = place.read("r/run.json");
     place.write("r/run.json", whole.replace("\"complete\"", "\"running\""));
@@ -183,7 +183,7 @@ fn a_sweep_becomes_a_page_with_intervals_figures_and_pictures() {
         assert!(text.to_lowercase().contains(&words.to_lowercase()), "{words}: {text}");
     }
     assert!(text.contains("sidestep run d/variants/0000/scenario.toml --seed 5"), "{text}");
-    assert!(place.read("d/report.html").len() < MOST_BYTES);
+    assert!(place.read("d/report.html").len() < MAX_PAGE_BYTES);
     let Some(browser) = chromium() else { return };
     let found = assert_sound(&browser, &place.path("d/report.html"));
     assert_eq!(
@@ -224,7 +224,7 @@ fn figures_for_print_that_cannot_be_made_leave_no_page() {
 
 #[test]
 fn what_is_no_run_or_no_page_is_refused_and_nothing_is_written() {
-    let place = Place::new();
+    let place = TestFolder::new();
     for args in [
         &["report", "."][..],
         &["report", "nowhere"],

@@ -1,7 +1,7 @@
 //! `reproduce`: a quick run writes a report, its figures and all its numbers.
 
 use crate::browser::{assert_sound, chromium};
-use crate::support::{Ended, Place, names, requires, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, names, requires, signal, wait_for};
 use serde_json::Value;
 
 /// The names in the folder of a report.
@@ -9,7 +9,7 @@ const WHOLE: [&str; 4] = ["figures", "report.html", "report.json", "report.md"];
 
 #[test]
 fn a_rehearsal_leaves_a_whole_report() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let told = place.json(&["reproduce", "loria", "--quick", "--out", "loria"]);
     assert!(told["claims"].as_array().map(Vec::len) > Some(10));
     assert_eq!(names(&place.path("loria")), WHOLE);
@@ -26,7 +26,7 @@ fn a_rehearsal_leaves_a_whole_report() {
 
 #[test]
 fn a_plan_out_of_range_is_refused_and_leaves_no_folder() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let ended = place.run(&["reproduce", "loria", "--seeds", "1", "--out", "loria"]);
     assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{}", ended.err());
     assert!(ended.err().contains("seeds"), "{}", ended.err());
@@ -35,19 +35,19 @@ fn a_plan_out_of_range_is_refused_and_leaves_no_folder() {
 
 #[test]
 fn ctrl_c_leaves_nothing_behind() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let child = place.start(&["reproduce", "loria", "--seeds", "1000", "--out", "loria"]);
     wait_for("the folder", || place.path("loria/timed-runs").exists());
     std::thread::sleep(std::time::Duration::from_millis(300));
     signal(&child, "INT");
-    let ended = Ended(child.wait_with_output().expect("ended"));
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
     assert_eq!((ended.code(), ended.out().as_str()), (130, ""));
     assert_eq!(place.names(), ["s.toml"]);
 }
 
 #[test]
 fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let told = place.json(&["reproduce", "serpentine", "--quick", "--out", "s", "--seeds", "1"]);
     assert_eq!(told["claims"].as_array().map(Vec::len), Some(25));
     assert_eq!(names(&place.path("s")), WHOLE);
@@ -72,7 +72,7 @@ fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
 /// Returns whether the program that carries the network is there or not.
 #[test]
 fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let told = place.json(&["reproduce", "agentfly", "--quick", "--seeds", "1", "--out", "a"]);
     assert_eq!(names(&place.path("a")), WHOLE);
     let report = place.read("a/report.md");

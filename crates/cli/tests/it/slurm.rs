@@ -1,6 +1,6 @@
 //! The array of `docs/src/clusters.md` on a real Slurm of one machine.
 
-use crate::support::{Place, requires, wait_for};
+use crate::support::{TestFolder, requires, wait_for};
 use crate::sweep::place;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -136,7 +136,7 @@ fn an_array_of_tasks_runs_a_sweep_to_the_same_table() {
         let why = missing.map_or("only root can start Slurm".into(), |p| format!("no `{p}` here"));
         return requires("slurm", &why);
     }
-    let place: Place = place();
+    let place: TestFolder = place();
     place.json(&["sweep", "sweep.toml", "--out", "whole"]);
     place.json(&["sweep", "plan", "sweep.toml", "--out", "d"]);
     place.write("sweep.sbatch", script(Path::new(env!("CARGO_BIN_EXE_sidestep"))));

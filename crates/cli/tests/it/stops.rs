@@ -1,6 +1,6 @@
 //! Runs stopped by Ctrl-C or by a kill, and `resume` of them.
 
-use crate::support::{Ended, Place, names, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, names, signal, wait_for};
 use serde_json::Value;
 use sidestep_record::read_table;
 
@@ -9,20 +9,20 @@ const ENDLESS: [&str; 6] = ["run", "s.toml", "--out", "r", "--cycles", "10000000
 /// Long enough to be stopped before the end.
 const LONG: [&str; 4] = ["run", "s.toml", "--cycles", "60000"];
 
-fn manifest(place: &Place) -> Value {
+fn manifest(place: &TestFolder) -> Value {
     serde_json::from_str(&place.read("r/run.json")).expect("JSON")
 }
 
 /// Interrupts an endless run once it has a checkpoint.
-fn interrupted(place: &Place, more: &[&str], with: &str) -> Ended {
+fn interrupted(place: &TestFolder, more: &[&str], with: &str) -> CommandOutput {
     let child = place.start(&[&ENDLESS, more].concat());
     wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
     signal(&child, with);
-    Ended(child.wait_with_output().expect("ended"))
+    CommandOutput(child.wait_with_output().expect("ended"))
 }
 
 /// Kills a long recorded run once it has a checkpoint.
-fn killed(place: &Place) {
+fn killed(place: &TestFolder) {
     let mut child = place.start(&[&LONG[..], &["--out", "r"]].concat());
     wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
     child.kill().expect("killed");
@@ -30,7 +30,7 @@ fn killed(place: &Place) {
 }
 
 /// Asserts that the rows of a table are the same, in the same order.
-fn assert_same_rows(place: &Place, a: &str, b: &str) {
+fn assert_same_rows(place: &TestFolder, a: &str, b: &str) {
     for table in ["trajectories", "events"] {
         let read = |folder: &str| read_table(&place.path(folder), table, ..).expect("a table");
         let (a, b) = (read(a), read(b));
@@ -42,7 +42,7 @@ fn assert_same_rows(place: &Place, a: &str, b: &str) {
 #[test]
 fn ctrl_c_ends_cleanly_and_marks_the_run_as_incomplete() {
     for name in ["INT", "TERM"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         let ended = interrupted(&place, &["--json"], name);
         assert_eq!(ended.code(), 130, "{}", ended.err());
         let said = ended.json();
@@ -59,18 +59,18 @@ fn ctrl_c_ends_cleanly_and_marks_the_run_as_incomplete() {
 
 #[test]
 fn ctrl_c_without_a_folder_reports_what_was_done() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let child = place.start(&["run", "s.toml", "--cycles", "1000000000"]);
     std::thread::sleep(std::time::Duration::from_millis(500));
     signal(&child, "INT");
-    let ended = Ended(child.wait_with_output().expect("ended"));
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
     assert_eq!(ended.code(), 130);
     assert!(ended.out().contains("INCOMPLETE"), "{}", ended.out());
     assert_eq!(place.names(), ["s.toml"]);
 }
 
 /// Returns `summary.json` without the times of a clock and the names of the place.
-fn told(place: &Place, folder: &str) -> Value {
+fn told(place: &TestFolder, folder: &str) -> Value {
     let text = place.read(&format!("{folder}/summary.json"));
     let mut summary: Value = serde_json::from_str(&text).expect("JSON");
     let of_the_process = [
@@ -90,7 +90,7 @@ fn told(place: &Place, folder: &str) -> Value {
 
 #[test]
 fn a_killed_run_resumes_to_the_same_digest_rows_and_summary() {
-    let place = Place::new();
+    let place = TestFolder::new();
     killed(&place);
     assert_eq!(manifest(&place)["status"], "running");
     let resumed = place.json(&["resume", "r", "--workers", "3"]);
@@ -103,13 +103,13 @@ fn a_killed_run_resumes_to_the_same_digest_rows_and_summary() {
 
 #[test]
 fn a_run_stopped_several_times_has_the_digest_of_one_in_one_go() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let stopped = killed_then_resumed_to(&place, &["10000", "25000"]);
     assert_eq!(stopped["status"], "complete");
     assert_eq!(stopped["digest"], place.json(&LONG)["digest"]);
 }
 
-fn killed_then_resumed_to(place: &Place, stops: &[&str]) -> Value {
+fn killed_then_resumed_to(place: &TestFolder, stops: &[&str]) -> Value {
     killed(place);
     for stop in stops {
         let ended = place.run(&["resume", "r", "--cycles", stop, "--json"]);
@@ -122,7 +122,7 @@ fn killed_then_resumed_to(place: &Place, stops: &[&str]) -> Value {
 
 #[test]
 fn a_run_killed_before_its_first_checkpoint_starts_again() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let long = [&LONG[..], &["--out", "r", "--set", "record.checkpoint_every=1000000"]].concat();
     let mut child = place.start(&long);
     wait_for("the folder", || place.path("r/run.json").exists());
@@ -133,7 +133,7 @@ fn a_run_killed_before_its_first_checkpoint_starts_again() {
 
 #[test]
 fn what_cannot_be_resumed_is_refused_with_the_reason() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     let refused = |args: &[&str], reason: &str| {
         let ended = place.run(args);
@@ -143,7 +143,7 @@ fn what_cannot_be_resumed_is_refused_with_the_reason() {
     refused(&["resume", "r", "--cycles", "4000"], "complete");
     refused(&["resume", "nowhere"], "nowhere");
     refused(&["resume", "."], "no run folder");
-    let other = Place::new();
+    let other = TestFolder::new();
     killed(&other);
     let mut bytes = std::fs::read(other.path("r/checkpoint.bin")).expect("bytes");
     let middle = bytes.len() / 2;
@@ -156,7 +156,7 @@ fn what_cannot_be_resumed_is_refused_with_the_reason() {
 
 #[test]
 fn a_running_folder_is_not_taken_twice() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let mut child = place.start(&ENDLESS);
     wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
     let second = place.run(&["resume", "r"]);
@@ -171,13 +171,13 @@ fn a_running_folder_is_not_taken_twice() {
 
 #[test]
 fn a_recording_of_a_stopped_run_can_be_opened_but_is_not_called_whole() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let endless = ["run", "s.toml", "--mcap", "x.mcap", "--cycles", "1000000000", "--json"];
     let child = place.start(&endless);
     let grown = || std::fs::metadata(place.path("x.mcap.partial")).is_ok_and(|m| m.len() > 200_000);
     wait_for("some frames", grown);
     signal(&child, "INT");
-    let ended = Ended(child.wait_with_output().expect("ended"));
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
     assert_eq!(ended.code(), 130, "{}", ended.err());
     assert_eq!(ended.json()["mcap"], "x.mcap.partial");
     assert_eq!(place.names(), ["s.toml", "x.mcap.partial"]);

@@ -1,6 +1,6 @@
 //! D1 for the studio: its digest is that of `run`; and nothing that a page sends ends a session or the process.
 
-use crate::support::{Ended, Place, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, signal, wait_for};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -16,7 +16,7 @@ pub(crate) struct Studio {
 }
 
 impl Studio {
-    pub(crate) fn start(place: &Place, args: &[&str]) -> Self {
+    pub(crate) fn start(place: &TestFolder, args: &[&str]) -> Self {
         let all = [&["studio", "--no-open", "--port", "0", "--quiet"], args].concat();
         let mut child = place.start(&all);
         let out = child.stdout.take().expect("its output");
@@ -68,12 +68,12 @@ impl Studio {
     }
 
     /// Ends it by a signal.
-    fn end(mut self, name: &str) -> Ended {
+    fn end(mut self, name: &str) -> CommandOutput {
         signal(&self.child, name);
         let status = self.child.wait().expect("it ends");
         let mut stderr = Vec::new();
         self.child.stderr.take().expect("errors").read_to_end(&mut stderr).expect("read");
-        Ended(std::process::Output { status, stdout: Vec::new(), stderr })
+        CommandOutput(std::process::Output { status, stdout: Vec::new(), stderr })
     }
 }
 
@@ -181,7 +181,7 @@ impl Page {
 
 #[test]
 fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let digest = place.json(&["run", "s.toml"])["digest"].clone();
     let studio = Studio::start(&place, &["s.toml", "--workers", "2"]);
     let mut page = studio.page();
@@ -202,7 +202,7 @@ fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
 
 #[test]
 fn noise_is_answered_with_problems_and_the_session_goes_on() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["s.toml"]);
     let mut page = studio.page();
     page.open("s.toml");
@@ -243,7 +243,7 @@ fn noise_is_answered_with_problems_and_the_session_goes_on() {
 
 #[test]
 fn a_page_has_so_many_sessions_and_closes_them_one_by_one() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &[]);
     let mut page = studio.page();
     let numbers: Vec<Value> = (0..4).map(|_| page.open("s.toml")["session"].clone()).collect();
@@ -259,7 +259,7 @@ fn a_page_has_so_many_sessions_and_closes_them_one_by_one() {
 
 #[test]
 fn a_page_that_reads_nothing_for_a_while_does_not_stop_the_run() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["s.toml"]);
     let mut page = studio.page();
     let text = place.read("s.toml").replace("cycles = 3000", "cycles = 100000000");
@@ -276,7 +276,7 @@ fn a_page_that_reads_nothing_for_a_while_does_not_stop_the_run() {
 
 #[test]
 fn a_studio_that_only_reads_takes_no_text() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["s.toml", "--read-only"]);
     let mut page = studio.page();
     assert_eq!(page.read()["read_only"], true);
@@ -296,7 +296,7 @@ fn a_studio_that_only_reads_takes_no_text() {
 
 #[test]
 fn only_its_own_page_may_ask() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &[]);
     let status = |headers: &[_]| studio.socket(headers).err();
     assert_eq!(status(&[("origin", "http://evil.example")]), Some(403));
@@ -318,7 +318,7 @@ fn only_its_own_page_may_ask() {
 
 #[test]
 fn a_studio_that_others_can_reach_asks_for_its_token() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["--addr", "0.0.0.0"]);
     let token = studio.url.split("#token=").nth(1).expect("a token").to_string();
     assert_eq!(token.len(), 32);
@@ -345,7 +345,7 @@ fn a_studio_that_others_can_reach_asks_for_its_token() {
 
 #[test]
 fn what_cannot_be_served_is_wrong_input() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &[]);
     let port = studio.host().split(':').nth(1).expect("a port");
     let ended = place.run(&["studio", "--no-open", "--port", port]);
@@ -365,7 +365,7 @@ fn what_cannot_be_served_is_wrong_input() {
 #[test]
 fn signals_end_all_sessions_and_the_process() {
     for name in ["INT", "TERM", "HUP"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         let studio = Studio::start(&place, &["s.toml"]);
         let mut page = studio.page();
         page.open("s.toml");
@@ -379,7 +379,7 @@ fn signals_end_all_sessions_and_the_process() {
 
 #[test]
 fn a_page_finds_the_studio_again_after_it_was_killed_and_started_anew() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let mut studio = Studio::start(&place, &["s.toml"]);
     let port = studio.host().split(':').nth(1).expect("a port").to_string();
     studio.page().open("s.toml");
@@ -395,7 +395,7 @@ fn a_page_finds_the_studio_again_after_it_was_killed_and_started_anew() {
 
 #[test]
 fn recordings_are_replayed_and_a_damaged_one_is_a_problem() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let recorded =
         place.json(&["run", "s.toml", "--out", "r", "--mcap", "x.mcap", "--mcap-every", "100"]);
     let bytes = std::fs::read(place.path("x.mcap")).expect("read");
@@ -423,7 +423,7 @@ fn recordings_are_replayed_and_a_damaged_one_is_a_problem() {
 
 #[test]
 fn who_finds_all_places_taken_is_told_so_and_let_in_when_one_is_free() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &[]);
     let mut pages: Vec<Page> = (0..16).map(|_| studio.page()).collect();
     assert_eq!(studio.socket(&[]).err(), Some(503));
@@ -443,7 +443,7 @@ const HEAVY: &str = "format = 1\nworld = \"robots\"\nseed = 1\ncycles = 10\n[map
 
 #[test]
 fn pages_that_ask_for_much_keep_no_other_page_waiting() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["s.toml"]);
     // Sockets count their sessions on, and each of them asks as much as is taken in at a time.
     let asking = (1..=6).map(|session| {
@@ -477,7 +477,7 @@ fn parts(answer: &str) -> (u16, &str, &str) {
 
 #[test]
 fn reports_and_exports_of_a_run_are_those_of_the_command() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "runs/a b"]);
     place.json(&["report", "runs/a b", "--out", "page.html"]);
     place.json(&["export", "runs/a b", "--to", "csv", "--out", "tables"]);
@@ -508,7 +508,7 @@ fn reports_and_exports_of_a_run_are_those_of_the_command() {
 
 #[test]
 fn results_are_made_of_what_may_be_read_and_for_its_own_page_alone() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "in/run"]);
     place.json(&["run", "s.toml", "--out", "out/run"]);
     let studio = Studio::start(&place, &["in"]);
@@ -538,7 +538,7 @@ fn results_are_made_of_what_may_be_read_and_for_its_own_page_alone() {
 
 #[test]
 fn runs_of_a_sweep_are_listed_with_what_opens_them() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["sweep", "s.toml", "--replicate", "2", "--out", "sw"]);
     let studio = Studio::start(&place, &["."]);
     let mut page = studio.page();

@@ -2,7 +2,7 @@
 //! files.
 
 use crate::studio::{Page, Studio};
-use crate::support::{Place, SmallDisk};
+use crate::support::{SmallDisk, TestFolder};
 use serde_json::{Value, json};
 
 impl Page {
@@ -26,7 +26,7 @@ fn cause(reply: &Value) -> String {
 
 #[test]
 fn comments_outlive_ten_edits_and_saving_and_the_session_goes_on_with_the_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let old = place.read("s.toml").replace("seed = 5", "# On the seed.\nseed = 5   # why");
     place.write("s.toml", &old);
     let studio = Studio::start(&place, &["s.toml"]);
@@ -62,7 +62,7 @@ fn comments_outlive_ten_edits_and_saving_and_the_session_goes_on_with_the_file()
 
 #[test]
 fn the_values_of_a_text_and_the_files_that_it_can_name_are_told() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.write("plan.pgm", "P2 1 1 255 255");
     let studio = Studio::start(&place, &["s.toml"]);
     let mut page = studio.page();
@@ -84,7 +84,7 @@ fn the_values_of_a_text_and_the_files_that_it_can_name_are_told() {
 
 #[test]
 fn a_file_that_another_program_changed_is_not_overwritten_unasked() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let studio = Studio::start(&place, &["s.toml"]);
     let mut page = studio.page();
     page.open("s.toml");
@@ -107,7 +107,7 @@ fn a_file_that_another_program_changed_is_not_overwritten_unasked() {
 
 #[test]
 fn a_scenario_is_saved_under_another_name_and_stays_there() {
-    let place = Place::new();
+    let place = TestFolder::new();
     std::fs::create_dir(place.path("deep")).expect("made");
     place.write("taken.toml", "world = \"robots\"\n");
     place.write("traffic.scn", "00:00:00.00>CRE A,B738,52,4,90,FL200,250\n");
@@ -147,7 +147,7 @@ fn a_scenario_is_saved_under_another_name_and_stays_there() {
 
 #[test]
 fn a_studio_that_only_reads_writes_nothing_and_edits_nothing() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let old = place.read("s.toml");
     let studio = Studio::start(&place, &["s.toml", "--read-only"]);
     let mut page = studio.page();
@@ -168,7 +168,7 @@ fn a_studio_that_only_reads_writes_nothing_and_edits_nothing() {
 
 #[test]
 fn a_recording_is_not_saved() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["run", "s.toml", "--cycles", "10", "--out", "r"]);
     let studio = Studio::start(&place, &["r"]);
     let mut page = studio.page();
@@ -181,7 +181,7 @@ fn a_recording_is_not_saved() {
 
 #[test]
 fn a_full_disk_leaves_the_old_file_whole() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let at = place.path("disk");
     let Some(disk) = SmallDisk::mount(&at, "32k") else {
         sidestep_testing::skip("this user may not mount a small disk");

@@ -1,7 +1,7 @@
 //! Sweeps and comparisons as a newcomer meets them: baselines, seeds that change nothing, lines that
 //! fit, and errors that name the typed words.
 
-use crate::support::{Ended, Place};
+use crate::support::{CommandOutput, TestFolder};
 use serde_json::Value;
 
 /// Two airplanes that meet; no number is drawn but by the optimizer.
@@ -10,14 +10,14 @@ const MEETING: &str = "format = 1\nworld = \"airspace\"\nname = \"meeting\"\n[ai
                        way_points_m = [[9000, 0]]\n[[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\n\
                        way_points_m = [[0, 500]]\n";
 
-fn place() -> Place {
-    let place = Place::new();
+fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("meeting.toml", MEETING);
     place
 }
 
 /// Checks that the text fits into 80 columns.
-fn fits(ended: &Ended) {
+fn fits(ended: &CommandOutput) {
     let text = ended.out();
     let long = text.lines().find(|line| line.chars().count() > 80);
     assert!(ended.code() == 0 && long.is_none(), "{long:?} in\n{text}{}", ended.err());

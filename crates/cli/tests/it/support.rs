@@ -50,9 +50,9 @@ checkpoint_every = 700
 "##;
 
 /// A temporary folder, and the program run in it.
-pub(crate) struct Place(tempfile::TempDir);
+pub(crate) struct TestFolder(tempfile::TempDir);
 
-impl Place {
+impl TestFolder {
     /// A place with [`SCENARIO`] as `s.toml`.
     pub(crate) fn new() -> Self {
         let place = Self(tempfile::tempdir().expect("a temporary folder"));
@@ -84,8 +84,8 @@ impl Place {
     }
 
     /// Runs the program to its end.
-    pub(crate) fn run(&self, args: &[&str]) -> Ended {
-        Ended(self.command(args).output().expect("the binary starts"))
+    pub(crate) fn run(&self, args: &[&str]) -> CommandOutput {
+        CommandOutput(self.command(args).output().expect("the binary starts"))
     }
 
     /// Starts the program and keeps its output.
@@ -113,9 +113,9 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
 }
 
 /// The output of a command.
-pub(crate) struct Ended(pub(crate) Output);
+pub(crate) struct CommandOutput(pub(crate) Output);
 
-impl Ended {
+impl CommandOutput {
     pub(crate) fn code(&self) -> i32 {
         self.0.status.code().expect("ended by itself")
     }

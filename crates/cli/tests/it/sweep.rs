@@ -1,7 +1,7 @@
 //! Many runs: the same table for any number of workers, in shares or in one go, and every row
 //! equals the result of `run` for its scenario and seed.
 
-use crate::support::{Place, names, wait_for};
+use crate::support::{TestFolder, names, wait_for};
 use std::path::Path;
 
 /// Six variants with three seeds each.
@@ -20,13 +20,13 @@ regime = ["reliable", "effectors", "both"]
 people.count = [0, 2]
 "#;
 
-pub(crate) fn place() -> Place {
-    let place = Place::new();
+pub(crate) fn place() -> TestFolder {
+    let place = TestFolder::new();
     place.write("sweep.toml", SWEEP);
     place
 }
 
-fn bytes(place: &Place, file: &str) -> Vec<u8> {
+fn bytes(place: &TestFolder, file: &str) -> Vec<u8> {
     std::fs::read(place.path(file)).expect(file)
 }
 
@@ -188,7 +188,7 @@ fn a_folder_holds_one_sweep() {
 #[test]
 fn the_shipped_sweeps_are_right() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/sweeps");
-    let place = Place::new();
+    let place = TestFolder::new();
     for name in names(&root) {
         let file = root.join(&name).display().to_string();
         let planned = place.json(&["sweep", "plan", &file, "--out", &name]);
@@ -199,7 +199,7 @@ fn the_shipped_sweeps_are_right() {
 #[test]
 fn the_shipped_sweep_of_flying_balls_runs_as_it_is_by_both_methods_of_escape() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/sweeps/flying.toml");
-    let place = Place::new();
+    let place = TestFolder::new();
     place.json(&["sweep", file, "--cycles", "60", "--replicate", "1", "--out", "flying"]);
     let rows = place.read("flying/shares/0-of-1.journal");
     for cell in ["\"cell\":0", "\"cell\":1"] {

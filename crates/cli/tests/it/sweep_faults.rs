@@ -1,14 +1,14 @@
 //! E1 for sweeps: partial output is never taken for whole. No kill loses a finished run, and none
 //! is made twice; a full disk stops the sweep, and it goes on when there is room.
 
-use crate::support::{Place, SmallDisk, signal, wait_for};
+use crate::support::{SmallDisk, TestFolder, signal, wait_for};
 use crate::sweep::place;
 use std::collections::BTreeSet;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
 /// Lines of the journal that are whole; the first is its head.
-fn finished(place: &Place, folder: &str) -> Vec<String> {
+fn finished(place: &TestFolder, folder: &str) -> Vec<String> {
     let path = place.path(&format!("{folder}/shares/0-of-1.journal"));
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let whole = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));

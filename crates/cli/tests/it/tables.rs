@@ -1,6 +1,6 @@
 //! Tables of recorded runs name their bodies, which other programs need to join and to draw them.
 
-use crate::support::Place;
+use crate::support::TestFolder;
 use sidestep::kernel::ports::{ColumnSpec, Values};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
@@ -33,8 +33,8 @@ heading_deg = 0
 way_points_m = [[90000, 50000]]
 "#;
 
-fn record(text: &str) -> Place {
-    let place = Place::new();
+fn record(text: &str) -> TestFolder {
+    let place = TestFolder::new();
     place.write("s.toml", text);
     let ended = place.run(&["run", "s.toml", "--out", "s"]);
     assert_eq!(ended.code(), 0, "{}", ended.err());

@@ -1,12 +1,12 @@
 //! ROS maps with a turned image: boxes stay along the image, and places are given in the world.
 
-use crate::support::{Place, SCENARIO};
+use crate::support::{SCENARIO, TestFolder};
 use serde_json::Value;
 
 const ORIGIN_M: [f64; 2] = [-3.0, 7.5];
 
 /// Writes the small building as a ROS map that is turned, and returns the scenario in it.
-pub(crate) fn on_a_map(place: &Place, yaw_deg: f64, cycles: u64) -> String {
+pub(crate) fn on_a_map(place: &TestFolder, yaw_deg: f64, cycles: u64) -> String {
     let (before, rest) = SCENARIO.split_once("ascii = \"\"\"\n").expect("a map");
     let (rows, after) = rest.split_once("\"\"\"\n").expect("its end");
     let gray = |c: char| if c == '#' { 0 } else { 254 };
@@ -34,7 +34,7 @@ fn number(body: &Value, key: &str) -> f64 {
 fn a_turned_map_is_the_same_building_elsewhere_in_the_world() {
     let mut straight: Option<(Value, Vec<Value>)> = None;
     for yaw_deg in [0.0, 90.0, 180.0, 30.0] {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.write("turned.toml", on_a_map(&place, yaw_deg, 60));
         let map = place.json(&["map", "m.yaml"]);
         assert_eq!(map["yaw_rad"], yaw_deg.to_radians(), "{map}");

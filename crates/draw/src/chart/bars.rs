@@ -2,16 +2,16 @@
 
 use crate::axis::Axis;
 use crate::chart::error_bar;
-use crate::chart::frame::{Across, Frame, Words, most_ticks};
+use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks};
 use crate::error::DrawError;
-use crate::legend::{Entry, Symbol};
+use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{INK, Style, series_color, series_fill};
 use crate::svg::Rect;
 
 /// The part of a category's slot that its bars fill.
-const FILLED: f64 = 0.78;
+const FILLED_FRACTION: f64 = 0.78;
 /// Greatest width of a bar.
-const WIDEST_PX: f64 = 60.0;
+const MAX_BAR_WIDTH_PX: f64 = 60.0;
 
 /// The height of a bar, optionally with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,15 +117,15 @@ impl BarChart {
         for series in &self.series {
             DrawError::length("bars of a series", self.categories.len(), series.bars.len())?;
         }
-        let y = self.y.fit(self.heights(), most_ticks(style).1)?;
-        let words = Words {
+        let y = self.y.fit(self.heights(), max_ticks(style).1)?;
+        let words = FrameText {
             title: &self.title,
             note: &self.note,
             x_label: &self.x_label,
             y_label: self.y.label(),
             legend: self.legend(),
         };
-        let mut frame = Frame::open(style, words, &Across::Categories(&self.categories), &y);
+        let mut frame = ChartFrame::open(style, words, &XAxis::Categories(&self.categories), &y);
         frame.open_data();
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut frame, index, series);
@@ -146,23 +146,23 @@ impl BarChart {
         bars.flat_map(reach).chain([0.0])
     }
 
-    fn legend(&self) -> Vec<Entry> {
+    fn legend(&self) -> Vec<LegendEntry> {
         let entry = |(index, series): (usize, &BarSeries)| {
             let (opacity, rim) = series_fill(index);
             let (fill, rim) = (series_color(index).into(), rim.into());
-            Entry::new(Symbol::Swatch { fill, rim, opacity }, &series.label)
+            LegendEntry::new(LegendSymbol::Swatch { fill, rim, opacity }, &series.label)
         };
         self.series.iter().enumerate().map(entry).collect()
     }
 
-    fn draw_series(&self, frame: &mut Frame, index: usize, series: &BarSeries) {
+    fn draw_series(&self, frame: &mut ChartFrame, index: usize, series: &BarSeries) {
         let slot = frame.area.width / self.categories.len().max(1) as f64;
         let count = self.series.len() as f64;
-        let width = (slot * FILLED / count).min(WIDEST_PX);
+        let width = (slot * FILLED_FRACTION / count).min(MAX_BAR_WIDTH_PX);
         // Offset from the middle of the slot to the middle of this series' bar.
         let aside = (index as f64 - (count - 1.0) / 2.0) * width;
         for (category, bar) in series.bars.iter().enumerate() {
-            if self.y.holds(bar.value) {
+            if self.y.contains(bar.value) {
                 let center = frame.area.x + (category as f64 + 0.5) * slot + aside;
                 draw_bar(frame, bar, center, width, index);
             }
@@ -171,7 +171,7 @@ impl BarChart {
 }
 
 /// Draws `bar` around `center`; a little of its `width` stays free beside the next one.
-fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, index: usize) {
+fn draw_bar(frame: &mut ChartFrame, bar: &Bar, center: f64, width: f64, index: usize) {
     let filled = width - (0.06 * width).min(1.5);
     column(frame, center - filled / 2.0, filled, bar.value, index);
     if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
@@ -181,7 +181,7 @@ fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, index: usize)
 }
 
 /// Draws a filled column from the axis's base to `value`, its left edge at `x`.
-fn column(frame: &mut Frame, x: f64, width: f64, value: f64, index: usize) {
+fn column(frame: &mut ChartFrame, x: f64, width: f64, value: f64, index: usize) {
     let (base, end) = (frame.y.base_px(), frame.y.px(value));
     let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };
     let (color, (opacity, rim)) = (series_color(index), series_fill(index));

@@ -1,45 +1,45 @@
 //! The frame of a chart: margins that fit the labels, grid, ticks, axis labels, title, legend.
 
-use crate::axis::{Fitted, Scale};
-use crate::legend::{Entry, Legend, paragraph, title_look};
+use crate::axis::{FittedAxis, Scale};
+use crate::legend::{Legend, LegendEntry, paragraph, title_style};
 use crate::style::{FAINT_INK, GRID, INK, Style};
-use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Rect, Svg, SvgNumber, TextStyle};
 use crate::text::{self, Weight};
-use crate::ticks::Spacing;
+use crate::ticks::LabelSpacing;
 
 const TICK_PX: f64 = 5.0;
 const EDGE_PX: f64 = 10.0;
 const LABEL_GAP_PX: f64 = 5.0;
 const NOTE_GAP_PX: f64 = 8.0;
 /// Least part of the picture's height for the data; the picture grows to provide it.
-const LEAST_AREA: f64 = 0.55;
+const MIN_AREA_FRACTION: f64 = 0.55;
 
 /// The content of the horizontal axis.
-pub(crate) enum Across<'a> {
+pub(crate) enum XAxis<'a> {
     /// Numbers.
-    Values(Fitted),
+    Values(FittedAxis),
     /// Named slots of equal width.
     Categories(&'a [String]),
 }
 
 /// The words of a frame.
-pub(crate) struct Words<'a> {
+pub(crate) struct FrameText<'a> {
     pub(crate) title: &'a str,
     pub(crate) note: &'a str,
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
-    pub(crate) legend: Vec<Entry>,
+    pub(crate) legend: Vec<LegendEntry>,
 }
 
 /// Returns the number of labeled ticks that fit a picture of this style, across and upward.
-pub(crate) fn most_ticks(style: &Style) -> (usize, usize) {
+pub(crate) fn max_ticks(style: &Style) -> (usize, usize) {
     let across = style.width_px / (7.0 * style.font_px);
     let upward = style.height_px / (4.5 * style.font_px);
     ((across as usize).clamp(2, 12), (upward as usize).clamp(2, 10))
 }
 
 /// A chart under construction: its axes are drawn, the data come next.
-pub(crate) struct Frame {
+pub(crate) struct ChartFrame {
     pub(crate) svg: Svg,
     /// The area of the data.
     pub(crate) area: Rect,
@@ -51,7 +51,7 @@ pub(crate) struct Frame {
 }
 
 /// The lines of text around the area, broken to fit.
-struct Labels {
+struct WrappedLabels {
     title: Vec<String>,
     note: Vec<String>,
     x: Vec<String>,
@@ -68,12 +68,12 @@ struct SlotNames {
     height_px: f64,
 }
 
-impl Labels {
+impl WrappedLabels {
     /// Breaks all text for an area `width` pixels wide; `y` is already broken.
     fn wrap(
         style: &Style,
-        words: &Words<'_>,
-        across: &Across<'_>,
+        words: &FrameText<'_>,
+        across: &XAxis<'_>,
         y: Vec<String>,
         width: f64,
     ) -> Self {
@@ -95,8 +95,8 @@ impl Labels {
 }
 
 impl SlotNames {
-    fn wrap(style: &Style, across: &Across<'_>, width: f64) -> Self {
-        let Across::Categories(names) = across else { return Self::default() };
+    fn wrap(style: &Style, across: &XAxis<'_>, width: f64) -> Self {
+        let XAxis::Categories(names) = across else { return Self::default() };
         let size = style.small_px();
         let room = width / names.len().max(1) as f64 - 6.0;
         let measure = |text: &str| text::width(text, size, Weight::Regular);
@@ -115,17 +115,22 @@ impl SlotNames {
     }
 }
 
-impl Frame {
+impl ChartFrame {
     /// Lays out and draws everything except the data.
-    pub(crate) fn open(style: &Style, words: Words<'_>, across: &Across<'_>, up: &Fitted) -> Self {
-        let least_height = LEAST_AREA * style.height_px;
+    pub(crate) fn open(
+        style: &Style,
+        words: FrameText<'_>,
+        across: &XAxis<'_>,
+        up: &FittedAxis,
+    ) -> Self {
+        let least_height = MIN_AREA_FRACTION * style.height_px;
         let y = text::wrap(words.y_label, style.font_px, Weight::Regular, least_height);
         let measure = |label: &str| text::width(label, style.small_px(), Weight::Regular);
-        let ticks_px = up.ticks.widest_px(measure) + TICK_PX + 8.0;
+        let ticks_px = up.ticks.max_label_px(measure) + TICK_PX + 8.0;
         let left = EDGE_PX + y.len() as f64 * line_px(style) + ticks_px;
         let width = (style.width_px - left - EDGE_PX - right_room(style, across)).max(60.0);
-        let labels = Labels::wrap(style, &words, across, y, width);
-        let legend = Legend::lay_out(words.legend, style.font_px, style.width_px - 2.0 * EDGE_PX);
+        let labels = WrappedLabels::wrap(style, &words, across, y, width);
+        let legend = Legend::new(words.legend, style.font_px, style.width_px - 2.0 * EDGE_PX);
         let mut svg = Svg::default();
         let top = draw_head(&mut svg, style, &labels.title, &legend);
         let below = labels.below_px(style);
@@ -133,7 +138,7 @@ impl Frame {
         let height = (style.height_px - top - below - note_px - EDGE_PX).max(least_height);
         let area = Rect { x: left, y: top, width, height };
         let title = words.title.to_string();
-        let y = up.between(area.bottom(), area.y);
+        let y = up.scale_between(area.bottom(), area.y);
         let note_top = area.bottom() + below;
         let mut frame = Self { svg, area, y, style: *style, title, note: vec![], note_top };
         frame.draw_axes(across, up, &labels);
@@ -142,8 +147,8 @@ impl Frame {
     }
 
     /// Returns the horizontal scale of `across`.
-    pub(crate) fn x_scale(&self, across: &Fitted) -> Scale {
-        across.between(self.area.x, self.area.right())
+    pub(crate) fn x_scale(&self, across: &FittedAxis) -> Scale {
+        across.scale_between(self.area.x, self.area.right())
     }
 
     /// Opens a group for data, of which only the part inside the area is visible.
@@ -154,16 +159,16 @@ impl Frame {
     /// Returns the finished picture.
     pub(crate) fn finish(mut self) -> String {
         let look =
-            TextLook { fill: FAINT_INK, ..TextLook::new(self.style.small_px(), Anchor::Start) };
+            TextStyle { fill: FAINT_INK, ..TextStyle::new(self.style.small_px(), Anchor::Start) };
         let end = paragraph(&mut self.svg, &self.note, (EDGE_PX, self.note_top), &look);
         self.svg.finish(self.style.width_px, (end + EDGE_PX).max(self.style.height_px), &self.title)
     }
 
-    fn draw_axes(&mut self, across: &Across<'_>, up: &Fitted, labels: &Labels) {
+    fn draw_axes(&mut self, across: &XAxis<'_>, up: &FittedAxis, labels: &WrappedLabels) {
         self.draw_y_ticks(up);
         match across {
-            Across::Values(fitted) => self.draw_x_ticks(fitted),
-            Across::Categories(_) => self.draw_categories(&labels.slots),
+            XAxis::Values(fitted) => self.draw_x_ticks(fitted),
+            XAxis::Categories(_) => self.draw_categories(&labels.slots),
         }
         let (left, bottom, right) = (self.area.x, self.area.bottom(), self.area.right());
         let ink = axis_ink();
@@ -172,15 +177,15 @@ impl Frame {
         self.draw_axis_labels(labels);
     }
 
-    fn draw_y_ticks(&mut self, up: &Fitted) {
+    fn draw_y_ticks(&mut self, up: &FittedAxis) {
         let (left, right) = (self.area.x, self.area.right());
-        let look = TextLook::new(self.style.small_px(), Anchor::End);
-        let mut spacing = Spacing::new();
+        let look = TextStyle::new(self.style.small_px(), Anchor::End);
+        let mut spacing = LabelSpacing::new();
         for (value, label) in &up.ticks.major {
             let y = self.y.px(*value);
             self.svg.line((left, y), (right, y), grid_ink());
             self.svg.line((left - TICK_PX, y), (left, y), axis_ink());
-            if spacing.admits(-y, look.size_px) {
+            if spacing.try_place(-y, look.size_px) {
                 self.svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
             }
         }
@@ -190,18 +195,18 @@ impl Frame {
         }
     }
 
-    fn draw_x_ticks(&mut self, across: &Fitted) {
+    fn draw_x_ticks(&mut self, across: &FittedAxis) {
         let x = self.x_scale(across);
         let (top, bottom) = (self.area.y, self.area.bottom());
-        let look = TextLook::new(self.style.small_px(), Anchor::Middle);
-        let mut spacing = Spacing::new();
+        let look = TextStyle::new(self.style.small_px(), Anchor::Middle);
+        let mut spacing = LabelSpacing::new();
         for (value, label) in &across.ticks.major {
             let at = x.px(*value);
             self.svg.line((at, top), (at, bottom), grid_ink());
             self.svg.line((at, bottom), (at, bottom + TICK_PX), axis_ink());
             let label_px = text::width(label, look.size_px, Weight::Regular);
             // Given ticks may be too close together for all their labels.
-            if spacing.admits(at, label_px + 0.4 * look.size_px) {
+            if spacing.try_place(at, label_px + 0.4 * look.size_px) {
                 self.svg.text(at, bottom + TICK_PX + 2.0 + look.size_px, label, &look);
             }
         }
@@ -216,7 +221,7 @@ impl Frame {
         let top = self.area.bottom() + TICK_PX;
         let anchor = if slots.upright { Anchor::End } else { Anchor::Middle };
         let look =
-            TextLook { upward: slots.upright, ..TextLook::new(self.style.small_px(), anchor) };
+            TextStyle { upward: slots.upright, ..TextStyle::new(self.style.small_px(), anchor) };
         for (index, lines) in slots.names.iter().enumerate() {
             let center = self.area.x + (index as f64 + 0.5) * slot;
             if slots.upright {
@@ -227,13 +232,13 @@ impl Frame {
         }
     }
 
-    fn draw_axis_labels(&mut self, labels: &Labels) {
+    fn draw_axis_labels(&mut self, labels: &WrappedLabels) {
         let Rect { x, y, width, height } = self.area;
         let line = line_px(&self.style);
-        let look = TextLook::new(self.style.font_px, Anchor::Middle);
+        let look = TextStyle::new(self.style.font_px, Anchor::Middle);
         let top = self.note_top - labels.x.len() as f64 * line - NOTE_GAP_PX;
         paragraph(&mut self.svg, &labels.x, (x + width / 2.0, top), &look);
-        let upward = TextLook { upward: true, ..look };
+        let upward = TextStyle { upward: true, ..look };
         for (row, text) in labels.y.iter().enumerate() {
             let baseline = EDGE_PX + row as f64 * line + self.style.font_px;
             self.svg.text(baseline, y + height / 2.0, text, &upward);
@@ -254,15 +259,15 @@ fn line_px(style: &Style) -> f64 {
 }
 
 /// Returns the room on the right, because half of the last tick's label may extend beyond the area.
-fn right_room(style: &Style, across: &Across<'_>) -> f64 {
-    let Across::Values(fitted) = across else { return 0.0 };
+fn right_room(style: &Style, across: &XAxis<'_>) -> f64 {
+    let XAxis::Values(fitted) = across else { return 0.0 };
     let last = fitted.ticks.major.last();
     last.map_or(0.0, |(_, label)| text::width(label, style.small_px(), Weight::Regular) / 2.0)
 }
 
 /// Draws title and legend; returns where the area may start.
 fn draw_head(svg: &mut Svg, style: &Style, title: &[String], legend: &Legend) -> f64 {
-    let top = paragraph(svg, title, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
+    let top = paragraph(svg, title, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
     legend.draw(svg, EDGE_PX, top + 2.0);
     top + legend.height_px() + 14.0
 }
@@ -272,7 +277,7 @@ pub(crate) fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
     let mut data = String::new();
     for (x, y) in points {
         let command = if data.is_empty() { 'M' } else { 'L' };
-        data.push_str(&format!("{command}{} {}", Num(x), Num(y)));
+        data.push_str(&format!("{command}{} {}", SvgNumber(x), SvgNumber(y)));
     }
     data
 }

@@ -1,18 +1,20 @@
 //! Lines and points over numeric axes.
 
-use crate::axis::{Axis, Fitted, Scale};
+use crate::axis::{Axis, FittedAxis, Scale};
 use crate::chart::error_bar;
-use crate::chart::frame::{Across, Frame, Words, most_ticks, polyline};
+use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks, polyline};
 use crate::error::DrawError;
-use crate::legend::{Entry, Marker, Symbol, arrowhead, dashes, start_mark};
+use crate::legend::{
+    LegendEntry, LegendSymbol, Marker, arrowhead, reference_line_attributes, start_mark,
+};
 use crate::style::{FAINT_INK, Style, series_color, series_dash};
 use crate::svg::Svg;
 use sidestep_kernel::math::hypot;
 
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
-const IDEAL_PIECES: u32 = 64;
+const IDEAL_LINE_SEGMENTS: u32 = 64;
 /// Longest series with a marker at each point; longer ones show only their line.
-const MOST_MARKERS: usize = 60;
+const MAX_MARKERS: usize = 60;
 
 /// A measured value, optionally with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +84,7 @@ impl Series {
     fn shows_markers(&self) -> bool {
         match self.mark {
             Mark::Points => true,
-            Mark::Line => self.points.len() <= MOST_MARKERS,
+            Mark::Line => self.points.len() <= MAX_MARKERS,
             Mark::Band | Mark::Way => false,
         }
     }
@@ -90,7 +92,7 @@ impl Series {
 
 /// A straight line in data coordinates, such as the ideal speed-up.
 #[derive(Debug, Clone, PartialEq)]
-struct Ideal {
+struct IdealLine {
     label: String,
     intercept: f64,
     slope: f64,
@@ -107,7 +109,7 @@ pub struct Plot {
     x: Axis,
     y: Axis,
     series: Vec<Series>,
-    ideals: Vec<Ideal>,
+    ideals: Vec<IdealLine>,
 }
 
 impl Plot {
@@ -148,7 +150,7 @@ impl Plot {
     /// speed-up, intercept 1 and slope 0 for the ideal efficiency. It does not widen the axes.
     #[must_use]
     pub fn ideal_line(mut self, label: impl Into<String>, intercept: f64, slope: f64) -> Self {
-        self.ideals.push(Ideal { label: label.into(), intercept, slope });
+        self.ideals.push(IdealLine { label: label.into(), intercept, slope });
         self
     }
 
@@ -165,22 +167,22 @@ impl Plot {
     /// [`DrawError::Value`] if the style or an axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
         style.check()?;
-        let (most_across, most_up) = most_ticks(style);
+        let (most_across, most_up) = max_ticks(style);
         let x = self.x.fit(self.drawable().map(|p| p.x), most_across)?;
-        let y = self.y.fit(self.drawable().flat_map(reach), most_up)?;
-        let words = Words {
+        let y = self.y.fit(self.drawable().flat_map(y_values), most_up)?;
+        let words = FrameText {
             title: &self.title,
             note: &self.note,
             x_label: self.x.label(),
             y_label: self.y.label(),
             legend: self.legend(),
         };
-        let across = Across::Values(x.clone());
-        let mut frame = Frame::open(style, words, &across, &y);
+        let across = XAxis::Values(x.clone());
+        let mut frame = ChartFrame::open(style, words, &across, &y);
         frame.open_data();
         let x_scale = frame.x_scale(&x);
         for ideal in &self.ideals {
-            draw_ideal(&mut frame, ideal, &x, x_scale, &self.y);
+            draw_ideal_line(&mut frame, ideal, &x, x_scale, &self.y);
         }
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut frame, x_scale, index, series, style);
@@ -189,34 +191,34 @@ impl Plot {
         Ok(frame.finish())
     }
 
-    fn holds(&self, point: &Point) -> bool {
-        self.x.holds(point.x) && self.y.holds(point.y)
+    fn contains(&self, point: &Point) -> bool {
+        self.x.contains(point.x) && self.y.contains(point.y)
     }
 
     fn drawable(&self) -> impl Iterator<Item = &Point> {
-        self.series.iter().flat_map(|s| &s.points).filter(|p| self.holds(p))
+        self.series.iter().flat_map(|s| &s.points).filter(|p| self.contains(p))
     }
 
     /// Returns one entry per series and ideal line.
-    fn legend(&self) -> Vec<Entry> {
+    fn legend(&self) -> Vec<LegendEntry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
             let (color, marker) = (series_color(index).into(), Marker::of_series(index));
             let symbol = match series.mark {
-                Mark::Points => Symbol::Marker { color, marker },
+                Mark::Points => LegendSymbol::Marker { color, marker },
                 Mark::Line | Mark::Band | Mark::Way => {
                     let marker = series.shows_markers().then_some(marker);
-                    Symbol::Line { color, marker, dash: series_dash(index) }
+                    LegendSymbol::Line { color, marker, dash: series_dash(index) }
                 }
             };
-            Entry::new(symbol, &series.label)
+            LegendEntry::new(symbol, &series.label)
         });
-        let ideal = |label| Entry::new(Symbol::Dashes { color: FAINT_INK }, label);
+        let ideal = |label| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, label);
         series.chain(self.ideals.iter().map(|line| ideal(&line.label))).collect()
     }
 
     fn draw_series(
         &self,
-        frame: &mut Frame,
+        frame: &mut ChartFrame,
         x: Scale,
         index: usize,
         series: &Series,
@@ -228,8 +230,8 @@ impl Plot {
             self.draw_band(frame, x, color, series);
         }
         if series.mark != Mark::Points {
-            for run in series.points.split(|p| !self.holds(p)).filter(|run| run.len() > 1) {
-                let data = polyline(thinned(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
+            for run in series.points.split(|p| !self.contains(p)).filter(|run| run.len() > 1) {
+                let data = polyline(decimate(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
                 let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
                 let dash = series_dash(index);
                 frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}{dash}"#));
@@ -239,7 +241,7 @@ impl Plot {
                 }
             }
         }
-        for point in series.points.iter().filter(|p| self.holds(p)) {
+        for point in series.points.iter().filter(|p| self.contains(p)) {
             let at = (x.px(point.x), y.px(point.y));
             if let Some((low, high)) = bounds(point).filter(|_| series.mark != Mark::Band) {
                 error_bar(
@@ -257,9 +259,9 @@ impl Plot {
     }
 
     /// Fills the area between the ends of the intervals, over each stretch that has them.
-    fn draw_band(&self, frame: &mut Frame, x: Scale, color: &str, series: &Series) {
+    fn draw_band(&self, frame: &mut ChartFrame, x: Scale, color: &str, series: &Series) {
         let y = frame.y;
-        let is_out = |p: &Point| !self.holds(p) || bounds(p).is_none();
+        let is_out = |p: &Point| !self.contains(p) || bounds(p).is_none();
         for run in series.points.split(is_out).filter(|run| run.len() > 1) {
             let ends = |p: &Point| bounds(p).unwrap_or((p.y, p.y));
             let upper = run.iter().map(|p| (x.px(p.x), y.px(ends(p).1)));
@@ -276,14 +278,14 @@ fn bounds(point: &Point) -> Option<(f64, f64)> {
 }
 
 /// Returns the vertical values that a point covers.
-fn reach(point: &Point) -> impl Iterator<Item = f64> {
+fn y_values(point: &Point) -> impl Iterator<Item = f64> {
     let (low, high) = point.interval.unwrap_or((point.y, point.y));
     [low, point.y, high].into_iter()
 }
 
 /// Leaves out points less than half a pixel from the last one kept, because they would not be
 /// visible. The last point always stays.
-fn thinned(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f64, f64)> {
+fn decimate(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f64, f64)> {
     let mut points = points.peekable();
     let mut kept: Option<(f64, f64)> = None;
     std::iter::from_fn(move || {
@@ -299,17 +301,23 @@ fn thinned(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f6
     })
 }
 
-fn draw_ideal(frame: &mut Frame, ideal: &Ideal, x: &Fitted, x_scale: Scale, y_axis: &Axis) {
+fn draw_ideal_line(
+    frame: &mut ChartFrame,
+    ideal: &IdealLine,
+    x: &FittedAxis,
+    x_scale: Scale,
+    y_axis: &Axis,
+) {
     let y_scale = frame.y;
-    let places = (0..=IDEAL_PIECES).map(|k| f64::from(k) / f64::from(IDEAL_PIECES));
+    let places = (0..=IDEAL_LINE_SEGMENTS).map(|k| f64::from(k) / f64::from(IDEAL_LINE_SEGMENTS));
     let points = places
         .map(|part| x.value_at(part))
         .map(|x| (x, ideal.intercept + ideal.slope * x))
-        .filter(|(_, y)| y_axis.holds(*y))
+        .filter(|(_, y)| y_axis.contains(*y))
         .map(|(x, y)| (x_scale.px(x), y_scale.px(y)));
     let data = polyline(points);
     if !data.is_empty() {
-        frame.svg.path(&data, dashes(FAINT_INK));
+        frame.svg.path(&data, reference_line_attributes(FAINT_INK));
     }
 }
 /// A point in pixels, y downward.

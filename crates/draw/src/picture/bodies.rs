@@ -6,63 +6,64 @@ use super::Scene;
 use super::canvas::{Canvas, Px, corners};
 use crate::legend::leader_mark;
 use crate::style::{INK, hex};
-use crate::svg::{Anchor, Num, Svg, TextLook};
+use crate::svg::{Anchor, Svg, SvgNumber, TextStyle};
 use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::{
-    Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL, color_of,
+    Body, BodyKind, Color, Condition, Pose, Scenery, Shape, Vec3, WALL_COLOR, body_color,
 };
 
 /// Least width of a line, because thinner ones would vanish.
-const LEAST_LINE_PX: f64 = 1.4;
+const MIN_LINE_PX: f64 = 1.4;
 /// Least radius of a body.
-const LEAST_RADIUS_PX: f64 = 1.2;
+const MIN_RADIUS_PX: f64 = 1.2;
 /// Least length of an arrowhead.
-const LEAST_DART_PX: f64 = 9.0;
+const MIN_DART_PX: f64 = 9.0;
 /// Least radius of a leader's mark, from above and in space.
-const LEADER_PX: [f64; 2] = [3.0, 5.0];
+const MIN_LEADER_PX: [f64; 2] = [3.0, 5.0];
 /// Least radius of a goal.
-const LEAST_GOAL_PX: f64 = 3.5;
+const MIN_GOAL_PX: f64 = 3.5;
 /// Length of a target's cross beyond its ring, and the size of its number.
 const TARGET_PX: f64 = 3.0;
 const TARGET_LETTERS_PX: f64 = 11.0;
 /// Most targets with numbers: with more there is no room.
-const MOST_NUMBERED: usize = 12;
+const MAX_NUMBERED_TARGETS: usize = 12;
 /// Width of the seam around the parts of agents in space, and the least thickness of parts that have one: those that
 /// lie over each other would be one blot without it.
 const SEAM_PX: f64 = 1.0;
-const LEAST_SEAMED_PX: f64 = 8.0;
+const MIN_SEAMED_PX: f64 = 8.0;
 /// Number of balls in space above which those of one size and about one depth are one path, without rims.
-const MOST_BALLS: usize = 400;
+const MAX_SEPARATE_BALLS: usize = 400;
 /// Shades of such balls.
 const SHADES: f64 = 16.0;
 /// The look that lines share.
-const LINE_LOOK: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
+const LINE_ATTRIBUTES: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
 /// Time of the way that a moving body's arrow shows, seconds.
-const ARROW_S: f64 = 1.0;
+const ARROW_TIME_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
 const CORNERS: usize = 32;
 /// Color of agents without a trail, if others have one.
-const DARK: Color = [0x22, 0x22, 0x22];
+const UNTRACED_COLOR: Color = [0x22, 0x22, 0x22];
 /// Gray level toward which distant things in space fade.
-const FAR: f64 = 215.0;
+const FAR_GRAY: f64 = 215.0;
 
 /// Draws static walls without thickness, seen from above, as one path.
 pub(super) fn draw_walls(svg: &mut Svg, scenery: &Scenery, canvas: &Canvas) {
     let mut data = String::new();
     for body in scenery.bodies.iter().filter(|body| is_wall(body)) {
         if let Shape::Line { points_m, .. } = &body.shape {
-            data += &path_data(points_m.iter().map(|&p| canvas.at(p)));
+            data += &path_data(points_m.iter().map(|&p| canvas.px(p)));
         }
     }
     if !data.is_empty() {
-        let (wall, look) = (hex(WALL), r#"fill="none" stroke-width="1.5" stroke-linecap="round""#);
+        let (wall, look) =
+            (hex(WALL_COLOR), r#"fill="none" stroke-width="1.5" stroke-linecap="round""#);
         svg.path(&data, format_args!(r#"class="walls" stroke="{wall}" {look}"#));
     }
 }
 
 fn is_wall(body: &Body) -> bool {
     let is_thin = matches!(body.shape, Shape::Line { thickness_m: 0.0, .. });
-    body.kind == Kind::Obstacle && is_thin && !body.moves()
+    body.kind == BodyKind::Obstacle && is_thin && !body.is_moving()
 }
 
 /// Draws bodies seen from above, those of lower layers first.
@@ -82,7 +83,7 @@ pub(super) fn draw_layers(
 }
 
 /// A body in space, or one stretch of a line with many points.
-struct Part<'a> {
+struct DepthItem<'a> {
     depth_m: f64,
     body: &'a Body,
     /// The first point of the stretch.
@@ -96,25 +97,26 @@ pub(super) fn draw_by_depth<'a>(
     canvas: &Canvas,
     bodies: impl Iterator<Item = &'a Body>,
 ) {
-    let mut parts: Vec<Part<'_>> = Vec::new();
+    let mut parts: Vec<DepthItem<'_>> = Vec::new();
     for body in bodies {
         match &body.shape {
             Shape::Line { points_m, .. } => {
                 let depth_m =
-                    |pair: &[Place]| 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
+                    |pair: &[Vec3]| 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
                 let pairs = points_m.windows(2).enumerate();
-                let part = |(k, pair)| Part { depth_m: depth_m(pair), body, from: Some(k) };
+                let part = |(k, pair)| DepthItem { depth_m: depth_m(pair), body, from: Some(k) };
                 parts.extend(pairs.map(part));
             }
-            _ => parts.push(Part { depth_m: depth(canvas, body.pose.at_m), body, from: None }),
+            _ => parts.push(DepthItem { depth_m: depth(canvas, body.pose.at_m), body, from: None }),
         }
     }
     // The sort is stable: of bodies at the same depth, the one named first is drawn first.
     parts.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
-    let are_many = parts.iter().filter(|part| is_ball(part.body)).count() > MOST_BALLS;
-    let like =
-        |a: &Body, b: &Body| is_ball(a) && is_ball(b) && dot_look(canvas, a) == dot_look(canvas, b);
-    svg.raw(format_args!(r#"<g class="parts" {LINE_LOOK}>"#));
+    let are_many = parts.iter().filter(|part| is_ball(part.body)).count() > MAX_SEPARATE_BALLS;
+    let like = |a: &Body, b: &Body| {
+        is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
+    };
+    svg.push_raw(format_args!(r#"<g class="parts" {LINE_ATTRIBUTES}>"#));
     for alike in parts.chunk_by(|a, b| are_many && like(a.body, b.body)) {
         match alike {
             [first, ..] if are_many && is_ball(first.body) => draw_dots(svg, canvas, alike),
@@ -124,7 +126,7 @@ pub(super) fn draw_by_depth<'a>(
     svg.close_group();
 }
 
-fn draw_part(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, part: &Part<'_>) {
+fn draw_part(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, part: &DepthItem<'_>) {
     match (&part.body.shape, part.from) {
         (Shape::Line { points_m, .. }, Some(k)) => {
             draw_line(svg, scene, canvas, part.body, &points_m[k..k + 2]);
@@ -135,50 +137,50 @@ fn draw_part(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, part: &Part<'_>)
 
 /// Returns whether a body is an obstacle of which there may be thousands.
 fn is_ball(body: &Body) -> bool {
-    body.kind == Kind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
+    body.kind == BodyKind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
 }
 
 /// Returns the look of a ball among many.
-fn dot_look(canvas: &Canvas, body: &Body) -> String {
+fn dot_attributes(canvas: &Canvas, body: &Body) -> String {
     let radius_m = if let Shape::Sphere { radius_m } = body.shape { radius_m } else { 0.0 };
     let look = body.appearance(3);
     let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
     let (color, opacity) = (hex(paler(look.color, shade)), look.opacity);
-    let width = Num(2.0 * (radius_m * canvas.px_per_m).max(LEAST_RADIUS_PX));
+    let width = SvgNumber(2.0 * (radius_m * canvas.px_per_m).max(MIN_RADIUS_PX));
     format!(r#"stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}""#)
 }
 
 /// Draws balls of one look as one path: thousands of circles would be most of a picture's bytes.
-fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[Part<'_>]) {
+fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[DepthItem<'_>]) {
     let mut data = String::new();
     for ball in balls {
-        let (x, y) = canvas.at(ball.body.pose.at_m);
+        let (x, y) = canvas.px(ball.body.pose.at_m);
         // A stroke of no length is not drawn. Writing into a String cannot fail.
         let _ = write!(
             data,
             "M{} {}h.01",
-            Num((x * 10.0).round() / 10.0),
-            Num((y * 10.0).round() / 10.0)
+            SvgNumber((x * 10.0).round() / 10.0),
+            SvgNumber((y * 10.0).round() / 10.0)
         );
     }
-    svg.path(&data, dot_look(canvas, balls[0].body));
+    svg.path(&data, dot_attributes(canvas, balls[0].body));
 }
 
-fn depth(canvas: &Canvas, at: Place) -> f64 {
+fn depth(canvas: &Canvas, at: Vec3) -> f64 {
     canvas.camera.depth_m(at)
 }
 
 /// Returns the color of a body, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let look = body.appearance(scene.scenery.dimensions);
-    let acts = body.kind.is_agent() || body.kind == Kind::Rods;
+    let acts = body.kind.is_agent() || body.kind == BodyKind::Rods;
     if acts
         && matches!(body.state, Condition::Plain | Condition::Leading)
-        && scene.is_beside_trails(body)
+        && scene.lacks_trail(body)
     {
-        return (DARK, look.opacity);
+        return (UNTRACED_COLOR, look.opacity);
     }
-    if body.kind == Kind::Obstacle && !canvas.is_above() {
+    if body.kind == BodyKind::Obstacle && !canvas.is_above() {
         return (paler(look.color, canvas.nearness(body.pose.at_m)), look.opacity);
     }
     (look.color, look.opacity)
@@ -186,13 +188,15 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
 
 impl Scene<'_> {
     /// Returns whether others have a trail and this body has none.
-    fn is_beside_trails(&self, body: &Body) -> bool {
+    fn lacks_trail(&self, body: &Body) -> bool {
         !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.number != body.number)
     }
 }
 
 fn paler(color: Color, nearness: f64) -> Color {
-    color.map(|byte| (f64::from(byte) + (FAR - f64::from(byte)) * (1.0 - nearness)).round() as u8)
+    color.map(|byte| {
+        (f64::from(byte) + (FAR_GRAY - f64::from(byte)) * (1.0 - nearness)).round() as u8
+    })
 }
 
 fn darker(color: Color) -> Color {
@@ -205,19 +209,19 @@ fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
         |color: Color, width: f64| format!(r#"stroke="{}" stroke-width="{width}""#, hex(color));
     let white = [0xFF; 3];
     match body.kind {
-        Kind::Door if body.state == Condition::Open => {
+        BodyKind::Door if body.state == Condition::Open => {
             format!(r#"{} stroke-dasharray="3 2""#, line(color, 1.0))
         }
-        Kind::Obstacle if canvas.is_above() => line(darker(color), 0.8),
-        Kind::Obstacle => format!(r#"{} stroke-opacity="0.5""#, line(darker(color), 0.6)),
-        Kind::Zone => format!(r#"{} stroke-opacity="0.6""#, line(color, 0.8)),
-        Kind::Start => format!(r#"{} stroke-dasharray="5 3""#, line(color, 1.0)),
-        Kind::Goal | Kind::Person | Kind::Door => line(darker(color), 1.0),
-        Kind::Connector if canvas.is_above() => line(white, 0.6),
-        Kind::Airplane => line(white, 0.6),
-        Kind::Robot => line(DARK, 0.8),
-        Kind::Connector if is_seamed(canvas, body) => line(white, SEAM_PX),
-        Kind::Connector | Kind::Rods => String::new(),
+        BodyKind::Obstacle if canvas.is_above() => line(darker(color), 0.8),
+        BodyKind::Obstacle => format!(r#"{} stroke-opacity="0.5""#, line(darker(color), 0.6)),
+        BodyKind::Zone => format!(r#"{} stroke-opacity="0.6""#, line(color, 0.8)),
+        BodyKind::Start => format!(r#"{} stroke-dasharray="5 3""#, line(color, 1.0)),
+        BodyKind::Goal | BodyKind::Person | BodyKind::Door => line(darker(color), 1.0),
+        BodyKind::Connector if canvas.is_above() => line(white, 0.6),
+        BodyKind::Airplane => line(white, 0.6),
+        BodyKind::Robot => line(UNTRACED_COLOR, 0.8),
+        BodyKind::Connector if is_seamed(canvas, body) => line(white, SEAM_PX),
+        BodyKind::Connector | BodyKind::Rods => String::new(),
     }
 }
 
@@ -228,8 +232,8 @@ fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
         Shape::Line { thickness_m, .. } => thickness_m,
         _ => 0.0,
     };
-    let is_part = matches!(body.kind, Kind::Connector | Kind::Rods);
-    is_part && !canvas.is_above() && thickness_m * canvas.px_per_m >= LEAST_SEAMED_PX
+    let is_part = matches!(body.kind, BodyKind::Connector | BodyKind::Rods);
+    is_part && !canvas.is_above() && thickness_m * canvas.px_per_m >= MIN_SEAMED_PX
 }
 
 fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
@@ -240,38 +244,38 @@ fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
         Shape::Line { points_m, .. } => draw_line(svg, scene, canvas, body, points_m),
         Shape::Cuboid { size_m } => {
             for face in faces(&body.pose, *size_m, canvas) {
-                svg.path(&outline(face.map(|p| canvas.at(p))), &look);
+                svg.path(&outline(face.map(|p| canvas.px(p))), &look);
             }
         }
         Shape::Cylinder { radius_m, .. } if !canvas.is_above() => {
-            svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.at(p))), look);
+            svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.px(p))), look);
         }
         Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
-            let least_px = if body.kind == Kind::Goal { LEAST_GOAL_PX } else { LEAST_RADIUS_PX };
+            let least_px = if body.kind == BodyKind::Goal { MIN_GOAL_PX } else { MIN_RADIUS_PX };
             let radius_px = (radius_m * canvas.px_per_m).max(least_px);
-            svg.circle(canvas.at(body.pose.at_m), radius_px, look);
+            svg.circle(canvas.px(body.pose.at_m), radius_px, look);
         }
         Shape::Dart { length_m, width_m } => {
-            let grown = (LEAST_DART_PX / (length_m * canvas.px_per_m)).max(1.0);
+            let grown = (MIN_DART_PX / (length_m * canvas.px_per_m)).max(1.0);
             let corners = dart(&body.pose, length_m * grown, width_m * grown);
-            svg.path(&outline(corners.map(|p| canvas.at(p))), look);
+            svg.path(&outline(corners.map(|p| canvas.px(p))), look);
         }
     }
     draw_heading(svg, canvas, body);
 }
 
 /// Draws a line with its thickness, round at its ends.
-fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, points_m: &[Place]) {
+fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, points_m: &[Vec3]) {
     let Shape::Line { thickness_m, .. } = body.shape else { return };
     let (color, opacity) = fill(scene, canvas, body);
-    let width_px = (thickness_m * canvas.px_per_m).max(LEAST_LINE_PX);
-    let width = Num(width_px);
+    let width_px = (thickness_m * canvas.px_per_m).max(MIN_LINE_PX);
+    let width = SvgNumber(width_px);
     let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
-    let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
+    let data = path_data(points_m.iter().map(|&p| canvas.px(p)));
     // In space the group around all parts sets the rest.
-    let ends = if canvas.is_above() { format!(" {LINE_LOOK}") } else { String::new() };
+    let ends = if canvas.is_above() { format!(" {LINE_ATTRIBUTES}") } else { String::new() };
     if is_seamed(canvas, body) {
-        let around = Num(width_px + 2.0 * SEAM_PX);
+        let around = SvgNumber(width_px + 2.0 * SEAM_PX);
         svg.path(&data, format_args!(r##"stroke="#FFFFFF" stroke-width="{around}""##));
     }
     let look = format!(r#"stroke="{}" stroke-width="{width}"{hides}{ends}"#, hex(color));
@@ -285,11 +289,11 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
         Shape::Cylinder { radius_m, height_m } => (1.6 * radius_m, 0.5 * height_m),
         _ => return,
     };
-    if body.kind == Kind::Robot {
+    if body.kind == BodyKind::Robot {
         let size_m = 0.34 * side_m;
         let corners =
             [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];
-        let corners = corners.map(|[x, y]| canvas.at(body.pose.place([x, y, top_m])));
+        let corners = corners.map(|[x, y]| canvas.px(body.pose.transform_point([x, y, top_m])));
         svg.path(&outline(corners), r##"fill="#FFFFFF""##);
     }
 }
@@ -297,50 +301,50 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
 /// Draws marks over everything: the targets of moving things, and the leaders.
 pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     let bodies = || scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    for body in bodies().filter(|body| body.kind == Kind::Obstacle && body.moves()) {
+    for body in bodies().filter(|body| body.kind == BodyKind::Obstacle && body.is_moving()) {
         let from = middle(body);
-        let to = std::array::from_fn(|k| from[k] + ARROW_S * body.velocity_m_s[k]);
-        arrow(svg, canvas.at(from), canvas.at(to));
+        let to = std::array::from_fn(|k| from[k] + ARROW_TIME_S * body.velocity_m_s[k]);
+        arrow(svg, canvas.px(from), canvas.px(to));
     }
-    let goals = || bodies().filter(|body| body.kind == Kind::Goal && body.part.is_some());
-    let are_few = goals().count() <= MOST_NUMBERED;
+    let goals = || bodies().filter(|body| body.kind == BodyKind::Goal && body.part.is_some());
+    let are_few = goals().count() <= MAX_NUMBERED_TARGETS;
     for goal in goals() {
         draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
     }
-    for body in bodies().filter(|body| leads(body)) {
+    for body in bodies().filter(|body| is_leader(body)) {
         if let Shape::Sphere { radius_m } = body.shape {
-            let least_px = LEADER_PX[usize::from(!canvas.is_above())];
+            let least_px = MIN_LEADER_PX[usize::from(!canvas.is_above())];
             let radius_px = (0.7 * radius_m * canvas.px_per_m).max(least_px);
             let (color, _) = fill(scene, canvas, body);
-            leader_mark(svg, canvas.at(body.pose.at_m), radius_px, &hex(color));
+            leader_mark(svg, canvas.px(body.pose.at_m), radius_px, &hex(color));
         }
     }
 }
 
 /// Returns whether a body leads the others.
-pub(super) fn leads(body: &Body) -> bool {
+pub(super) fn is_leader(body: &Body) -> bool {
     body.state == Condition::Leading
 }
 
 /// Draws a target over everything that hides it: a ring with a cross, and its number if there are few.
 fn draw_target(svg: &mut Svg, canvas: &Canvas, goal: &Body, number: Option<u32>) {
     let Shape::Sphere { radius_m } = goal.shape else { return };
-    let (x, y) = canvas.at(goal.pose.at_m);
+    let (x, y) = canvas.px(goal.pose.at_m);
     let (radius_px, color) =
-        ((radius_m * canvas.px_per_m).max(LEAST_GOAL_PX), hex(darker(color_of(goal.number))));
+        ((radius_m * canvas.px_per_m).max(MIN_GOAL_PX), hex(darker(body_color(goal.number))));
     let look = format!(r#"stroke="{color}" stroke-width="1.3""#);
     svg.circle((x, y), radius_px, format_args!(r#"class="target" fill="none" {look}"#));
     let reach = radius_px + TARGET_PX;
     svg.line((x - reach, y), (x + reach, y), &look);
     svg.line((x, y - reach), (x, y + reach), &look);
     if let Some(number) = number {
-        let words = TextLook { halo: true, ..TextLook::new(TARGET_LETTERS_PX, Anchor::Start) };
+        let words = TextStyle { halo: true, ..TextStyle::new(TARGET_LETTERS_PX, Anchor::Start) };
         svg.text(x + reach, y - radius_px, &number.to_string(), &words);
     }
 }
 
 /// Returns the middle of a body, wherever its pose is.
-fn middle(body: &Body) -> Place {
+fn middle(body: &Body) -> Vec3 {
     match &body.shape {
         Shape::Line { points_m, .. } => {
             let n = points_m.len().max(1) as f64;
@@ -351,13 +355,13 @@ fn middle(body: &Body) -> Place {
 }
 
 /// Returns the faces of a box that look toward the viewer.
-fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
+fn faces(pose: &Pose, size_m: Vec3, canvas: &Canvas) -> Vec<[Vec3; 4]> {
     let half = size_m.map(|side_m| 0.5 * side_m);
-    let corners = corners([half.map(|m| -m), half]).map(|corner| pose.place(corner));
+    let corners = corners([half.map(|m| -m), half]).map(|corner| pose.transform_point(corner));
     let turn = |k: usize| {
         let mut axis = [0.0; 3];
         axis[k] = 1.0;
-        dot(pose.turned(axis), canvas.camera.to_eye)
+        dot(pose.rotate(axis), canvas.camera.to_eye)
     };
     // A face that is seen edge-on has no extent.
     let facing = (0..3).map(|k| (k, turn(k))).filter(|(_, turn)| turn.abs() > 1e-9);
@@ -370,18 +374,18 @@ fn faces(pose: &Pose, size_m: Place, canvas: &Canvas) -> Vec<[Place; 4]> {
 }
 
 /// Returns a circle that lies flat.
-fn circle(pose: &Pose, radius_m: f64) -> [Place; CORNERS] {
+fn circle(pose: &Pose, radius_m: f64) -> [Vec3; CORNERS] {
     std::array::from_fn(|k| {
         let angle = k as f64 * std::f64::consts::TAU / CORNERS as f64;
-        pose.place([radius_m * libm::cos(angle), radius_m * libm::sin(angle), 0.0])
+        pose.transform_point([radius_m * libm::cos(angle), radius_m * libm::sin(angle), 0.0])
     })
 }
 
 /// Returns an arrowhead with its middle at the pose.
-fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Place; 4] {
+fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Vec3; 4] {
     let (half_m, wing_m) = (0.5 * length_m, 0.5 * width_m);
     let corners = [[half_m, 0.0], [-half_m, wing_m], [-0.5 * half_m, 0.0], [-half_m, -wing_m]];
-    corners.map(|[x, y]| pose.place([x, y, 0.0]))
+    corners.map(|[x, y]| pose.transform_point([x, y, 0.0]))
 }
 
 /// Draws an arrow, unless it is shorter than its head.
@@ -410,7 +414,7 @@ fn path_data(points: impl IntoIterator<Item = Px>) -> String {
     for (index, (x, y)) in points.into_iter().enumerate() {
         let command = if index == 0 { 'M' } else { 'L' };
         // Writing into a String cannot fail.
-        let _ = write!(data, "{command}{} {}", Num(x), Num(y));
+        let _ = write!(data, "{command}{} {}", SvgNumber(x), SvgNumber(y));
     }
     data
 }
@@ -426,7 +430,7 @@ mod tests {
         let map = Rect { x: 0.0, y: 0.0, width: 1.0, height: 1.0 };
         let above = Canvas::above([0.0; 2], 1.0, map);
         let corner = Canvas { camera: Camera::CORNER, ..above };
-        let pose = Pose::at([0.0; 3]);
+        let pose = Pose::from_position([0.0; 3]);
         assert_eq!(faces(&pose, [2.0, 4.0, 6.0], &above).len(), 1);
         let faces = faces(&pose, [2.0, 4.0, 6.0], &corner);
         assert_eq!(faces.len(), 3);

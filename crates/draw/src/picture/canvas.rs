@@ -2,20 +2,20 @@
 
 use crate::svg::Rect;
 use sidestep_kernel::geometry::dot;
-use sidestep_kernel::view::Place;
+use sidestep_kernel::view::Vec3;
 
 /// A point in pixels, y downward.
 pub(crate) type Px = (f64, f64);
 
 /// Limit of drawing outside a picture, pixels.
-const FURTHEST_PX: f64 = 1e5;
+const MAX_OFFSET_PX: f64 = 1e5;
 
 /// The direction of view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Camera {
-    pub(crate) right: Place,
-    pub(crate) up: Place,
-    pub(crate) to_eye: Place,
+    pub(crate) right: Vec3,
+    pub(crate) up: Vec3,
+    pub(crate) to_eye: Vec3,
 }
 
 impl Camera {
@@ -28,16 +28,16 @@ impl Camera {
         Self { right: [0.8, 0.6, 0.0], up: [-0.36, 0.48, 0.8], to_eye: [0.48, -0.64, 0.6] };
 
     /// Returns where a place is seen: meters to the right and up.
-    pub(crate) fn seen(&self, at: Place) -> [f64; 2] {
+    pub(crate) fn project(&self, at: Vec3) -> [f64; 2] {
         [dot(self.right, at), dot(self.up, at)]
     }
 
-    pub(crate) fn depth_m(&self, at: Place) -> f64 {
+    pub(crate) fn depth_m(&self, at: Vec3) -> f64 {
         dot(self.to_eye, at)
     }
 
     /// Returns the least and the greatest coordinate of a box's corners in some direction.
-    pub(crate) fn range(direction: Place, box_m: [Place; 2]) -> [f64; 2] {
+    pub(crate) fn range(direction: Vec3, box_m: [Vec3; 2]) -> [f64; 2] {
         let along = corners(box_m).map(|corner| dot(corner, direction));
         let least = along.into_iter().fold(f64::INFINITY, f64::min);
         [least, along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
@@ -45,7 +45,7 @@ impl Camera {
 }
 
 /// Returns the corners of a box; bit k of a corner's number says at which end of axis k it is.
-pub(crate) fn corners([lo, hi]: [Place; 2]) -> [Place; 8] {
+pub(crate) fn corners([lo, hi]: [Vec3; 2]) -> [Vec3; 8] {
     std::array::from_fn(|bits| {
         std::array::from_fn(|k| if bits >> k & 1 == 1 { hi[k] } else { lo[k] })
     })
@@ -58,7 +58,7 @@ pub(crate) struct Canvas {
     pub(crate) px_per_m: f64,
     /// The pixel of the point seen at `seen_m`.
     pub(crate) zero: Px,
-    pub(crate) seen_m: [f64; 2],
+    pub(crate) origin_m: [f64; 2],
     /// The nearest and the farthest depth.
     pub(crate) depths_m: [f64; 2],
 }
@@ -67,13 +67,13 @@ impl Canvas {
     /// Returns a view from above; `lo_m` is in the lower left corner of `map`.
     pub(crate) fn above(lo_m: [f64; 2], px_per_m: f64, map: Rect) -> Self {
         let zero = (map.x, map.bottom());
-        Self { camera: Camera::ABOVE, px_per_m, zero, seen_m: lo_m, depths_m: [0.0, 1.0] }
+        Self { camera: Camera::ABOVE, px_per_m, zero, origin_m: lo_m, depths_m: [0.0, 1.0] }
     }
 
-    pub(crate) fn at(&self, place: Place) -> Px {
-        let [right_m, up_m] = self.camera.seen(place);
-        let px = |m: f64| (m * self.px_per_m).clamp(-FURTHEST_PX, FURTHEST_PX);
-        (self.zero.0 + px(right_m - self.seen_m[0]), self.zero.1 - px(up_m - self.seen_m[1]))
+    pub(crate) fn px(&self, place: Vec3) -> Px {
+        let [right_m, up_m] = self.camera.project(place);
+        let px = |m: f64| (m * self.px_per_m).clamp(-MAX_OFFSET_PX, MAX_OFFSET_PX);
+        (self.zero.0 + px(right_m - self.origin_m[0]), self.zero.1 - px(up_m - self.origin_m[1]))
     }
 
     pub(crate) fn is_above(&self) -> bool {
@@ -81,7 +81,7 @@ impl Canvas {
     }
 
     /// Returns 0 for the farthest place, 1 for the nearest.
-    pub(crate) fn nearness(&self, place: Place) -> f64 {
+    pub(crate) fn nearness(&self, place: Vec3) -> f64 {
         let [far_m, near_m] = self.depths_m;
         ((self.camera.depth_m(place) - far_m) / (near_m - far_m)).clamp(0.0, 1.0)
     }
@@ -111,8 +111,8 @@ mod tests {
     fn a_meter_is_as_long_in_both_directions() {
         let map = Rect { x: 40.0, y: 10.0, width: 300.0, height: 100.0 };
         let canvas = Canvas::above([1.0, 2.0], 7.0, map);
-        assert_eq!(canvas.at([1.0, 2.0, 9.0]), (40.0, 110.0));
-        assert_eq!(canvas.at([11.0, 2.0, 0.0]), (110.0, 110.0));
-        assert_eq!(canvas.at([1.0, 12.0, 0.0]), (40.0, 40.0));
+        assert_eq!(canvas.px([1.0, 2.0, 9.0]), (40.0, 110.0));
+        assert_eq!(canvas.px([11.0, 2.0, 0.0]), (110.0, 110.0));
+        assert_eq!(canvas.px([1.0, 12.0, 0.0]), (40.0, 40.0));
     }
 }

@@ -3,21 +3,25 @@
 use super::Scene;
 use super::canvas::Camera;
 use crate::error::DrawError;
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Place, Scenery, Shape, Trail};
+use sidestep_kernel::view::{Body, BodyKind, Frame, OccupancyGrid, Scenery, Shape, Trail, Vec3};
 
 /// Most boxes of a map: 16384 x 16384.
-const MOST_BOXES: u64 = 1 << 28;
+const MAX_BOXES: u64 = 1 << 28;
 /// Most bodies, their points, and points of trails together.
-const MOST_PARTS: u64 = 1 << 22;
+const MAX_PARTS: u64 = 1 << 22;
 /// Largest coordinate, meters: beyond it, pictures show nothing useful.
-const FURTHEST_M: f64 = 1e9;
+const MAX_COORDINATE_M: f64 = 1e9;
 /// Margin around the shown area, as a part of its longest side.
-const MARGIN: f64 = 0.03;
+const MARGIN_FRACTION: f64 = 0.03;
 /// Least length of a side, as a part of the longest.
-const LEAST_SIDE: f64 = 0.2;
+const MIN_SIDE_FRACTION: f64 = 0.2;
 
 /// Refuses content that no picture can be drawn of.
-pub(crate) fn check(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> Result<(), DrawError> {
+pub(crate) fn check_content(
+    scenery: &Scenery,
+    frame: &Frame,
+    trails: &[Trail],
+) -> Result<(), DrawError> {
     if let Some(floor) = &scenery.floor {
         check_floor(floor)?;
     }
@@ -27,24 +31,24 @@ pub(crate) fn check(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> Resul
         _ => 1,
     };
     let found = bodies().map(points).sum::<usize>();
-    let found = (found + trails.iter().map(|trail| trail.way.len()).sum::<usize>()) as u64;
-    if found > MOST_PARTS {
-        return Err(DrawError::TooLarge { what: "bodies", found, limit: MOST_PARTS });
+    let found = (found + trails.iter().map(|trail| trail.points.len()).sum::<usize>()) as u64;
+    if found > MAX_PARTS {
+        return Err(DrawError::TooLarge { what: "bodies", found, limit: MAX_PARTS });
     }
     bodies().try_for_each(check_body)?;
-    trails.iter().flat_map(|trail| &trail.way).try_for_each(|(_, at)| check_place(at))
+    trails.iter().flat_map(|trail| &trail.points).try_for_each(|(_, at)| check_place(at))
 }
 
-fn check_floor(floor: &Floor) -> Result<(), DrawError> {
+fn check_floor(floor: &OccupancyGrid) -> Result<(), DrawError> {
     let boxes = u64::from(floor.width) * u64::from(floor.height);
-    if boxes > MOST_BOXES {
-        let (what, limit) = ("boxes of the map", MOST_BOXES);
+    if boxes > MAX_BOXES {
+        let (what, limit) = ("boxes of the map", MAX_BOXES);
         return Err(DrawError::TooLarge { what, found: boxes, limit });
     }
     DrawError::positive("number of the map's boxes", boxes as f64)?;
     DrawError::length("boxes of the map", boxes as usize, floor.boxes.len())?;
     DrawError::positive("box size in m", floor.box_m)?;
-    let [lo, hi] = around_floor(floor);
+    let [lo, hi] = floor_bounds(floor);
     check_place(&lo)?;
     check_place(&hi)?;
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
@@ -69,8 +73,8 @@ fn check_body(body: &Body) -> Result<(), DrawError> {
     }
 }
 
-fn check_place(at: &Place) -> Result<(), DrawError> {
-    match at.iter().find(|x| !(-FURTHEST_M..=FURTHEST_M).contains(*x)) {
+fn check_place(at: &Vec3) -> Result<(), DrawError> {
+    match at.iter().find(|x| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*x)) {
         None => Ok(()),
         Some(&value) => {
             Err(DrawError::Value { what: "a coordinate in m", value, must: "from -1e9 to 1e9" })
@@ -79,103 +83,106 @@ fn check_place(at: &Place) -> Result<(), DrawError> {
 }
 
 fn check_size(value: f64) -> Result<(), DrawError> {
-    match (0.0..=FURTHEST_M).contains(&value) {
+    match (0.0..=MAX_COORDINATE_M).contains(&value) {
         true => Ok(()),
         false => Err(DrawError::Value { what: "a size in m", value, must: "from 0 to 1e9" }),
     }
 }
 
-fn around_floor(floor: &Floor) -> [Place; 2] {
-    let mut bounds = Bounds::default();
-    floor.corners_m().into_iter().for_each(|[x, y]| bounds.hold([x, y, 0.0], 0.0));
+fn floor_bounds(floor: &OccupancyGrid) -> [Vec3; 2] {
+    let mut bounds = BoundingBox::default();
+    floor.corners_m().into_iter().for_each(|[x, y]| bounds.include([x, y, 0.0], 0.0));
     [bounds.lo, bounds.hi]
 }
 
 /// Returns the lower and upper corner of everything shown; never empty.
-pub(super) fn whole(scene: &Scene<'_>) -> Result<[Place; 2], DrawError> {
+pub(super) fn scene_bounds(scene: &Scene<'_>) -> Result<[Vec3; 2], DrawError> {
     if let (Some(floor), true) = (&scene.scenery.floor, scene.is_plane()) {
-        return Ok(around_floor(floor));
+        return Ok(floor_bounds(floor));
     }
-    let mut bounds = Bounds::default();
+    let mut bounds = BoundingBox::default();
     let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    bodies.for_each(|body| bounds.hold_body(body));
+    bodies.for_each(|body| bounds.include_body(body));
     let places = scene.trails.iter().flat_map(|trail| trail.way);
-    places.for_each(|(_, at)| bounds.hold(*at, 0.0));
-    bounds.grown()
+    places.for_each(|(_, at)| bounds.include(*at, 0.0));
+    bounds.with_margin()
 }
 
 /// Returns the lower and upper corner of a film's view: those of the floor, or otherwise of all
 /// places where things other than obstacles are at some time.
-pub(crate) fn around(scenery: &Scenery, frames: &[Frame]) -> Result<[Place; 2], DrawError> {
+pub(crate) fn animation_bounds(
+    scenery: &Scenery,
+    frames: &[Frame],
+) -> Result<[Vec3; 2], DrawError> {
     if let (Some(floor), 2) = (&scenery.floor, scenery.dimensions) {
         check_floor(floor)?;
-        return Ok(around_floor(floor));
+        return Ok(floor_bounds(floor));
     }
-    let mut bounds = Bounds::default();
+    let mut bounds = BoundingBox::default();
     for body in frames.iter().flat_map(|frame| &frame.bodies) {
-        if body.kind != Kind::Obstacle {
+        if body.kind != BodyKind::Obstacle {
             check_body(body)?;
-            bounds.hold_body(body);
+            bounds.include_body(body);
         }
     }
-    bounds.grown()
+    bounds.with_margin()
 }
 
 /// Returns the rectangle in which a box is seen.
-pub(crate) fn seen(camera: Camera, box_m: [Place; 2]) -> [[f64; 2]; 2] {
+pub(crate) fn projected_bounds(camera: Camera, box_m: [Vec3; 2]) -> [[f64; 2]; 2] {
     let (across, upward) = (Camera::range(camera.right, box_m), Camera::range(camera.up, box_m));
     [[across[0], upward[0]], [across[1], upward[1]]]
 }
 
-struct Bounds {
-    lo: Place,
-    hi: Place,
+struct BoundingBox {
+    lo: Vec3,
+    hi: Vec3,
 }
 
-impl Default for Bounds {
+impl Default for BoundingBox {
     fn default() -> Self {
         Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] }
     }
 }
 
-impl Bounds {
-    fn hold(&mut self, at: Place, by_m: f64) {
+impl BoundingBox {
+    fn include(&mut self, at: Vec3, by_m: f64) {
         for (k, x) in at.into_iter().enumerate() {
             self.lo[k] = self.lo[k].min(x - by_m);
             self.hi[k] = self.hi[k].max(x + by_m);
         }
     }
 
-    fn hold_body(&mut self, body: &Body) {
+    fn include_body(&mut self, body: &Body) {
         let at = body.pose.at_m;
         match &body.shape {
             Shape::Line { points_m, thickness_m } => {
-                points_m.iter().for_each(|&point| self.hold(point, 0.5 * thickness_m));
+                points_m.iter().for_each(|&point| self.include(point, 0.5 * thickness_m));
             }
             Shape::Cuboid { size_m } => {
                 let half = size_m.map(|m| 0.5 * m);
                 for corner in super::canvas::corners([half.map(|m| -m), half]) {
-                    self.hold(body.pose.place(corner), 0.0);
+                    self.include(body.pose.transform_point(corner), 0.0);
                 }
             }
             Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
-                self.hold(at, *radius_m);
+                self.include(at, *radius_m);
             }
-            Shape::Dart { length_m, .. } => self.hold(at, 0.5 * length_m),
+            Shape::Dart { length_m, .. } => self.include(at, 0.5 * length_m),
         }
     }
 
     /// Adds a margin on all sides, and widens a side that is very short compared with the others.
-    fn grown(self) -> Result<[Place; 2], DrawError> {
+    fn with_margin(self) -> Result<[Vec3; 2], DrawError> {
         if self.lo[0] > self.hi[0] {
             return Ok([[0.0; 3], [1.0; 3]]);
         }
         let side_m = |k: usize| self.hi[k] - self.lo[k];
         let longest_m = (0..3).map(side_m).fold(0.0, f64::max);
-        let least_m = if longest_m > 0.0 { LEAST_SIDE * longest_m } else { 1.0 };
-        let by_m = |k: usize| MARGIN * longest_m + 0.5 * (least_m - side_m(k)).max(0.0);
-        let lo: Place = std::array::from_fn(|k| self.lo[k] - by_m(k));
-        let hi: Place = std::array::from_fn(|k| self.hi[k] + by_m(k));
+        let least_m = if longest_m > 0.0 { MIN_SIDE_FRACTION * longest_m } else { 1.0 };
+        let by_m = |k: usize| MARGIN_FRACTION * longest_m + 0.5 * (least_m - side_m(k)).max(0.0);
+        let lo: Vec3 = std::array::from_fn(|k| self.lo[k] - by_m(k));
+        let hi: Vec3 = std::array::from_fn(|k| self.hi[k] + by_m(k));
         for side_m in std::array::from_fn::<f64, 3, _>(|k| hi[k] - lo[k]) {
             DrawError::positive("extent of what is shown in m", side_m)?;
         }

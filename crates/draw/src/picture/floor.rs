@@ -4,15 +4,15 @@ use std::fmt::Write as _;
 
 use super::canvas::Canvas;
 use crate::style::hex;
-use crate::svg::{Num, Svg};
-use sidestep_kernel::view::{Floor, Occupancy, UNKNOWN, WALL};
+use crate::svg::{Svg, SvgNumber};
+use sidestep_kernel::view::{Occupancy, OccupancyGrid, UNKNOWN_COLOR, WALL_COLOR};
 
 /// Most rectangles of a floor (some megabytes of SVG); with more it is drawn at a coarser grain.
-const MOST_RECTANGLES: usize = 100_000;
+const MAX_RECTANGLES: usize = 100_000;
 
 /// A run of columns over a span of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Block {
+struct FloorBlock {
     col: u32,
     width: u32,
     row: u32,
@@ -20,16 +20,16 @@ struct Block {
 }
 
 /// Draws a floor, in a group with one box as its unit, y upward.
-pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
+pub(super) fn draw(svg: &mut Svg, floor: &OccupancyGrid, canvas: &Canvas) {
     let [x_m, y_m] = floor.plane.origin_m;
-    let (x, y) = canvas.at([x_m, y_m, 0.0]);
-    let (x, y, px) = (Num(x), Num(y), canvas.px_per_m * floor.box_m);
+    let (x, y) = canvas.px([x_m, y_m, 0.0]);
+    let (x, y, px) = (SvgNumber(x), SvgNumber(y), canvas.px_per_m * floor.box_m);
     let turn = match floor.plane.yaw_rad {
         0.0 => String::new(),
         yaw_rad => format!(" rotate({})", yaw_rad.to_degrees()),
     };
-    svg.raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px}){turn}">"#));
-    for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN), (Occupancy::Wall, WALL)] {
+    svg.push_raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px}){turn}">"#));
+    for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN_COLOR), (Occupancy::Wall, WALL_COLOR)] {
         let is = |col: u32, row: u32| {
             floor.boxes[row as usize * floor.width as usize + col as usize] == occupancy
         };
@@ -43,7 +43,7 @@ pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
 
 /// Returns path data of the boxes for which `is` holds.
 ///
-/// If they need more than [`MOST_RECTANGLES`], squares of 2, 4, 8, ... boxes are filled if any of
+/// If they need more than [`MAX_RECTANGLES`], squares of 2, 4, 8, ... boxes are filled if any of
 /// their boxes is: nothing vanishes, and such boxes are smaller than a pixel anyway.
 fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
     let mut grain = 1;
@@ -61,9 +61,9 @@ fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
 }
 
 /// Covers the boxes for which `is` holds with blocks that do not overlap: runs of a row, merged
-/// with the equal run in the row below. Returns `None` above [`MOST_RECTANGLES`].
-fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<Block>> {
-    let (mut done, mut open) = (Vec::new(), Vec::<Block>::new());
+/// with the equal run in the row below. Returns `None` above [`MAX_RECTANGLES`].
+fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<FloorBlock>> {
+    let (mut done, mut open) = (Vec::new(), Vec::<FloorBlock>::new());
     for row in 0..height {
         let mut above = Vec::new();
         let mut old = open.into_iter().peekable();
@@ -73,13 +73,13 @@ fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<
                 done.push(block);
             }
             above.push(match old.next_if(|b| (b.col, b.width) == (col, width)) {
-                Some(block) => Block { height: block.height + 1, ..block },
-                None => Block { col, width, row, height: 1 },
+                Some(block) => FloorBlock { height: block.height + 1, ..block },
+                None => FloorBlock { col, width, row, height: 1 },
             });
         }
         done.extend(old);
         open = above;
-        if done.len() + open.len() > MOST_RECTANGLES {
+        if done.len() + open.len() > MAX_RECTANGLES {
             return None;
         }
     }
@@ -98,7 +98,7 @@ fn runs(width: u32, is: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, u32)
     })
 }
 
-fn write(blocks: &[Block], grain: u32, width: u32, height: u32) -> String {
+fn write(blocks: &[FloorBlock], grain: u32, width: u32, height: u32) -> String {
     let mut data = String::new();
     for block in blocks {
         let (x, y) = (block.col * grain, block.row * grain);
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn a_checkerboard_of_four_million_boxes_stays_small() {
         let data = path_data(2000, 2000, &|col, row| (col + row) % 2 == 0);
-        assert!(data.matches('M').count() <= MOST_RECTANGLES);
+        assert!(data.matches('M').count() <= MAX_RECTANGLES);
         assert!(!data.is_empty());
     }
 
@@ -141,7 +141,7 @@ mod tests {
             let blocks = merged(width, height, &is).unwrap();
             for row in 0..height {
                 for col in 0..width {
-                    let holds = |b: &&Block| {
+                    let holds = |b: &&FloorBlock| {
                         (b.col..b.col + b.width).contains(&col)
                             && (b.row..b.row + b.height).contains(&row)
                     };

@@ -1,24 +1,24 @@
 //! Names beside the bodies with trails, placed where they cover neither each other nor any body.
 
 use super::canvas::{Canvas, Px};
-use super::trails::Shown;
-use super::{Scene, key};
+use super::trails::DrawnTrail;
+use super::{Scene, map_legend};
 use crate::legend::{arrowhead, end_mark, start_mark};
 use crate::style::{Style, hex};
-use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Rect, Svg, TextStyle};
 use crate::text::{self, Weight};
 use sidestep_kernel::math::hypot;
-use sidestep_kernel::view::{Body, Kind, Shape};
+use sidestep_kernel::view::{Body, BodyKind, Shape};
 
 /// Most trails in a picture with names: with more there is no room.
-const MOST_LABELS: usize = 12;
+const MAX_LABELS: usize = 12;
 /// Distance between a name and the named body.
 const GAP_PX: f64 = 4.0;
 /// Radius of the mark at the start of a line, and length of the head that shows its direction.
 const LINE_START_PX: f64 = 2.6;
 const HEAD_PX: f64 = 8.0;
 /// Distances at which room is searched for, in gaps.
-const FURTHER: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
+const LABEL_DISTANCES_GAPS: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
 
 /// Marks where a trail starts and ends, and writes the name of its body if there is room.
 pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect, style: &Style) {
@@ -28,8 +28,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let Some((&(_, start), &(_, end))) = trail.way.first().zip(trail.way.last()) else {
             continue;
         };
-        let (start, end, color) = (canvas.at(start), canvas.at(end), hex(trail.color));
-        let body = scene.frame.bodies.iter().find(|body| body.who() == trail.of);
+        let (start, end, color) = (canvas.px(start), canvas.px(end), hex(trail.color));
+        let body = scene.frame.bodies.iter().find(|body| body.id() == trail.of);
         let radius_px = body.map_or(0.0, |body| radius_m(body) * canvas.px_per_m);
         let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
         // If the body itself is drawn there, it needs no mark.
@@ -44,34 +44,39 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
             end_mark(svg, end, 3.0, &color);
         }
         let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
-        taken.push(around(end, clear_px));
+        taken.push(square_around(end, clear_px));
         // Parts of a body have no name of their own.
         if trail.of.part.is_none() && contains(room, end) {
-            wanted.push((end, clear_px, key::name(scene, trail.of.kind, trail.of.number)));
+            wanted.push((
+                end,
+                clear_px,
+                map_legend::display_name(scene, trail.of.kind, trail.of.number),
+            ));
         }
     }
-    if wanted.len() > MOST_LABELS {
+    if wanted.len() > MAX_LABELS {
         return;
     }
-    taken.extend(bodies_to_spare(scene, canvas));
+    taken.extend(body_rects(scene, canvas));
     for (at, clear_px, words) in wanted {
         let label = Label { at, clear_px, words: &words };
-        write(svg, label, room, &mut taken, style);
+        write_label(svg, label, room, &mut taken, style);
     }
 }
 
 /// Returns the rooms of bodies that no name may cover.
-fn bodies_to_spare(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
+fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
     let matters = |body: &&Body| {
-        body.kind.is_agent() || matches!(body.kind, Kind::Person | Kind::Start | Kind::Goal)
+        body.kind.is_agent()
+            || matches!(body.kind, BodyKind::Person | BodyKind::Start | BodyKind::Goal)
     };
     let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
-    bodies.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m))
+    bodies.map(|body| square_around(canvas.px(body.pose.at_m), radius_m(body) * canvas.px_per_m))
 }
 
 /// Draws an arrowhead in the middle of a line, which shows where it goes.
-fn draw_direction(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas, color: &str) {
-    let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.at(at)).collect();
+fn draw_direction(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas, color: &str) {
+    let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.px(at)).collect();
     let length = |pair: &[Px]| hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
     let half = 0.5 * points.windows(2).map(length).sum::<f64>();
     // A short line has no room for a head.
@@ -96,7 +101,7 @@ fn radius_m(body: &Body) -> f64 {
     }
 }
 
-fn around((x, y): Px, radius: f64) -> Rect {
+fn square_around((x, y): Px, radius: f64) -> Rect {
     Rect { x: x - radius, y: y - radius, width: 2.0 * radius, height: 2.0 * radius }
 }
 
@@ -113,14 +118,15 @@ struct Label<'a> {
 }
 
 /// Writes words beside a point if there is room; otherwise nothing.
-fn write(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect>, style: &Style) {
+fn write_label(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect>, style: &Style) {
     let Label { at: (x, y), clear_px, words } = label;
     let size = style.small_px();
-    let look = TextLook { halo: true, weight: Weight::Bold, ..TextLook::new(size, Anchor::Start) };
+    let look =
+        TextStyle { halo: true, weight: Weight::Bold, ..TextStyle::new(size, Anchor::Start) };
     let width = text::width(words, size, Weight::Bold);
     // Letters reach slightly beyond their font size.
     let height = 1.3 * size;
-    let places = FURTHER.iter().flat_map(|&gaps| {
+    let places = LABEL_DISTANCES_GAPS.iter().flat_map(|&gaps| {
         let out = clear_px + gaps * GAP_PX;
         let (left, middle, up) = (x - out - width, x - 0.5 * width, y - out - height);
         [
@@ -135,7 +141,8 @@ fn write(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect>, sty
         ]
     });
     let mut rects = places.map(|(x, y)| Rect { x, y, width, height });
-    let is_free = |rect: &Rect| is_within(*rect, room) && taken.iter().all(|t| apart(*t, *rect));
+    let is_free =
+        |rect: &Rect| is_within(*rect, room) && taken.iter().all(|t| is_disjoint(*t, *rect));
     if let Some(rect) = rects.find(is_free) {
         svg.text(rect.x, rect.y + 0.5 * height + look.middle_px(), words, &look);
         taken.push(rect);
@@ -146,6 +153,6 @@ fn is_within(rect: Rect, room: Rect) -> bool {
     contains(room, (rect.x, rect.y)) && contains(room, (rect.right(), rect.bottom()))
 }
 
-fn apart(a: Rect, b: Rect) -> bool {
+fn is_disjoint(a: Rect, b: Rect) -> bool {
     a.right() <= b.x || b.right() <= a.x || a.bottom() <= b.y || b.bottom() <= a.y
 }

@@ -12,34 +12,34 @@ mod bodies;
 pub(crate) mod canvas;
 mod extent;
 mod floor;
-mod key;
 mod labels;
+mod map_legend;
 mod sheet;
 mod space;
 #[cfg(test)]
 mod tests;
+mod trail_lines;
 mod trails;
-mod ways;
 
-pub use key::describe;
-pub use trails::worth_a_trail;
+pub use map_legend::describe;
+pub use trails::bodies_with_trails;
 
-pub(crate) use extent::{around, check, seen};
+pub(crate) use extent::{animation_bounds, check_content, projected_bounds};
 
 use crate::error::DrawError;
 use crate::style::{INK, Style};
 use crate::svg::Svg;
 use canvas::Canvas;
-use sheet::{Area, Sheet};
+use sheet::{Sheet, SheetContent};
 use sidestep_kernel::view::{Frame, Scenery, Trail};
-use trails::Shown;
+use trails::DrawnTrail;
 
 /// Largest side of a drawn box.
-const LARGEST_BOX_PX: f64 = 28.0;
+const MAX_BOX_PX: f64 = 28.0;
 
 /// Options of a picture, and the words around it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
+pub struct PictureOptions {
     /// The room that it may take.
     pub style: Style,
     /// Its heading; may be empty.
@@ -48,7 +48,7 @@ pub struct Options {
     pub caption: String,
 }
 
-impl Options {
+impl PictureOptions {
     /// Returns options for a picture as large as a page, under the scenario's name.
     pub fn page(scenery: &Scenery, caption: impl Into<String>) -> Self {
         Self { style: Style::MAP, title: scenery.name.clone(), caption: caption.into() }
@@ -58,7 +58,7 @@ impl Options {
 /// Draws a moment of a run, with the ways that led to it: from above if everything lies in a plane,
 /// otherwise in parallel projection from a corner. The scale is the same in all directions.
 ///
-/// Only trails that can be distinguished are drawn ([`worth_a_trail`]): as wide as the body on a
+/// Only trails that can be distinguished are drawn ([`bodies_with_trails`]): as wide as the body on a
 /// floor, otherwise as lines; the older, the paler. Agents without a trail are dark if others have
 /// one.
 ///
@@ -70,10 +70,10 @@ pub fn draw(
     scenery: &Scenery,
     frame: &Frame,
     trails: &[Trail],
-    options: &Options,
+    options: &PictureOptions,
 ) -> Result<String, DrawError> {
     options.style.check()?;
-    check(scenery, frame, trails)?;
+    check_content(scenery, frame, trails)?;
     let scene = Scene::new(scenery, frame, trails);
     match scene.is_plane() {
         true => from_above(&scene, options),
@@ -85,12 +85,12 @@ pub fn draw(
 pub(crate) struct Scene<'a> {
     pub(crate) scenery: &'a Scenery,
     pub(crate) frame: &'a Frame,
-    trails: Vec<Shown<'a>>,
+    trails: Vec<DrawnTrail<'a>>,
 }
 
 impl<'a> Scene<'a> {
     pub(crate) fn new(scenery: &'a Scenery, frame: &'a Frame, trails: &'a [Trail]) -> Self {
-        Self { scenery, frame, trails: trails::shown(scenery, frame, trails) }
+        Self { scenery, frame, trails: trails::drawn_trails(scenery, frame, trails) }
     }
 
     /// Returns the same scene with trails as thin lines, for bodies with steps that are far apart.
@@ -122,7 +122,7 @@ impl<'a> Scene<'a> {
             return self.draw_over(svg, canvas);
         }
         bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 0..=3);
-        self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
+        self.trails.iter().for_each(|trail| trail_lines::draw(svg, trail, canvas));
         bodies::draw_layers(svg, self, canvas, &self.frame.bodies, 4..=u8::MAX);
         bodies::draw_marks(svg, self, canvas);
     }
@@ -135,17 +135,21 @@ impl<'a> Scene<'a> {
     }
 
     fn draw_over(&self, svg: &mut Svg, canvas: &Canvas) {
-        self.trails.iter().for_each(|trail| ways::draw(svg, trail, canvas));
+        self.trails.iter().for_each(|trail| trail_lines::draw(svg, trail, canvas));
         bodies::draw_marks(svg, self, canvas);
     }
 }
 
-fn from_above(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError> {
-    let [lo, hi] = extent::whole(scene)?;
+fn from_above(scene: &Scene<'_>, options: &PictureOptions) -> Result<String, DrawError> {
+    let [lo, hi] = extent::scene_bounds(scene)?;
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
     let px = px_per_m(scene, size_m, &options.style);
-    let area =
-        Area { origin_m: [lo[0], lo[1]], size_m, title: &options.title, caption: &options.caption };
+    let area = SheetContent {
+        origin_m: [lo[0], lo[1]],
+        size_m,
+        title: &options.title,
+        caption: &options.caption,
+    };
     let mut svg = Svg::default();
     let sheet = Sheet::open(&mut svg, &area, &options.style, px);
     let canvas = Canvas::above([lo[0], lo[1]], px, sheet.map);
@@ -155,7 +159,7 @@ fn from_above(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError>
     svg.close_group();
     svg.rect(sheet.map, format_args!(r#"fill="none" stroke="{INK}""#));
     labels::draw(&mut svg, scene, &canvas, sheet.map, &options.style);
-    Ok(sheet.close(svg, &area, key::entries(scene), &options.style))
+    Ok(sheet.close(svg, &area, map_legend::legend_entries(scene), &options.style))
 }
 
 /// Returns the scale at which everything fits the style's room; whole pixels per box if boxes are
@@ -163,6 +167,6 @@ fn from_above(scene: &Scene<'_>, options: &Options) -> Result<String, DrawError>
 fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], style: &Style) -> f64 {
     let px = (style.width_px / size_m[0]).min(style.height_px / size_m[1]);
     let Some(floor) = &scene.scenery.floor else { return px };
-    let box_px = (px * floor.box_m).min(LARGEST_BOX_PX);
+    let box_px = (px * floor.box_m).min(MAX_BOX_PX);
     (if box_px >= 2.0 { box_px.floor() } else { box_px }) / floor.box_m
 }

@@ -1,27 +1,27 @@
 //! The surroundings of the map: title, axes in meters, scale bar, legend, caption.
 
-use crate::legend::{Entry, Legend, faint, paragraph, title_look};
+use crate::legend::{Legend, LegendEntry, paragraph, small_print_style, title_style};
 use crate::style::{INK, Style};
-use crate::svg::{Anchor, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Rect, Svg, TextStyle};
 use crate::text::{self, Weight};
-use crate::ticks::{Spacing, Ticks, decimals, label, nice_step};
+use crate::ticks::{LabelSpacing, Ticks, decimals, label, nice_step};
 
 pub(super) const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
 /// The length of "y (m)" in letter sizes.
 const Y_LABEL_LETTERS: f64 = 3.0;
 /// Least width of a picture, in letters, to make room for title and legend.
-const LEAST_LETTERS: f64 = 32.0;
+const MIN_WIDTH_LETTERS: f64 = 32.0;
 /// Extent from which on axes are in kilometers, meters.
-const FAR_M: f64 = 5000.0;
+const MIN_KM_EXTENT_M: f64 = 5000.0;
 
 /// Returns the unit of length for something of this extent, and its length in meters.
 pub(super) fn unit(extent_m: f64) -> (&'static str, f64) {
-    if extent_m < FAR_M { ("m", 1.0) } else { ("km", 1000.0) }
+    if extent_m < MIN_KM_EXTENT_M { ("m", 1.0) } else { ("km", 1000.0) }
 }
 
 /// The content of a sheet: a rectangle in meters, and the words around it.
-pub(super) struct Area<'a> {
+pub(super) struct SheetContent<'a> {
     /// World coordinates of its lower left corner.
     pub(super) origin_m: [f64; 2],
     /// Width and height.
@@ -43,13 +43,13 @@ pub(super) struct Sheet {
 }
 
 /// One edge of the map in its unit.
-struct Edge {
+struct SheetEdge {
     origin: f64,
     length: f64,
     ticks: Ticks,
 }
 
-impl Edge {
+impl SheetEdge {
     fn new(origin: f64, length: f64, length_px: f64, tick_room_px: f64) -> Self {
         let most = ((length_px / tick_room_px) as usize).clamp(1, 12);
         // Sizes that a double cannot resolve at this origin have no ticks.
@@ -67,20 +67,21 @@ impl Edge {
 
 impl Sheet {
     /// Draws title and axes, and returns the place of the map.
-    pub(super) fn open(svg: &mut Svg, area: &Area<'_>, style: &Style, px: f64) -> Self {
+    pub(super) fn open(svg: &mut Svg, area: &SheetContent<'_>, style: &Style, px: f64) -> Self {
         let size = style.small_px();
         let ([x0, y0], [width, height]) = (area.origin_m, area.size_m);
         let unit = unit(width.max(height));
         let edge = |from: f64, length: f64, room_px| {
-            Edge::new(from / unit.1, length / unit.1, length * px, room_px)
+            SheetEdge::new(from / unit.1, length / unit.1, length * px, room_px)
         };
         let (across, upward) = (edge(x0, width, 6.0 * size), edge(y0, height, 4.0 * size));
-        let labels = upward.ticks.widest_px(|label| text::width(label, size, Weight::Regular));
+        let labels = upward.ticks.max_label_px(|label| text::width(label, size, Weight::Regular));
         let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
         let (map_width, map_height) = (width * px, height * px);
-        let width = (left + map_width + 2.0 * EDGE_PX + size).max(LEAST_LETTERS * style.font_px);
+        let width =
+            (left + map_width + 2.0 * EDGE_PX + size).max(MIN_WIDTH_LETTERS * style.font_px);
         let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
-        let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_look(style.title_px()));
+        let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
         // Whole pixels, for sharp edges.
         let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
         let (x, y) = (left.ceil(), (top + spill + 8.0).ceil());
@@ -95,37 +96,37 @@ impl Sheet {
     pub(super) fn close(
         &self,
         mut svg: Svg,
-        area: &Area<'_>,
-        entries: Vec<Entry>,
+        area: &SheetContent<'_>,
+        entries: Vec<LegendEntry>,
         style: &Style,
     ) -> String {
         let axis_px = TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
         let top = self.map.bottom() + axis_px.max(self.spill + 8.0);
         let bar_px = self.draw_scale_bar(&mut svg, style, top);
         let left = self.map.x + bar_px + 2.0 * style.font_px;
-        let legend = Legend::lay_out(entries, style.small_px(), self.width - left - EDGE_PX);
+        let legend = Legend::new(entries, style.small_px(), self.width - left - EDGE_PX);
         legend.draw(&mut svg, left, top - 4.0);
         let top = top + legend.height_px().max(2.4 * style.small_px()) + 6.0;
         let size = style.small_px();
         let lines = text::wrap(area.caption, size, Weight::Regular, self.width - 2.0 * EDGE_PX);
-        let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &faint(size));
+        let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &small_print_style(size));
         svg.finish(self.width, end + EDGE_PX, area.title)
     }
 
-    fn draw_across(&self, svg: &mut Svg, style: &Style, edge: &Edge) {
+    fn draw_across(&self, svg: &mut Svg, style: &Style, edge: &SheetEdge) {
         let bottom = self.map.bottom();
-        let look = TextLook::new(style.small_px(), Anchor::Middle);
+        let look = TextStyle::new(style.small_px(), Anchor::Middle);
         let baseline = bottom + TICK_PX + 3.0 + look.size_px;
-        let mut spacing = Spacing::new();
+        let mut spacing = LabelSpacing::new();
         for (part, label) in edge.marks() {
             let x = self.map.x + part * self.map.width;
             let label_px = text::width(label, look.size_px, Weight::Regular) + 0.5 * look.size_px;
-            if spacing.admits(x, label_px) {
+            if spacing.try_place(x, label_px) {
                 svg.line((x, bottom), (x, bottom + TICK_PX), format_args!(r#"stroke="{INK}""#));
                 svg.text(x, baseline, label, &look);
             }
         }
-        let look = TextLook::new(style.font_px, Anchor::Middle);
+        let look = TextStyle::new(style.font_px, Anchor::Middle);
         svg.text(
             self.map.x + self.map.width / 2.0,
             baseline + 1.45 * style.font_px,
@@ -134,18 +135,18 @@ impl Sheet {
         );
     }
 
-    fn draw_upward(&self, svg: &mut Svg, style: &Style, edge: &Edge) {
+    fn draw_upward(&self, svg: &mut Svg, style: &Style, edge: &SheetEdge) {
         let left = self.map.x;
-        let look = TextLook::new(style.small_px(), Anchor::End);
-        let mut spacing = Spacing::new();
+        let look = TextStyle::new(style.small_px(), Anchor::End);
+        let mut spacing = LabelSpacing::new();
         for (part, label) in edge.marks() {
             let y = self.map.bottom() - part * self.map.height;
-            if spacing.admits(-y, look.size_px) {
+            if spacing.try_place(-y, look.size_px) {
                 svg.line((left - TICK_PX, y), (left, y), format_args!(r#"stroke="{INK}""#));
                 svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
             }
         }
-        let look = TextLook { upward: true, ..TextLook::new(style.font_px, Anchor::Middle) };
+        let look = TextStyle { upward: true, ..TextStyle::new(style.font_px, Anchor::Middle) };
         let words = format!("y ({})", self.unit.0);
         svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &look);
     }
@@ -161,7 +162,7 @@ impl Sheet {
             return 0.0;
         }
         let words = format!("{} {}", label(length, decimals(length)), self.unit.0);
-        let look = TextLook::new(style.small_px(), Anchor::Middle);
+        let look = TextStyle::new(style.small_px(), Anchor::Middle);
         let text_px = text::width(&words, look.size_px, Weight::Regular);
         let bar = Rect {
             x: self.map.x + ((text_px - length_px) / 2.0).max(0.0),

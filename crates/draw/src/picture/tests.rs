@@ -1,20 +1,20 @@
 //! Tests of pictures: which parts they show, where, and in which colors.
 
-use super::{Options, draw};
+use super::{PictureOptions, draw};
 use crate::raster::to_png;
 use crate::style::hex;
 use crate::testing::{ball, moment, open};
 use sidestep_kernel::view::{
-    Body, COLORS, Condition, Frame, Kind, Place, Pose, Scenery, Shape, WALL,
+    BODY_COLORS, Body, BodyKind, Condition, Frame, Pose, Scenery, Shape, Vec3, WALL_COLOR,
 };
 
 fn picture(scenery: &Scenery, frame: &Frame) -> String {
-    draw(scenery, frame, &[], &Options::page(scenery, "")).unwrap()
+    draw(scenery, frame, &[], &PictureOptions::page(scenery, "")).unwrap()
 }
 
 /// Two marks that make the shown area 10 meters square, apart from the margin.
 fn corners() -> Vec<Body> {
-    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(Kind::Goal, 0, at, 0.0)).to_vec()
+    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(BodyKind::Goal, 0, at, 0.0)).to_vec()
 }
 
 fn numbers(text: &str) -> Vec<f64> {
@@ -55,22 +55,22 @@ fn colors<const N: usize>(
 }
 
 fn obstacle(pose: Pose, shape: Shape) -> Body {
-    Body::new(Kind::Obstacle, 0, pose, shape)
+    Body::new(BodyKind::Obstacle, 0, pose, shape)
 }
 
 #[test]
 fn shapes_are_where_they_are() {
-    let turned = Pose::heading([0.0, 5.0, 0.0], 0.8_f64.atan2(0.6));
+    let turned = Pose::from_heading([0.0, 5.0, 0.0], 0.8_f64.atan2(0.6));
     let pole = Shape::Line { points_m: vec![[0.0, 1.0, 0.0], [3.0, 1.0, 0.0]], thickness_m: 0.8 };
     let still = || {
         vec![
-            ball(Kind::Obstacle, 0, [5.0, 5.0, 0.0], 1.0),
+            ball(BodyKind::Obstacle, 0, [5.0, 5.0, 0.0], 1.0),
             obstacle(turned, Shape::Cuboid { size_m: [2.0, 1.0, 0.1] }),
-            obstacle(Pose::at([0.0; 3]), pole.clone()),
+            obstacle(Pose::from_position([0.0; 3]), pole.clone()),
         ]
     };
     let inside = [[5.0, 5.9], [0.5, 5.6], [-0.3, 1.0], [3.0, 1.3]];
-    assert_eq!(colors(vec![], still(), inside), [WALL; 4]);
+    assert_eq!(colors(vec![], still(), inside), [WALL_COLOR; 4]);
     let outside = [[5.8, 5.8], [0.8, 5.0], [-0.5, 1.2], [3.0, 1.5]];
     assert_eq!(colors(vec![], still(), outside), [[255; 3]; 4]);
 }
@@ -80,10 +80,14 @@ fn pair() -> Vec<Body> {
     let ends = [[4.0, 5.0, 0.0], [2.0, 5.0, 0.0]];
     let rod = Shape::Line { points_m: ends.to_vec(), thickness_m: 0.4 };
     let connector = |part: u32| {
-        let ball = ball(Kind::Connector, 0, ends[part as usize], 0.5);
-        ball.part(part).when(part == 0, Condition::Leading)
+        let ball = ball(BodyKind::Connector, 0, ends[part as usize], 0.5);
+        ball.with_part(part).with_state_if(part == 0, Condition::Leading)
     };
-    vec![Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), rod), connector(0), connector(1)]
+    vec![
+        Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rod),
+        connector(0),
+        connector(1),
+    ]
 }
 
 #[test]
@@ -91,14 +95,14 @@ fn a_leader_is_a_ring_and_its_followers_are_discs() {
     let places = [[4.25, 5.0], [2.0, 5.3], [3.0, 5.15], [3.0, 5.3]];
     let [leader, follower, rod, beside] = colors(pair(), vec![], places);
     assert_eq!((leader, beside), ([255; 3], [255; 3]));
-    assert_eq!((follower, rod), (COLORS[0], COLORS[0]));
+    assert_eq!((follower, rod), (BODY_COLORS[0], BODY_COLORS[0]));
 }
 
 #[test]
 fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
     let wall = |k: u32| {
         let points_m = [0.0, 9.0].map(|y| [f64::from(k), y, 0.0]).to_vec();
-        obstacle(Pose::at([0.0; 3]), Shape::Line { points_m, thickness_m: 0.0 })
+        obstacle(Pose::from_position([0.0; 3]), Shape::Line { points_m, thickness_m: 0.0 })
     };
     let arrows = |more: Vec<Body>| {
         let bodies = corners().into_iter().chain((0..8).map(wall)).chain(more).collect();
@@ -106,7 +110,8 @@ fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
         assert_eq!(svg.matches(r#"class="walls""#).count(), 1);
         svg.matches(r#"class="arrow""#).count()
     };
-    let mover = |x_m_s: f64| ball(Kind::Obstacle, 0, [0.0; 3], 0.1).moving([x_m_s, 0.0, 0.0]);
+    let mover =
+        |x_m_s: f64| ball(BodyKind::Obstacle, 0, [0.0; 3], 0.1).with_velocity([x_m_s, 0.0, 0.0]);
     assert_eq!(arrows(vec![mover(0.0)]), 0);
     assert_eq!(arrows(vec![mover(1.0), mover(0.01)]), 1, "too short an arrow is none");
 }
@@ -115,10 +120,12 @@ fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
 fn near_things_are_drawn_over_far_ones() {
     // From near to far; the view looks along the opposite of this.
     let to_eye = super::canvas::Camera::CORNER.to_eye;
-    let at = |k: u32| -> Place { to_eye.map(|x| x * -f64::from(k)) };
-    let frame = moment((0..4).map(|k| ball(Kind::Connector, k, at(k), 1.0).part(1)).collect());
+    let at = |k: u32| -> Vec3 { to_eye.map(|x| x * -f64::from(k)) };
+    let frame =
+        moment((0..4).map(|k| ball(BodyKind::Connector, k, at(k), 1.0).with_part(1)).collect());
     let svg = picture(&open(3), &frame);
-    let place = |k: usize| svg.find(&format!(r#"fill="{}""#, hex(COLORS[k]))).expect("a connector");
+    let place =
+        |k: usize| svg.find(&format!(r#"fill="{}""#, hex(BODY_COLORS[k]))).expect("a connector");
     assert!((0..3).all(|k| place(k) > place(k + 1)), "{svg}");
 }
 
@@ -127,10 +134,12 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
     for (width_m, height_m) in [(10.0, 10.0), (40_000.0, 9000.0), (3.0, 70.0)] {
         let far = f64::max(width_m, height_m);
         let at = [[0.0, 0.0, 0.0], [width_m, 0.0, 0.0], [0.0, height_m, 0.0]];
-        let balls =
-            (0..).zip(at).map(|(k, at)| ball(Kind::Connector, k, at, 0.01 * far).part(1)).collect();
+        let balls = (0..)
+            .zip(at)
+            .map(|(k, at)| ball(BodyKind::Connector, k, at, 0.01 * far).with_part(1))
+            .collect();
         let svg = picture(&open(2), &moment(balls));
-        let [origin, east, north] = [0, 1, 2].map(|k| circle(&svg, &hex(COLORS[k])));
+        let [origin, east, north] = [0, 1, 2].map(|k| circle(&svg, &hex(BODY_COLORS[k])));
         let (across, upward) = ((east[0] - origin[0]) / width_m, (origin[1] - north[1]) / height_m);
         assert!((across / upward - 1.0).abs() < 1e-3, "{across} and {upward} px per m");
         assert!((origin[2] / (0.01 * far * across) - 1.0).abs() < 1e-2, "radii are true as well");
@@ -140,19 +149,19 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
 #[test]
 fn every_kind_has_the_colors_of_the_table() {
     let kinds = [
-        Kind::Robot,
-        Kind::Person,
-        Kind::Door,
-        Kind::Connector,
-        Kind::Airplane,
-        Kind::Zone,
-        Kind::Obstacle,
-        Kind::Goal,
-        Kind::Start,
+        BodyKind::Robot,
+        BodyKind::Person,
+        BodyKind::Door,
+        BodyKind::Connector,
+        BodyKind::Airplane,
+        BodyKind::Zone,
+        BodyKind::Obstacle,
+        BodyKind::Goal,
+        BodyKind::Start,
     ];
     for kind in kinds {
         for state in [Condition::Plain, Condition::Touching, Condition::Failed] {
-            let body = ball(kind, 1, [0.0; 3], 1.0).part(1).when(true, state);
+            let body = ball(kind, 1, [0.0; 3], 1.0).with_part(1).with_state_if(true, state);
             let look = body.appearance(2);
             let svg = picture(&open(2), &moment(vec![body]));
             let fill = format!(r#"fill="{}""#, hex(look.color));
@@ -168,7 +177,12 @@ fn every_kind_has_the_colors_of_the_table() {
 fn thick_parts_in_space_have_a_seam_and_thin_ones_none() {
     let rods = |thickness_m: f64| {
         let points_m = vec![[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]];
-        Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), Shape::Line { points_m, thickness_m })
+        Body::new(
+            BodyKind::Rods,
+            0,
+            Pose::from_position([0.0; 3]),
+            Shape::Line { points_m, thickness_m },
+        )
     };
     let seams = |dimensions: u8, thickness_m: f64| {
         let svg = picture(&open(dimensions), &moment(vec![rods(thickness_m)]));

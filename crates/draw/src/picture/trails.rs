@@ -5,23 +5,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::style::body_dashes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    Body, COLORS, Color, Condition, Floor, Frame, Kind, Place, Scenery, Shape, Trail, Who, color_of,
+    BODY_COLORS, Body, BodyId, BodyKind, Color, Condition, Frame, OccupancyGrid, Scenery, Shape,
+    Trail, Vec3, body_color,
 };
 
 /// Most lines in a picture: they are thin, so more of them than there are colors can be
 /// distinguished.
-const MOST_LINES: usize = 60;
+const MAX_LINES: usize = 60;
 /// Lengths of ribbons in cycles, the longest first: shorter ones are for crowds, where long ones
 /// would cover each other.
-const LENGTHS: [Cycle; 4] = [400, 200, 100, 50];
+const RIBBON_LENGTHS_CYCLES: [Cycle; 4] = [400, 200, 100, 50];
 /// Largest share of the covered area that may be covered twice before ribbons are shortened.
-const MOST_SHARED: f64 = 0.3;
+const MAX_OVERLAP_FRACTION: f64 = 0.3;
 
 /// A trail that is drawn.
 #[derive(Debug, Clone)]
-pub(crate) struct Shown<'a> {
-    pub(crate) of: Who,
-    pub(crate) way: &'a [(Cycle, Place)],
+pub(crate) struct DrawnTrail<'a> {
+    pub(crate) of: BodyId,
+    pub(crate) way: &'a [(Cycle, Vec3)],
     pub(crate) color: Color,
     /// The body's width, if the trail is the area that it has swept on a floor.
     pub(crate) width_m: Option<f64>,
@@ -31,7 +32,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) dash: &'static str,
 }
 
-impl Shown<'_> {
+impl DrawnTrail<'_> {
     /// Returns the shade of a cycle, one of `shades`, 0 for the oldest.
     pub(super) fn shade(&self, cycle: Cycle, shades: usize) -> usize {
         let [from, to] = self.span;
@@ -42,56 +43,56 @@ impl Shown<'_> {
 
 /// Returns agents with ways that can be distinguished in one picture: at most one of each
 /// color, or sixty if ways are thin lines; for chains the leader and the other end.
-pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
+pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
     let numbers: Vec<u32> = agents.into_iter().map(|(_, number)| number).collect();
     match kind {
         None => Vec::new(),
-        Some(Kind::Airplane) => {
-            let first = numbers.into_iter().take(MOST_LINES);
-            first.map(|number| Who::new(Kind::Airplane, number, None)).collect()
+        Some(BodyKind::Airplane) => {
+            let first = numbers.into_iter().take(MAX_LINES);
+            first.map(|number| BodyId::new(BodyKind::Airplane, number, None)).collect()
         }
-        Some(Kind::Connector) => {
-            numbers.into_iter().take(COLORS.len()).flat_map(|n| ends(frame, n)).collect()
+        Some(BodyKind::Connector) => {
+            numbers.into_iter().take(BODY_COLORS.len()).flat_map(|n| chain_ends(frame, n)).collect()
         }
         Some(kind) => {
-            of_each_color(&numbers).into_iter().map(|n| Who::new(kind, n, None)).collect()
+            one_per_color(&numbers).into_iter().map(|n| BodyId::new(kind, n, None)).collect()
         }
     }
 }
 
 /// Returns kinds and numbers of the agents, by number; everything with a start is an airplane, even
 /// if it is not present.
-pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(Kind, u32)> {
+pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u32)> {
     // Robots that are parts of a chain keep to its connectors.
     let acts = |body: &&Body| {
-        body.kind.is_agent() && (body.kind == Kind::Connector || body.part.is_none())
+        body.kind.is_agent() && (body.kind == BodyKind::Connector || body.part.is_none())
     };
     let here = frame.bodies.iter().filter(acts).map(|body| (body.kind, body.number));
-    let starts = scenery.bodies.iter().filter(|body| body.kind == Kind::Start);
-    here.chain(starts.map(|start| (Kind::Airplane, start.number))).collect()
+    let starts = scenery.bodies.iter().filter(|body| body.kind == BodyKind::Start);
+    here.chain(starts.map(|start| (BodyKind::Airplane, start.number))).collect()
 }
 
 /// Returns the leader of a chain, or its first connector, and the other end.
-fn ends(frame: &Frame, number: u32) -> Vec<Who> {
-    let is_its = |body: &&Body| body.kind == Kind::Connector && body.number == number;
-    let mut parts = frame.bodies.iter().filter(is_its).map(Body::who);
+fn chain_ends(frame: &Frame, number: u32) -> Vec<BodyId> {
+    let is_its = |body: &&Body| body.kind == BodyKind::Connector && body.number == number;
+    let mut parts = frame.bodies.iter().filter(is_its).map(Body::id);
     let leader = frame.bodies.iter().filter(is_its).find(|body| body.state == Condition::Leading);
     let first = parts.next();
-    let leader = leader.map(Body::who).or(first);
+    let leader = leader.map(Body::id).or(first);
     let last = parts.next_back().filter(|last| Some(*last) != leader).or(first);
     let ends = [leader, last.filter(|last| Some(*last) != leader)];
     ends.into_iter().flatten().collect()
 }
 
 /// Returns at most one number of each color, at about equal steps, including the first.
-fn of_each_color(numbers: &[u32]) -> Vec<u32> {
-    let most = numbers.len().min(COLORS.len());
+fn one_per_color(numbers: &[u32]) -> Vec<u32> {
+    let most = numbers.len().min(BODY_COLORS.len());
     let mut chosen: Vec<u32> = Vec::new();
     for k in 0..most {
         let from = k * numbers.len() / most;
-        let is_new = |n: &&u32| chosen.iter().all(|c| color_of(*c) != color_of(**n));
+        let is_new = |n: &&u32| chosen.iter().all(|c| body_color(*c) != body_color(**n));
         chosen.extend(numbers[from..].iter().chain(&numbers[..from]).find(is_new));
     }
     chosen.sort_unstable();
@@ -99,21 +100,25 @@ fn of_each_color(numbers: &[u32]) -> Vec<u32> {
 }
 
 /// Returns the trails that are drawn, and how much of them.
-pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -> Vec<Shown<'a>> {
-    let worth = worth_a_trail(scenery, frame);
+pub(super) fn drawn_trails<'a>(
+    scenery: &Scenery,
+    frame: &Frame,
+    trails: &'a [Trail],
+) -> Vec<DrawnTrail<'a>> {
+    let worth = bodies_with_trails(scenery, frame);
     let sizes = sizes(scenery, frame);
-    let drawn = |trail: &'a Trail| Shown {
+    let drawn = |trail: &'a Trail| DrawnTrail {
         of: trail.of,
-        way: &trail.way,
-        color: color_of(trail.of.number),
+        way: &trail.points,
+        color: body_color(trail.of.number),
         width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
         span: [0, 0],
         dash: "",
     };
-    let is_shown = |trail: &&Trail| worth.contains(&trail.of) && !trail.way.is_empty();
-    let mut shown: Vec<Shown<'_>> = trails.iter().filter(is_shown).map(drawn).collect();
+    let is_shown = |trail: &&Trail| worth.contains(&trail.of) && !trail.points.is_empty();
+    let mut shown: Vec<DrawnTrail<'_>> = trails.iter().filter(is_shown).map(drawn).collect();
     if let Some(floor) = scenery.floor.as_ref().filter(|_| !sizes.is_empty()) {
-        shorten(&mut shown, floor, &sizes);
+        shorten_ribbons(&mut shown, floor, &sizes);
     }
     let cycles = || shown.iter().flat_map(|trail| trail.way).map(|(cycle, _)| *cycle);
     let span = [cycles().min().unwrap_or(0), cycles().max().unwrap_or(0)];
@@ -128,35 +133,43 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
 }
 
 /// Returns the width and height of the bodies that sweep a floor.
-fn sizes(scenery: &Scenery, frame: &Frame) -> BTreeMap<Who, [f64; 2]> {
+fn sizes(scenery: &Scenery, frame: &Frame) -> BTreeMap<BodyId, [f64; 2]> {
     if scenery.floor.is_none() {
         return BTreeMap::new();
     }
     let size = |body: &Body| match body.shape {
         // A body without extent leaves no ribbon.
-        Shape::Cuboid { size_m: [x, y, _] } if x > 0.0 && y > 0.0 => Some((body.who(), [x, y])),
+        Shape::Cuboid { size_m: [x, y, _] } if x > 0.0 && y > 0.0 => Some((body.id(), [x, y])),
         _ => None,
     };
     frame.bodies.iter().filter(|body| body.kind.is_agent()).filter_map(size).collect()
 }
 
 /// Keeps the longest last part of the trails that leaves them distinguishable.
-fn shorten(trails: &mut [Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) {
+fn shorten_ribbons(
+    trails: &mut [DrawnTrail<'_>],
+    floor: &OccupancyGrid,
+    sizes: &BTreeMap<BodyId, [f64; 2]>,
+) {
     let now = trails.iter().filter_map(|trail| trail.way.last()).map(|(cycle, _)| *cycle).max();
     let now = now.unwrap_or(0);
-    for length in LENGTHS {
+    for length in RIBBON_LENGTHS_CYCLES {
         for trail in trails.iter_mut() {
-            let is_before = |(cycle, _): &(Cycle, Place)| cycle + length < now;
+            let is_before = |(cycle, _): &(Cycle, Vec3)| cycle + length < now;
             trail.way = &trail.way[trail.way.partition_point(is_before)..];
         }
-        if shared(trails, floor, sizes) <= MOST_SHARED {
+        if overlap_fraction(trails, floor, sizes) <= MAX_OVERLAP_FRACTION {
             return;
         }
     }
 }
 
 /// Returns the share of the covered boxes that two bodies or more have covered.
-fn shared(trails: &[Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) -> f64 {
+fn overlap_fraction(
+    trails: &[DrawnTrail<'_>],
+    floor: &OccupancyGrid,
+    sizes: &BTreeMap<BodyId, [f64; 2]>,
+) -> f64 {
     let mut covered_by = BTreeMap::<(i64, i64), u64>::new();
     for (index, trail) in trails.iter().enumerate() {
         let Some(size_m) = sizes.get(&trail.of) else { continue };
@@ -165,8 +178,8 @@ fn shared(trails: &[Shown<'_>], floor: &Floor, sizes: &BTreeMap<Who, [f64; 2]>) 
             ((size_m[k] / floor.box_m).round() as i64).clamp(1, i64::from(most))
         };
         let (width, height) = (boxes(0, floor.width), boxes(1, floor.height));
-        let corner = |&(_, [x, y, _]): &(Cycle, Place)| {
-            let middle_m = floor.plane.point([x, y]);
+        let corner = |&(_, [x, y, _]): &(Cycle, Vec3)| {
+            let middle_m = floor.plane.inverse_transform_point([x, y]);
             let low = |k: usize| ((middle_m[k] - 0.5 * size_m[k]) / floor.box_m).round() as i64;
             (low(0), low(1))
         };
@@ -187,12 +200,12 @@ mod tests {
     #[test]
     fn robots_are_chosen_evenly_and_differ_in_color() {
         let numbers: Vec<u32> = (0..24).collect();
-        let chosen = of_each_color(&numbers);
+        let chosen = one_per_color(&numbers);
         assert_eq!(chosen, [0, 4, 8, 13, 17, 21]);
-        let colors: BTreeSet<Color> = chosen.iter().map(|&n| color_of(n)).collect();
-        assert_eq!(colors.len(), COLORS.len());
-        assert_eq!(of_each_color(&numbers[..3]), [0, 1, 2]);
-        assert!(of_each_color(&[]).is_empty());
-        assert_eq!(of_each_color(&[0, 6, 12]), [0], "all of one color");
+        let colors: BTreeSet<Color> = chosen.iter().map(|&n| body_color(n)).collect();
+        assert_eq!(colors.len(), BODY_COLORS.len());
+        assert_eq!(one_per_color(&numbers[..3]), [0, 1, 2]);
+        assert!(one_per_color(&[]).is_empty());
+        assert_eq!(one_per_color(&[0, 6, 12]), [0], "all of one color");
     }
 }

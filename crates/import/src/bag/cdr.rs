@@ -59,7 +59,7 @@ impl std::fmt::Display for CdrError {
 pub trait Cdr: Sized {
     /// The least number of bytes that a value takes, so that no list can claim more values than there
     /// are bytes for.
-    const LEAST_BYTES: usize;
+    const MIN_BYTES: usize;
 
     /// Reads a value.
     ///
@@ -80,7 +80,7 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Returns the next bytes, which begin at a multiple of `alignment`.
-    fn take(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
+    fn read_bytes(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
         let start = self.at.next_multiple_of(alignment);
         let taken = self.body.get(start..).and_then(|rest| rest.get(..n));
         let taken = taken.ok_or(CdrError::Cut { at: start })?;
@@ -90,7 +90,7 @@ impl<'a> Reader<'a> {
 
     fn number<const N: usize>(&mut self) -> Result<[u8; N], CdrError> {
         let mut bytes = [0; N];
-        bytes.copy_from_slice(self.take(N, N)?);
+        bytes.copy_from_slice(self.read_bytes(N, N)?);
         if !self.is_little {
             bytes.reverse();
         }
@@ -112,7 +112,7 @@ impl Writer {
     }
 
     /// A longer list than can be counted is no message of a robot.
-    fn length(&mut self, length: usize) {
+    fn write_length(&mut self, length: usize) {
         u32::try_from(length).expect("fewer than four billion values").write(self);
     }
 }
@@ -120,7 +120,7 @@ impl Writer {
 macro_rules! number {
     ($($type:ty),*) => {$(
         impl Cdr for $type {
-            const LEAST_BYTES: usize = size_of::<Self>();
+            const MIN_BYTES: usize = size_of::<Self>();
 
             fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
                 reader.number().map(Self::from_le_bytes)
@@ -136,11 +136,11 @@ macro_rules! number {
 number!(f32, f64, i32, u32);
 
 impl Cdr for String {
-    const LEAST_BYTES: usize = 4;
+    const MIN_BYTES: usize = 4;
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
         let length = u32::read(reader)? as usize;
-        let (at, bytes) = (reader.at, reader.take(length, 1)?);
+        let (at, bytes) = (reader.at, reader.read_bytes(length, 1)?);
         // Some programs write an empty text without the zero at its end.
         let Some((&0, text)) = bytes.split_last() else {
             return if bytes.is_empty() { Ok(Self::new()) } else { Err(CdrError::Text { at }) };
@@ -149,32 +149,32 @@ impl Cdr for String {
     }
 
     fn write(&self, writer: &mut Writer) {
-        writer.length(self.len() + 1);
+        writer.write_length(self.len() + 1);
         writer.bytes.extend(self.as_bytes());
         writer.bytes.push(0);
     }
 }
 
 impl<T: Cdr> Cdr for Vec<T> {
-    const LEAST_BYTES: usize = 4;
+    const MIN_BYTES: usize = 4;
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
         let length = u32::read(reader)? as usize;
         let left = reader.body.len() - reader.at;
-        if length > left / T::LEAST_BYTES {
+        if length > left / T::MIN_BYTES {
             return Err(CdrError::Cut { at: reader.at });
         }
         (0..length).map(|_| T::read(reader)).collect()
     }
 
     fn write(&self, writer: &mut Writer) {
-        writer.length(self.len());
+        writer.write_length(self.len());
         self.iter().for_each(|value| value.write(writer));
     }
 }
 
 impl<T: Cdr + Copy + Default, const N: usize> Cdr for [T; N] {
-    const LEAST_BYTES: usize = N * T::LEAST_BYTES;
+    const MIN_BYTES: usize = N * T::MIN_BYTES;
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
         let mut values = [T::default(); N];
@@ -199,7 +199,7 @@ macro_rules! message {
         }
 
         impl Cdr for $name {
-            const LEAST_BYTES: usize = 0 $(+ <$type as Cdr>::LEAST_BYTES)*;
+            const MIN_BYTES: usize = 0 $(+ <$type as Cdr>::MIN_BYTES)*;
 
             fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
                 $(let $field = Cdr::read(reader)?;)*

@@ -3,23 +3,23 @@
 use sidestep_kernel::InputError;
 
 use super::messages::LaserScan;
-use super::poses::Placed;
-use crate::mrclam::TruePose;
+use super::poses::StampedPose;
+use crate::mrclam::StampedPose2;
 
 /// Messages may overtake each other by this much; a stamp further back is a clock that was set back.
-const BACK_MAX_SECS: f64 = 0.5;
+const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
 /// A stamp this far ahead of the one before is a clock that was set forward.
-const AHEAD_MAX_SECS: f64 = 3600.0;
+const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 
 /// Something with a time.
-pub(super) trait Stamped {
+pub(super) trait HasStamp {
     /// Returns the time in s.
     fn t_secs(&self) -> f64;
     /// Returns the number of its message, from 1.
     fn message(&self) -> u64;
 }
 
-impl Stamped for &Placed {
+impl HasStamp for &StampedPose {
     fn t_secs(&self) -> f64 {
         self.t_secs
     }
@@ -29,7 +29,7 @@ impl Stamped for &Placed {
     }
 }
 
-impl Stamped for (u64, LaserScan) {
+impl HasStamp for (u64, LaserScan) {
     fn t_secs(&self) -> f64 {
         self.1.header.stamp.secs()
     }
@@ -43,13 +43,16 @@ impl Stamped for (u64, LaserScan) {
 ///
 /// # Errors
 /// When the clock jumps.
-pub(super) fn in_order<T: Stamped>(place: &str, mut all: Vec<T>) -> Result<Vec<T>, InputError> {
+pub(super) fn sort_by_stamp<T: HasStamp>(
+    place: &str,
+    mut all: Vec<T>,
+) -> Result<Vec<T>, InputError> {
     let mut latest = f64::NEG_INFINITY;
     for stamped in &all {
         let step_secs = stamped.t_secs() - latest;
         let is_first = latest == f64::NEG_INFINITY;
-        if !is_first && !(-BACK_MAX_SECS..=AHEAD_MAX_SECS).contains(&step_secs) {
-            return Err(jump(place, stamped.message(), step_secs));
+        if !is_first && !(-MAX_BACKWARD_STEP_SECS..=MAX_FORWARD_STEP_SECS).contains(&step_secs) {
+            return Err(clock_jump(place, stamped.message(), step_secs));
         }
         latest = latest.max(stamped.t_secs());
     }
@@ -57,7 +60,7 @@ pub(super) fn in_order<T: Stamped>(place: &str, mut all: Vec<T>) -> Result<Vec<T
     Ok(all)
 }
 
-fn jump(place: &str, message: u64, step_secs: f64) -> InputError {
+fn clock_jump(place: &str, message: u64, step_secs: f64) -> InputError {
     let side = if step_secs < 0.0 { "before" } else { "after" };
     let cause = format!(
         "the clock jumps: message {message} is stamped {:.3} s {side} an earlier one",
@@ -74,9 +77,9 @@ fn jump(place: &str, message: u64, step_secs: f64) -> InputError {
 /// When they have none.
 pub(super) fn check_overlap(
     bag: &str,
-    [(a_name, a), (b_name, b)]: [(&str, &[TruePose]); 2],
+    [(a_name, a), (b_name, b)]: [(&str, &[StampedPose2]); 2],
 ) -> Result<(), InputError> {
-    let ends = |track: &[TruePose]| Some((track.first()?.t_secs, track.last()?.t_secs));
+    let ends = |track: &[StampedPose2]| Some((track.first()?.t_secs, track.last()?.t_secs));
     let (Some(first), Some(second)) = (ends(a), ends(b)) else { return Ok(()) };
     if first.0 <= second.1 && second.0 <= first.1 {
         return Ok(());

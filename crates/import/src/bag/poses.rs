@@ -8,7 +8,7 @@ use super::messages::{
     Header, Message, Odometry, Pose, PoseStamped, PoseWithCovarianceStamped, TfMessage,
     TransformStamped,
 };
-use crate::mrclam::TruePose;
+use crate::mrclam::StampedPose2;
 
 /// The types of messages that hold poses.
 pub(super) const SCHEMAS: [&str; 5] = [
@@ -19,11 +19,11 @@ pub(super) const SCHEMAS: [&str; 5] = [
     TfMessage::NAME,
 ];
 /// An orientation with a smaller norm than this is none.
-const NORM_MIN: f64 = 1e-3;
+const MIN_NORM: f64 = 1e-3;
 
 /// A pose at a time, of one frame in another.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct StampedPose {
     /// The number of its message on its topic, from 1.
     pub(super) message: u64,
     pub(super) t_secs: f64,
@@ -33,14 +33,14 @@ pub(super) struct Placed {
     pub(super) pose: Turned,
 }
 
-impl Placed {
+impl StampedPose {
     fn new(header: Header, child: String, pose: Pose) -> Self {
         let t_secs = header.stamp.secs();
         let pose = Turned { at_m: pose.position, turn: pose.orientation };
         Self { message: 0, t_secs, parent: header.frame_id, child, pose }
     }
 
-    fn of_transform(transform: TransformStamped) -> Self {
+    fn from_transform(transform: TransformStamped) -> Self {
         Self::new(transform.header, transform.child_frame_id, transform.transform)
     }
 
@@ -51,7 +51,7 @@ impl Placed {
             return Err("its pose has a number that is not finite");
         }
         let norm = self.pose.turn.iter().map(|q| q * q).sum::<f64>().sqrt();
-        if norm < NORM_MIN {
+        if norm < MIN_NORM {
             return Err("its orientation is 0, 0, 0, 0, which is none");
         }
         self.pose.turn = self.pose.turn.map(|q| q / norm);
@@ -59,39 +59,43 @@ impl Placed {
     }
 
     /// Returns where the frame is and looks in the plane.
-    pub(super) fn planar(&self) -> TruePose {
+    pub(super) fn to_planar(&self) -> StampedPose2 {
         let [x_m, y_m, _] = self.pose.at_m;
-        let ahead = self.pose.turned([1.0, 0.0, 0.0]);
+        let ahead = self.pose.rotate([1.0, 0.0, 0.0]);
         let heading_rad = atan2(ahead[1], ahead[0]);
-        TruePose { t_secs: self.t_secs, position_m: [x_m, y_m], heading_rad }
+        StampedPose2 { t_secs: self.t_secs, position_m: [x_m, y_m], heading_rad }
     }
 }
 
 /// Returns the poses in message number `message` of its topic, which is of one of [`SCHEMAS`].
-pub(super) fn placed(schema: &str, message: u64, bytes: &[u8]) -> Result<Vec<Placed>, String> {
-    let found = decoded(schema, bytes).map_err(|e| e.to_string())?;
-    let numbered = found.into_iter().map(|placed| Placed { message, ..placed });
-    Ok(numbered.map(Placed::checked).collect::<Result<_, _>>()?)
+pub(super) fn decode_poses(
+    schema: &str,
+    message: u64,
+    bytes: &[u8],
+) -> Result<Vec<StampedPose>, String> {
+    let found = decode_message(schema, bytes).map_err(|e| e.to_string())?;
+    let numbered = found.into_iter().map(|placed| StampedPose { message, ..placed });
+    Ok(numbered.map(StampedPose::checked).collect::<Result<_, _>>()?)
 }
 
-fn decoded(schema: &str, bytes: &[u8]) -> Result<Vec<Placed>, CdrError> {
+fn decode_message(schema: &str, bytes: &[u8]) -> Result<Vec<StampedPose>, CdrError> {
     Ok(match SCHEMAS.iter().position(|known| *known == schema) {
         Some(0) => {
             let message: Odometry = decode(bytes)?;
-            vec![Placed::new(message.header, message.child_frame_id, message.pose.pose)]
+            vec![StampedPose::new(message.header, message.child_frame_id, message.pose.pose)]
         }
         Some(1) => {
             let message: PoseStamped = decode(bytes)?;
-            vec![Placed::new(message.header, String::new(), message.pose)]
+            vec![StampedPose::new(message.header, String::new(), message.pose)]
         }
         Some(2) => {
             let message: PoseWithCovarianceStamped = decode(bytes)?;
-            vec![Placed::new(message.header, String::new(), message.pose.pose)]
+            vec![StampedPose::new(message.header, String::new(), message.pose.pose)]
         }
-        Some(3) => vec![Placed::of_transform(decode(bytes)?)],
+        Some(3) => vec![StampedPose::from_transform(decode(bytes)?)],
         _ => {
             let message: TfMessage = decode(bytes)?;
-            message.transforms.into_iter().map(Placed::of_transform).collect()
+            message.transforms.into_iter().map(StampedPose::from_transform).collect()
         }
     })
 }
@@ -101,7 +105,7 @@ pub(super) fn compose(outer: &Turned, inner: &Turned) -> Turned {
     let [ax, ay, az, aw] = outer.turn;
     let [bx, by, bz, bw] = inner.turn;
     Turned {
-        at_m: outer.place(inner.at_m),
+        at_m: outer.transform_point(inner.at_m),
         turn: [
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
@@ -118,10 +122,10 @@ mod tests {
 
     #[test]
     fn poses_one_in_the_other_are_placed_and_turned_by_both() {
-        let outer = Turned::heading([1.0, 2.0, 0.0], FRAC_PI_2);
-        let whole = compose(&outer, &Turned::heading([3.0, 0.0, 0.5], FRAC_PI_2));
+        let outer = Turned::from_heading([1.0, 2.0, 0.0], FRAC_PI_2);
+        let whole = compose(&outer, &Turned::from_heading([3.0, 0.0, 0.5], FRAC_PI_2));
         assert!((whole.at_m[0] - 1.0).abs() < 1e-12 && (whole.at_m[1] - 5.0).abs() < 1e-12);
-        let back = whole.turned([1.0, 0.0, 0.0]);
+        let back = whole.rotate([1.0, 0.0, 0.0]);
         assert!((back[0] + 1.0).abs() < 1e-12, "{back:?}");
     }
 }

@@ -12,9 +12,9 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
 /// Largest record in bytes: an image of sixty megapixels and more.
-const RECORD_BYTES_MAX: usize = 1 << 28;
+const MAX_RECORD_BYTES: usize = 1 << 28;
 /// Largest `metadata.yaml` in bytes; it lists topics and files.
-const METADATA_BYTES_MAX: u64 = 1 << 20;
+const MAX_METADATA_BYTES: u64 = 1 << 20;
 /// The encoding of messages of ROS 2.
 const CDR: &str = "cdr";
 
@@ -48,7 +48,7 @@ pub(super) fn read(
     mut each: impl FnMut(RawMessage<'_>) -> Result<(), InputError>,
 ) -> Result<BTreeMap<String, Topic>, InputError> {
     let mut topics = BTreeMap::new();
-    for file in files(path)? {
+    for file in bag_files(path)? {
         read_file(&file, &mut topics, &is_wanted, &mut each)?;
     }
     Ok(topics)
@@ -56,7 +56,7 @@ pub(super) fn read(
 
 /// The schemas and channels of a file by their numbers.
 #[derive(Default)]
-struct Declared {
+struct ChannelTable {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
 }
@@ -68,13 +68,13 @@ fn read_file(
     each: &mut impl FnMut(RawMessage<'_>) -> Result<(), InputError>,
 ) -> Result<(), InputError> {
     let mut file = File::open(path).map_err(|e| unreadable(path, &e))?;
-    check_beginning(path, &mut file)?;
+    check_magic(path, &mut file)?;
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_validate_chunk_crcs(true)
-        .with_record_length_limit(RECORD_BYTES_MAX);
+        .with_record_length_limit(MAX_RECORD_BYTES);
     let mut reader = LinearReader::new_with_options(options);
-    let mut declared = Declared::default();
+    let mut declared = ChannelTable::default();
     while let Some(event) = reader.next_event() {
         match event.map_err(|e| damaged(path, &e))? {
             LinearReadEvent::ReadRequest(n) => {
@@ -83,17 +83,17 @@ fn read_file(
             }
             LinearReadEvent::Record { data, opcode } => {
                 let record = parse_record(opcode, data).map_err(|e| damaged(path, &e))?;
-                take(path, record, &mut declared, topics, is_wanted, each)?;
+                process_record(path, record, &mut declared, topics, is_wanted, each)?;
             }
         }
     }
     Ok(())
 }
 
-fn take(
+fn process_record(
     path: &Path,
     record: Record<'_>,
-    declared: &mut Declared,
+    declared: &mut ChannelTable,
     topics: &mut BTreeMap<String, Topic>,
     is_wanted: &impl Fn(&str) -> bool,
     each: &mut impl FnMut(RawMessage<'_>) -> Result<(), InputError>,
@@ -135,14 +135,14 @@ fn check_encoding(path: &Path, name: &str, topic: &Topic) -> Result<(), InputErr
 }
 
 /// Returns the files of a bag: the file itself, or those that the folder's `metadata.yaml` lists.
-fn files(path: &Path) -> Result<Vec<PathBuf>, InputError> {
+fn bag_files(path: &Path) -> Result<Vec<PathBuf>, InputError> {
     if !path.is_dir() {
         return Ok(vec![path.to_path_buf()]);
     }
     let metadata = path.join("metadata.yaml");
     let names = match metadata.is_file() {
-        true => listed(&metadata)?,
-        false => found(path)?,
+        true => read_file_list(&metadata)?,
+        false => find_mcap_files(path)?,
     };
     if names.is_empty() {
         let remedy = "name a folder that `ros2 bag record -s mcap` wrote, or an .mcap file";
@@ -152,7 +152,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, InputError> {
 }
 
 /// Returns the names of the files in a folder without `metadata.yaml`, in the order of their numbers.
-fn found(folder: &Path) -> Result<Vec<String>, InputError> {
+fn find_mcap_files(folder: &Path) -> Result<Vec<String>, InputError> {
     let entries = std::fs::read_dir(folder).map_err(|e| unreadable(folder, &e))?;
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let mut names: Vec<String> = names.filter(|name| name.ends_with(".mcap")).collect();
@@ -164,8 +164,8 @@ fn found(folder: &Path) -> Result<Vec<String>, InputError> {
 /// Returns the names of the files that `metadata.yaml` lists, a line each below their key.
 ///
 /// The key is found without a parser of YAML: both known writers put it so, and no depth of a tree can do harm.
-fn listed(path: &Path) -> Result<Vec<String>, InputError> {
-    let text = read_text(path, METADATA_BYTES_MAX)?;
+fn read_file_list(path: &Path) -> Result<Vec<String>, InputError> {
+    let text = read_text(path, MAX_METADATA_BYTES)?;
     let mut below = text.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
     if below.next().is_none() {
         let remedy = "restore it: `ros2 bag reindex -s mcap FOLDER`, or name an .mcap file";
@@ -176,7 +176,7 @@ fn listed(path: &Path) -> Result<Vec<String>, InputError> {
 }
 
 /// Kinds of files that are taken for bags, by their first bytes, and the remedy.
-const OTHERS: [(&[u8], &str, &str); 3] = [
+const FOREIGN_FORMATS: [(&[u8], &str, &str); 3] = [
     (b"#ROSBAG", "is a bag of ROS 1", "convert it: `rosbags-convert --src FILE --dst FOLDER`"),
     (b"SQLite f", "is a bag in SQLite", "convert it to MCAP: `ros2 bag convert`"),
     (
@@ -186,13 +186,13 @@ const OTHERS: [(&[u8], &str, &str); 3] = [
     ),
 ];
 
-fn check_beginning(path: &Path, file: &mut File) -> Result<(), InputError> {
+fn check_magic(path: &Path, file: &mut File) -> Result<(), InputError> {
     let mut begin = [0; ::mcap::MAGIC.len()];
     let is_whole = file.read_exact(&mut begin).is_ok();
     if is_whole && begin == ::mcap::MAGIC {
         return Ok(());
     }
-    let other = OTHERS.iter().find(|(magic, ..)| begin.starts_with(magic));
+    let other = FOREIGN_FORMATS.iter().find(|(magic, ..)| begin.starts_with(magic));
     let (cause, remedy) = other.map_or(
         ("is no MCAP file", "name a bag recorded with `ros2 bag record -s mcap`"),
         |(_, cause, remedy)| (cause, remedy),

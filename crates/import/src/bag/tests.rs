@@ -15,7 +15,7 @@ use super::messages::{
     Header, LaserScan, Odometry, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped,
     TfMessage, Time, TransformStamped, TwistWithCovariance,
 };
-use super::{BagLog, Source, Wanted, read};
+use super::{BagLog, PoseTopic, TopicSelection, read};
 use sidestep_kernel::InputError;
 
 /// A topic, the type of its message, and the message.
@@ -31,7 +31,7 @@ fn header(t_ms: u64, frame: &str) -> Header {
 }
 
 fn at(x_m: f64, heading_rad: f64) -> Pose {
-    let pose = view::Pose::heading([x_m, 0.0, 0.0], heading_rad);
+    let pose = view::Pose::from_heading([x_m, 0.0, 0.0], heading_rad);
     Pose { position: pose.at_m, orientation: pose.turn }
 }
 
@@ -112,10 +112,10 @@ fn stored(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-fn wanted(truth: &str, scans: Option<&str>) -> Wanted {
-    Wanted {
-        odometry: Some(Source::parse("/odom").unwrap()),
-        truth: Source::parse(truth).unwrap(),
+fn wanted(truth: &str, scans: Option<&str>) -> TopicSelection {
+    TopicSelection {
+        odometry: Some(PoseTopic::parse("/odom").unwrap()),
+        truth: PoseTopic::parse(truth).unwrap(),
         scans: scans.map(String::from),
     }
 }
@@ -124,12 +124,12 @@ fn drive() -> Vec<Entry> {
     (0..20).flat_map(|k| [odometry(100 * k, k as f64), truth(100 * k, 2.0 * k as f64)]).collect()
 }
 
-fn read_all(entries: &[Entry], wanted: &Wanted) -> Result<BagLog, InputError> {
+fn read_all(entries: &[Entry], wanted: &TopicSelection) -> Result<BagLog, InputError> {
     let (_folder, path) = bag(entries);
     read(&path, wanted)
 }
 
-fn refused(entries: &[Entry], wanted: &Wanted) -> InputError {
+fn refused(entries: &[Entry], wanted: &TopicSelection) -> InputError {
     read_all(entries, wanted).unwrap_err()
 }
 
@@ -196,7 +196,7 @@ fn frames_are_joined_through_those_between_them() {
 #[test]
 fn a_circle_of_frames_ends() {
     let entries = [transforms("/tf", 0, &[("a", "b", at(0.0, 0.0)), ("b", "a", at(0.0, 0.0))])];
-    let wanted = Wanted { odometry: None, ..wanted("/tf:map:a", None) };
+    let wanted = TopicSelection { odometry: None, ..wanted("/tf:map:a", None) };
     assert!(refused(&entries, &wanted).cause().contains("no transforms lead"));
 }
 
@@ -221,8 +221,8 @@ fn the_scanner_sits_where_static_transforms_put_it() {
         (found.at_m[0] - 1.0).abs() < 1e-12 && (found.at_m[1] - 2.0).abs() < 1e-12,
         "{found:?}"
     );
-    assert!((found.turned([1.0, 0.0, 0.0])[0] + 1.0).abs() < 1e-12);
-    assert_eq!(mount(&tree, "base"), Some(view::Pose::at([0.0; 3])));
+    assert!((found.rotate([1.0, 0.0, 0.0])[0] + 1.0).abs() < 1e-12);
+    assert_eq!(mount(&tree, "base"), Some(view::Pose::from_position([0.0; 3])));
     assert_eq!(mount(&tree, "eye"), None);
 }
 
@@ -266,7 +266,7 @@ fn a_clock_that_is_set_is_an_error_and_messages_that_overtake_are_sorted() {
     let stamps = |stamps: &[u64]| {
         let mut entries = vec![odometry(0, 0.0), odometry(9_000_000, 0.0)];
         entries.extend(stamps.iter().map(|t_ms| truth(*t_ms, *t_ms as f64)));
-        let wanted = Wanted { odometry: None, ..wanted("/truth", None) };
+        let wanted = TopicSelection { odometry: None, ..wanted("/truth", None) };
         read_all(&entries, &wanted)
     };
     let error = stamps(&[0, 1000, 400]).unwrap_err();
@@ -360,11 +360,11 @@ fn a_folder_is_read_in_the_order_that_its_metadata_list_or_else_of_its_numbers()
 
 #[test]
 fn a_source_is_a_topic_or_a_topic_and_two_frames() {
-    let source = Source::parse("/tf:map:robot/base").unwrap();
+    let source = PoseTopic::parse("/tf:map:robot/base").unwrap();
     assert_eq!(source.frames, Some(("map".into(), "robot/base".into())));
-    assert_eq!(Source::parse("/odom").unwrap().frames, None);
+    assert_eq!(PoseTopic::parse("/odom").unwrap().frames, None);
     for wrong in ["", "/tf:map", "/tf::base", "/tf:a:b:c"] {
-        assert!(Source::parse(wrong).unwrap_err().remedy().contains("/tf:map:base_link"));
+        assert!(PoseTopic::parse(wrong).unwrap_err().remedy().contains("/tf:map:base_link"));
     }
 }
 
@@ -383,7 +383,7 @@ proptest::proptest! {
 #[test]
 fn every_message_takes_some_bytes() {
     fn least<T: Cdr>() -> usize {
-        T::LEAST_BYTES
+        T::MIN_BYTES
     }
     assert_eq!(
         [least::<TransformStamped>(), least::<Odometry>(), least::<LaserScan>()],

@@ -6,14 +6,14 @@ use std::fmt;
 use super::lines::Command;
 use super::values::{
     Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, heading_deg, is_latitude, number,
-    positive, speed, switch, vertical_speed_fpm, zone_size,
+    on_off, positive, speed, vertical_speed_fpm, zone_size,
 };
 use super::{
-    Change, MAX_AIRCRAFT, MAX_WAY_POINTS, Place, Resolution, ScnAircraft, ScnFile, Speed,
-    UnplacedAircraft, UnresolvedPlace, WayPoint, Wind, synthetic,
+    AircraftCommand, Airspeed, MAX_AIRCRAFT, MAX_WAY_POINTS, PositionRef, ResolutionMethod,
+    ScnAircraft, ScnFile, UnplacedAircraft, UnresolvedPosition, WayPoint, Wind, synthetic,
 };
 use crate::local_plane::LatLon;
-use crate::table::Word;
+use crate::table::Token;
 use sidestep_kernel::InputError;
 
 /// Commands to one aircraft; its name may stand in front of them.
@@ -44,28 +44,28 @@ const DISPLAY_COMMANDS: [&str; 12] = [
 const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
 
 /// The result of a command.
-enum Outcome {
+enum CommandOutcome {
     Done,
     /// It has no effect here, and is counted under this name.
     NotUnderstood(String),
 }
 
 /// The reason why a command had no effect.
-enum Problem {
+enum CommandError {
     Unparsed(InputError),
     Refused(InputError),
 }
 
-impl From<InputError> for Problem {
+impl From<InputError> for CommandError {
     fn from(error: InputError) -> Self {
         Self::Unparsed(error)
     }
 }
 
-type Done = Result<Outcome, Problem>;
+type CommandResult = Result<CommandOutcome, CommandError>;
 
 /// An aircraft that is being built.
-struct Draft {
+struct AircraftBuilder {
     aircraft: ScnAircraft,
     /// The name of its starting place, where the position of that is not known.
     unresolved_start: Option<String>,
@@ -75,7 +75,7 @@ struct Draft {
 pub(super) struct Interpreter<'p> {
     place: &'p dyn fmt::Display,
     file: ScnFile,
-    drafts: Vec<Draft>,
+    drafts: Vec<AircraftBuilder>,
     /// The last draft with each identifier.
     by_id: BTreeMap<String, usize>,
     /// The way-points that `DEFWPT` has defined.
@@ -93,7 +93,7 @@ impl<'p> Interpreter<'p> {
         for command in commands {
             self.execute(command);
         }
-        for Draft { aircraft, unresolved_start } in self.drafts {
+        for AircraftBuilder { aircraft, unresolved_start } in self.drafts {
             match unresolved_start {
                 None => self.file.traffic.aircraft.push(aircraft),
                 Some(place) => {
@@ -113,15 +113,15 @@ impl<'p> Interpreter<'p> {
             return count(&mut self.file.ignored, name);
         }
         match self.act(&name, time_s, &mut arguments) {
-            Ok(Outcome::Done) => {}
-            Ok(Outcome::NotUnderstood(what)) => count(&mut self.file.not_understood, what),
-            Err(Problem::Unparsed(error)) => self.file.unparsed.push(error),
-            Err(Problem::Refused(error)) => self.file.refused.push(error),
+            Ok(CommandOutcome::Done) => {}
+            Ok(CommandOutcome::NotUnderstood(what)) => count(&mut self.file.not_understood, what),
+            Err(CommandError::Unparsed(error)) => self.file.unparsed.push(error),
+            Err(CommandError::Refused(error)) => self.file.refused.push(error),
         }
     }
 
     /// Moves an aircraft that stands in front of its command behind it.
-    fn name_and_arguments<'a>(&self, mut words: Vec<Word<'a>>) -> (String, Arguments<'a>)
+    fn name_and_arguments<'a>(&self, mut words: Vec<Token<'a>>) -> (String, Arguments<'a>)
     where
         'p: 'a,
     {
@@ -139,14 +139,14 @@ impl<'p> Interpreter<'p> {
         (name, Arguments::new(self.place, command, words))
     }
 
-    fn act(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn act(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         match name {
             "CRE" | "CREATE" => self.create(time_s, arguments),
             "DEL" | "DELETE" => self.delete(time_s, arguments),
             "DEFWPT" => self.define(arguments),
             "ADDWPT" => self.add_way_point(time_s, arguments),
             "AFTER" => self.add_way_point_after(time_s, arguments),
-            "ORIG" | "DEST" => self.set_end(name, time_s, arguments),
+            "ORIG" | "DEST" => self.set_endpoint(name, time_s, arguments),
             "HDG" | "HEADING" | "TURN" | "SPD" | "SPEED" | "ALT" | "VS" | "LNAV" | "VNAV" => {
                 self.change(name, time_s, arguments)
             }
@@ -159,12 +159,12 @@ impl<'p> Interpreter<'p> {
                 let cause = "the command has no name".to_string();
                 Err(arguments.command.error(self.place, cause, "remove the comma").into())
             }
-            _ => Ok(Outcome::NotUnderstood(name.to_string())),
+            _ => Ok(CommandOutcome::NotUnderstood(name.to_string())),
         }
     }
 
     /// `CRE aircraft,type,place[,heading[,altitude[,speed]]]`
-    fn create(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn create(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         let id = arguments.required("an aircraft")?;
         let kind = arguments.next().map_or(String::new(), |word| word.text.to_owned());
         let place = self.place(arguments)?;
@@ -176,7 +176,7 @@ impl<'p> Interpreter<'p> {
             lon_deg: place.position().map_or(0.0, |position| position.lon_deg),
             heading_deg: arguments.optional(heading_deg)?.unwrap_or(0.0),
             altitude_ft: arguments.optional(altitude_ft)?.unwrap_or(0.0),
-            speed: arguments.optional(speed)?.unwrap_or(Speed::CasKt(0.0)),
+            speed: arguments.optional(speed)?.unwrap_or(Airspeed::CasKt(0.0)),
             way_points: Vec::new(),
             origin: None,
             destination: None,
@@ -185,26 +185,26 @@ impl<'p> Interpreter<'p> {
             deleted_s: None,
         };
         let unresolved_start = match &place {
-            Place::Unresolved(name) => Some(name.clone()),
+            PositionRef::Unresolved(name) => Some(name.clone()),
             _ => None,
         };
-        self.admit(id, Draft { aircraft, unresolved_start })?;
-        self.note_unresolved(arguments.command, Some(id.text), &place);
-        Ok(Outcome::Done)
+        self.add_aircraft(id, AircraftBuilder { aircraft, unresolved_start })?;
+        self.add_unresolved(arguments.command, Some(id.text), &place);
+        Ok(CommandOutcome::Done)
     }
 
     /// Adds a new aircraft; errors point at `word`.
-    fn admit(&mut self, word: Word, draft: Draft) -> Result<(), Problem> {
+    fn add_aircraft(&mut self, word: Token, draft: AircraftBuilder) -> Result<(), CommandError> {
         if self.drafts.len() >= MAX_AIRCRAFT {
             let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");
-            return Err(self.refused(word, cause, "create fewer"));
+            return Err(self.refusal(word, cause, "create fewer"));
         }
         let id = draft.aircraft.id.clone();
         if let Some(&earlier) = self.by_id.get(&id)
             && self.drafts[earlier].aircraft.deleted_s.is_none()
         {
             let cause = format!("aircraft {id} exists already");
-            return Err(self.refused(word, cause, "delete it first, or take another identifier"));
+            return Err(self.refusal(word, cause, "delete it first, or take another identifier"));
         }
         self.by_id.insert(id, self.drafts.len());
         self.drafts.push(draft);
@@ -212,22 +212,22 @@ impl<'p> Interpreter<'p> {
     }
 
     /// `DEL aircraft,...` or `DEL WIND`
-    fn delete(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn delete(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         if arguments.peek().is_some_and(|word| word.eq_ignore_ascii_case("WIND")) {
             self.file.traffic.wind.clear();
-            return Ok(Outcome::Done);
+            return Ok(CommandOutcome::Done);
         }
         loop {
-            let index = self.existing(arguments)?;
+            let index = self.existing_aircraft(arguments)?;
             self.drafts[index].aircraft.deleted_s = Some(time_s);
             if arguments.remaining() == 0 {
-                return Ok(Outcome::Done);
+                return Ok(CommandOutcome::Done);
             }
         }
     }
 
     /// Returns the next argument, which must be an existing aircraft.
-    fn existing(&self, arguments: &mut Arguments) -> Result<usize, Problem> {
+    fn existing_aircraft(&self, arguments: &mut Arguments) -> Result<usize, CommandError> {
         let word = arguments.required("an aircraft")?;
         let found = self.by_id.get(&upper(word)).copied();
         let why = match found {
@@ -236,44 +236,44 @@ impl<'p> Interpreter<'p> {
             None => "was not created before",
         };
         let cause = format!("aircraft {} {why}", word.text);
-        Err(self.refused(word, cause, "check the identifier and the times"))
+        Err(self.refusal(word, cause, "check the identifier and the times"))
     }
 
     /// `DEFWPT name,place`
-    fn define(&mut self, arguments: &mut Arguments) -> Done {
+    fn define(&mut self, arguments: &mut Arguments) -> CommandResult {
         let name = arguments.required("a name")?;
         let place = self.place(arguments)?;
         if let Some(position) = place.position() {
             self.defined.insert(upper(name), position);
         }
-        self.note_unresolved(arguments.command, None, &place);
-        Ok(Outcome::Done)
+        self.add_unresolved(arguments.command, None, &place);
+        Ok(CommandOutcome::Done)
     }
 
     /// `ADDWPT aircraft,place[,altitude[,speed[,after]]]`
-    fn add_way_point(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn add_way_point(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         let id = arguments.peek();
-        let index = self.existing(arguments)?;
+        let index = self.existing_aircraft(arguments)?;
         let mode = arguments.peek().unwrap_or("").to_ascii_uppercase();
         if TURN_MODES.contains(&&*mode) {
-            return Ok(Outcome::Done);
+            return Ok(CommandOutcome::Done);
         }
         let way_point = self.way_point(time_s, arguments)?;
         let after = arguments.next();
-        self.insert(index, way_point, after, arguments.command, id)
+        self.insert_way_point(index, way_point, after, arguments.command, id)
     }
 
     /// `AFTER aircraft,after,ADDWPT,place[,altitude[,speed]]`
-    fn add_way_point_after(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn add_way_point_after(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         let id = arguments.peek();
-        let index = self.existing(arguments)?;
+        let index = self.existing_aircraft(arguments)?;
         let after = arguments.required("a way-point of the route")?;
         let what = upper(arguments.required("ADDWPT")?);
         if what != "ADDWPT" {
-            return Ok(Outcome::NotUnderstood(format!("AFTER {what}")));
+            return Ok(CommandOutcome::NotUnderstood(format!("AFTER {what}")));
         }
         let way_point = self.way_point(time_s, arguments)?;
-        self.insert(index, way_point, Some(after), arguments.command, id)
+        self.insert_way_point(index, way_point, Some(after), arguments.command, id)
     }
 
     fn way_point(&self, added_s: f64, arguments: &mut Arguments) -> Result<WayPoint, InputError> {
@@ -286,18 +286,18 @@ impl<'p> Interpreter<'p> {
     }
 
     /// Inserts into a route after the last way-point called `after`, or at its end.
-    fn insert(
+    fn insert_way_point(
         &mut self,
         index: usize,
         way_point: WayPoint,
-        after: Option<Word>,
-        command: Word,
+        after: Option<Token>,
+        command: Token,
         id: Option<&str>,
-    ) -> Done {
+    ) -> CommandResult {
         let route = &self.drafts[index].aircraft.way_points;
         if route.len() >= MAX_WAY_POINTS {
             let cause = format!("the route has more than {MAX_WAY_POINTS} way-points");
-            return Err(self.refused(command, cause, "write fewer"));
+            return Err(self.refusal(command, cause, "write fewer"));
         }
         let mut slot = route.len();
         if let Some(after) = after {
@@ -305,94 +305,105 @@ impl<'p> Interpreter<'p> {
             let found = route.iter().rposition(|earlier| earlier.place.name() == Some(&name));
             let Some(found) = found else {
                 let cause = format!("no way-point {name} is on the route");
-                return Err(self.refused(after, cause, "add that one first"));
+                return Err(self.refusal(after, cause, "add that one first"));
             };
             slot = found + 1;
         }
-        self.note_unresolved(command, id, &way_point.place);
+        self.add_unresolved(command, id, &way_point.place);
         self.drafts[index].aircraft.way_points.insert(slot, way_point);
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// `ORIG aircraft,place` and `DEST aircraft,place`
-    fn set_end(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn set_endpoint(
+        &mut self,
+        name: &str,
+        time_s: f64,
+        arguments: &mut Arguments,
+    ) -> CommandResult {
         let id = arguments.peek();
-        let index = self.existing(arguments)?;
+        let index = self.existing_aircraft(arguments)?;
         // Without a place the command is a query.
         if arguments.remaining() == 0 {
-            return Ok(Outcome::Done);
+            return Ok(CommandOutcome::Done);
         }
         let place = self.place(arguments)?;
-        self.note_unresolved(arguments.command, id, &place);
+        self.add_unresolved(arguments.command, id, &place);
         let aircraft = &mut self.drafts[index].aircraft;
         if name == "ORIG" {
             aircraft.origin = Some(place);
         } else {
             (aircraft.destination, aircraft.destination_s) = (Some(place), Some(time_s));
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// `HDG aircraft,heading` and similar commands. Without a value they are queries and change
     /// nothing.
-    fn change(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> Done {
-        let index = self.existing(arguments)?;
+    fn change(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
+        let index = self.existing_aircraft(arguments)?;
         let change = match name {
-            "HDG" | "HEADING" | "TURN" => arguments.optional(heading_deg)?.map(Change::HeadingDeg),
-            "SPD" | "SPEED" => arguments.optional(speed)?.map(Change::Speed),
-            "ALT" => arguments.optional(altitude_ft)?.map(Change::AltitudeFt),
-            "LNAV" => arguments.optional(switch)?.map(Change::LateralNavigation),
-            "VNAV" => arguments.optional(switch)?.map(Change::VerticalNavigation),
-            _ => arguments.optional(vertical_speed_fpm)?.map(Change::VerticalSpeedFpm),
+            "HDG" | "HEADING" | "TURN" => {
+                arguments.optional(heading_deg)?.map(AircraftCommand::HeadingDeg)
+            }
+            "SPD" | "SPEED" => arguments.optional(speed)?.map(AircraftCommand::Speed),
+            "ALT" => arguments.optional(altitude_ft)?.map(AircraftCommand::AltitudeFt),
+            "LNAV" => arguments.optional(on_off)?.map(AircraftCommand::LateralNavigation),
+            "VNAV" => arguments.optional(on_off)?.map(AircraftCommand::VerticalNavigation),
+            _ => arguments.optional(vertical_speed_fpm)?.map(AircraftCommand::VerticalSpeedFpm),
         };
         // ALT may have the vertical speed as a further argument.
         let climb = if name == "ALT" { arguments.optional(vertical_speed_fpm)? } else { None };
-        let changes = change.into_iter().chain(climb.map(Change::VerticalSpeedFpm));
+        let changes = change.into_iter().chain(climb.map(AircraftCommand::VerticalSpeedFpm));
         self.drafts[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// `SYN SUPER n`, `SYN WALL`, `SYN MATRIX n`
-    fn synthesize(&mut self, time_s: f64, arguments: &mut Arguments) -> Done {
+    fn synthesize(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         let variant = arguments.required("SUPER, WALL or MATRIX")?;
         let spacing_nm = self.file.traffic.zone_radius_nm;
         let aircraft = match upper(variant).as_str() {
-            "SUPER" => synthetic::super_conflict(self.size(arguments, 1)?, time_s),
+            "SUPER" => synthetic::super_conflict(self.pattern_size(arguments, 1)?, time_s),
             "WALL" => synthetic::wall(spacing_nm, time_s),
-            "MATRIX" => synthetic::matrix(self.size(arguments, 4)?, spacing_nm, time_s),
-            other => return Ok(Outcome::NotUnderstood(format!("SYN {other}"))),
+            "MATRIX" => synthetic::matrix(self.pattern_size(arguments, 4)?, spacing_nm, time_s),
+            other => return Ok(CommandOutcome::NotUnderstood(format!("SYN {other}"))),
         };
         if aircraft.iter().any(|one| one.lat_deg.abs() > 90.0 || one.lon_deg.abs() > 180.0) {
             let cause = "the pattern is larger than the earth".to_string();
-            return Err(self.refused(variant, cause, "take a smaller number or a smaller ZONER"));
+            return Err(self.refusal(variant, cause, "take a smaller number or a smaller ZONER"));
         }
         for aircraft in aircraft {
-            self.admit(variant, Draft { aircraft, unresolved_start: None })?;
+            self.add_aircraft(variant, AircraftBuilder { aircraft, unresolved_start: None })?;
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// Returns the size of a pattern that has `per_size` aircraft for each unit of size.
-    fn size(&self, arguments: &mut Arguments, per_size: usize) -> Result<u32, Problem> {
+    fn pattern_size(
+        &self,
+        arguments: &mut Arguments,
+        per_size: usize,
+    ) -> Result<u32, CommandError> {
         let word = arguments.required("a number of aircraft")?;
         let size = word.integer(&self.place)?;
         if size == 0 || (size as usize).saturating_mul(per_size) > MAX_AIRCRAFT {
             let cause = format!("a pattern has 1 to {MAX_AIRCRAFT} aircraft");
-            return Err(self.refused(word, cause, "take another number"));
+            return Err(self.refusal(word, cause, "take another number"));
         }
         Ok(size)
     }
 
     /// A setting. Without a value it is a query and changes nothing.
-    fn set(&mut self, name: &str, arguments: &mut Arguments) -> Done {
+    fn set(&mut self, name: &str, arguments: &mut Arguments) -> CommandResult {
         if arguments.peek().is_none() {
-            return Ok(Outcome::Done);
+            return Ok(CommandOutcome::Done);
         }
         let value = arguments.required("a value")?;
         let place = self.place;
         if name == "RESO" {
             self.file.traffic.resolution = Some(self.resolution(value)?);
-            return Ok(Outcome::Done);
+            return Ok(CommandOutcome::Done);
         }
         let traffic = &mut self.file.traffic;
         match name {
@@ -401,29 +412,29 @@ impl<'p> Interpreter<'p> {
                 traffic.zone_half_height_ft = zone_size(place, value, &ZONE_HALF_HEIGHTS_FT, "ft")?;
             }
             "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
-            "NOISE" => traffic.noise = switch(place, value)?,
+            "NOISE" => traffic.noise = on_off(place, value)?,
             _ if upper(value) == "STATEBASED" => traffic.detection = Some(true),
-            _ => traffic.detection = Some(switch(place, value)?),
+            _ => traffic.detection = Some(on_off(place, value)?),
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
-    fn resolution(&self, word: Word) -> Result<Resolution, Problem> {
+    fn resolution(&self, word: Token) -> Result<ResolutionMethod, CommandError> {
         match upper(word).as_str() {
-            "OFF" => Ok(Resolution::Off),
-            "MVP" => Ok(Resolution::Mvp),
-            "SSD" => Ok(Resolution::Ssd),
-            "EBY" => Ok(Resolution::Eby),
+            "OFF" => Ok(ResolutionMethod::Off),
+            "MVP" => Ok(ResolutionMethod::Mvp),
+            "SSD" => Ok(ResolutionMethod::Ssd),
+            "EBY" => Ok(ResolutionMethod::Eby),
             other => {
                 let cause = format!("no resolution method `{other}` is known");
-                Err(self.refused(word, cause, "take OFF, MVP, SSD or EBY"))
+                Err(self.refusal(word, cause, "take OFF, MVP, SSD or EBY"))
             }
         }
     }
 
     /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for
     /// each altitude, where the altitude may be left out.
-    fn add_wind(&mut self, arguments: &mut Arguments) -> Done {
+    fn add_wind(&mut self, arguments: &mut Arguments) -> CommandResult {
         let place = self.place(arguments)?;
         let has_altitudes = arguments.remaining() != 2;
         let mut winds = Vec::new();
@@ -442,22 +453,22 @@ impl<'p> Interpreter<'p> {
                 break;
             }
         }
-        self.note_unresolved(arguments.command, None, &place);
+        self.add_unresolved(arguments.command, None, &place);
         if place.position().is_some() {
             self.file.traffic.wind.append(&mut winds);
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// Reads a latitude and a longitude, a defined way-point, or a name with or without a runway.
-    fn place(&self, arguments: &mut Arguments) -> Result<Place, InputError> {
+    fn place(&self, arguments: &mut Arguments) -> Result<PositionRef, InputError> {
         let next = arguments.peek().unwrap_or("").to_ascii_uppercase();
         if let Some(&position) = self.defined.get(&next) {
             arguments.next();
-            return Ok(Place::Defined { name: next, position });
+            return Ok(PositionRef::Defined { name: next, position });
         }
         if is_latitude(&next) {
-            return Ok(Place::At(arguments.lat_lon()?));
+            return Ok(PositionRef::At(arguments.lat_lon()?));
         }
         let mut name = upper(arguments.required("a place")?);
         let runway = arguments.peek().unwrap_or("").to_ascii_uppercase();
@@ -465,13 +476,13 @@ impl<'p> Interpreter<'p> {
             arguments.next();
             name = format!("{name} {runway}");
         }
-        Ok(Place::Unresolved(name))
+        Ok(PositionRef::Unresolved(name))
     }
 
     /// Adds a place without a known position to the list.
-    fn note_unresolved(&mut self, command: Word, aircraft: Option<&str>, place: &Place) {
-        if let Place::Unresolved(name) = place {
-            self.file.unresolved_places.push(UnresolvedPlace {
+    fn add_unresolved(&mut self, command: Token, aircraft: Option<&str>, place: &PositionRef) {
+        if let PositionRef::Unresolved(name) = place {
+            self.file.unresolved_places.push(UnresolvedPosition {
                 name: name.clone(),
                 command: upper(command),
                 aircraft: aircraft.map(str::to_ascii_uppercase),
@@ -480,12 +491,12 @@ impl<'p> Interpreter<'p> {
         }
     }
 
-    fn refused(&self, word: Word, cause: String, remedy: &str) -> Problem {
-        Problem::Refused(word.error(self.place, cause, remedy))
+    fn refusal(&self, word: Token, cause: String, remedy: &str) -> CommandError {
+        CommandError::Refused(word.error(self.place, cause, remedy))
     }
 }
 
-fn upper(word: Word) -> String {
+fn upper(word: Token) -> String {
     word.text.to_ascii_uppercase()
 }
 
@@ -501,11 +512,11 @@ fn is_display(name: &str) -> bool {
 
 /// Returns whether the first word is a command, not an aircraft.
 fn is_command(name: &str) -> bool {
-    const OTHERS: [&str; 12] = [
+    const OTHER_COMMANDS: [&str; 12] = [
         "ASAS", "CDMETHOD", "CRE", "CREATE", "DEFWPT", "DTLOOK", "NOISE", "RESO", "SYN", "WIND",
         "ZONEDH", "ZONER",
     ];
-    is_display(name) || AIRCRAFT_COMMANDS.contains(&name) || OTHERS.contains(&name)
+    is_display(name) || AIRCRAFT_COMMANDS.contains(&name) || OTHER_COMMANDS.contains(&name)
 }
 
 /// `RW18L` or `RWY18L`.

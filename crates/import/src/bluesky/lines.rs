@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use crate::table::Word;
+use crate::table::Token;
 use sidestep_kernel::InputError;
 
 /// The minimum number of characters of a line; shorter ones are skipped, as in the scenarios' own
@@ -23,20 +23,20 @@ pub(super) struct Command<'a> {
     /// Seconds since the start of the scenario.
     pub(super) time_s: f64,
     /// Words, at least one. An argument that is left out is an empty word.
-    pub(super) words: Vec<Word<'a>>,
+    pub(super) words: Vec<Token<'a>>,
 }
 
 /// A line with all its continuations, without the comment.
 #[derive(Debug, Default)]
-pub(super) struct Line<'a> {
+pub(super) struct LogicalLine<'a> {
     text: Cow<'a, str>,
     /// The index in `text` of the first byte of each physical line, and its number, from 1.
     pieces: Vec<(usize, usize)>,
 }
 
 /// Returns the lines that hold commands, and the number of those skipped because they are short.
-pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
-    let mut lines: Vec<Line> = Vec::new();
+pub(super) fn join_lines(text: &str) -> (Vec<LogicalLine<'_>>, u64) {
+    let mut lines: Vec<LogicalLine> = Vec::new();
     let mut short_lines = 0;
     let mut is_continued = false;
     for (number, physical) in physical_lines(text) {
@@ -56,7 +56,7 @@ pub(super) fn join_lines(text: &str) -> (Vec<Line<'_>>, u64) {
         };
         match lines.last_mut().filter(|_| is_continued) {
             Some(line) => line.append(number, content),
-            None => lines.push(Line { text: content.into(), pieces: vec![(0, number)] }),
+            None => lines.push(LogicalLine { text: content.into(), pieces: vec![(0, number)] }),
         }
         is_continued = continues;
     }
@@ -74,7 +74,7 @@ fn before_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or("")
 }
 
-impl<'a> Line<'a> {
+impl<'a> LogicalLine<'a> {
     /// Appends a continuation unchanged, including its leading blanks.
     fn append(&mut self, number: usize, content: &str) {
         // A longer line is refused by `commands`, so the rest of it is not needed.
@@ -92,26 +92,26 @@ impl<'a> Line<'a> {
         if self.text.len() > MAX_LINE_BYTES {
             let cause = format!("the line has more than {MAX_LINE_BYTES} bytes");
             let error = InputError::new(place, cause, "write one command per line");
-            return Err(error.at(self.pieces[0].1, 1));
+            return Err(error.with_position(self.pieces[0].1, 1));
         }
         let Some((stamp, content)) = self.text.split_once('>') else {
-            let word = self.word(self.text.trim());
+            let word = self.token(self.text.trim());
             return Err(word.error(place, "no `>` behind a time".to_string(), STAMP_REMEDY));
         };
-        let time_s = parse_stamp(place, self.word(stamp.trim()))?;
+        let time_s = parse_stamp(place, self.token(stamp.trim()))?;
         let commands =
-            content.split(';').map(|command| Command { time_s, words: self.words(command) });
+            content.split(';').map(|command| Command { time_s, words: self.tokens(command) });
         Ok(commands.filter(|command| !command.words.is_empty()).collect())
     }
 
     /// Splits at blanks, at commas with blanks around them, or both; two commas with nothing
     /// between them leave an argument out.
-    fn words(&self, command: &str) -> Vec<Word<'_>> {
+    fn tokens(&self, command: &str) -> Vec<Token<'_>> {
         let mut words = Vec::new();
         let mut rest = command.trim_matches(BLANKS);
         while !rest.is_empty() {
             let end = rest.find([',', ' ', '\t']).unwrap_or(rest.len());
-            words.push(self.word(&rest[..end]));
+            words.push(self.token(&rest[..end]));
             rest = rest[end..].trim_start_matches(BLANKS);
             rest = rest.strip_prefix(',').unwrap_or(rest).trim_start_matches(BLANKS);
         }
@@ -119,12 +119,12 @@ impl<'a> Line<'a> {
     }
 
     /// Returns `part` of this line's text with its position in the file.
-    fn word(&self, part: &str) -> Word<'_> {
+    fn token(&self, part: &str) -> Token<'_> {
         let offset = part.as_ptr() as usize - self.text.as_ptr() as usize;
         let piece = self.pieces.iter().rev().find(|(start, _)| *start <= offset);
         let &(start, line) = piece.unwrap_or(&self.pieces[0]);
         let column = self.text[start..offset].chars().count() + 1;
-        Word { text: &self.text[offset..offset + part.len()], line, column }
+        Token { text: &self.text[offset..offset + part.len()], line, column }
     }
 }
 
@@ -135,7 +135,7 @@ const STAMP_REMEDY: &str =
     "start the line with a time such as 00:01:30.00>, of up to 59 minutes and less than 60 seconds";
 
 /// Reads `HH:MM:SS.ss` in seconds; one digit per part is enough.
-fn parse_stamp(place: &dyn fmt::Display, stamp: Word) -> Result<f64, InputError> {
+fn parse_stamp(place: &dyn fmt::Display, stamp: Token) -> Result<f64, InputError> {
     let parts: Vec<&str> = stamp.text.split(':').map(str::trim).collect();
     let seconds = match parts[..] {
         [hours, minutes, seconds] => hours

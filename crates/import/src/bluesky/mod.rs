@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-pub use speed::{FOOT_M, KNOT_MPS, Speed};
+pub use speed::{Airspeed, FOOT_M, KNOT_MPS};
 
 use super::local_plane::LatLon;
 use interpreter::Interpreter;
@@ -65,14 +65,14 @@ pub struct ScnFile {
     /// not exist; in the order of their times.
     pub refused: Vec<InputError>,
     /// Names of places that the file does not define, one entry for each use.
-    pub unresolved_places: Vec<UnresolvedPlace>,
+    pub unresolved_places: Vec<UnresolvedPosition>,
     /// The aircraft and their rules.
     pub traffic: Traffic,
 }
 
 /// A use of a name that only a navigation database can resolve.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnresolvedPlace {
+pub struct UnresolvedPosition {
     /// The name of the airport, runway or fix, in capital letters.
     pub name: String,
     /// The command that names it.
@@ -101,7 +101,7 @@ pub struct Traffic {
     /// command. Without detection nothing is resolved.
     pub detection: Option<bool>,
     /// The method of resolving conflicts (`RESO`); `None` where the file has no such command.
-    pub resolution: Option<Resolution>,
+    pub resolution: Option<ResolutionMethod>,
     /// Winds at places (`WIND`).
     pub wind: Vec<Wind>,
     /// Whether positions and turbulence are noisy (`NOISE`).
@@ -126,7 +126,7 @@ impl Default for Traffic {
 
 /// A method of resolving conflicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Resolution {
+pub enum ResolutionMethod {
     /// No resolution.
     Off,
     /// Modified voltage potential.
@@ -168,17 +168,17 @@ pub struct ScnAircraft {
     /// Altitude in ft; 0 where it is left out.
     pub altitude_ft: f64,
     /// Speed; 0 kt where it is left out.
-    pub speed: Speed,
+    pub speed: Airspeed,
     /// The route, without origin and destination.
     pub way_points: Vec<WayPoint>,
     /// The place that it comes from.
-    pub origin: Option<Place>,
+    pub origin: Option<PositionRef>,
     /// The place that it goes to after the last way-point.
-    pub destination: Option<Place>,
+    pub destination: Option<PositionRef>,
     /// Time of the command that set the destination, in s.
     pub destination_s: Option<f64>,
     /// Changes with the time of their command in s, sorted by time.
-    pub changes: Vec<(f64, Change)>,
+    pub changes: Vec<(f64, AircraftCommand)>,
     /// Time of its deletion, in s.
     pub deleted_s: Option<f64>,
 }
@@ -193,7 +193,7 @@ impl ScnAircraft {
     /// is known: the goals that can be flown without a navigation database.
     pub fn known_goals(&self) -> impl Iterator<Item = LatLon> {
         let places = self.way_points.iter().map(|way_point| &way_point.place);
-        places.chain(&self.destination).filter_map(Place::position)
+        places.chain(&self.destination).filter_map(PositionRef::position)
     }
 }
 
@@ -210,18 +210,18 @@ pub struct UnplacedAircraft {
 #[derive(Debug, Clone, PartialEq)]
 pub struct WayPoint {
     /// Its place.
-    pub place: Place,
+    pub place: PositionRef,
     /// Altitude there in ft; `None` where it is left out.
     pub altitude_ft: Option<f64>,
     /// Speed there; `None` where it is left out.
-    pub speed: Option<Speed>,
+    pub speed: Option<Airspeed>,
     /// Time at which it was added to the route, in s.
     pub added_s: f64,
 }
 
 /// A place in a scenario.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Place {
+pub enum PositionRef {
     /// A latitude and a longitude.
     At(LatLon),
     /// A way-point that the file has defined before its use.
@@ -236,7 +236,7 @@ pub enum Place {
     Unresolved(String),
 }
 
-impl Place {
+impl PositionRef {
     /// Returns its position, if that is known.
     pub fn position(&self) -> Option<LatLon> {
         match self {
@@ -256,11 +256,11 @@ impl Place {
 
 /// A command that changes the flight of an aircraft.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Change {
+pub enum AircraftCommand {
     /// Turn to a heading in degrees from true north, in [0, 360), and leave the route.
     HeadingDeg(f64),
     /// Take a speed.
-    Speed(Speed),
+    Speed(Airspeed),
     /// Climb or descend to an altitude in ft.
     AltitudeFt(f64),
     /// Climb (positive) or descend with this vertical speed, in ft/min.

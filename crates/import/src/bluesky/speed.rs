@@ -12,7 +12,7 @@ const SEA_LEVEL_PRESSURE_PA: f64 = 101_325.0;
 const GRAVITY_MPS2: f64 = 9.806_65;
 const AIR_GAS_CONSTANT: f64 = 287.052_87;
 /// Ratio of the heat capacities of air.
-const GAMMA: f64 = 1.4;
+const HEAT_CAPACITY_RATIO: f64 = 1.4;
 
 /// The speed of sound at sea level, in m/s.
 const SEA_LEVEL_SOUND_MPS: f64 = 340.294;
@@ -28,27 +28,27 @@ const LAYERS: [(f64, f64, f64); 4] = [
 
 /// A speed through the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Speed {
+pub enum Airspeed {
     /// Calibrated airspeed in kt.
     CasKt(f64),
     /// Multiple of the speed of sound.
     Mach(f64),
 }
 
-impl Speed {
+impl Airspeed {
     /// Returns the true airspeed in m/s at a pressure altitude in ft, by the international standard
     /// atmosphere: exact below the speed of sound up to 32 km (105 000 ft), and above that with a
     /// constant temperature. Pitot tubes are treated as subsonic at every speed.
     pub fn true_airspeed_mps(self, altitude_ft: f64) -> f64 {
         let (temperature_k, pressure_pa) = standard_air(altitude_ft * FOOT_M);
-        let sound_mps = (GAMMA * AIR_GAS_CONSTANT * temperature_k).sqrt();
+        let sound_mps = (HEAT_CAPACITY_RATIO * AIR_GAS_CONSTANT * temperature_k).sqrt();
         match self {
             Self::Mach(mach) => mach * sound_mps,
             Self::CasKt(cas_kt) => {
                 // The pressure that a pitot tube adds is the same at sea level and at altitude.
                 let sea_level_mach = cas_kt * KNOT_MPS / SEA_LEVEL_SOUND_MPS;
                 let impact_pa = SEA_LEVEL_PRESSURE_PA * impact_ratio(sea_level_mach);
-                mach_of(impact_pa / pressure_pa) * sound_mps
+                mach_from_ratio(impact_pa / pressure_pa) * sound_mps
             }
         }
     }
@@ -56,12 +56,17 @@ impl Speed {
 
 /// Returns impact pressure over static pressure at a Mach number.
 fn impact_ratio(mach: f64) -> f64 {
-    math::powf(1.0 + 0.5 * (GAMMA - 1.0) * mach * mach, GAMMA / (GAMMA - 1.0)) - 1.0
+    math::powf(
+        1.0 + 0.5 * (HEAT_CAPACITY_RATIO - 1.0) * mach * mach,
+        HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0),
+    ) - 1.0
 }
 
 /// Returns the Mach number at which impact pressure over static pressure is `ratio`.
-fn mach_of(ratio: f64) -> f64 {
-    (2.0 / (GAMMA - 1.0) * (math::powf(1.0 + ratio, (GAMMA - 1.0) / GAMMA) - 1.0)).sqrt()
+fn mach_from_ratio(ratio: f64) -> f64 {
+    (2.0 / (HEAT_CAPACITY_RATIO - 1.0)
+        * (math::powf(1.0 + ratio, (HEAT_CAPACITY_RATIO - 1.0) / HEAT_CAPACITY_RATIO) - 1.0))
+        .sqrt()
 }
 
 /// Returns temperature in K and pressure in Pa at a geopotential altitude in m.
@@ -110,13 +115,13 @@ mod tests {
 
     #[test]
     fn calibrated_is_true_airspeed_at_sea_level_and_slower_above() {
-        close(Speed::CasKt(250.0).true_airspeed_mps(0.0), 250.0 * KNOT_MPS, 1e-3);
+        close(Airspeed::CasKt(250.0).true_airspeed_mps(0.0), 250.0 * KNOT_MPS, 1e-3);
         // Found in tables of airspeeds: 400 kt at FL200 are 524 kt, Mach 0.8 at FL350 461 kt.
-        close(Speed::CasKt(400.0).true_airspeed_mps(20_000.0) / KNOT_MPS, 524.37, 0.01);
-        close(Speed::Mach(0.8).true_airspeed_mps(35_000.0) / KNOT_MPS, 461.1, 0.1);
-        assert_eq!(Speed::CasKt(0.0).true_airspeed_mps(30_000.0), 0.0);
+        close(Airspeed::CasKt(400.0).true_airspeed_mps(20_000.0) / KNOT_MPS, 524.37, 0.01);
+        close(Airspeed::Mach(0.8).true_airspeed_mps(35_000.0) / KNOT_MPS, 461.1, 0.1);
+        assert_eq!(Airspeed::CasKt(0.0).true_airspeed_mps(30_000.0), 0.0);
         for altitude_ft in [-10_000.0, 300_000.0] {
-            assert!(Speed::CasKt(10_000.0).true_airspeed_mps(altitude_ft).is_finite());
+            assert!(Airspeed::CasKt(10_000.0).true_airspeed_mps(altitude_ft).is_finite());
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{KNOT_MPS, Place, ScnAircraft, Speed};
+use super::{Airspeed, KNOT_MPS, PositionRef, ScnAircraft};
 use crate::local_plane::LatLon;
 use sidestep_kernel::math;
 
@@ -110,10 +110,10 @@ impl Pattern {
             lon_deg,
             heading_deg,
             altitude_ft: ALTITUDE_FT,
-            speed: Speed::CasKt(SPEED_MPS / KNOT_MPS),
+            speed: Airspeed::CasKt(SPEED_MPS / KNOT_MPS),
             way_points: Vec::new(),
             origin: None,
-            destination: Some(Place::At(goal)),
+            destination: Some(PositionRef::At(goal)),
             destination_s: Some(self.created_s),
             changes: Vec::new(),
             deleted_s: None,

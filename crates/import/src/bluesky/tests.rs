@@ -37,16 +37,19 @@ fn an_aircraft_is_created_from_all_forms_of_values() {
     let [first, second] = &file.traffic.aircraft[..] else { panic!("{file:?}") };
     assert_eq!((first.id.as_str(), first.kind.as_str()), ("KL204", "b747"));
     assert_eq!((first.position(), first.heading_deg), (at(52.5, 4.5), 326.8));
-    assert_eq!((first.altitude_ft, first.speed), (10_000.0, Speed::Mach(0.8)));
+    assert_eq!((first.altitude_ft, first.speed), (10_000.0, Airspeed::Mach(0.8)));
     assert_eq!((second.kind.as_str(), second.position()), ("", at(0.0, -3.06e-17)));
     assert_eq!((second.heading_deg, second.altitude_ft), (0.0, 0.0));
-    assert_eq!(second.speed, Speed::CasKt(250.0));
+    assert_eq!(second.speed, Airspeed::CasKt(250.0));
 }
 
 #[test]
 fn an_aircraft_may_stand_in_front_and_alone_asks_for_its_position() {
     let file = good("CRE KL204 B744 52 4 90 FL200 250\nkl204 ALT FL300 -500\nKL204\nPOS KL204");
-    let expected = [(0.0, Change::AltitudeFt(30_000.0)), (0.0, Change::VerticalSpeedFpm(-500.0))];
+    let expected = [
+        (0.0, AircraftCommand::AltitudeFt(30_000.0)),
+        (0.0, AircraftCommand::VerticalSpeedFpm(-500.0)),
+    ];
     assert_eq!(file.traffic.aircraft[0].changes, expected);
     assert_eq!(file.commands, counts(&[("CRE", 1), ("ALT", 1), ("POS", 2)]));
     assert_eq!(file.ignored, counts(&[("POS", 2)]));
@@ -64,11 +67,11 @@ fn commands_take_effect_in_the_order_of_their_times() {
     let file = parse(&"f.scn", text);
     assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
     let expected = [
-        (60.0, Change::Speed(Speed::Mach(0.7))),
-        (60.0, Change::VerticalSpeedFpm(-1000.0)),
-        (60.0, Change::LateralNavigation(false)),
-        (60.0, Change::VerticalNavigation(true)),
-        (600.0, Change::HeadingDeg(180.0)),
+        (60.0, AircraftCommand::Speed(Airspeed::Mach(0.7))),
+        (60.0, AircraftCommand::VerticalSpeedFpm(-1000.0)),
+        (60.0, AircraftCommand::LateralNavigation(false)),
+        (60.0, AircraftCommand::VerticalNavigation(true)),
+        (600.0, AircraftCommand::HeadingDeg(180.0)),
     ];
     let [first, second] = &file.traffic.aircraft[..] else { panic!("{file:?}") };
     assert_eq!(first.changes, expected);
@@ -90,16 +93,16 @@ fn routes_use_defined_way_points_and_coordinates() {
         DEST A,home",
     );
     let aircraft = &file.traffic.aircraft[0];
-    let home = Place::Defined { name: "HOME".to_string(), position: at(52.0, 4.0) };
+    let home = PositionRef::Defined { name: "HOME".to_string(), position: at(52.0, 4.0) };
     let way_point =
         |place, altitude_ft, speed| WayPoint { place, altitude_ft, speed, added_s: 0.0 };
     let expected = [
-        way_point(home.clone(), Some(10_000.0), Some(Speed::Mach(0.7))),
-        way_point(Place::At(at(50.5, 4.25)), Some(3000.0), None),
-        way_point(Place::At(at(51.0, 4.5)), None, Some(Speed::CasKt(220.0))),
+        way_point(home.clone(), Some(10_000.0), Some(Airspeed::Mach(0.7))),
+        way_point(PositionRef::At(at(50.5, 4.25)), Some(3000.0), None),
+        way_point(PositionRef::At(at(51.0, 4.5)), None, Some(Airspeed::CasKt(220.0))),
     ];
     assert_eq!(aircraft.way_points, expected);
-    assert_eq!(aircraft.origin, Some(Place::At(at(0.0, 1.0))));
+    assert_eq!(aircraft.origin, Some(PositionRef::At(at(0.0, 1.0))));
     assert_eq!(aircraft.destination, Some(home));
     let goals: Vec<LatLon> = aircraft.known_goals().collect();
     assert_eq!(goals, [at(52.0, 4.0), at(50.5, 4.25), at(51.0, 4.5), at(52.0, 4.0)]);
@@ -152,7 +155,7 @@ fn settings_are_read_and_the_last_one_holds() {
     let traffic = file.traffic;
     assert_eq!((traffic.zone_radius_nm, traffic.zone_half_height_ft), (5.5, 900.0));
     assert_eq!((traffic.lookahead_s, traffic.noise, traffic.detection), (120.0, true, Some(true)));
-    assert_eq!(traffic.resolution, Some(Resolution::Eby));
+    assert_eq!(traffic.resolution, Some(ResolutionMethod::Eby));
     let wind = |position, altitude_ft, from_deg, speed_kt| Wind {
         position,
         altitude_ft,
@@ -229,7 +232,7 @@ fn patterns_are_those_of_the_saved_scenarios() {
         assert_eq!(made.len(), saved.len(), "{name}");
         for (made, saved) in made.iter().zip(&saved) {
             assert_eq!((&made.id, &made.kind), (&saved.id, &saved.kind), "{name}");
-            let plane = LocalPlane::about(saved.position());
+            let plane = LocalPlane::centered_at(saved.position());
             let [east_m, north_m] = plane.to_plane_m(made.position());
             assert!(east_m.abs() < 1.0 && north_m.abs() < 1.0, "{name}: {made:?}");
             assert!((made.heading_deg - saved.heading_deg).abs() < 1e-9, "{name}: {made:?}");
@@ -245,7 +248,7 @@ fn the_goals_of_a_pattern_are_straight_ahead() {
     assert!((aircraft[7].lat_deg - aircraft[6].lat_deg - 3.3 * 1852.0 / 111_319.0).abs() < 1e-9);
     for one in aircraft {
         let goal = one.known_goals().next().unwrap();
-        let [east, north] = LocalPlane::about(at(0.0, 0.0))
+        let [east, north] = LocalPlane::centered_at(at(0.0, 0.0))
             .to_plane_m(at(goal.lat_deg - one.lat_deg, goal.lon_deg - one.lon_deg));
         let bearing_deg = sidestep_kernel::math::atan2(east, north).to_degrees();
         let off_deg = (bearing_deg - one.heading_deg + 180.0).rem_euclid(360.0) - 180.0;
@@ -409,7 +412,7 @@ fn the_shared_scenarios_of_each_kind_are_read_to_the_end() {
     let Some(file) = shared_scenario("ASAS__ASAS-SUPER8-WIND.scn") else { return };
     let wind = Wind { position: at(0.0, 0.0), altitude_ft: None, from_deg: 315.0, speed_kt: 100.0 };
     assert_eq!((file.traffic.wind, file.traffic.aircraft.len()), (vec![wind], 8));
-    assert_eq!(file.traffic.resolution, Some(Resolution::Mvp));
+    assert_eq!(file.traffic.resolution, Some(ResolutionMethod::Mvp));
     assert_eq!(file.not_understood, counts(&[("AREA", 1), ("RMETHH", 1), ("RMETHV", 1)]));
 
     let route = shared_scenario("ASAS__ASAS-06.scn").expect("shared").traffic.aircraft;
@@ -426,7 +429,8 @@ fn the_shared_scenarios_of_each_kind_are_read_to_the_end() {
     assert!((first.lat_deg - (52.0 + 12.0 / 60.0 + 51.0 / 3600.0)).abs() < 1e-9);
 
     let dateline = shared_scenario("ASAS__testdateline.scn").expect("shared").traffic.aircraft;
-    let plane = LocalPlane::about_all(dateline.iter().map(ScnAircraft::position)).expect("two");
+    let plane =
+        LocalPlane::from_positions(dateline.iter().map(ScnAircraft::position)).expect("two");
     let [[west_m, _], [east_m, _]] = [0, 1].map(|i| plane.to_plane_m(dateline[i].position()));
     assert!((east_m - west_m - 111_194.9).abs() < 0.1, "{west_m} {east_m}");
 }

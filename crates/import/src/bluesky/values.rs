@@ -3,9 +3,9 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use super::Speed;
+use super::Airspeed;
 use crate::local_plane::{LatLon, wrap_deg};
-use crate::table::Word;
+use crate::table::Token;
 use sidestep_kernel::InputError;
 
 /// The arguments of one command, read from the left.
@@ -13,26 +13,26 @@ pub(super) struct Arguments<'a> {
     /// The name of the file in errors.
     pub(super) place: &'a dyn fmt::Display,
     /// Name of the command, where errors about a missing argument point.
-    pub(super) command: Word<'a>,
-    words: std::vec::IntoIter<Word<'a>>,
+    pub(super) command: Token<'a>,
+    words: std::vec::IntoIter<Token<'a>>,
 }
 
 impl<'a> Arguments<'a> {
     pub(super) fn new(
         place: &'a dyn fmt::Display,
-        command: Word<'a>,
-        words: Vec<Word<'a>>,
+        command: Token<'a>,
+        words: Vec<Token<'a>>,
     ) -> Self {
         Self { place, command, words: words.into_iter() }
     }
 
     /// Takes the next argument; `None` where it is left out, is `*`, or the line ends.
-    pub(super) fn next(&mut self) -> Option<Word<'a>> {
+    pub(super) fn next(&mut self) -> Option<Token<'a>> {
         self.words.next().filter(|word| !word.text.is_empty() && word.text != "*")
     }
 
     /// Takes the next argument, called `what` in errors.
-    pub(super) fn required(&mut self, what: &str) -> Result<Word<'a>, InputError> {
+    pub(super) fn required(&mut self, what: &str) -> Result<Token<'a>, InputError> {
         self.next().ok_or_else(|| {
             let cause = format!("{} lacks {what}", self.command.text);
             self.command.error(self.place, cause, &format!("add {what}"))
@@ -52,7 +52,7 @@ impl<'a> Arguments<'a> {
     /// Takes the next argument as `parse` reads it, where it is not left out.
     pub(super) fn optional<T>(
         &mut self,
-        parse: impl Fn(&dyn fmt::Display, Word) -> Result<T, InputError>,
+        parse: impl Fn(&dyn fmt::Display, Token) -> Result<T, InputError>,
     ) -> Result<Option<T>, InputError> {
         self.next().map(|word| parse(self.place, word)).transpose()
     }
@@ -68,14 +68,14 @@ impl<'a> Arguments<'a> {
 
 /// The letters and the range of a coordinate.
 #[derive(Clone, Copy)]
-struct Axis {
+struct CoordinateAxis {
     positive: char,
     negative: char,
     max_deg: f64,
 }
 
-const LATITUDE: Axis = Axis { positive: 'N', negative: 'S', max_deg: 90.0 };
-const LONGITUDE: Axis = Axis { positive: 'E', negative: 'W', max_deg: 360.0 };
+const LATITUDE: CoordinateAxis = CoordinateAxis { positive: 'N', negative: 'S', max_deg: 90.0 };
+const LONGITUDE: CoordinateAxis = CoordinateAxis { positive: 'E', negative: 'W', max_deg: 360.0 };
 
 /// The range of altitudes, in ft; true airspeeds are finite at all of them.
 const ALTITUDES_FT: RangeInclusive<f64> = -10_000.0..=300_000.0;
@@ -108,7 +108,7 @@ pub(super) fn is_latitude(word: &str) -> bool {
 
 /// Reads degrees with a fraction, or `degrees'minutes'seconds`; a sign or a letter of the
 /// hemisphere in front or at the end.
-fn degrees(place: &dyn fmt::Display, word: Word, axis: Axis) -> Result<f64, InputError> {
+fn degrees(place: &dyn fmt::Display, word: Token, axis: CoordinateAxis) -> Result<f64, InputError> {
     let value = signed_degrees(word.text, axis).filter(|deg| deg.abs() <= axis.max_deg);
     let value = value.ok_or_else(|| {
         let (positive, negative, max) = (axis.positive, axis.negative, axis.max_deg);
@@ -120,7 +120,7 @@ fn degrees(place: &dyn fmt::Display, word: Word, axis: Axis) -> Result<f64, Inpu
     Ok(if value.abs() > 180.0 { wrap_deg(value) } else { value })
 }
 
-fn signed_degrees(text: &str, axis: Axis) -> Option<f64> {
+fn signed_degrees(text: &str, axis: CoordinateAxis) -> Option<f64> {
     let of_letter = |letter: char, sign: f64| {
         let both = [letter, letter.to_ascii_lowercase()];
         let rest = text.strip_prefix(both).or_else(|| text.strip_suffix(both));
@@ -152,9 +152,9 @@ fn unsigned_degrees(text: &str) -> Option<f64> {
 }
 
 /// Reads a heading or a wind direction in degrees from true north, in [0, 360).
-pub(super) fn heading_deg(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+pub(super) fn heading_deg(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
     let text = word.text.strip_suffix(['T', 't']).unwrap_or(word.text);
-    let value = Word { text, ..word }.number(place).map_err(|_| {
+    let value = Token { text, ..word }.number(place).map_err(|_| {
         let cause = format!("`{}` is no true heading", word.text);
         word.error(place, cause, "write degrees from true north such as 326.8 or 326.8T")
     })?;
@@ -164,10 +164,10 @@ pub(super) fn heading_deg(place: &dyn fmt::Display, word: Word) -> Result<f64, I
 }
 
 /// Reads an altitude in ft: a number, or a flight level such as `FL200`.
-pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
     let level = word.text.get(..2).filter(|start| start.eq_ignore_ascii_case("FL"));
     let (text, unit_ft) = level.map_or((word.text, 1.0), |_| (&word.text[2..], 100.0));
-    let value = Word { text, ..word }.number(place).map_err(|_| {
+    let value = Token { text, ..word }.number(place).map_err(|_| {
         let cause = format!("`{}` is no altitude", word.text);
         word.error(place, cause, "write feet such as 20000, or a flight level such as FL200")
     })?;
@@ -179,28 +179,28 @@ pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Word) -> Result<f64, I
 }
 
 /// Reads a speed: knots, or a Mach number as `.8`, `M0.8`, `M.8` or `M80`.
-pub(super) fn speed(place: &dyn fmt::Display, word: Word) -> Result<Speed, InputError> {
+pub(super) fn speed(place: &dyn fmt::Display, word: Token) -> Result<Airspeed, InputError> {
     let wrong = || {
         let cause = format!("`{}` is no speed", word.text);
         word.error(place, cause, "write knots such as 250, or a Mach number such as M0.8")
     };
     let up_to = |max: f64, text: &str| {
-        let value = Word { text, ..word }.number(place);
+        let value = Token { text, ..word }.number(place);
         value.ok().filter(|value| (0.0..=max).contains(value)).ok_or_else(wrong)
     };
     let Some(mach) = word.text.strip_prefix(['M', 'm']) else {
         let value = up_to(MAX_SPEED_KT, word.text)?;
         // No aircraft flies at less than a knot, so a number below 1 is meant as a Mach number.
         let is_mach = 0.1 < value && value < 1.0;
-        return Ok(if is_mach { Speed::Mach(value) } else { Speed::CasKt(value) });
+        return Ok(if is_mach { Airspeed::Mach(value) } else { Airspeed::CasKt(value) });
     };
     // Without a point the digits are decimals.
     let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
-    Ok(Speed::Mach(up_to(MAX_MACH, &digits)?))
+    Ok(Airspeed::Mach(up_to(MAX_MACH, &digits)?))
 }
 
 /// Reads a number that must be greater than 0.
-pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+pub(super) fn positive(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
     let value = word.number(place)?;
     if value > 0.0 {
         return Ok(value);
@@ -209,7 +209,7 @@ pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, Inpu
 }
 
 /// Reads a vertical speed in ft/min, up or down, or 0 for none.
-pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
     let value = word.number(place)?;
     if value == 0.0 || VERTICAL_SPEEDS_FPM.contains(&value.abs()) {
         return Ok(value);
@@ -222,7 +222,7 @@ pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Word) -> Result
 /// Reads a size of the protected zone.
 pub(super) fn zone_size(
     place: &dyn fmt::Display,
-    word: Word,
+    word: Token,
     range: &RangeInclusive<f64>,
     unit: &str,
 ) -> Result<f64, InputError> {
@@ -235,12 +235,12 @@ pub(super) fn zone_size(
 }
 
 /// Reads any number.
-pub(super) fn number(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+pub(super) fn number(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
     word.number(place)
 }
 
 /// Reads `ON` or `OFF`.
-pub(super) fn switch(place: &dyn fmt::Display, word: Word) -> Result<bool, InputError> {
+pub(super) fn on_off(place: &dyn fmt::Display, word: Token) -> Result<bool, InputError> {
     match word.text.to_ascii_uppercase().as_str() {
         "ON" | "TRUE" | "YES" | "1" => Ok(true),
         "OFF" | "FALSE" | "NO" | "0" => Ok(false),
@@ -255,8 +255,8 @@ pub(super) fn switch(place: &dyn fmt::Display, word: Word) -> Result<bool, Input
 mod tests {
     use super::*;
 
-    fn word(text: &str) -> Word<'_> {
-        Word { text, line: 3, column: 7 }
+    fn word(text: &str) -> Token<'_> {
+        Token { text, line: 3, column: 7 }
     }
 
     #[test]
@@ -348,11 +348,11 @@ mod tests {
     #[test]
     fn speeds_below_one_or_with_an_m_are_mach_numbers() {
         for text in ["M0.8", "M.8", "m80", "M8", ".8", "0.80"] {
-            assert_eq!(speed(&"f", word(text)), Ok(Speed::Mach(0.8)), "{text}");
+            assert_eq!(speed(&"f", word(text)), Ok(Airspeed::Mach(0.8)), "{text}");
         }
-        assert_eq!(speed(&"f", word("M1.2")), Ok(Speed::Mach(1.2)));
+        assert_eq!(speed(&"f", word("M1.2")), Ok(Airspeed::Mach(1.2)));
         for (text, knots) in [("250", 250.0), ("0", 0.0), ("1", 1.0), ("0.05", 0.05)] {
-            assert_eq!(speed(&"f", word(text)), Ok(Speed::CasKt(knots)), "{text}");
+            assert_eq!(speed(&"f", word(text)), Ok(Airspeed::CasKt(knots)), "{text}");
         }
         for text in ["M", "fast", "-250", "inf", "M-1", "1e5", "M99.9", "M1e3"] {
             assert!(speed(&"f", word(text)).is_err(), "{text}");

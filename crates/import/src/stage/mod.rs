@@ -34,7 +34,7 @@ pub struct World {
     /// Bitmaps with their size and pose, in the order of the file.
     pub floor_plans: Vec<FloorPlan>,
     /// Boxes that are obstacles.
-    pub boxes: Vec<Body>,
+    pub boxes: Vec<BoxObstacle>,
     /// Robots.
     pub robots: Vec<Robot>,
     /// Properties and kinds of models that were ignored, by name, with their number.
@@ -43,7 +43,7 @@ pub struct World {
 
 /// Position and heading of a model; `yaw_rad` is counterclockwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Pose {
+pub struct Pose2 {
     /// Coordinate to the east, in meters.
     pub x_m: f64,
     /// Coordinate to the north, in meters.
@@ -66,18 +66,18 @@ pub struct FloorPlan {
     /// Its extent along rows and columns in meters; pixels need not be square.
     pub size_m: [f64; 2],
     /// The pose of its center.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Whether it has a wall all around.
     pub has_boundary: bool,
 }
 
 /// A box.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Body {
+pub struct BoxObstacle {
     /// Its name; may be empty.
     pub name: String,
     /// The pose of its center.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Its extent along its own axes, in meters.
     pub size_m: [f64; 2],
 }
@@ -90,7 +90,7 @@ pub struct Robot {
     /// The name of its model.
     pub kind: String,
     /// The initial pose of the point about which it turns.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Extent of its body in meters, lengthwise and sideways.
     pub size_m: [f64; 2],
     /// Radius in meters of the smallest disc around [`Self::pose`] that contains its body.

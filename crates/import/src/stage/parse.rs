@@ -18,7 +18,7 @@ pub(super) const MAX_NESTING: usize = 64;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Item {
     Include(Value),
-    Define { name: String, model: Model },
+    Define { name: String, model: ModelBlock },
     Entry(Entry),
 }
 
@@ -26,27 +26,27 @@ pub(super) enum Item {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Entry {
     Property { key: String, value: Value },
-    Model(Model),
+    Model(ModelBlock),
 }
 
 /// `KIND ( ENTRIES )`
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Model {
+pub(super) struct ModelBlock {
     pub(super) kind: String,
     pub(super) entries: Vec<Entry>,
-    pub(super) at: Place,
+    pub(super) at: SourcePosition,
 }
 
 /// One word or text, or a list of them.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Value {
     pub(super) words: Vec<String>,
-    pub(super) at: Place,
+    pub(super) at: SourcePosition,
 }
 
 /// A file, and a byte offset in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct SourcePosition {
     pub(super) file: usize,
     pub(super) offset: usize,
 }
@@ -67,7 +67,7 @@ pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, I
         };
         let cause = format!("{found} where {expected} is expected");
         InputError::new(place, cause, format!("write {expected} there"))
-            .in_text(text, error.offset())
+            .with_offset(text, error.offset())
     })
 }
 
@@ -88,7 +88,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
         }
         if depth > MAX_NESTING {
             let cause = format!("more than {MAX_NESTING} models in each other");
-            return Err(InputError::new(place, cause, "use fewer").in_text(text, at));
+            return Err(InputError::new(place, cause, "use fewer").with_offset(text, at));
         }
     }
     Ok(())
@@ -127,7 +127,7 @@ fn atom(input: &mut Input) -> ModalResult<String> {
 }
 
 fn value(input: &mut Input, file: usize) -> ModalResult<Value> {
-    let at = Place { file, offset: input.current_token_start() };
+    let at = SourcePosition { file, offset: input.current_token_start() };
     let closed = cut_err(sign(']')).context(expected("a value or `]`"));
     let list = preceded(sign('['), terminated(repeat(0.., atom), closed));
     let one = atom.map(|word| vec![word]);
@@ -136,13 +136,13 @@ fn value(input: &mut Input, file: usize) -> ModalResult<Value> {
 }
 
 fn item(input: &mut Input, file: usize) -> ModalResult<Item> {
-    let at = Place { file, offset: input.current_token_start() };
+    let at = SourcePosition { file, offset: input.current_token_start() };
     let word = name.parse_next(input)?;
     match word.as_str() {
         "include" => value(input, file).map(Item::Include),
         "define" => {
             let name = cut_err(name).context(expected("a name")).parse_next(input)?;
-            let at = Place { file, offset: input.current_token_start() };
+            let at = SourcePosition { file, offset: input.current_token_start() };
             let kind = cut_err(self::name).context(expected("a model's name")).parse_next(input)?;
             cut_err(sign('(')).context(expected("`(`")).parse_next(input)?;
             Ok(Item::Define { name, model: model(input, kind, at)? })
@@ -152,13 +152,13 @@ fn item(input: &mut Input, file: usize) -> ModalResult<Item> {
 }
 
 fn entry(input: &mut Input, file: usize) -> ModalResult<Entry> {
-    let at = Place { file, offset: input.current_token_start() };
+    let at = SourcePosition { file, offset: input.current_token_start() };
     let word = name.parse_next(input)?;
     entry_of(input, word, at)
 }
 
 /// Parses the entry that starts with a word: a model, or a property.
-fn entry_of(input: &mut Input, word: String, at: Place) -> ModalResult<Entry> {
+fn entry_of(input: &mut Input, word: String, at: SourcePosition) -> ModalResult<Entry> {
     if opt(sign('(')).parse_next(input)?.is_some() {
         return model(input, word, at).map(Entry::Model);
     }
@@ -166,8 +166,8 @@ fn entry_of(input: &mut Input, word: String, at: Place) -> ModalResult<Entry> {
 }
 
 /// Parses the rest of a model, after its opening bracket.
-fn model(input: &mut Input, kind: String, at: Place) -> ModalResult<Model> {
+fn model(input: &mut Input, kind: String, at: SourcePosition) -> ModalResult<ModelBlock> {
     let entries = repeat(0.., |input: &mut Input| entry(input, at.file)).parse_next(input)?;
     cut_err(sign(')')).context(expected("a property, a model or `)`")).parse_next(input)?;
-    Ok(Model { kind, entries, at })
+    Ok(ModelBlock { kind, entries, at })
 }

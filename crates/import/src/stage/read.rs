@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::parse::{self, Entry, Item, MAX_NESTING, Model, Place, Value};
-use super::{Body, FloorPlan, MAX_WORLD_BYTES, Pose, Robot, World};
+use super::parse::{self, Entry, Item, MAX_NESTING, ModelBlock, SourcePosition, Value};
+use super::{BoxObstacle, FloorPlan, MAX_WORLD_BYTES, Pose2, Robot, World};
 use crate::image::Bitmap;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, hypot, sin};
@@ -16,17 +16,17 @@ const MAX_MODELS: usize = 100_000;
 /// The size that Stage gives to models without one, in meters.
 const DEFAULT_SIZE_M: f64 = 0.1;
 /// The greatest brightness of a solid pixel, as in Stage; brighter ones are free.
-const DARKEST_FREE: f64 = 127.0;
+const MAX_SOLID_BRIGHTNESS: f64 = 127.0;
 
 pub(super) fn world(path: &Path) -> Result<World, InputError> {
-    let mut reader = Reader::default();
+    let mut reader = WorldReader::default();
     reader.file(path)?;
     reader.world.not_used = reader.not_used.into_iter().collect();
     Ok(reader.world)
 }
 
 /// A file that has been read.
-struct Source {
+struct SourceFile {
     path: PathBuf,
     text: String,
 }
@@ -38,12 +38,12 @@ struct Definition {
     root: String,
     /// The last value of each property.
     properties: BTreeMap<String, Value>,
-    children: Vec<Model>,
+    children: Vec<ModelBlock>,
 }
 
 #[derive(Default)]
-struct Reader {
-    sources: Vec<Source>,
+struct WorldReader {
+    sources: Vec<SourceFile>,
     /// Files that are being read: each was included by the one before.
     open: Vec<PathBuf>,
     definitions: BTreeMap<String, Rc<Definition>>,
@@ -52,23 +52,23 @@ struct Reader {
     world: World,
 }
 
-impl Reader {
+impl WorldReader {
     fn file(&mut self, path: &Path) -> Result<(), InputError> {
         let text = read_text(path, MAX_WORLD_BYTES)?;
         let canonical = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         self.open.push(canonical);
         let file = self.sources.len();
         let items = parse::items(&path.display().to_string(), &text, file)?;
-        self.sources.push(Source { path: path.to_owned(), text });
+        self.sources.push(SourceFile { path: path.to_owned(), text });
         for item in items {
             match item {
                 Item::Include(name) => self.include(&name)?,
                 Item::Define { name, model } => {
-                    let definition = self.resolved(&model);
+                    let definition = self.resolve(&model);
                     self.definitions.insert(name, Rc::new(definition));
                 }
-                Item::Entry(Entry::Property { key, .. }) => self.pass_over(key),
-                Item::Entry(Entry::Model(model)) => self.model(&model, Pose::default(), 0)?,
+                Item::Entry(Entry::Property { key, .. }) => self.count_ignored(key),
+                Item::Entry(Entry::Model(model)) => self.add_model(&model, Pose2::default(), 0)?,
             }
         }
         self.open.pop();
@@ -103,17 +103,17 @@ impl Reader {
         Ok(beside.unwrap_or(Path::new("")).join(file))
     }
 
-    fn error(&self, at: Place, cause: impl Into<String>, remedy: &str) -> InputError {
-        let Source { path, text } = &self.sources[at.file];
-        InputError::new(path.display(), cause, remedy).in_text(text, at.offset)
+    fn error(&self, at: SourcePosition, cause: impl Into<String>, remedy: &str) -> InputError {
+        let SourceFile { path, text } = &self.sources[at.file];
+        InputError::new(path.display(), cause, remedy).with_offset(text, at.offset)
     }
 
-    fn pass_over(&mut self, name: impl Into<String>) {
+    fn count_ignored(&mut self, name: impl Into<String>) {
         *self.not_used.entry(name.into()).or_default() += 1;
     }
 
     /// Returns the properties of a model, its own before inherited ones.
-    fn resolved(&self, model: &Model) -> Definition {
+    fn resolve(&self, model: &ModelBlock) -> Definition {
         let mut definition = match self.definitions.get(&model.kind) {
             Some(base) => (**base).clone(),
             None => Definition { root: model.kind.clone(), ..Definition::default() },
@@ -129,34 +129,44 @@ impl Reader {
         definition
     }
 
-    fn model(&mut self, model: &Model, parent: Pose, depth: usize) -> Result<(), InputError> {
+    fn add_model(
+        &mut self,
+        model: &ModelBlock,
+        parent: Pose2,
+        depth: usize,
+    ) -> Result<(), InputError> {
         self.models += 1;
         if self.models > MAX_MODELS || depth > MAX_NESTING {
             let cause = format!("more than {MAX_MODELS} models, or {MAX_NESTING} in each other");
             return Err(self.error(model.at, cause, "use fewer"));
         }
-        let definition = self.resolved(model);
+        let definition = self.resolve(model);
         match definition.root.as_str() {
-            "position" => self.robot(model, &definition, parent),
-            "model" => self.thing(model, &definition, parent, depth),
+            "position" => self.add_robot(model, &definition, parent),
+            "model" => self.add_thing(model, &definition, parent, depth),
             _ if definition.properties.contains_key("bitmap") => {
                 // A floor plan with its definition in a file that is missing.
-                self.thing(model, &definition, parent, depth)
+                self.add_thing(model, &definition, parent, depth)
             }
             root => {
-                self.pass_over(root);
+                self.count_ignored(root);
                 Ok(())
             }
         }
     }
 
-    fn robot(&mut self, model: &Model, def: &Definition, parent: Pose) -> Result<(), InputError> {
+    fn add_robot(
+        &mut self,
+        model: &ModelBlock,
+        def: &Definition,
+        parent: Pose2,
+    ) -> Result<(), InputError> {
         let (size_m, origin) = (self.size_m(def)?, self.pose(def, "origin")?);
         let far = |offset_m: f64, size_m: f64| offset_m.abs() + 0.5 * size_m;
         let robot = Robot {
             name: self.text(def, "name"),
             kind: model.kind.clone(),
-            pose: self.pose(def, "pose")?.on(parent),
+            pose: self.pose(def, "pose")?.transformed_by(parent),
             size_m,
             radius_m: match origin.yaw_rad == 0.0 {
                 true => hypot(far(origin.x_m, size_m[0]), far(origin.y_m, size_m[1])),
@@ -169,15 +179,15 @@ impl Reader {
         Ok(())
     }
 
-    fn thing(
+    fn add_thing(
         &mut self,
-        model: &Model,
+        model: &ModelBlock,
         def: &Definition,
-        parent: Pose,
+        parent: Pose2,
         depth: usize,
     ) -> Result<(), InputError> {
-        let pose = self.pose(def, "pose")?.on(parent);
-        let middle = self.pose(def, "origin")?.on(pose);
+        let pose = self.pose(def, "pose")?.transformed_by(parent);
+        let middle = self.pose(def, "origin")?.transformed_by(pose);
         let size_m = self.size_m(def)?;
         let name = self.text(def, "name");
         if let Some(bitmap) = def.properties.get("bitmap") {
@@ -185,16 +195,16 @@ impl Reader {
             let plan = self.floor_plan(bitmap)?;
             let plan = FloorPlan { name, size_m, pose: middle, has_boundary, ..plan };
             self.world.floor_plans.push(plan);
-        } else if self.is_in_the_way(def)? {
-            self.world.boxes.push(Body { name, pose: middle, size_m });
+        } else if self.is_obstacle(def)? {
+            self.world.boxes.push(BoxObstacle { name, pose: middle, size_m });
         } else {
-            self.pass_over(&model.kind);
+            self.count_ignored(&model.kind);
         }
         self.count_unused(def);
-        def.children.iter().try_for_each(|child| self.model(child, pose, depth + 1))
+        def.children.iter().try_for_each(|child| self.add_model(child, pose, depth + 1))
     }
 
-    fn is_in_the_way(&self, def: &Definition) -> Result<bool, InputError> {
+    fn is_obstacle(&self, def: &Definition) -> Result<bool, InputError> {
         let is_hit = self.number(def, "obstacle_return", 1.0)? != 0.0;
         Ok(is_hit || self.number(def, "ranger_return", 1.0)? >= 0.0)
     }
@@ -202,7 +212,7 @@ impl Reader {
     /// Reads the pixels of a bitmap.
     fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
         let image = Bitmap::load(&self.path(bitmap)?)?;
-        let from_top = image.map_brightness(|brightness| brightness <= DARKEST_FREE);
+        let from_top = image.map_brightness(|brightness| brightness <= MAX_SOLID_BRIGHTNESS);
         // Image rows run from the top, those of the plan from the bottom.
         let rows = from_top.rchunks(image.width() as usize);
         Ok(FloorPlan {
@@ -211,15 +221,15 @@ impl Reader {
             height: image.height(),
             solid: rows.flatten().copied().collect(),
             size_m: [0.0; 2],
-            pose: Pose::default(),
+            pose: Pose2::default(),
             has_boundary: false,
         })
     }
 
     fn count_unused(&mut self, def: &Definition) {
-        let is_used = |key: &&String| !USED.contains(&key.as_str());
+        let is_used = |key: &&String| !KNOWN_PROPERTIES.contains(&key.as_str());
         for key in def.properties.keys().filter(is_used) {
-            self.pass_over(key);
+            self.count_ignored(key);
         }
     }
 
@@ -257,11 +267,11 @@ impl Reader {
         }
     }
 
-    fn pose(&self, def: &Definition, key: &str) -> Result<Pose, InputError> {
-        let Some(value) = def.properties.get(key) else { return Ok(Pose::default()) };
+    fn pose(&self, def: &Definition, key: &str) -> Result<Pose2, InputError> {
+        let Some(value) = def.properties.get(key) else { return Ok(Pose2::default()) };
         match self.numbers(value)?[..] {
-            [x_m, y_m, _, yaw_deg] => Ok(Pose { x_m, y_m, yaw_rad: yaw_deg.to_radians() }),
-            [x_m, y_m, _] if key == "origin" => Ok(Pose { x_m, y_m, yaw_rad: 0.0 }),
+            [x_m, y_m, _, yaw_deg] => Ok(Pose2 { x_m, y_m, yaw_rad: yaw_deg.to_radians() }),
+            [x_m, y_m, _] if key == "origin" => Ok(Pose2 { x_m, y_m, yaw_rad: 0.0 }),
             _ => Err(self.error(
                 value.at,
                 format!("no {key}"),
@@ -272,12 +282,12 @@ impl Reader {
 }
 
 /// The properties that are read.
-const USED: [&str; 8] =
+const KNOWN_PROPERTIES: [&str; 8] =
     ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
 
-impl Pose {
+impl Pose2 {
     /// Returns a pose that is given in the frame of another in the frame of that one's parent.
-    fn on(self, parent: Self) -> Self {
+    fn transformed_by(self, parent: Self) -> Self {
         let (s, c) = (sin(parent.yaw_rad), cos(parent.yaw_rad));
         Self {
             x_m: parent.x_m + c * self.x_m - s * self.y_m,

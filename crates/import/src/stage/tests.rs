@@ -34,7 +34,7 @@ fn a_floor_plan_is_stretched_to_its_size_and_place() {
     assert_eq!((plan.width, plan.height), (2, 3));
     assert_eq!(plan.solid, [true, false, false, false, false, false]);
     assert_eq!((plan.name.as_str(), plan.size_m, plan.has_boundary), ("cave", [4.0, 9.0], true));
-    assert_eq!(plan.pose, Pose { x_m: 1.0, y_m: 2.0, yaw_rad: FRAC_PI_2 });
+    assert_eq!(plan.pose, Pose2 { x_m: 1.0, y_m: 2.0, yaw_rad: FRAC_PI_2 });
     assert_eq!(world.not_used, [("color".into(), 1)]);
 }
 

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 
 /// The maximum size of a model in bytes after unpacking: some 400 times the longest known.
 pub const MAX_URDF_BYTES: u64 = 1 << 24;
@@ -103,7 +103,7 @@ pub struct Limits {
 
 impl Limits {
     /// Returns whether `value` is in the range, up to the rounding of a printed value.
-    pub fn contain(&self, value: f64) -> bool {
+    pub fn contains(&self, value: f64) -> bool {
         const SLACK: f64 = 1e-9;
         (self.lower - SLACK..=self.upper + SLACK).contains(&value)
     }
@@ -136,7 +136,7 @@ impl Model {
     pub fn load(path: &Path) -> Result<Self, InputError> {
         let place = path.display().to_string();
         if place.trim_end_matches(".gz").ends_with(".xacro") {
-            return Err(InputError::new(&place, read::XACRO, read::EXPAND));
+            return Err(InputError::new(&place, read::XACRO_CAUSE, read::XACRO_REMEDY));
         }
         Self::parse(&place, &read_text(path, MAX_URDF_BYTES)?)
     }
@@ -158,7 +158,7 @@ impl Model {
         self.links.iter().position(|link| link == name).ok_or_else(|| {
             let known: Vec<&str> = self.links.iter().map(String::as_str).collect();
             let cause = format!("`{}` has no link `{name}`", self.name);
-            InputError::new(place, cause, nearest(name, &known))
+            InputError::new(place, cause, suggestion(name, &known))
         })
     }
 
@@ -171,12 +171,12 @@ impl Model {
         self.joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
             let known: Vec<&str> = self.joints.iter().map(|j| j.name.as_str()).collect();
             let cause = format!("`{}` has no joint `{name}`", self.name);
-            InputError::new(place, cause, nearest(name, &known))
+            InputError::new(place, cause, suggestion(name, &known))
         })
     }
 
     /// Returns the joint that carries `link`; `None` for the root.
-    pub fn joint_above(&self, link: usize) -> Option<usize> {
+    pub fn parent_joint(&self, link: usize) -> Option<usize> {
         self.joints.iter().position(|joint| joint.child == link)
     }
 }

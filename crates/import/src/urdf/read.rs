@@ -2,15 +2,15 @@
 
 use super::tree;
 use super::{Collision, Joint, JointKind, Limits, Mimic, Model, Origin, Shape};
-use crate::xml::{Element, Value, XmlFile};
+use crate::xml::{Element, XmlAttribute, XmlFile};
 use sidestep_kernel::InputError;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 
-pub(super) const XACRO: &str = "is xacro, macros that have to become URDF first";
-pub(super) const EXPAND: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
+pub(super) const XACRO_CAUSE: &str = "is xacro, macros that have to become URDF first";
+pub(super) const XACRO_REMEDY: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
 
 /// The names of joint types in files.
-const KINDS: [(&str, JointKind); 6] = [
+const JOINT_KINDS: [(&str, JointKind); 6] = [
     ("fixed", JointKind::Fixed),
     ("revolute", JointKind::Revolute),
     ("continuous", JointKind::Continuous),
@@ -32,7 +32,11 @@ const MIN_AXIS: f64 = 1e-6;
 pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let file = XmlFile::parse(place, text).map_err(|error| {
         let is_xacro = error.cause().contains("`xacro:`");
-        if is_xacro { at(&error, InputError::new(place, XACRO, EXPAND)) } else { error }
+        if is_xacro {
+            at_position_of(&error, InputError::new(place, XACRO_CAUSE, XACRO_REMEDY))
+        } else {
+            error
+        }
     })?;
     refuse_xacro(&file)?;
     let robot = file.root("robot")?;
@@ -55,9 +59,9 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
 }
 
 /// Moves `error` to the position of another.
-fn at(other: &InputError, error: InputError) -> InputError {
+fn at_position_of(other: &InputError, error: InputError) -> InputError {
     match other.position() {
-        Some((line, column)) => error.at(line, column),
+        Some((line, column)) => error.with_position(line, column),
         None => error,
     }
 }
@@ -67,11 +71,12 @@ fn at(other: &InputError, error: InputError) -> InputError {
 fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
     for element in file.elements() {
         if element.namespace().is_some_and(|address| address.contains("xacro")) {
-            return Err(element.error(XACRO, EXPAND));
+            return Err(element.error(XACRO_CAUSE, XACRO_REMEDY));
         }
-        let is_macro = |value: &Value| value.text().contains("${") || value.text().contains("$(");
+        let is_macro =
+            |value: &XmlAttribute| value.text().contains("${") || value.text().contains("$(");
         if let Some(value) = element.attributes().find(is_macro) {
-            return Err(value.error(XACRO, EXPAND));
+            return Err(value.error(XACRO_CAUSE, XACRO_REMEDY));
         }
     }
     Ok(())
@@ -90,7 +95,7 @@ impl Links {
         self.names.get(value.text()).ok_or_else(|| {
             let known: Vec<&str> = self.in_order.iter().map(String::as_str).collect();
             let cause = format!("there is no link `{}`", value.text());
-            value.error(cause, nearest(value.text(), &known))
+            value.error(cause, suggestion(value.text(), &known))
         })
     }
 }
@@ -144,8 +149,8 @@ fn shape(element: Element) -> Result<Shape, InputError> {
 
 /// Reads lengths that are not negative.
 fn size<'a>(
-    value: Value<'a>,
-    read: impl Fn(&Value<'a>) -> Result<[f64; 3], InputError>,
+    value: XmlAttribute<'a>,
+    read: impl Fn(&XmlAttribute<'a>) -> Result<[f64; 3], InputError>,
 ) -> Result<[f64; 3], InputError> {
     let lengths = read(&value)?;
     match lengths.into_iter().find(|x| !(0.0..=MAX_COORDINATE).contains(x)) {
@@ -173,11 +178,11 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
     })
 }
 
-fn kind(value: Value) -> Result<JointKind, InputError> {
-    let found = KINDS.iter().find(|(name, _)| *name == value.text());
+fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
+    let found = JOINT_KINDS.iter().find(|(name, _)| *name == value.text());
     found.map(|(_, kind)| *kind).ok_or_else(|| {
         let cause = format!("there are no `{}` joints", value.text());
-        value.error(cause, nearest(value.text(), &KINDS.map(|(name, _)| name)))
+        value.error(cause, suggestion(value.text(), &JOINT_KINDS.map(|(name, _)| name)))
     })
 }
 
@@ -187,21 +192,21 @@ fn origin(joint: Element) -> Result<Origin, InputError> {
     Ok(Origin { xyz_m: triple("xyz")?, rpy_rad: triple("rpy")? })
 }
 
-fn bounded(value: Value) -> Result<[f64; 3], InputError> {
+fn bounded(value: XmlAttribute) -> Result<[f64; 3], InputError> {
     let triple = value.triple()?;
     triple.into_iter().try_for_each(|x| is_bounded(&value, x))?;
     Ok(triple)
 }
 
 /// Reads one number of a robot's size.
-fn bounded_number(value: Value) -> Result<f64, InputError> {
+fn bounded_number(value: XmlAttribute) -> Result<f64, InputError> {
     let number = value.number()?;
     is_bounded(&value, number)?;
     Ok(number)
 }
 
 /// Refuses a number that no robot has, at which lengths would be lost to rounding.
-fn is_bounded(value: &Value, x: f64) -> Result<(), InputError> {
+fn is_bounded(value: &XmlAttribute, x: f64) -> Result<(), InputError> {
     if x.abs() <= MAX_COORDINATE {
         return Ok(());
     }
@@ -267,7 +272,7 @@ fn read_mimics(
         let driver = names.get(value.text()).ok_or_else(|| {
             let known: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
             let cause = format!("there is no joint `{}`", value.text());
-            value.error(cause, nearest(value.text(), &known))
+            value.error(cause, suggestion(value.text(), &known))
         })?;
         if !joints[i].kind.has_one_value() || !joints[driver].kind.has_one_value() {
             let cause = "a joint that cannot move takes part in a mimicry";
@@ -280,7 +285,7 @@ fn read_mimics(
             offset: number("offset", 0.0)?,
         });
     }
-    let endless = (0..joints.len()).find(|&i| tree::mimics_in_a_circle(joints, i));
+    let endless = (0..joints.len()).find(|&i| tree::has_mimic_cycle(joints, i));
     endless.map_or(Ok(()), |i| {
         let cause = format!("`{}` mimics itself in a circle", joints[i].name);
         Err(elements[i].error(cause, "remove one <mimic> of the circle"))

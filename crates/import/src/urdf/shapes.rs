@@ -117,7 +117,7 @@ fn mesh_box(urdf: &Path, file: &str, scale: [f64; 3]) -> Result<(Shape, [f64; 3]
         return Err("only STL meshes are read".into());
     }
     let path = find_mesh(urdf, file).ok_or("the file is absent")?;
-    let [low, high] = stl::bounds(&path).map_err(|error| error.cause().to_owned())?;
+    let [low, high] = stl::read_bounds(&path).map_err(|error| error.cause().to_owned())?;
     let ends = [0, 1, 2].map(|i| [low[i] * scale[i], high[i] * scale[i]]);
     let size_m = ends.map(|[a, b]| (b - a).abs());
     Ok((Shape::Box { size_m }, ends.map(|[a, b]| 0.5 * (a + b))))

@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use super::{MAX_URDF_BYTES, Model};
-use crate::xml::{Element, Value, XmlFile};
+use crate::xml::{Element, XmlAttribute, XmlFile};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 
 /// The content of an SRDF file for a model.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -84,7 +84,7 @@ impl Semantics {
     /// Those of [`Semantics::load`], except for reading.
     pub fn parse(place: &str, text: &str, model: &Model) -> Result<Self, InputError> {
         let file = XmlFile::parse(place, text)?;
-        let reader = Reader { robot: file.root("robot")?, model };
+        let reader = SrdfReader { robot: file.root("robot")?, model };
         let groups = reader.groups()?;
         Ok(Self {
             postures: reader.each("group_state", |e| reader.posture(e, &groups))?,
@@ -104,7 +104,7 @@ impl Semantics {
         if named.is_empty() {
             let known: Vec<&str> = self.postures.iter().map(|p| p.name.as_str()).collect();
             let cause = format!("there is no posture `{name}`");
-            return Err(InputError::new(place, cause, nearest(name, &known)));
+            return Err(InputError::new(place, cause, suggestion(name, &known)));
         }
         Ok(named.iter().flat_map(|posture| posture.values.iter().copied()).collect())
     }
@@ -116,7 +116,7 @@ impl Semantics {
     pub fn group(&self, place: &str, name: &str) -> Result<&Group, InputError> {
         self.groups.iter().find(|group| group.name == name).ok_or_else(|| {
             let known: Vec<&str> = self.groups.iter().map(|g| g.name.as_str()).collect();
-            InputError::new(place, format!("there is no group `{name}`"), nearest(name, &known))
+            InputError::new(place, format!("there is no group `{name}`"), suggestion(name, &known))
         })
     }
 
@@ -143,7 +143,7 @@ impl Semantics {
             let group = self.group(place, name)?;
             joints.extend(group.joints.iter().copied());
             // A listed link stands for the joint that carries it.
-            joints.extend(group.links.iter().filter_map(|&link| model.joint_above(link)));
+            joints.extend(group.links.iter().filter_map(|&link| model.parent_joint(link)));
             for part in &group.groups {
                 if !names.contains(&part.as_str()) {
                     names.push(part);
@@ -151,7 +151,7 @@ impl Semantics {
             }
             next += 1;
         }
-        way_of(&joints, model).ok_or_else(|| {
+        path_ends(&joints, model).ok_or_else(|| {
             let cause = format!("the joints of group `{name}` do not lie on one way");
             InputError::new(place, cause, "name base and tip with --base and --tip")
         })
@@ -159,21 +159,22 @@ impl Semantics {
 }
 
 /// Returns the ends of the path that holds all of these joints.
-fn way_of(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
-    let depth = |&joint: &usize| model.way(model.root, model.joints[joint].child).map(|w| w.len());
+fn path_ends(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
+    let depth =
+        |&joint: &usize| model.joint_path(model.root, model.joints[joint].child).map(|w| w.len());
     let first = *joints.iter().min_by_key(|j| depth(j))?;
     let last = *joints.iter().max_by_key(|j| depth(j))?;
     let (base, tip) = (model.joints[first].parent, model.joints[last].child);
-    let way = model.way(base, tip)?;
+    let way = model.joint_path(base, tip)?;
     joints.iter().all(|joint| way.contains(joint)).then_some((base, tip))
 }
 
-struct Reader<'a> {
+struct SrdfReader<'a> {
     robot: Element<'a>,
     model: &'a Model,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> SrdfReader<'a> {
     /// Returns the result of `read` for each element called `name`.
     fn each<T>(
         &self,
@@ -198,7 +199,7 @@ impl<'a> Reader<'a> {
     }
 
     fn group(&self, element: Element<'a>) -> Result<Group, InputError> {
-        let of_model = |name, found: fn(&Self, Value) -> Result<usize, InputError>| {
+        let of_model = |name, found: fn(&Self, XmlAttribute) -> Result<usize, InputError>| {
             let named = element.children(name).map(|e| found(self, e.required("name")?));
             named.collect::<Result<Vec<usize>, InputError>>()
         };
@@ -216,7 +217,7 @@ impl<'a> Reader<'a> {
         let base = self.link(element.required("base_link")?)?;
         let tip_link = element.required("tip_link")?;
         let tip = self.link(tip_link)?;
-        if self.model.way(base, tip).is_none() {
+        if self.model.joint_path(base, tip).is_none() {
             let links = &self.model.links;
             let cause = format!("`{}` does not hang on `{}`", links[tip], links[base]);
             return Err(tip_link.error(cause, "write the link nearer to the root as base_link"));
@@ -261,22 +262,22 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn link(&self, value: Value) -> Result<usize, InputError> {
+    fn link(&self, value: XmlAttribute) -> Result<usize, InputError> {
         let found = self.model.link("", value.text());
         found.map_err(|error| value.error(error.cause(), error.remedy()))
     }
 
-    fn joint(&self, value: Value) -> Result<usize, InputError> {
+    fn joint(&self, value: XmlAttribute) -> Result<usize, InputError> {
         let found = self.model.joint("", value.text());
         found.map_err(|error| value.error(error.cause(), error.remedy()))
     }
 }
 
-fn known_group(value: Value, groups: &[Group]) -> Result<(), InputError> {
+fn known_group(value: XmlAttribute, groups: &[Group]) -> Result<(), InputError> {
     if groups.iter().any(|group| group.name == value.text()) {
         return Ok(());
     }
     let known: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
     let cause = format!("there is no group `{}`", value.text());
-    Err(value.error(cause, nearest(value.text(), &known)))
+    Err(value.error(cause, suggestion(value.text(), &known)))
 }

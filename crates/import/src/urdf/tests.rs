@@ -32,8 +32,8 @@ fn a_small_arm_is_read_with_all_defaults() {
     assert_eq!(shoulder.origin, Origin::default());
     assert_eq!(shoulder.limits, Some(Limits { lower: -1.0, upper: 2.0 }));
     assert_eq!((wrist.kind, wrist.limits), (JointKind::Fixed, None));
-    assert_eq!(arm.way(0, 2), Some(vec![0, 1]));
-    assert_eq!(arm.way(2, 0), None);
+    assert_eq!(arm.joint_path(0, 2), Some(vec![0, 1]));
+    assert_eq!(arm.joint_path(2, 0), None);
 }
 
 #[test]
@@ -83,7 +83,8 @@ fn xacro_is_refused_and_its_unused_prefix_is_not() {
         assert!(error.remedy().contains("xacro FILE"), "{error}");
     }
     assert!(
-        Model::load(std::path::Path::new("a.urdf.xacro")).is_err_and(|e| e.cause() == read::XACRO)
+        Model::load(std::path::Path::new("a.urdf.xacro"))
+            .is_err_and(|e| e.cause() == read::XACRO_CAUSE)
     );
 }
 

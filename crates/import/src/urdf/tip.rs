@@ -8,7 +8,7 @@ impl Model {
     /// that carries the fingers, or the one frame that is fixed to the hand and carries nothing.
     pub fn default_tip(&self) -> usize {
         let leaf = self.farthest_leaf();
-        let way = self.way_to(leaf);
+        let way = self.path_to(leaf);
         let hand = (0..way.len()).find_map(|k| self.hand(&way, k));
         hand.map_or(leaf, |hand| self.tool_frame(hand))
     }
@@ -16,7 +16,7 @@ impl Model {
     fn farthest_leaf(&self) -> usize {
         let mut best = (self.root, 0);
         for leaf in self.leaves() {
-            let count = self.moving(&self.way_to(leaf));
+            let count = self.movable_joints(&self.path_to(leaf));
             if count > best.1 || best.0 == self.root {
                 best = (leaf, count);
             }
@@ -24,41 +24,43 @@ impl Model {
         best.0
     }
 
-    fn way_to(&self, link: usize) -> Vec<usize> {
-        self.way(self.root, link).expect("every link hangs on the root")
+    fn path_to(&self, link: usize) -> Vec<usize> {
+        self.joint_path(self.root, link).expect("every link hangs on the root")
     }
 
-    fn moves(&self, joint: usize) -> bool {
+    fn is_movable(&self, joint: usize) -> bool {
         self.joints[joint].kind.has_one_value()
     }
 
-    fn moving(&self, way: &[usize]) -> usize {
-        way.iter().filter(|&&joint| self.moves(joint)).count()
+    fn movable_joints(&self, way: &[usize]) -> usize {
+        way.iter().filter(|&&joint| self.is_movable(joint)).count()
     }
 
     /// Returns the link from which joint `way[k]` goes out, if that is a finger's: it moves, other joints
     /// move on the same body, and none of these branches has as many joints as there are before.
     fn hand(&self, way: &[usize], k: usize) -> Option<usize> {
-        let before = self.moving(&way[..k]);
+        let before = self.movable_joints(&way[..k]);
         let hand = self.joints[way[k]].parent;
-        let body = self.body(hand);
-        let goes_out = |joint: &usize| self.moves(*joint) && body[self.joints[*joint].parent];
+        let body = self.rigid_links(hand);
+        let goes_out = |joint: &usize| self.is_movable(*joint) && body[self.joints[*joint].parent];
         let fingers = (0..self.joints.len()).filter(goes_out).count();
         let beyond = |leaf: usize| {
-            let way = self.way_to(leaf);
-            way.iter().position(|&joint| goes_out(&joint)).map_or(0, |at| self.moving(&way[at..]))
+            let way = self.path_to(leaf);
+            way.iter()
+                .position(|&joint| goes_out(&joint))
+                .map_or(0, |at| self.movable_joints(&way[at..]))
         };
         let longest = self.leaves().into_iter().map(beyond).max().unwrap_or(0);
         (goes_out(&way[k]) && fingers > 1 && longest < before).then_some(hand)
     }
 
     /// Returns for each link whether it is rigid to `link`.
-    fn body(&self, link: usize) -> Vec<bool> {
+    fn rigid_links(&self, link: usize) -> Vec<bool> {
         let mut is_rigid = vec![false; self.links.len()];
         is_rigid[link] = true;
         let mut open = vec![link];
         while let Some(link) = open.pop() {
-            for joint in (0..self.joints.len()).filter(|&joint| !self.moves(joint)) {
+            for joint in (0..self.joints.len()).filter(|&joint| !self.is_movable(joint)) {
                 let ends = [self.joints[joint].parent, self.joints[joint].child];
                 for (from, to) in [(ends[0], ends[1]), (ends[1], ends[0])] {
                     if from == link && !is_rigid[to] {
@@ -74,7 +76,7 @@ impl Model {
     /// Returns the one frame that is fixed to a hand and carries nothing, or the hand if there is none or
     /// more than one.
     fn tool_frame(&self, hand: usize) -> usize {
-        let body = self.body(hand);
+        let body = self.rigid_links(hand);
         let frames: Vec<usize> = self.leaves().into_iter().filter(|&leaf| body[leaf]).collect();
         match frames[..] {
             [frame] => frame,

@@ -7,7 +7,7 @@ use crate::xml::Element;
 use sidestep_kernel::InputError;
 
 /// The maximum number of names that an error lists.
-const LISTED: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Names and their indices.
 #[derive(Default)]
@@ -28,7 +28,7 @@ impl Names {
 }
 
 /// Returns whether following the mimicry from `joint` never ends.
-pub(super) fn mimics_in_a_circle(joints: &[Joint], joint: usize) -> bool {
+pub(super) fn has_mimic_cycle(joints: &[Joint], joint: usize) -> bool {
     let mut next = joint;
     for _ in 0..=joints.len() {
         match &joints[next].mimic {
@@ -46,29 +46,29 @@ pub(super) fn root(
     links: &[String],
     joints: &[Joint],
 ) -> Result<usize, InputError> {
-    let above = joints_above(elements, links, joints)?;
+    let above = parent_joints(elements, links, joints)?;
     let roots: Vec<usize> = (0..links.len()).filter(|&link| above[link].is_none()).collect();
     match roots[..] {
-        [root] => all_hang_on(root, &above, elements, links, joints).map(|()| root),
+        [root] => check_connected(root, &above, elements, links, joints).map(|()| root),
         [] => {
             let cause = "every link hangs on another: the joints form a loop";
             Err(robot.error(cause, "a URDF is a tree: remove the joint that closes the loop"))
         }
         _ => {
             let names = roots.iter().map(|&link| format!("`{}`", links[link]));
-            let cause = format!("{} links hang on nothing: {}", roots.len(), listed(names));
+            let cause = format!("{} links hang on nothing: {}", roots.len(), quote_names(names));
             Err(robot.error(cause, "connect all but one to the others with joints"))
         }
     }
 }
 
-fn listed(names: impl ExactSizeIterator<Item = String>) -> String {
-    let more = if names.len() > LISTED { ", ..." } else { "" };
-    names.take(LISTED).collect::<Vec<_>>().join(", ") + more
+fn quote_names(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = if names.len() > MAX_LISTED { ", ..." } else { "" };
+    names.take(MAX_LISTED).collect::<Vec<_>>().join(", ") + more
 }
 
 /// Returns for each link the joint that carries it.
-fn joints_above(
+fn parent_joints(
     elements: &[Element],
     links: &[String],
     joints: &[Joint],
@@ -89,7 +89,7 @@ fn joints_above(
 }
 
 /// Checks that all links are reached from the root; a link that is not is in a loop or below one.
-fn all_hang_on(
+fn check_connected(
     root: usize,
     above: &[Option<usize>],
     elements: &[Element],
@@ -116,7 +116,7 @@ fn all_hang_on(
 impl Model {
     /// Returns the joints from `base` out to `tip`, in this order; empty where they are the same
     /// link, `None` where `tip` is not a descendant of `base`.
-    pub fn way(&self, base: usize, tip: usize) -> Option<Vec<usize>> {
+    pub fn joint_path(&self, base: usize, tip: usize) -> Option<Vec<usize>> {
         let mut above = vec![None; self.links.len()];
         for (i, joint) in self.joints.iter().enumerate() {
             above[joint.child] = Some(i);

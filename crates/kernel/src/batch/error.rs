@@ -13,7 +13,7 @@ pub enum BatchError {
     Empty,
     /// Too few or too many values, one for each world.
     #[error("a batch of {worlds} worlds needs {worlds} {what}, not {found}")]
-    Worlds {
+    Count {
         /// Number of worlds.
         worlds: usize,
         /// The noun for the values.
@@ -47,7 +47,7 @@ pub enum BatchError {
     },
     /// A missing team, or room of another shape.
     #[error(transparent)]
-    Room(#[from] OrderError),
+    Observe(#[from] OrderError),
     /// A world that broke off: it has no state until it is restarted.
     #[error(
         "world {world} (seed {seed}) broke off after cycle {cycle}, which is a bug: {cause}; the other worlds \

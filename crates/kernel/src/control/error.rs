@@ -20,7 +20,7 @@ pub enum OrderError {
     #[error(
         "{who} decides for itself; let the scenario say that it is decided from outside (`external`)"
     )]
-    Decides {
+    NotExternal {
         /// The agent.
         who: String,
     },
@@ -58,7 +58,7 @@ pub enum OrderError {
     },
     /// Controls were handed over to a run with agents that decide within it.
     #[error("in this run nobody decides outside: {cause}")]
-    NobodyOutside {
+    NoExternalAgents {
         /// The reason, and the remedy.
         cause: String,
     },
@@ -72,7 +72,7 @@ pub enum OrderError {
     },
     /// An order that makes no sense to the world.
     #[error("the order `{order}` to {who} cannot be obeyed: {cause}")]
-    Senseless {
+    Invalid {
         /// The order.
         order: String,
         /// The agent.
@@ -90,7 +90,7 @@ pub enum OrderError {
     },
     /// Room of another shape than the observations.
     #[error("the room for observations does not fit; it must be {expected}")]
-    Room {
+    BufferShape {
         /// The rooms that would fit.
         expected: String,
     },

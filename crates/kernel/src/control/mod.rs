@@ -18,19 +18,19 @@
 //! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. A run
 //! that was decided from outside is therefore a function of its scenario, its seed and its tables `orders` and `controls`.
 
-mod book;
+mod controls;
 mod error;
-mod handed;
+mod orders;
 mod rows;
 mod space;
 mod team;
 
-pub use book::OrderBook;
+pub use controls::{ControlLog, ControlReader};
 pub use error::OrderError;
-pub use handed::{ControlBook, ControlReader};
+pub use orders::OrderLog;
 pub use rows::OrderReader;
-pub use space::{Bounds, CellsMut, Space};
+pub use space::{BufferMut, Space, SpaceKind};
 pub use team::{Order, Orders, Team, Teams};
 
-pub(crate) use book::{OrderRow, table};
-pub(crate) use handed::{ControlRow, controls_table, rows_of};
+pub(crate) use controls::{ControlRow, control_rows, controls_table};
+pub(crate) use orders::{OrderRow, orders_table};

@@ -1,6 +1,6 @@
 //! Orders read back from the rows that record them.
 
-use super::book::{ORDERS, OrderBook};
+use super::orders::{ORDERS, OrderLog};
 use super::team::Orders;
 use crate::ports::{MemoryRecorder, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
@@ -8,13 +8,13 @@ use crate::units::{Cycle, EntityId};
 /// Reads the orders of the table `orders`, block after block: each row has one value.
 #[derive(Debug, Default)]
 pub struct OrderReader {
-    book: OrderBook,
-    pending: Option<Pending>,
+    log: OrderLog,
+    pending: Option<IncompleteOrder>,
 }
 
 /// An order with values that are still being read.
 #[derive(Debug)]
-struct Pending {
+struct IncompleteOrder {
     cycle: Cycle,
     agent: EntityId,
     order: String,
@@ -40,10 +40,10 @@ impl OrderReader {
         let names = &schema.columns[at("order")?];
         for row in 0..orders.len() {
             if *parts.get(row)? == 0 {
-                self.close();
+                self.finish_order();
                 let (cycle, agent) = (*cycles.get(row)?, *agents.get(row)?);
                 let order = names.text(orders, row);
-                self.pending = Some(Pending { cycle, agent, order, values: Vec::new() });
+                self.pending = Some(IncompleteOrder { cycle, agent, order, values: Vec::new() });
             }
             if let Some(pending) = &mut self.pending {
                 pending.values.push(*values.get(row)?);
@@ -53,32 +53,32 @@ impl OrderReader {
     }
 
     /// Returns all orders that were read.
-    pub fn into_book(mut self) -> OrderBook {
-        self.close();
-        self.book
+    pub fn into_log(mut self) -> OrderLog {
+        self.finish_order();
+        self.log
     }
 
     /// Notes the order that has all of its values.
-    fn close(&mut self) {
-        if let Some(Pending { cycle, agent, order, values }) = self.pending.take() {
-            self.book.note(cycle, &Orders { order: &order, agents: &[agent], values: &values });
+    fn finish_order(&mut self) {
+        if let Some(IncompleteOrder { cycle, agent, order, values }) = self.pending.take() {
+            self.log.add(cycle, &Orders { order: &order, agents: &[agent], values: &values });
         }
     }
 }
 
-impl OrderBook {
+impl OrderLog {
     /// Returns the orders that a run recorded; `None` if there is no table of them.
-    pub fn recorded(recorder: &MemoryRecorder) -> Option<Self> {
+    pub fn from_recorder(recorder: &MemoryRecorder) -> Option<Self> {
         let (schema, columns) = recorder.table(ORDERS)?;
         let mut reader = OrderReader::default();
         reader.read(schema, columns)?;
-        Some(reader.into_book())
+        Some(reader.into_log())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::book::{OrderRow, table};
+    use super::super::orders::{OrderRow, orders_table};
     use super::*;
     use crate::ports::Recorder;
 
@@ -95,11 +95,11 @@ mod tests {
             row(7, 1, 1, 0, 1.0),
             row(7, 1, 1, 1, 2.0),
         ];
-        let mut book = OrderBook::default();
-        book.note(3, &Orders { order: "to", agents: &[1], values: &[0.5, 0.25] });
-        book.note(3, &Orders { order: "go", agents: &[2], values: &[4.0] });
-        book.note(7, &Orders { order: "to", agents: &[1], values: &[1.0, 2.0] });
-        let table = || table(vec!["go".into(), "to".into()]);
+        let mut book = OrderLog::default();
+        book.add(3, &Orders { order: "to", agents: &[1], values: &[0.5, 0.25] });
+        book.add(3, &Orders { order: "go", agents: &[2], values: &[4.0] });
+        book.add(7, &Orders { order: "to", agents: &[1], values: &[1.0, 2.0] });
+        let table = || orders_table(vec!["go".into(), "to".into()]);
         for cut in 0..=rows.len() {
             let mut reader = OrderReader::default();
             for part in [&rows[..cut], &rows[cut..]] {
@@ -108,7 +108,7 @@ mod tests {
                 let (schema, columns) = recorder.table("orders").expect("it is there");
                 assert_eq!(reader.read(schema, columns), Some(()));
             }
-            assert_eq!(reader.into_book(), book, "cut before row {cut}");
+            assert_eq!(reader.into_log(), book, "cut before row {cut}");
         }
     }
 
@@ -116,6 +116,6 @@ mod tests {
     fn another_table_is_none_of_orders() {
         let schema = TableSchema::new("orders", Vec::new());
         assert_eq!(OrderReader::default().read(&schema, &[]), None);
-        assert_eq!(OrderBook::recorded(&MemoryRecorder::new(&[])), None);
+        assert_eq!(OrderLog::from_recorder(&MemoryRecorder::new(&[])), None);
     }
 }

@@ -11,44 +11,44 @@ pub struct Space {
     /// Shape of one agent's share; empty for a single number.
     pub shape: Vec<usize>,
     /// The allowed values.
-    pub bounds: Bounds,
+    pub kind: SpaceKind,
     /// One sentence for the reader.
     pub meaning: String,
 }
 
 /// The values of a space.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Bounds {
+pub enum SpaceKind {
     /// One of these, by number from 0.
-    Choice(Vec<String>),
+    Discrete(Vec<String>),
     /// Whole numbers from `least` to `most`, both included.
-    Whole {
+    Integer {
         /// The least value.
-        least: i64,
+        low: i64,
         /// The greatest value.
-        most: i64,
+        high: i64,
     },
     /// Numbers from `least` to `most`, both included; infinite where there is no bound.
     Real {
         /// The least value.
-        least: f64,
+        low: f64,
         /// The greatest value.
-        most: f64,
+        high: f64,
     },
 }
 
 impl Space {
     /// The greatest whole number in an order: up to it, no two of them become the same float.
-    pub const MOST_WHOLE: i64 = (1 << 53) - 1;
+    pub const MAX_INTEGER: i64 = (1 << 53) - 1;
 
     /// Creates a space of single numbers.
-    pub fn new(name: impl Into<String>, bounds: Bounds, meaning: impl Into<String>) -> Self {
-        Self { name: name.into(), shape: Vec::new(), bounds, meaning: meaning.into() }
+    pub fn new(name: impl Into<String>, bounds: SpaceKind, meaning: impl Into<String>) -> Self {
+        Self { name: name.into(), shape: Vec::new(), kind: bounds, meaning: meaning.into() }
     }
 
     /// Returns the same space with another shape.
     #[must_use]
-    pub fn shaped(self, shape: impl Into<Vec<usize>>) -> Self {
+    pub fn with_shape(self, shape: impl Into<Vec<usize>>) -> Self {
         Self { shape: shape.into(), ..self }
     }
 
@@ -58,8 +58,8 @@ impl Space {
     }
 
     /// Returns whether its values are whole numbers.
-    pub fn is_whole(&self) -> bool {
-        !matches!(self.bounds, Bounds::Real { .. })
+    pub fn is_integer(&self) -> bool {
+        !matches!(self.kind, SpaceKind::Real { .. })
     }
 
     /// The unit of its values, where its name ends in one.
@@ -68,51 +68,61 @@ impl Space {
     }
 
     /// Returns whether a value is allowed in it.
-    pub fn holds(&self, value: f64) -> bool {
+    pub fn contains(&self, value: f64) -> bool {
         let between = |least: f64, most: f64| least <= value && value <= most;
         // By a conversion, because taking the fraction is a library call in builds for processors of any age.
         let is_whole = || value as i64 as f64 == value;
-        match &self.bounds {
-            Bounds::Choice(names) => between(0.0, names.len() as f64 - 1.0) && is_whole(),
-            &Bounds::Whole { least, most } => between(least as f64, most as f64) && is_whole(),
-            &Bounds::Real { least, most } => value.is_finite() && between(least, most),
+        match &self.kind {
+            SpaceKind::Discrete(names) => between(0.0, names.len() as f64 - 1.0) && is_whole(),
+            &SpaceKind::Integer { low: least, high: most } => {
+                between(least as f64, most as f64) && is_whole()
+            }
+            &SpaceKind::Real { low: least, high: most } => {
+                value.is_finite() && between(least, most)
+            }
         }
     }
 
     /// Returns its values in words: `one of 0 forward, 1 left`, `a number from 0 to 1`.
-    pub fn words(&self) -> String {
-        match &self.bounds {
-            Bounds::Choice(names) => {
+    pub fn describe(&self) -> String {
+        match &self.kind {
+            SpaceKind::Discrete(names) => {
                 let named: Vec<_> =
                     names.iter().enumerate().map(|(k, name)| format!("{k} {name}")).collect();
                 format!("one of {}", named.join(", "))
             }
-            Bounds::Whole { least, most } => format!("a whole number from {least} to {most}"),
-            Bounds::Real { least, most } if least.is_infinite() && most.is_infinite() => {
+            SpaceKind::Integer { low: least, high: most } => {
+                format!("a whole number from {least} to {most}")
+            }
+            SpaceKind::Real { low: least, high: most }
+                if least.is_infinite() && most.is_infinite() =>
+            {
                 "a finite number".into()
             }
-            Bounds::Real { least, most } if most.is_infinite() => {
+            SpaceKind::Real { low: least, high: most } if most.is_infinite() => {
                 format!("a finite number of at least {least}")
             }
-            Bounds::Real { least, most } => format!("a number from {least} to {most}"),
+            SpaceKind::Real { low: least, high: most } => {
+                format!("a number from {least} to {most}")
+            }
         }
     }
 }
 
 /// Room for the values of all agents of a team in one space, one agent after the other.
 #[derive(Debug)]
-pub enum CellsMut<'a> {
-    /// Room for [`Bounds::Choice`] and [`Bounds::Whole`].
-    Whole(&'a mut [i64]),
-    /// Room for [`Bounds::Real`].
+pub enum BufferMut<'a> {
+    /// Room for [`SpaceKind::Discrete`] and [`SpaceKind::Integer`].
+    Integer(&'a mut [i64]),
+    /// Room for [`SpaceKind::Real`].
     Real(&'a mut [f64]),
 }
 
-impl CellsMut<'_> {
+impl BufferMut<'_> {
     /// Number of values for which there is room.
     pub fn len(&self) -> usize {
         match self {
-            Self::Whole(room) => room.len(),
+            Self::Integer(room) => room.len(),
             Self::Real(room) => room.len(),
         }
     }
@@ -124,15 +134,15 @@ impl CellsMut<'_> {
 
     /// Writes a whole number; does nothing with room for real ones, because a space has one kind of values.
     #[inline]
-    pub fn whole(&mut self, at: usize, value: i64) {
-        if let Self::Whole(room) = self {
+    pub fn set_integer(&mut self, at: usize, value: i64) {
+        if let Self::Integer(room) = self {
             room[at] = value;
         }
     }
 
     /// Writes a real number; does nothing with room for whole ones, because a space has one kind of values.
     #[inline]
-    pub fn real(&mut self, at: usize, value: f64) {
+    pub fn set_real(&mut self, at: usize, value: f64) {
         if let Self::Real(room) = self {
             room[at] = value;
         }
@@ -145,20 +155,22 @@ mod tests {
 
     #[test]
     fn a_space_holds_what_its_words_say() {
-        let choice = Space::new("action", Bounds::Choice(vec!["go".into(), "stay".into()]), "");
-        assert_eq!(choice.words(), "one of 0 go, 1 stay");
+        let choice =
+            Space::new("action", SpaceKind::Discrete(vec!["go".into(), "stay".into()]), "");
+        assert_eq!(choice.describe(), "one of 0 go, 1 stay");
         assert_eq!(
-            [0.0, 1.0, 2.0, -1.0, 0.5, f64::NAN].map(|v| choice.holds(v)),
+            [0.0, 1.0, 2.0, -1.0, 0.5, f64::NAN].map(|v| choice.contains(v)),
             [true, true, false, false, false, false]
         );
-        let whole = Space::new("word", Bounds::Whole { least: -2, most: Space::MOST_WHOLE }, "");
-        assert!(whole.holds(-2.0) && whole.holds(Space::MOST_WHOLE as f64));
-        assert!(!whole.holds(-3.0) && !whole.holds(1.5) && !whole.holds(f64::INFINITY));
+        let whole =
+            Space::new("word", SpaceKind::Integer { low: -2, high: Space::MAX_INTEGER }, "");
+        assert!(whole.contains(-2.0) && whole.contains(Space::MAX_INTEGER as f64));
+        assert!(!whole.contains(-3.0) && !whole.contains(1.5) && !whole.contains(f64::INFINITY));
         let real =
-            Space::new("rate_rad_s", Bounds::Real { least: -1.0, most: 1.0 }, "").shaped([3]);
+            Space::new("rate_rad_s", SpaceKind::Real { low: -1.0, high: 1.0 }, "").with_shape([3]);
         assert_eq!((real.width(), real.unit(), choice.width()), (3, Some("rad/s"), 1));
-        assert!(real.holds(-1.0) && !real.holds(1.1) && !real.holds(f64::NAN));
-        let free = Bounds::Real { least: f64::NEG_INFINITY, most: f64::INFINITY };
-        assert!(!Space::new("x_m", free, "").holds(f64::INFINITY));
+        assert!(real.contains(-1.0) && !real.contains(1.1) && !real.contains(f64::NAN));
+        let free = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
+        assert!(!Space::new("x_m", free, "").contains(f64::INFINITY));
     }
 }

@@ -1,7 +1,7 @@
 //! Agents that are alike, and orders to them.
 
 use super::error::OrderError;
-use super::space::{CellsMut, Space};
+use super::space::{BufferMut, Space};
 use crate::units::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,9 +13,9 @@ pub struct Team {
     /// Its agents, rising; rows of arrays are in this order.
     pub agents: Vec<EntityId>,
     /// Spaces of their observations.
-    pub observed: Vec<Space>,
+    pub observation_spaces: Vec<Space>,
     /// Spaces of orders to them; empty for agents that decide for themselves.
-    pub ordered: Vec<Space>,
+    pub action_spaces: Vec<Space>,
 }
 
 /// One order to several agents: one row of values for each.
@@ -61,14 +61,14 @@ impl Teams {
     /// Returns these teams; no agent is in two of them. `noun` is the noun for an agent. A repeated name
     /// gets a number: `robot`, `robot 2`.
     pub fn new(mut all: Vec<Team>, noun: &'static str) -> Self {
-        give_names(&mut all);
+        number_duplicates(&mut all);
         let last = all.iter().flat_map(|team| &team.agents).max();
         let mut team_of = vec![NONE; last.map_or(0, |&last| last as usize + 1)];
         for (k, team) in (0..).zip(&all) {
             team.agents.iter().for_each(|&agent| team_of[agent as usize] = k);
         }
         let mut order_names: Vec<String> = Vec::new();
-        for space in all.iter().flat_map(|team| &team.ordered) {
+        for space in all.iter().flat_map(|team| &team.action_spaces) {
             if !order_names.contains(&space.name) {
                 order_names.push(space.name.clone());
             }
@@ -87,8 +87,8 @@ impl Teams {
     }
 
     /// Returns whether any agent takes orders.
-    pub(crate) fn take_orders(&self) -> bool {
-        self.all.iter().any(|team| !team.ordered.is_empty())
+    pub(crate) fn accept_orders(&self) -> bool {
+        self.all.iter().any(|team| !team.action_spaces.is_empty())
     }
 
     /// The names of all orders, each once.
@@ -98,7 +98,7 @@ impl Teams {
 
     /// Checks that orders have the shape and the bounds of their spaces.
     pub(crate) fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        self.each(orders, |_| Ok(()))
+        self.for_each_order(orders, |_| Ok(()))
     }
 
     /// Hands over the orders to single agents, one after the other, as far as they have the shape and the bounds
@@ -106,13 +106,13 @@ impl Teams {
     ///
     /// # Errors
     /// The first one that is wrong, or that `take` returns.
-    pub(crate) fn each<'a>(
+    pub(crate) fn for_each_order<'a>(
         &self,
         orders: &Orders<'a>,
         mut take: impl FnMut(&Order<'a>) -> Result<(), OrderError>,
     ) -> Result<(), OrderError> {
         let &Orders { order, agents, values } = orders;
-        let Some(&first) = agents.first() else { return nobody(orders) };
+        let Some(&first) = agents.first() else { return check_empty(orders) };
         // Usually all are of one team, so its space is looked up once.
         let mut of_team = self.space(order, first)?;
         let width = of_team.2.width();
@@ -130,9 +130,9 @@ impl Teams {
                 return Err(OrderError::Shape { order: order.into(), expected, found: width });
             }
             let values = &values[k * width..(k + 1) * width];
-            if let Some(&value) = values.iter().find(|&&value| !space.holds(value)) {
+            if let Some(&value) = values.iter().find(|&&value| !space.contains(value)) {
                 let who = format!("{} {agent}", self.noun);
-                let (order, expected) = (order.into(), space.words());
+                let (order, expected) = (order.into(), space.describe());
                 return Err(OrderError::Value { order, who, value, expected });
             }
             take(&Order { team, space: number, agent, values })?;
@@ -148,9 +148,9 @@ impl Teams {
             let last = self.team_of.len().checked_sub(1).map(|last| last as EntityId);
             return Err(OrderError::NoAgent { who: who(), noun: self.noun, last });
         };
-        let ordered = &self.all[team].ordered;
+        let ordered = &self.all[team].action_spaces;
         if ordered.is_empty() {
-            return Err(OrderError::Decides { who: who() });
+            return Err(OrderError::NotExternal { who: who() });
         }
         let number = ordered.iter().position(|space| space.name == order).ok_or_else(|| {
             let known = ordered.iter().map(|space| space.name.clone()).collect();
@@ -160,27 +160,31 @@ impl Teams {
     }
 
     /// Checks that there is exactly the room that a team's observations need.
-    pub(crate) fn check_room(&self, team: usize, room: &[CellsMut<'_>]) -> Result<(), OrderError> {
-        let Some(Team { agents, observed, .. }) = self.all.get(team) else {
+    pub(crate) fn check_buffers(
+        &self,
+        team: usize,
+        room: &[BufferMut<'_>],
+    ) -> Result<(), OrderError> {
+        let Some(Team { agents, observation_spaces: observed, .. }) = self.all.get(team) else {
             return Err(OrderError::NoTeam { team, teams: self.all.len() });
         };
-        let fits = |(space, room): (&Space, &CellsMut<'_>)| {
+        let fits = |(space, room): (&Space, &BufferMut<'_>)| {
             room.len() == agents.len() * space.width()
-                && space.is_whole() == matches!(room, CellsMut::Whole(_))
+                && space.is_integer() == matches!(room, BufferMut::Integer(_))
         };
         if observed.len() == room.len() && observed.iter().zip(room).all(fits) {
             return Ok(());
         }
         let expected = observed.iter().map(|space| {
-            let sort = if space.is_whole() { "whole" } else { "real" };
+            let sort = if space.is_integer() { "whole" } else { "real" };
             format!("{} of {} x {} {sort} values", space.name, agents.len(), space.width())
         });
-        Err(OrderError::Room { expected: expected.collect::<Vec<_>>().join(", ") })
+        Err(OrderError::BufferShape { expected: expected.collect::<Vec<_>>().join(", ") })
     }
 }
 
 /// Checks an order to no agents: it is right if it has no values.
-fn nobody(orders: &Orders<'_>) -> Result<(), OrderError> {
+fn check_empty(orders: &Orders<'_>) -> Result<(), OrderError> {
     match orders.values {
         [] => Ok(()),
         values => {
@@ -191,7 +195,7 @@ fn nobody(orders: &Orders<'_>) -> Result<(), OrderError> {
 }
 
 /// Gives a number to each repeated name.
-fn give_names(teams: &mut [Team]) {
+fn number_duplicates(teams: &mut [Team]) {
     let mut taken = BTreeSet::new();
     // The next number to try for each name, because thousands of teams may share one.
     let mut next: BTreeMap<String, u32> = BTreeMap::new();
@@ -213,7 +217,12 @@ mod tests {
     fn no_two_teams_have_one_name() {
         let team = |name: &str| {
             let (observed, ordered) = (Vec::new(), Vec::new());
-            Team { name: name.into(), agents: Vec::new(), observed, ordered }
+            Team {
+                name: name.into(),
+                agents: Vec::new(),
+                observation_spaces: observed,
+                action_spaces: ordered,
+            }
         };
         let all = ["snake", "snake 2", "snake", "crane", "snake"].map(team).to_vec();
         let teams = Teams::new(all, "chain");

@@ -1,7 +1,7 @@
 //! Links between agents: which of them carry messages at a time, and which are in a burst of
 //! losses.
 
-use crate::distr::Chance;
+use crate::distr::Bernoulli;
 use crate::stream::{Purpose, Streams};
 use crate::units::EntityId;
 
@@ -10,7 +10,7 @@ const STEPS_PER_MEAN: f64 = 10.0;
 
 /// A while, in seconds after the start of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct While {
+pub struct TimeWindow {
     /// Its start.
     pub from_s: f64,
     /// Its end; may be infinite.
@@ -19,11 +19,11 @@ pub struct While {
 
 /// A while in which an agent's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Silence {
+pub struct RadioOutage {
     /// Id of the agent.
     pub agent: EntityId,
     /// The while.
-    pub during: While,
+    pub window: TimeWindow,
 }
 
 /// A while in which no message gets from one side to another. Agents on no side hear all, and are heard
@@ -33,18 +33,18 @@ pub struct Partition {
     /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
     /// The while.
-    pub during: While,
+    pub window: TimeWindow,
 }
 
 /// A while in which a link works one way only.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OneWay {
+pub struct UnidirectionalLink {
     /// Id of the agent that is heard by the other.
     pub sender: EntityId,
     /// Id of the agent that does not reach the other with its messages.
     pub receiver: EntityId,
     /// The while.
-    pub during: While,
+    pub window: TimeWindow,
 }
 
 /// The streams from which faults are drawn, and the purposes of the draws.
@@ -63,55 +63,55 @@ pub struct FaultStreams {
 /// Bursts of losses (Gilbert and Elliott): each direction of each link is a Markov chain of two
 /// states.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bursts {
+pub struct GilbertElliott {
     /// Probability that a message is lost during a burst.
     pub loss: f64,
     /// Mean length of a burst in seconds.
-    pub lasts_s: f64,
+    pub mean_burst_s: f64,
     /// Mean time in seconds from the end of a burst to the start of the next one.
-    pub every_s: f64,
+    pub mean_gap_s: f64,
 }
 
-impl While {
+impl TimeWindow {
     /// The time from the start of the run on.
     pub const ALWAYS: Self = Self { from_s: 0.0, until_s: f64::INFINITY };
 
     /// Returns whether a time is within the while.
-    pub fn is_on(&self, at_s: f64) -> bool {
+    pub fn contains(&self, at_s: f64) -> bool {
         self.from_s <= at_s && at_s < self.until_s
     }
 }
 
 impl Partition {
     /// Returns whether the partition separates two agents at a time.
-    pub(super) fn cuts(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
+    pub(super) fn separates(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
         let side = |id: EntityId| self.sides.iter().position(|side| side.contains(&id));
-        self.during.is_on(at_s) && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
+        self.window.contains(at_s) && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
     }
 }
 
-impl OneWay {
+impl UnidirectionalLink {
     /// Returns whether the fault stops a message at a time.
-    pub(super) fn stops(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
-        self.during.is_on(at_s) && (self.receiver, self.sender) == (sender, receiver)
+    pub(super) fn blocks(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
+        self.window.contains(at_s) && (self.receiver, self.sender) == (sender, receiver)
     }
 }
 
-impl Bursts {
+impl GilbertElliott {
     /// Returns whether a link is in a burst at a time.
     ///
     /// In each step of the chain its state is drawn anew with a certain probability, and otherwise
     /// stays the same. That is the chain with the given mean times, and its state at any time
     /// follows from the draws of a few steps before it.
-    pub(super) fn is_on(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
-        let step_s = self.lasts_s.min(self.every_s) / STEPS_PER_MEAN;
-        let renewed = Chance::new(step_s / self.lasts_s + step_s / self.every_s);
-        let in_burst = Chance::new(self.lasts_s / (self.lasts_s + self.every_s));
+    pub(super) fn is_in_burst(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
+        let step_s = self.mean_burst_s.min(self.mean_gap_s) / STEPS_PER_MEAN;
+        let renewed = Bernoulli::new(step_s / self.mean_burst_s + step_s / self.mean_gap_s);
+        let in_burst = Bernoulli::new(self.mean_burst_s / (self.mean_burst_s + self.mean_gap_s));
         let mut step = (at_s / step_s) as u64;
         loop {
             let words = draws.streams.pair(link[0], link[1], step, draws.burst, 0);
-            if step == 0 || renewed.happens(words[0]) {
-                return in_burst.happens(words[1]);
+            if step == 0 || renewed.sample(words[0]) {
+                return in_burst.sample(words[1]);
             }
             step -= 1;
         }
@@ -127,13 +127,14 @@ mod tests {
     /// allowed.
     #[test]
     fn bursts_last_and_return_as_stated() {
-        let bursts = Bursts { loss: 1.0, lasts_s: 2.0, every_s: 6.0 };
+        let bursts = GilbertElliott { loss: 1.0, mean_burst_s: 2.0, mean_gap_s: 6.0 };
         let [network, burst, burst_loss] = [5, 6, 7].map(Purpose);
         let draws = FaultStreams { streams: Streams::new(Seed(5)), network, burst, burst_loss };
         let (step_s, steps) = (0.2, 2000);
         let (mut on, mut begun) = (0, 0);
         for receiver in 1..=40 {
-            let state = |k: u64| bursts.is_on(&draws, [0, receiver], (k as f64 + 0.5) * step_s);
+            let state =
+                |k: u64| bursts.is_in_burst(&draws, [0, receiver], (k as f64 + 0.5) * step_s);
             on += (0..steps).filter(|&k| state(k)).count();
             begun += (1..steps).filter(|&k| state(k) && !state(k - 1)).count();
         }
@@ -146,10 +147,10 @@ mod tests {
     #[test]
     fn a_partition_cuts_between_its_sides_and_nowhere_else() {
         let sides = vec![vec![0, 2], vec![1, 3]];
-        let partition = Partition { sides, during: While { from_s: 10.0, until_s: 20.0 } };
-        assert!(partition.cuts([0, 3], 10.0) && partition.cuts([3, 0], 19.9));
+        let partition = Partition { sides, window: TimeWindow { from_s: 10.0, until_s: 20.0 } };
+        assert!(partition.separates([0, 3], 10.0) && partition.separates([3, 0], 19.9));
         for (pair, at_s) in [([0, 2], 15.0), ([0, 4], 15.0), ([0, 3], 9.9), ([0, 3], 20.0)] {
-            assert!(!partition.cuts(pair, at_s), "{pair:?} at {at_s}");
+            assert!(!partition.separates(pair, at_s), "{pair:?} at {at_s}");
         }
     }
 }

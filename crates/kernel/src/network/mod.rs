@@ -9,25 +9,28 @@
 //!
 //! Agents are known by their ids on the network; their meaning is up to the world.
 
-mod carrier;
-mod ether;
+mod fault_injector;
+mod faulty_transport;
 mod links;
 mod packet;
 
 use crate::math;
 use crate::ports::Faults;
 use crate::units::EntityId;
-pub use carrier::{Apart, Carrier};
-pub use ether::Ether;
-pub use links::{Bursts, FaultStreams, OneWay, Partition, Silence, While};
+pub use fault_injector::FaultInjector;
+pub use faulty_transport::{Distances, FaultyTransport};
+pub use links::{
+    FaultStreams, GilbertElliott, Partition, RadioOutage, TimeWindow, UnidirectionalLink,
+};
 pub use packet::{
-    Draft, HEADER_BYTES, Refusal, Refused, Seal, TalkId, Topic, digest, fingerprint, open,
+    ConversationId, DropCounts, DropReason, HEADER_BYTES, PacketBuffer, PacketHeader, Protocol,
+    digest, fingerprint, parse_packet,
 };
 
 /// Chance of giving up an agent that is in touch.
-const GIVEN_UP: f64 = 1e-9;
+const FALSE_GIVE_UP_PROBABILITY: f64 = 1e-9;
 /// The same for an agent that was not heard in the talk before: another miss is no worse than that one.
-const MISSED: f64 = 0.1;
+const FALSE_GIVE_UP_PROBABILITY_AFTER_MISS: f64 = 0.1;
 
 /// A network that may lose, delay and repeat messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,25 +52,27 @@ pub struct Network {
     /// Distance in meters that messages reach.
     pub range_m: f64,
     /// Bursts of losses, if there are any.
-    pub bursts: Option<Bursts>,
+    pub bursts: Option<GilbertElliott>,
     /// Agents whose radio is dead, and the times.
-    pub silences: Vec<Silence>,
+    pub radio_outages: Vec<RadioOutage>,
     /// Sides that do not hear each other, and the times.
     pub partitions: Vec<Partition>,
     /// Links that work one way only, and the times.
-    pub one_ways: Vec<OneWay>,
+    pub unidirectional_links: Vec<UnidirectionalLink>,
 }
 
 impl Network {
     /// Returns whether an agent is silent at a time.
-    pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
-        self.silences.iter().any(|silence| silence.agent == id && silence.during.is_on(at_s))
+    pub fn is_radio_off(&self, id: EntityId, at_s: f64) -> bool {
+        self.radio_outages
+            .iter()
+            .any(|silence| silence.agent == id && silence.window.contains(at_s))
     }
 
     /// Returns whether a link carries messages at a time, as far as distance does not matter.
     pub fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
-        let is_cut = self.partitions.iter().any(|one| one.cuts([sender, receiver], at_s));
-        !is_cut && !self.one_ways.iter().any(|one| one.stops(sender, receiver, at_s))
+        let is_cut = self.partitions.iter().any(|one| one.separates([sender, receiver], at_s));
+        !is_cut && !self.unidirectional_links.iter().any(|one| one.blocks(sender, receiver, at_s))
     }
 
     fn ticks(&self, seconds: f64) -> u64 {
@@ -90,25 +95,28 @@ impl Network {
     }
 
     /// Returns the time that an agent waits before it asks, and the number of questions.
-    pub fn patience(&self) -> Patience {
-        let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
+    pub fn retry_policy(&self) -> RetryPolicy {
+        let (tries, first_tries) = (
+            self.max_tries(FALSE_GIVE_UP_PROBABILITY),
+            self.max_tries(FALSE_GIVE_UP_PROBABILITY_AFTER_MISS),
+        );
         let bits_per_tick = self.bits_per_tick();
-        Patience { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
+        RetryPolicy { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
     }
 
     /// Returns the same for talks of many steps: an agent that has fallen silent is given up in a
     /// quarter of the time at the latest, so that enough is left to go on without it.
-    pub fn short_patience(&self) -> Patience {
+    pub fn short_retry_policy(&self) -> RetryPolicy {
         let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
-        let long = self.patience();
-        Patience { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
+        let long = self.retry_policy();
+        RetryPolicy { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
     }
 
     /// Returns the number of questions after which the chance is at most `chance` that an agent in
     /// touch has answered none: each question or its answer was lost, or fell into a burst.
-    fn tries(&self, chance: f64) -> u32 {
+    fn max_tries(&self, chance: f64) -> u32 {
         let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
-        let burst_s = self.bursts.map_or(0.0, |bursts| bursts.lasts_s * -math::ln(chance));
+        let burst_s = self.bursts.map_or(0.0, |bursts| bursts.mean_burst_s * -math::ln(chance));
         let lost = (math::ln(chance) / math::ln(unanswered)).ceil();
         let on_way_s = 2.0 * (self.latency_s + self.max_delay_s);
         // The conversion saturates, and bursts may last longer than any talk.
@@ -127,7 +135,7 @@ impl Network {
 
 /// The time after which an agent asks, and the number of questions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patience {
+pub struct RetryPolicy {
     /// Number of ticks without a new message after which it asks.
     pub ticks: u64,
     /// Number of bits that go over a link in a tick.
@@ -138,15 +146,15 @@ pub struct Patience {
     pub first_tries: u32,
 }
 
-impl Patience {
+impl RetryPolicy {
     /// Returns whether agents ever ask, which they do not on a network that loses nothing.
-    pub fn asks(&self) -> bool {
+    pub fn is_enabled(&self) -> bool {
         self.ticks < u64::MAX
     }
 
     /// Returns the number of ticks after which an agent asks where messages are of this size: the
     /// ticks that a message and its answer take on the way are added.
-    pub fn ticks_for(&self, bytes: usize) -> u64 {
+    pub fn timeout_ticks(&self, bytes: usize) -> u64 {
         let on_way = (2.0 * 8.0 * bytes as f64 / self.bits_per_tick).ceil();
         self.ticks.saturating_add(on_way as u64)
     }

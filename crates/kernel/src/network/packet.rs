@@ -5,7 +5,7 @@
 //! 2      1        1      8            8      8        4       4         8         bytes, little-endian
 //! ```
 //!
-//! Bytes from a network may be anything. [`open`] lets through only those that another agent of the same
+//! Bytes from a network may be anything. [`parse_packet`] lets through only those that another agent of the same
 //! scenario and build has sent in this form, for a talk; the message itself is checked by the agent that
 //! takes it. The checksum detects damage on the way, not forgery: the network below has to control access.
 
@@ -17,22 +17,22 @@ const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
 /// Place of the checksum among them.
-const CHECKSUM_AT: usize = HEADER_BYTES - 8;
+const CHECKSUM_OFFSET: usize = HEADER_BYTES - 8;
 /// Number of bytes for which there is room in a new packet.
-const USUAL_BYTES: usize = 512;
+const TYPICAL_BYTES: usize = 512;
 
 /// The subject of a talk, as a world names it.
-pub trait Topic: Copy + Ord {
+pub trait Protocol: Copy + Ord {
     /// Returns its number on the wire.
     fn number(self) -> u8;
 
     /// Returns the topic of a number, if there is one.
-    fn of_number(number: u8) -> Option<Self>;
+    fn from_number(number: u8) -> Option<Self>;
 }
 
 /// The identity of a talk: messages of one are not meant for any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct TalkId<T> {
+pub struct ConversationId<T> {
     /// The cycle that is decided.
     pub cycle: Cycle,
     /// The subject.
@@ -42,7 +42,7 @@ pub struct TalkId<T> {
     pub members: u64,
 }
 
-impl<T: Topic> TalkId<T> {
+impl<T: Protocol> ConversationId<T> {
     /// Returns the identity of the talk of these agents, by rising id.
     pub fn new(cycle: Cycle, topic: T, members: &[EntityId]) -> Self {
         let bytes: Vec<u8> = members.iter().flat_map(|id| id.to_le_bytes()).collect();
@@ -57,24 +57,24 @@ impl<T: Topic> TalkId<T> {
 
 /// A message in its serialized form, with room before it for the header of a packet.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Draft(Vec<u8>);
+pub struct PacketBuffer(Vec<u8>);
 
-impl Draft {
+impl PacketBuffer {
     /// Returns a message in the form in which it travels.
-    pub fn of<M: Serialize + ?Sized>(message: &M) -> Self {
-        let mut room = Vec::with_capacity(USUAL_BYTES);
+    pub fn from_message<M: Serialize + ?Sized>(message: &M) -> Self {
+        let mut room = Vec::with_capacity(TYPICAL_BYTES);
         room.resize(HEADER_BYTES, 0);
         Self(postcard::to_extend(message, room).expect("messages are plain data"))
     }
 
     /// Returns an already serialized message.
-    pub fn of_bytes(message: &[u8]) -> Self {
+    pub fn from_bytes(message: &[u8]) -> Self {
         Self([&[0; HEADER_BYTES], message].concat())
     }
 
     /// Returns a message that is followed by bytes in a form of their own.
-    pub fn with<M: Serialize + ?Sized>(message: &M, bytes: &[u8]) -> Self {
-        let Self(mut draft) = Self::of(message);
+    pub fn from_parts<M: Serialize + ?Sized>(message: &M, bytes: &[u8]) -> Self {
+        let Self(mut draft) = Self::from_message(message);
         draft.extend_from_slice(bytes);
         Self(draft)
     }
@@ -91,32 +91,37 @@ impl Draft {
     }
 
     /// Returns the bytes of the packet.
-    pub fn sealed<T: Topic>(mut self, seal: &Seal<T>) -> Vec<u8> {
-        seal.write(&mut self.0[..CHECKSUM_AT]);
+    pub fn into_packet<T: Protocol>(mut self, seal: &PacketHeader<T>) -> Vec<u8> {
+        seal.write(&mut self.0[..CHECKSUM_OFFSET]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
-        let checksum = digest([&head[..CHECKSUM_AT], message]).to_le_bytes();
-        self.0[CHECKSUM_AT..HEADER_BYTES].copy_from_slice(&checksum);
+        let checksum = digest([&head[..CHECKSUM_OFFSET], message]).to_le_bytes();
+        self.0[CHECKSUM_OFFSET..HEADER_BYTES].copy_from_slice(&checksum);
         self.0
     }
 }
 
 /// The statements of a packet about its message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Seal<T> {
+pub struct PacketHeader<T> {
     /// Digest of scenario and build: agents with any other are not understood.
     pub fingerprint: u64,
     /// The talk.
-    pub talk: TalkId<T>,
+    pub conversation: ConversationId<T>,
     /// The sender.
     pub sender: EntityId,
     /// Number among the sender's packets of the talk.
     pub sequence: u32,
 }
 
-impl<T: Topic> Seal<T> {
+impl<T: Protocol> PacketHeader<T> {
     /// Writes the bytes before the checksum.
     fn write(&self, room: &mut [u8]) {
-        let Self { fingerprint, talk: TalkId { cycle, topic, members }, sender, sequence } = *self;
+        let Self {
+            fingerprint,
+            conversation: ConversationId { cycle, topic, members },
+            sender,
+            sequence,
+        } = *self;
         let [m, a] = MAGIC;
         room[..4].copy_from_slice(&[m, a, VERSION, topic.number()]);
         room[4..12].copy_from_slice(&fingerprint.to_le_bytes());
@@ -127,18 +132,18 @@ impl<T: Topic> Seal<T> {
     }
 
     /// Reads the bytes before the checksum.
-    fn read(bytes: &[u8]) -> Result<Self, Refusal> {
+    fn read(bytes: &[u8]) -> Result<Self, DropReason> {
         let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         let half = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         if bytes[..2] != MAGIC {
-            return Err(Refusal::NoPacket);
+            return Err(DropReason::NoPacket);
         }
         if bytes[2] != VERSION {
-            return Err(Refusal::Version);
+            return Err(DropReason::Version);
         }
-        let topic = T::of_number(bytes[3]).ok_or(Refusal::Damaged)?;
-        let talk = TalkId { cycle: word(12), topic, members: word(20) };
-        Ok(Self { fingerprint: word(4), talk, sender: half(28), sequence: half(32) })
+        let topic = T::from_number(bytes[3]).ok_or(DropReason::Damaged)?;
+        let talk = ConversationId { cycle: word(12), topic, members: word(20) };
+        Ok(Self { fingerprint: word(4), conversation: talk, sender: half(28), sequence: half(32) })
     }
 }
 
@@ -146,24 +151,27 @@ impl<T: Topic> Seal<T> {
 ///
 /// # Errors
 /// When the bytes are no packet of `fingerprint`, or were damaged.
-pub fn open<T: Topic>(bytes: &[u8], fingerprint: u64) -> Result<(Seal<T>, &[u8]), Refusal> {
+pub fn parse_packet<T: Protocol>(
+    bytes: &[u8],
+    fingerprint: u64,
+) -> Result<(PacketHeader<T>, &[u8]), DropReason> {
     let Some((head, message)) = bytes.split_at_checked(HEADER_BYTES) else {
-        return Err(Refusal::NoPacket);
+        return Err(DropReason::NoPacket);
     };
-    let (said, checksum) = head.split_at(CHECKSUM_AT);
-    let seal = Seal::read(said)?;
+    let (said, checksum) = head.split_at(CHECKSUM_OFFSET);
+    let seal = PacketHeader::read(said)?;
     if digest([said, message]).to_le_bytes() != *checksum {
-        return Err(Refusal::Damaged);
+        return Err(DropReason::Damaged);
     }
     if seal.fingerprint != fingerprint {
-        return Err(Refusal::Fingerprint);
+        return Err(DropReason::Fingerprint);
     }
     Ok((seal, message))
 }
 
 /// A reason why a packet was dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Refusal {
+pub enum DropReason {
     /// Too short, or without the first bytes of a packet.
     NoPacket,
     /// The packet is of another version of this form.
@@ -188,7 +196,7 @@ pub enum Refusal {
     Unsound,
 }
 
-impl Refusal {
+impl DropReason {
     /// All reasons.
     pub const ALL: [Self; 11] = [
         Self::NoPacket,
@@ -224,16 +232,16 @@ impl Refusal {
 
 /// Packets that were dropped, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Refused([u64; Refusal::ALL.len()]);
+pub struct DropCounts([u64; DropReason::ALL.len()]);
 
-impl Refused {
+impl DropCounts {
     /// Counts a packet that was dropped.
-    pub fn count(&mut self, why: Refusal) {
+    pub fn record(&mut self, why: DropReason) {
         self.0[why as usize] += 1;
     }
 
     /// Returns the number of packets that were dropped for a reason.
-    pub fn of(&self, why: Refusal) -> u64 {
+    pub fn get(&self, why: DropReason) -> u64 {
         self.0[why as usize]
     }
 
@@ -245,7 +253,7 @@ impl Refused {
 
 /// Returns a digest of two pieces of bytes, one after the other: fast, but no defense against forgery.
 pub fn digest(pieces: [&[u8]; 2]) -> u64 {
-    let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_of(piece), FACTOR ^ piece.len() as u64);
+    let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_bytes(piece), FACTOR ^ piece.len() as u64);
     pieces.into_iter().fold(FACTOR, add)
 }
 
@@ -260,7 +268,7 @@ fn mix(a: u64, b: u64) -> u64 {
 
 /// Returns a digest of some bytes. Four sums go side by side, because each product has to wait for the one before
 /// it.
-fn digest_of(bytes: &[u8]) -> u64 {
+fn digest_bytes(bytes: &[u8]) -> u64 {
     const LANES: usize = 4;
     let both = |sum: u64, bytes: &[u8; 16]| {
         let (words, _) = bytes.as_chunks::<8>();
@@ -291,12 +299,12 @@ mod tests {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
     struct Weather;
 
-    impl Topic for Weather {
+    impl Protocol for Weather {
         fn number(self) -> u8 {
             9
         }
 
-        fn of_number(number: u8) -> Option<Self> {
+        fn from_number(number: u8) -> Option<Self> {
             (number == 9).then_some(Self)
         }
     }
@@ -304,17 +312,22 @@ mod tests {
     /// Any flipped bit of a packet, and any cut: the checksum finds it.
     #[test]
     fn a_packet_of_which_a_bit_was_turned_is_damaged() {
-        let talk = TalkId::new(7, Weather, &[1, 4, 9]);
-        let seal = Seal { fingerprint: 0x0123_4567_89AB_CDEF, talk, sender: 4, sequence: 3 };
+        let talk = ConversationId::new(7, Weather, &[1, 4, 9]);
+        let seal = PacketHeader {
+            fingerprint: 0x0123_4567_89AB_CDEF,
+            conversation: talk,
+            sender: 4,
+            sequence: 3,
+        };
         for length in [0, 1, 7, 16, 63, 64, 65, 200] {
             let message: Vec<u8> = (0..length).map(|k| (k * k) as u8).collect();
-            let packet = Draft::of_bytes(&message).sealed(&seal);
-            assert_eq!(open(&packet, seal.fingerprint), Ok((seal, &message[..])));
+            let packet = PacketBuffer::from_bytes(&message).into_packet(&seal);
+            assert_eq!(parse_packet(&packet, seal.fingerprint), Ok((seal, &message[..])));
             for bit in 0..8 * packet.len() {
                 let mut turned = packet.clone();
                 turned[bit / 8] ^= 1 << (bit % 8);
                 assert!(
-                    open::<Weather>(&turned, seal.fingerprint).is_err(),
+                    parse_packet::<Weather>(&turned, seal.fingerprint).is_err(),
                     "bit {bit} of {length} bytes"
                 );
             }

@@ -4,7 +4,7 @@
 //! by (cycle, sender, sequence), so that the order of arrival never matters (promise D2). The
 //! in-memory version can lose, delay and duplicate messages, all drawn from the run's streams.
 
-use crate::distr::Chance;
+use crate::distr::Bernoulli;
 use crate::stream::{Purpose, Streams};
 use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
@@ -90,10 +90,10 @@ impl Transport for MemoryTransport {
         self.bytes += envelope.payload.len() as u64;
         let Envelope { cycle, sender, sequence, receiver, .. } = envelope;
         let words = self.streams.pair(sender, receiver, cycle, self.purpose, sequence);
-        if Chance::new(self.faults.loss).happens(words[0]) {
+        if Bernoulli::new(self.faults.loss).sample(words[0]) {
             return;
         }
-        if Chance::new(self.faults.duplication).happens(words[1]) {
+        if Bernoulli::new(self.faults.duplication).sample(words[1]) {
             // The duplicate has a delay of its own.
             self.deliver(envelope.clone(), words[3]);
         }

@@ -10,13 +10,13 @@
 //! Claims are not withdrawn, because a claim of an earlier cycle is only ever read by a body that
 //! has written its own over it.
 
-use crate::column::{Column, Word};
+use crate::column::{AtomicValue, Column};
 use crate::units::Slot;
 use std::ops::BitAnd;
 
 /// The content of a box in one word. The highest bit means that nothing stands there, so the
 /// bitwise conjunction of several boxes is free when all are.
-pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
+pub trait BoxWord: AtomicValue + Eq + BitAnd<Output = Self> {
     /// Nothing stands here, and no body claims it.
     const FREE: Self;
     /// A wall stands here.
@@ -75,7 +75,7 @@ pub enum Floor {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Occupant {
     /// Nothing.
-    Nobody,
+    Empty,
     /// A wall.
     Wall,
     /// The body in this slot.
@@ -101,7 +101,7 @@ impl Floor {
     pub fn occupant(&self, index: usize) -> Occupant {
         fn of<T: BoxWord>(word: T) -> Occupant {
             match word {
-                _ if word.is_free() => Occupant::Nobody,
+                _ if word.is_free() => Occupant::Empty,
                 _ if word == T::WALL => Occupant::Wall,
                 _ => Occupant::Body(word.slot()),
             }
@@ -113,7 +113,7 @@ impl Floor {
     }
 
     /// Places the body in `slot` on the box with this index.
-    pub fn stand(&self, index: usize, slot: Slot) {
+    pub fn place(&self, index: usize, slot: Slot) {
         match self {
             Self::Narrow(boxes) => boxes.set(index, BoxWord::standing(slot)),
             Self::Wide(boxes) => boxes.set(index, BoxWord::standing(slot)),
@@ -158,9 +158,9 @@ mod tests {
         for bodies in [2, u16::MAX_BODIES, u16::MAX_BODIES + 1] {
             let floor = Floor::new([false, true, false].into_iter(), bodies);
             let last = bodies as Slot - 1;
-            floor.stand(2, last);
+            floor.place(2, last);
             let seen = [0, 1, 2].map(|index| floor.occupant(index));
-            assert_eq!(seen, [Occupant::Nobody, Occupant::Wall, Occupant::Body(last)]);
+            assert_eq!(seen, [Occupant::Empty, Occupant::Wall, Occupant::Body(last)]);
         }
     }
 }

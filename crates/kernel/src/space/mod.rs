@@ -1,9 +1,9 @@
 //! Places on a grid: positions, the occupants and claimants of boxes, marked boxes.
 
+pub mod bit_set;
 pub mod floor;
-pub mod marks;
 pub mod position;
 
+pub use bit_set::AtomicBitSet;
 pub use floor::{BoxWord, Floor, Occupant};
-pub use marks::Marks;
 pub use position::Position;

@@ -1,15 +1,15 @@
 //! Bodies: kind, pose, shape and condition.
 
-use super::pose::{Place, Pose};
+use super::pose::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The name of a body, which it keeps during the run; shown as `robot/3` or `connector/0/7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "Parts", into = "Parts")]
-pub struct Who {
+pub struct BodyId {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// Its number among the bodies of its kind.
     pub number: u32,
     /// Its part, of things that have parts.
@@ -17,28 +17,28 @@ pub struct Who {
 }
 
 /// A name as it is written: kind, number and part.
-type Parts = (Kind, u32, Option<u32>);
+type Parts = (BodyKind, u32, Option<u32>);
 
-impl Who {
+impl BodyId {
     /// Returns the name of a body.
-    pub fn new(kind: Kind, number: u32, part: Option<u32>) -> Self {
+    pub fn new(kind: BodyKind, number: u32, part: Option<u32>) -> Self {
         Self { kind, number, part }
     }
 }
 
-impl From<Parts> for Who {
+impl From<Parts> for BodyId {
     fn from((kind, number, part): Parts) -> Self {
         Self { kind, number, part }
     }
 }
 
-impl From<Who> for Parts {
-    fn from(Who { kind, number, part }: Who) -> Self {
+impl From<BodyId> for Parts {
+    fn from(BodyId { kind, number, part }: BodyId) -> Self {
         (kind, number, part)
     }
 }
 
-impl fmt::Display for Who {
+impl fmt::Display for BodyId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.kind, self.number)?;
         self.part.map_or(Ok(()), |part| write!(f, "/{part}"))
@@ -49,7 +49,7 @@ impl fmt::Display for Who {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Body {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// Its number among the bodies of its kind.
     pub number: u32,
     /// Its part, where the thing has parts.
@@ -61,12 +61,12 @@ pub struct Body {
     /// Its condition.
     pub state: Condition,
     /// The velocity of a thing that is moved without acting; zero for all that stand still.
-    pub velocity_m_s: Place,
+    pub velocity_m_s: Vec3,
 }
 
 impl Body {
     /// Creates a body without parts, in plain condition.
-    pub fn new(kind: Kind, number: u32, pose: Pose, shape: Shape) -> Self {
+    pub fn new(kind: BodyKind, number: u32, pose: Pose, shape: Shape) -> Self {
         Self {
             kind,
             number,
@@ -80,42 +80,42 @@ impl Body {
 
     /// Returns the same body as a part of a larger thing.
     #[must_use]
-    pub fn part(self, part: u32) -> Self {
+    pub fn with_part(self, part: u32) -> Self {
         Self { part: Some(part), ..self }
     }
 
     /// Returns the same body in another condition, if `is_so`.
     #[must_use]
-    pub fn when(self, is_so: bool, state: Condition) -> Self {
+    pub fn with_state_if(self, is_so: bool, state: Condition) -> Self {
         if is_so { Self { state, ..self } } else { self }
     }
 
     /// Returns the same body with a velocity.
     #[must_use]
-    pub fn moving(self, velocity_m_s: Place) -> Self {
+    pub fn with_velocity(self, velocity_m_s: Vec3) -> Self {
         Self { velocity_m_s, ..self }
     }
 
     /// Returns whether it has a velocity.
-    pub fn moves(&self) -> bool {
+    pub fn is_moving(&self) -> bool {
         self.velocity_m_s != [0.0; 3]
     }
 
     /// Returns its identity.
-    pub fn who(&self) -> Who {
-        Who::new(self.kind, self.number, self.part)
+    pub fn id(&self) -> BodyId {
+        BodyId::new(self.kind, self.number, self.part)
     }
 
     /// Returns a name that it keeps during the run, such as `robot/3` or `connector/0/7`.
     pub fn name(&self) -> String {
-        self.who().to_string()
+        self.id().to_string()
     }
 }
 
 /// Kinds of bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum BodyKind {
     /// A robot.
     Robot,
     /// A person, or another pedestrian.
@@ -138,7 +138,7 @@ pub enum Kind {
     Start,
 }
 
-impl Kind {
+impl BodyKind {
     /// All kinds.
     pub const ALL: [Self; 10] = [
         Self::Robot,
@@ -180,7 +180,7 @@ impl Kind {
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for BodyKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
@@ -226,7 +226,7 @@ pub enum Shape {
     /// A box.
     Cuboid {
         /// Its extent along its axes, in meters.
-        size_m: Place,
+        size_m: Vec3,
     },
     /// An upright cylinder.
     Cylinder {
@@ -243,7 +243,7 @@ pub enum Shape {
     /// A polyline; its points are in the frame of the world, regardless of the pose.
     Line {
         /// Its points, in meters.
-        points_m: Vec<Place>,
+        points_m: Vec<Vec3>,
         /// Its thickness in meters; 0 for the thinnest line that can be drawn.
         thickness_m: f64,
     },
@@ -263,8 +263,8 @@ mod tests {
     #[test]
     fn names_tell_kind_number_and_part() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        let body = Body::new(Kind::Connector, 2, Pose::at([0.0; 3]), ball);
+        let body = Body::new(BodyKind::Connector, 2, Pose::from_position([0.0; 3]), ball);
         assert_eq!(body.name(), "connector/2");
-        assert_eq!(body.part(7).name(), "connector/2/7");
+        assert_eq!(body.with_part(7).name(), "connector/2/7");
     }
 }

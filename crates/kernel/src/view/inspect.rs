@@ -1,7 +1,7 @@
 //! Percepts and decisions of a body, and their outcome: facts for a panel, and marks for the scene.
 
-use super::body::Who;
-use super::pose::Place;
+use super::body::BodyId;
+use super::pose::Vec3;
 use crate::units::Cycle;
 use serde::Serialize;
 
@@ -9,26 +9,26 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The body.
-    pub who: Who,
+    pub who: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
     /// The body's name among people.
     pub title: String,
     /// Facts about it, by topic.
-    pub sections: Vec<Section>,
+    pub sections: Vec<FactSection>,
     /// Marks to draw over the scene.
     pub marks: Vec<Mark>,
 }
 
 /// Facts about one topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Section {
+pub struct FactSection {
     /// The topic.
     pub title: String,
     /// Single facts.
     pub facts: Vec<Fact>,
     /// Facts of the same kind about several things.
-    pub table: Option<Table>,
+    pub table: Option<FactTable>,
 }
 
 /// A fact.
@@ -37,13 +37,13 @@ pub struct Fact {
     /// The question that it answers.
     pub label: String,
     /// The answer.
-    pub value: Value,
+    pub value: FactValue,
 }
 
 /// The value of a fact.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Value {
+pub enum FactValue {
     /// A number.
     Number {
         /// The number itself.
@@ -56,9 +56,9 @@ pub enum Value {
     /// Words.
     Text(String),
     /// A body.
-    Who(Who),
+    Who(BodyId),
     /// A place in meters.
-    Place(Place),
+    Place(Vec3),
     /// Whether it is so.
     Yes(bool),
     /// Nothing, or not known.
@@ -67,18 +67,18 @@ pub enum Value {
 
 /// Facts of the same kind about several things.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Table {
+pub struct FactTable {
     /// Heads of the columns.
     pub columns: Vec<String>,
     /// A value for each column, by row.
-    pub rows: Vec<Vec<Value>>,
+    pub rows: Vec<Vec<FactValue>>,
 }
 
 /// Something to draw over the scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
     /// Its role in the inspection.
-    pub role: Role,
+    pub role: MarkRole,
     /// Words for it.
     pub label: String,
     /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
@@ -90,7 +90,7 @@ pub struct Mark {
 /// The role of a mark in an inspection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Role {
+pub enum MarkRole {
     /// The truth to be perceived.
     True,
     /// The percept.
@@ -124,22 +124,22 @@ pub enum MarkShape {
     /// A polyline.
     Line {
         /// Its points.
-        points_m: Vec<Place>,
+        points_m: Vec<Vec3>,
     },
     /// A polygon.
     Area {
         /// Its corners, counterclockwise.
-        corners_m: Vec<Place>,
+        corners_m: Vec<Vec3>,
     },
     /// A point.
     Point {
         /// Its place.
-        at_m: Place,
+        at_m: Vec3,
     },
     /// A level circle.
     Circle {
         /// Its center.
-        at_m: Place,
+        at_m: Vec3,
         /// Its radius.
         radius_m: f64,
     },
@@ -147,45 +147,51 @@ pub enum MarkShape {
 
 impl Inspection {
     /// Creates an empty inspection.
-    pub fn new(who: Who, cycle: Cycle, title: impl Into<String>) -> Self {
+    pub fn new(who: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
         Self { who, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
 
     /// Adds a section, unless it is empty.
-    pub fn tell(&mut self, section: Section) {
+    pub fn add_section(&mut self, section: FactSection) {
         if !section.facts.is_empty() || section.table.is_some() {
             self.sections.push(section);
         }
     }
 
     /// Adds a mark with full weight.
-    pub fn mark(&mut self, role: Role, label: impl Into<String>, shape: MarkShape) {
-        self.weigh(role, label, 1.0, shape);
+    pub fn add_mark(&mut self, role: MarkRole, label: impl Into<String>, shape: MarkShape) {
+        self.add_weighted_mark(role, label, 1.0, shape);
     }
 
     /// Adds a mark with a weight, which is kept between 0 and 1.
-    pub fn weigh(&mut self, role: Role, label: impl Into<String>, weight: f64, shape: MarkShape) {
+    pub fn add_weighted_mark(
+        &mut self,
+        role: MarkRole,
+        label: impl Into<String>,
+        weight: f64,
+        shape: MarkShape,
+    ) {
         self.marks.push(Mark { role, label: label.into(), weight: weight.clamp(0.0, 1.0), shape });
     }
 
     /// Returns the section with a title.
-    pub fn section(&self, title: &str) -> Option<&Section> {
+    pub fn section(&self, title: &str) -> Option<&FactSection> {
         self.sections.iter().find(|section| section.title == title)
     }
 
     /// Returns the value of a fact, by the titles of its section and itself.
-    pub fn value(&self, section: &str, label: &str) -> Option<&Value> {
+    pub fn value(&self, section: &str, label: &str) -> Option<&FactValue> {
         let fact = self.section(section)?.facts.iter().find(|fact| fact.label == label)?;
         Some(&fact.value)
     }
 
     /// Returns all marks in a role.
-    pub fn marks_of(&self, role: Role) -> impl Iterator<Item = &Mark> {
+    pub fn marks_with_role(&self, role: MarkRole) -> impl Iterator<Item = &Mark> {
         self.marks.iter().filter(move |mark| mark.role == role)
     }
 }
 
-impl Section {
+impl FactSection {
     /// Creates a section without facts.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), facts: Vec::new(), table: None }
@@ -193,14 +199,14 @@ impl Section {
 
     /// Adds a fact.
     #[must_use]
-    pub fn fact(mut self, label: impl Into<String>, value: impl Into<Value>) -> Self {
+    pub fn fact(mut self, label: impl Into<String>, value: impl Into<FactValue>) -> Self {
         self.facts.push(Fact { label: label.into(), value: value.into() });
         self
     }
 
     /// Adds a fact, if there is a value.
     #[must_use]
-    pub fn fact_if(self, label: &str, value: Option<impl Into<Value>>) -> Self {
+    pub fn fact_if(self, label: &str, value: Option<impl Into<FactValue>>) -> Self {
         match value {
             Some(value) => self.fact(label, value),
             None => self,
@@ -209,37 +215,37 @@ impl Section {
 
     /// Adds a table, unless it has no rows.
     #[must_use]
-    pub fn table(self, table: Table) -> Self {
+    pub fn table(self, table: FactTable) -> Self {
         Self { table: (!table.rows.is_empty()).then_some(table), ..self }
     }
 }
 
-impl Table {
+impl FactTable {
     /// Creates a table without rows.
     pub fn new<const N: usize>(columns: [&str; N]) -> Self {
         Self { columns: columns.map(String::from).to_vec(), rows: Vec::new() }
     }
 
     /// Adds a row, which must have a value for each column.
-    pub fn row<const N: usize>(&mut self, values: [Value; N]) {
+    pub fn push_row<const N: usize>(&mut self, values: [FactValue; N]) {
         assert_eq!(N, self.columns.len(), "a value for each column");
         self.rows.push(values.into());
     }
 
     /// Returns the values of a column, by its head.
-    pub fn column(&self, head: &str) -> Option<impl Iterator<Item = &Value>> {
+    pub fn column(&self, head: &str) -> Option<impl Iterator<Item = &FactValue>> {
         let k = self.columns.iter().position(|column| column == head)?;
         Some(self.rows.iter().map(move |row| &row[k]))
     }
 }
 
-impl Value {
+impl FactValue {
     /// Creates a number with a unit.
     pub fn number(value: f64, unit: &'static str) -> Self {
         Self::Number { value, unit }
     }
 
-    /// Creates a number of meters; infinity becomes [`Value::None`].
+    /// Creates a number of meters; infinity becomes [`FactValue::None`].
     pub fn meters(value: f64) -> Self {
         if value.is_finite() { Self::number(value, "m") } else { Self::None }
     }
@@ -260,37 +266,37 @@ impl Value {
     }
 }
 
-impl From<&str> for Value {
+impl From<&str> for FactValue {
     fn from(words: &str) -> Self {
         Self::Text(words.into())
     }
 }
 
-impl From<String> for Value {
+impl From<String> for FactValue {
     fn from(words: String) -> Self {
         Self::Text(words)
     }
 }
 
-impl From<Who> for Value {
-    fn from(who: Who) -> Self {
+impl From<BodyId> for FactValue {
+    fn from(who: BodyId) -> Self {
         Self::Who(who)
     }
 }
 
-impl From<Place> for Value {
-    fn from(at_m: Place) -> Self {
+impl From<Vec3> for FactValue {
+    fn from(at_m: Vec3) -> Self {
         Self::Place(at_m)
     }
 }
 
-impl From<bool> for Value {
+impl From<bool> for FactValue {
     fn from(is_so: bool) -> Self {
         Self::Yes(is_so)
     }
 }
 
-impl<T: Into<Self>> From<Option<T>> for Value {
+impl<T: Into<Self>> From<Option<T>> for FactValue {
     fn from(value: Option<T>) -> Self {
         value.map_or(Self::None, Into::into)
     }
@@ -298,22 +304,27 @@ impl<T: Into<Self>> From<Option<T>> for Value {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Kind;
+    use super::super::BodyKind;
     use super::*;
 
     #[test]
     fn what_was_told_is_found_again_and_empty_sections_are_left_out() {
-        let who = Who::new(Kind::Robot, 3, None);
+        let who = BodyId::new(BodyKind::Robot, 3, None);
         let mut told = Inspection::new(who, 7, "robot 3");
-        told.tell(Section::new("nothing").table(Table::new(["a"])));
-        let mut table = Table::new(["other", "apart"]);
-        table.row([who.into(), Value::meters(f64::INFINITY)]);
-        told.tell(Section::new("sees").fact("heading", Value::degrees(0.0)).table(table));
-        told.weigh(Role::Wish, "on", 1.5, MarkShape::Point { at_m: [0.0; 3] });
+        told.add_section(FactSection::new("nothing").table(FactTable::new(["a"])));
+        let mut table = FactTable::new(["other", "apart"]);
+        table.push_row([who.into(), FactValue::meters(f64::INFINITY)]);
+        told.add_section(
+            FactSection::new("sees").fact("heading", FactValue::degrees(0.0)).table(table),
+        );
+        told.add_weighted_mark(MarkRole::Wish, "on", 1.5, MarkShape::Point { at_m: [0.0; 3] });
         assert_eq!(told.sections.len(), 1);
-        assert_eq!(told.value("sees", "heading"), Some(&Value::number(0.0, "°")));
+        assert_eq!(told.value("sees", "heading"), Some(&FactValue::number(0.0, "°")));
         let table = told.section("sees").and_then(|s| s.table.as_ref()).unwrap();
-        assert_eq!(table.column("apart").unwrap().collect::<Vec<_>>(), [&Value::None]);
-        assert_eq!(told.marks_of(Role::Wish).map(|m| m.weight).collect::<Vec<_>>(), [1.0]);
+        assert_eq!(table.column("apart").unwrap().collect::<Vec<_>>(), [&FactValue::None]);
+        assert_eq!(
+            told.marks_with_role(MarkRole::Wish).map(|m| m.weight).collect::<Vec<_>>(),
+            [1.0]
+        );
     }
 }

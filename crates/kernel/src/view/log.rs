@@ -1,33 +1,33 @@
 //! The events of a run, for viewers.
 
-use super::body::Who;
-use super::pose::Place;
+use super::body::BodyId;
+use super::pose::Vec3;
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct LogEvent {
     /// The cycle in which it happened.
     pub cycle: Cycle,
     /// Its severity.
-    pub level: Level,
+    pub level: Severity,
     /// Its kind.
-    pub kind: Happening,
+    pub kind: LogEventKind,
     /// The body that it happened to.
-    pub who: Who,
+    pub who: BodyId,
     /// The other body concerned, if there is one and the world knows it.
-    pub with: Option<Who>,
+    pub with: Option<BodyId>,
     /// The place, in meters.
-    pub at_m: Option<Place>,
+    pub at_m: Option<Vec3>,
     /// The measure of it, where it has one.
-    pub value: Option<Amount>,
+    pub value: Option<Quantity>,
     /// The event in words.
     pub words: String,
 }
 
-impl Entry {
+impl LogEvent {
     /// Returns the name of the body it happened to.
     pub fn name(&self) -> String {
         self.who.to_string()
@@ -36,14 +36,14 @@ impl Entry {
 
 /// A number with its unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Amount {
+pub struct Quantity {
     /// The number.
     pub value: f64,
     /// Its unit; empty for plain numbers.
     pub unit: Cow<'static, str>,
 }
 
-impl Amount {
+impl Quantity {
     /// Creates an amount.
     pub fn new(value: f64, unit: &'static str) -> Self {
         Self { value, unit: Cow::Borrowed(unit) }
@@ -56,11 +56,11 @@ macro_rules! happenings {
         /// The kinds of events of all worlds.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         #[serde(rename_all = "kebab-case")]
-        pub enum Happening {
+        pub enum LogEventKind {
             $($(#[$doc])* $kind,)*
         }
 
-        impl Happening {
+        impl LogEventKind {
             /// All kinds.
             pub const ALL: &[Self] = &[$(Self::$kind),*];
 
@@ -148,7 +148,7 @@ happenings! {
 /// The severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Level {
+pub enum Severity {
     /// Normal.
     Info,
     /// Worth a look.
@@ -161,35 +161,35 @@ pub enum Level {
 #[derive(Debug, Clone)]
 pub struct Log<E> {
     events: Vec<E>,
-    left_out: u64,
+    dropped: u64,
     /// Whether events are kept, because there is a watcher.
-    pub is_kept: bool,
+    pub is_enabled: bool,
 }
 
 /// The maximum number of events between two frames; further ones are only counted.
-const MOST_EVENTS: usize = 10_000;
+const MAX_EVENTS: usize = 10_000;
 
 impl<E> Default for Log<E> {
     fn default() -> Self {
-        Self { events: Vec::new(), left_out: 0, is_kept: false }
+        Self { events: Vec::new(), dropped: 0, is_enabled: false }
     }
 }
 
 impl<E> Log<E> {
     /// Keeps an event, if there is a watcher.
     pub fn push(&mut self, event: E) {
-        if !self.is_kept {
+        if !self.is_enabled {
             return;
         }
-        match self.events.len() < MOST_EVENTS {
+        match self.events.len() < MAX_EVENTS {
             true => self.events.push(event),
-            false => self.left_out += 1,
+            false => self.dropped += 1,
         }
     }
 
     /// Takes all events since the last call, and the number of those that were left out.
     pub fn take(&mut self) -> (Vec<E>, u64) {
-        (std::mem::take(&mut self.events), std::mem::take(&mut self.left_out))
+        (std::mem::take(&mut self.events), std::mem::take(&mut self.dropped))
     }
 }
 
@@ -199,9 +199,9 @@ mod tests {
 
     #[test]
     fn kinds_of_events_have_one_name_each_and_the_same_in_all_files() {
-        for kind in Happening::ALL {
+        for kind in LogEventKind::ALL {
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
-            assert_eq!(Happening::ALL.iter().filter(|k| k.name() == kind.name()).count(), 1);
+            assert_eq!(LogEventKind::ALL.iter().filter(|k| k.name() == kind.name()).count(), 1);
         }
     }
 
@@ -210,10 +210,10 @@ mod tests {
         let mut log = Log::default();
         log.push(1);
         assert_eq!(log.take(), (vec![], 0));
-        log.is_kept = true;
-        (0..MOST_EVENTS + 3).for_each(|k| log.push(k));
+        log.is_enabled = true;
+        (0..MAX_EVENTS + 3).for_each(|k| log.push(k));
         let (kept, left_out) = log.take();
-        assert_eq!((kept.len(), left_out), (MOST_EVENTS, 3));
+        assert_eq!((kept.len(), left_out), (MAX_EVENTS, 3));
         assert_eq!(log.take(), (vec![], 0));
     }
 }

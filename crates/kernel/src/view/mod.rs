@@ -11,12 +11,15 @@ mod log;
 mod pose;
 mod trails;
 
-pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
-pub use body::{Body, Condition, Kind, Shape, Who};
-pub use inspect::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
-pub use log::{Amount, Entry, Happening, Level, Log};
-pub use pose::{Place, Plane, Pose, TurnedPlane};
-pub use trails::{Axis, PlaceRows, Trail, corner};
+pub use appearance::{
+    ALERT_COLOR, Appearance, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR,
+    WALL_COLOR, body_color,
+};
+pub use body::{Body, BodyId, BodyKind, Condition, Shape};
+pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
+pub use log::{Log, LogEvent, LogEventKind, Quantity, Severity};
+pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
+pub use trails::{Axis, PositionColumns, Trail, corner};
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
@@ -31,16 +34,16 @@ pub struct Scenery {
     /// Simulated seconds per cycle.
     pub cycle_s: f64,
     /// The floor, where it is known box by box.
-    pub floor: Option<Floor>,
+    pub floor: Option<OccupancyGrid>,
     /// Walls, obstacles that stand still, starts and goals.
     pub bodies: Vec<Body>,
     /// Names of bodies that have their own, by kind and number.
-    pub names: Vec<(Kind, u32, String)>,
+    pub names: Vec<(BodyKind, u32, String)>,
 }
 
 /// A floor of square boxes, along the axes of its own plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Floor {
+pub struct OccupancyGrid {
     /// Boxes along the first axis: from west to east, where the floor is not turned.
     pub width: u32,
     /// Boxes along the second axis: from south to north, where the floor is not turned.
@@ -48,16 +51,16 @@ pub struct Floor {
     /// Side of a box, in meters.
     pub box_m: f64,
     /// The corner of the first box, and the turn about it.
-    pub plane: Plane,
+    pub plane: Isometry2,
     /// The content of each box, row by row from the first.
     pub boxes: Vec<Occupancy>,
 }
 
-impl Floor {
+impl OccupancyGrid {
     /// Returns the corners of the floor in the world, counterclockwise from the first box's.
     pub fn corners_m(&self) -> [[f64; 2]; 4] {
         let [x, y] = [self.width, self.height].map(|boxes| f64::from(boxes) * self.box_m);
-        [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]].map(|point| self.plane.place(point))
+        [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]].map(|point| self.plane.transform_point(point))
     }
 }
 
@@ -87,55 +90,55 @@ pub struct Frame {
     /// The poses that bodies' wheels claim, each in the frame in which the body was when watching began; none in
     /// worlds without wheels that err.
     #[serde(default)]
-    pub odometry: Vec<(Who, Pose)>,
+    pub odometry: Vec<(BodyId, Pose)>,
     /// The events since the frame before, by time.
-    pub log: Vec<Entry>,
+    pub log: Vec<LogEvent>,
     /// Entries that were left out because there were too many.
     pub log_left_out: u64,
 }
 
 /// The options of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Look {
+pub struct FrameOptions {
     /// The bodies of which scans are wanted; reading sensors costs as much as simulating them.
-    pub scans: Scans,
+    pub scans: ScanSelection,
 }
 
-impl Look {
+impl FrameOptions {
     /// A frame with bodies and events, without scans.
-    pub const BODIES: Self = Self::first(0);
+    pub const WITHOUT_SCANS: Self = Self::with_first_scans(0);
 
     /// Returns a frame with the scans of the first bodies that have sensors.
-    pub const fn first(bodies: usize) -> Self {
-        Self { scans: Scans::First(bodies) }
+    pub const fn with_first_scans(bodies: usize) -> Self {
+        Self { scans: ScanSelection::First(bodies) }
     }
 
     /// Returns a frame with the scans of these bodies, as far as they have sensors.
-    pub fn of(bodies: Vec<Who>) -> Self {
-        Self { scans: Scans::Of(bodies) }
+    pub fn with_scans_of(bodies: Vec<BodyId>) -> Self {
+        Self { scans: ScanSelection::Of(bodies) }
     }
 }
 
 /// The bodies of which a frame holds scans.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Scans {
+pub enum ScanSelection {
     /// This number of bodies, the first ones that have sensors.
     First(usize),
     /// These, in this order; those without sensors are left out.
-    Of(Vec<Who>),
+    Of(Vec<BodyId>),
 }
 
 /// Largest difference in rad between steps of beams that count as evenly spaced.
-const EVEN_RAD: f64 = 1e-6;
+const EVEN_TOLERANCE_RAD: f64 = 1e-6;
 /// Step in rad of the raster for beams that are not evenly spaced.
-const RASTER_RAD: f64 = std::f64::consts::PI / 180.0;
+const RASTER_STEP_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Ranges of one sensor, all around or in a sector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
     /// The body with the sensor: kind, number and part.
-    pub of: Who,
+    pub of: BodyId,
     /// The sensor's name.
     pub sensor: String,
     /// The sensor's position, and the direction of its bearing 0.
@@ -167,21 +170,21 @@ impl Scan {
         };
         let step_rad = (last - first) / (bearings_rad.len().max(2) - 1) as f64;
         let is_even = (0..).zip(bearings_rad).all(|(k, bearing_rad): (u32, &f64)| {
-            (first + f64::from(k) * step_rad - bearing_rad).abs() < EVEN_RAD
+            (first + f64::from(k) * step_rad - bearing_rad).abs() < EVEN_TOLERANCE_RAD
         });
         if is_even {
             return (first, last, ranges_m.clone());
         }
         let low = bearings_rad.iter().copied().fold(f64::INFINITY, f64::min);
         let high = bearings_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_RAD).round() as usize;
+        let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_STEP_RAD).round() as usize;
         let mut raster = vec![f64::NAN; place(high) + 1];
         for (&bearing_rad, &range_m) in bearings_rad.iter().zip(ranges_m) {
             let seen_m = &mut raster[place(bearing_rad)];
             *seen_m = seen_m.min(range_m);
         }
         raster.iter_mut().filter(|range_m| range_m.is_nan()).for_each(|range_m| *range_m = no_beam);
-        (low, low + (raster.len() - 1) as f64 * RASTER_RAD, raster)
+        (low, low + (raster.len() - 1) as f64 * RASTER_STEP_RAD, raster)
     }
 }
 
@@ -192,9 +195,9 @@ mod tests {
 
     fn scan(bearings_rad: &[f64], ranges_m: &[f64]) -> Scan {
         Scan {
-            of: Who::new(Kind::Robot, 0, None),
+            of: BodyId::new(BodyKind::Robot, 0, None),
             sensor: "eye".into(),
-            pose: Pose::at([0.0; 3]),
+            pose: Pose::from_position([0.0; 3]),
             bearings_rad: bearings_rad.to_vec(),
             ranges_m: ranges_m.to_vec(),
             true_m: Vec::new(),

@@ -3,50 +3,50 @@
 use serde::{Deserialize, Serialize};
 
 /// A place in space, in meters; worlds of the plane have height 0.
-pub type Place = [f64; 3];
+pub type Vec3 = [f64; 3];
 
 /// A plane that lies in that of the world, such as the image of a map: the place of its origin, and
 /// the turn of its axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Plane {
+pub struct Isometry2 {
     /// Its origin in the world, in meters.
     pub origin_m: [f64; 2],
     /// The direction of its x axis in the world, in radians, counterclockwise.
     pub yaw_rad: f64,
 }
 
-impl Plane {
+impl Isometry2 {
     /// Returns the place in the world of a point of the plane, in meters.
-    pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
-        self.turned().place(point)
+    pub fn transform_point(&self, point: [f64; 2]) -> [f64; 2] {
+        self.cached().transform_point(point)
     }
 
     /// Returns the plane with its sine and cosine, for many points.
-    pub fn turned(&self) -> TurnedPlane {
+    pub fn cached(&self) -> CachedIsometry2 {
         let (sine, cosine) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
-        TurnedPlane { origin_m: self.origin_m, sine, cosine }
+        CachedIsometry2 { origin_m: self.origin_m, sine, cosine }
     }
 
     /// Returns the point of the plane that is at a place in the world, in meters.
-    pub fn point(&self, at_m: [f64; 2]) -> [f64; 2] {
+    pub fn inverse_transform_point(&self, at_m: [f64; 2]) -> [f64; 2] {
         let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
         let [x, y] = [at_m[0] - self.origin_m[0], at_m[1] - self.origin_m[1]];
         [c * x + s * y, c * y - s * x]
     }
 }
 
-/// A [`Plane`] with the sine and cosine of its turn.
+/// A [`Isometry2`] with the sine and cosine of its turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TurnedPlane {
+pub struct CachedIsometry2 {
     origin_m: [f64; 2],
     sine: f64,
     cosine: f64,
 }
 
-impl TurnedPlane {
+impl CachedIsometry2 {
     /// Returns the place in the world of a point of the plane, in meters.
     #[inline]
-    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn transform_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (s, c) = (self.sine, self.cosine);
         [self.origin_m[0] + (c * x - s * y), self.origin_m[1] + (s * x + c * y)]
     }
@@ -56,26 +56,26 @@ impl TurnedPlane {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// The position, in meters.
-    pub at_m: Place,
+    pub at_m: Vec3,
     /// The orientation: a unit quaternion x, y, z, w.
     pub turn: [f64; 4],
 }
 
 impl Pose {
     /// Creates a pose at a place, facing along x.
-    pub fn at(at_m: Place) -> Self {
+    pub fn from_position(at_m: Vec3) -> Self {
         Self { at_m, turn: [0.0, 0.0, 0.0, 1.0] }
     }
 
     /// Creates a pose at a place, turned about the vertical axis.
-    pub fn heading(at_m: Place, heading_rad: f64) -> Self {
+    pub fn from_heading(at_m: Vec3, heading_rad: f64) -> Self {
         let half = 0.5 * heading_rad;
         Self { at_m, turn: [0.0, 0.0, crate::math::sin(half), crate::math::cos(half)] }
     }
 
     /// Creates a pose at a place with these unit vectors as its axes; they must be perpendicular to
     /// each other and right-handed.
-    pub fn axes(at_m: Place, axes: [Place; 3]) -> Self {
+    pub fn from_axes(at_m: Vec3, axes: [Vec3; 3]) -> Self {
         // Entry [row][column] of the rotation is axes[column][row].
         let m = |row: usize, column: usize| axes[column][row];
         let trace = m(0, 0) + m(1, 1) + m(2, 2);
@@ -99,7 +99,7 @@ impl Pose {
     }
 
     /// Rotates a vector from the frame of the body into that of the world.
-    pub fn turned(&self, [x, y, z]: Place) -> Place {
+    pub fn rotate(&self, [x, y, z]: Vec3) -> Vec3 {
         let [qx, qy, qz, w] = self.turn;
         // v + 2 q x (q x v + w v)
         let t = [2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)];
@@ -111,8 +111,8 @@ impl Pose {
     }
 
     /// Transforms a point from the frame of the body into that of the world.
-    pub fn place(&self, of_body: Place) -> Place {
-        let turned = self.turned(of_body);
+    pub fn transform_point(&self, of_body: Vec3) -> Vec3 {
+        let turned = self.rotate(of_body);
         std::array::from_fn(|i| self.at_m[i] + turned[i])
     }
 }
@@ -124,7 +124,7 @@ mod tests {
     use crate::math::{cos, sin};
     use proptest::prelude::*;
 
-    fn near(a: Place, b: Place) -> bool {
+    fn near(a: Vec3, b: Vec3) -> bool {
         a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
     }
 
@@ -136,31 +136,31 @@ mod tests {
             let x = [cos(yaw) * cos(pitch), sin(yaw) * cos(pitch), sin(pitch)];
             let level = [-sin(yaw), cos(yaw), 0.0];
             let up = cross(x, level);
-            let y: Place = std::array::from_fn(|i| cos(roll) * level[i] + sin(roll) * up[i]);
+            let y: Vec3 = std::array::from_fn(|i| cos(roll) * level[i] + sin(roll) * up[i]);
             let z = cross(x, y);
-            let pose = Pose::axes([1.0, 2.0, 3.0], [x, y, z]);
+            let pose = Pose::from_axes([1.0, 2.0, 3.0], [x, y, z]);
             let length: f64 = pose.turn.iter().map(|q| q * q).sum();
             prop_assert!((length - 1.0).abs() < 1e-9);
             for (axis, to) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().zip([x, y, z]) {
-                prop_assert!(near(pose.turned(axis), to), "{axis:?}: {:?} {to:?}", pose.turned(axis));
+                prop_assert!(near(pose.rotate(axis), to), "{axis:?}: {:?} {to:?}", pose.rotate(axis));
             }
         }
     }
 
     #[test]
     fn a_plane_is_turned_about_its_origin_and_not_at_all_without_a_yaw() {
-        let quarter = Plane { origin_m: [10.0, 20.0], yaw_rad: 0.5 * std::f64::consts::PI };
-        let [x, y] = quarter.place([2.0, 1.0]);
+        let quarter = Isometry2 { origin_m: [10.0, 20.0], yaw_rad: 0.5 * std::f64::consts::PI };
+        let [x, y] = quarter.transform_point([2.0, 1.0]);
         assert!((x - 9.0).abs() < 1e-12 && (y - 22.0).abs() < 1e-12, "{x} {y}");
-        let [x, y] = quarter.point([9.0, 22.0]);
+        let [x, y] = quarter.inverse_transform_point([9.0, 22.0]);
         assert!((x - 2.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12, "{x} {y}");
-        let still = Plane { origin_m: [0.1, 0.2], yaw_rad: 0.0 };
-        assert_eq!(still.place([0.7, -0.3]), [0.1 + 0.7, 0.2 - 0.3]);
+        let still = Isometry2 { origin_m: [0.1, 0.2], yaw_rad: 0.0 };
+        assert_eq!(still.transform_point([0.7, -0.3]), [0.1 + 0.7, 0.2 - 0.3]);
     }
 
     #[test]
     fn a_heading_turns_to_the_left() {
-        let pose = Pose::heading([1.0, 1.0, 0.0], 0.5 * std::f64::consts::PI);
-        assert!(near(pose.place([2.0, 0.0, 0.0]), [1.0, 3.0, 0.0]));
+        let pose = Pose::from_heading([1.0, 1.0, 0.0], 0.5 * std::f64::consts::PI);
+        assert!(near(pose.transform_point([2.0, 0.0, 0.0]), [1.0, 3.0, 0.0]));
     }
 }

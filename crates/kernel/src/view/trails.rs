@@ -1,7 +1,7 @@
 //! The trails of bodies, and the recorded rows from which they are made.
 
-use super::body::{Body, Kind, Shape, Who};
-use super::pose::{Place, Plane};
+use super::body::{Body, BodyId, BodyKind, Shape};
+use super::pose::{Isometry2, Vec3};
 use super::{Frame, Scenery};
 use crate::ports::Values;
 use crate::units::Cycle;
@@ -11,18 +11,18 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     /// The body.
-    pub of: Who,
+    pub of: BodyId,
     /// The places of its center at the start of cycles, the earliest first.
-    pub way: Vec<(Cycle, Place)>,
+    pub points: Vec<(Cycle, Vec3)>,
 }
 
 /// Rows of a recorded table as places of bodies.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlaceRows {
+pub struct PositionColumns {
     /// Name of the table; its column `cycle` has the cycle of each row.
     pub table: &'static str,
     /// The kind of the bodies.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// The column with their numbers.
     pub number: &'static str,
     /// The column with the numbers of their parts.
@@ -30,17 +30,17 @@ pub struct PlaceRows {
     /// Columns with the coordinates x, y and perhaps z.
     pub axes: Vec<Axis>,
     /// The plane of the coordinates x and y, that of the world unless given.
-    pub plane: Option<Plane>,
+    pub plane: Option<Isometry2>,
     /// Whether the places are those of a body's corner with the lowest coordinates, not those of
     /// its center.
     pub is_corner: bool,
     /// The column with headings in quarter turns from east, of bodies that go straight ahead before
     /// they slip to a side.
-    pub ahead: Option<&'static str>,
+    pub heading: Option<&'static str>,
     /// Cycles between two rows of a body.
-    pub every: Cycle,
+    pub interval: Cycle,
     /// Number of cycles before the present that are worth showing.
-    pub worth: Cycle,
+    pub history: Cycle,
 }
 
 /// A column with coordinates: a coordinate in meters is `offset_m` plus the value times `scale_m`.
@@ -55,9 +55,9 @@ pub struct Axis {
 }
 
 /// A row: the cycle, the place, and the heading in quarter turns.
-type Row = (Cycle, Place, Option<u32>);
+type Row = (Cycle, Vec3, Option<u32>);
 
-impl PlaceRows {
+impl PositionColumns {
     /// Returns the trails of some bodies up to the moment of a frame, from the columns of the
     /// table; `None` where it has other columns. A body with rows that end before that moment,
     /// though it is still there, has no trail, because its trail would jump.
@@ -65,14 +65,14 @@ impl PlaceRows {
         &self,
         scenery: &Scenery,
         frame: &Frame,
-        whose: &[Who],
+        whose: &[BodyId],
         column: impl Fn(&str) -> Option<&'a Values>,
     ) -> Option<Vec<Trail>> {
         let rows = self.rows(frame.cycle, whose, column)?;
-        let trail = |(of, rows): (Who, Vec<Row>)| {
-            let here = frame.bodies.iter().find(|body| body.who() == of);
-            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of.number);
-            way.map(|way| Trail { of, way })
+        let trail = |(of, rows): (BodyId, Vec<Row>)| {
+            let here = frame.bodies.iter().find(|body| body.id() == of);
+            let way = self.points(rows, scenery, here.map(|body| (frame.cycle, body)), of.number);
+            way.map(|way| Trail { of, points: way })
         };
         Some(rows.into_iter().filter_map(trail).collect())
     }
@@ -81,9 +81,9 @@ impl PlaceRows {
     fn rows<'a>(
         &self,
         before: Cycle,
-        whose: &[Who],
+        whose: &[BodyId],
         column: impl Fn(&str) -> Option<&'a Values>,
-    ) -> Option<BTreeMap<Who, Vec<Row>>> {
+    ) -> Option<BTreeMap<BodyId, Vec<Row>>> {
         let Values::U64(cycles) = column("cycle")? else { return None };
         let words = |name| match column(name)? {
             Values::U32(values) | Values::Label(values) => Some(values),
@@ -92,12 +92,13 @@ impl PlaceRows {
         let numbers = words(self.number)?;
         // A table without one of the named columns is another table.
         let parts = self.part.map(|name| words(name).ok_or(())).transpose().ok()?;
-        let ahead = self.ahead.map(|name| words(name).ok_or(())).transpose().ok()?;
+        let ahead = self.heading.map(|name| words(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
         let axes: Vec<(&Axis, &Values)> = axes.collect::<Option<_>>()?;
-        let mut rows: BTreeMap<Who, Vec<Row>> = whose.iter().map(|&of| (of, Vec::new())).collect();
+        let mut rows: BTreeMap<BodyId, Vec<Row>> =
+            whose.iter().map(|&of| (of, Vec::new())).collect();
         for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
-            let of = Who::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
+            let of = BodyId::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
             let Some(own) = rows.get_mut(&of) else { continue };
             let mut at_m = [0.0; 3];
             for (x, (axis, values)) in at_m.iter_mut().zip(&axes) {
@@ -109,41 +110,43 @@ impl PlaceRows {
         Some(rows)
     }
 
-    fn way(
+    fn points(
         &self,
         rows: Vec<Row>,
         scenery: &Scenery,
         here: Option<(Cycle, &Body)>,
         number: u32,
-    ) -> Option<Vec<(Cycle, Place)>> {
+    ) -> Option<Vec<(Cycle, Vec3)>> {
         let &(last, ..) = rows.last()?;
-        if here.is_some_and(|(now, _)| last + self.every < now) {
+        if here.is_some_and(|(now, _)| last + self.interval < now) {
             return None;
         }
         // A body that is gone has no shape in the frame, so the shape of its start is taken.
-        let is_start = |body: &&Body| (body.kind, body.number) == (Kind::Start, number);
+        let is_start = |body: &&Body| (body.kind, body.number) == (BodyKind::Start, number);
         let like = here.map(|(_, body)| body).or_else(|| scenery.bodies.iter().find(is_start));
         // The way from the corner to the center.
         let half_m = match like.map(|body| &body.shape) {
             Some(Shape::Cuboid { size_m }) if self.is_corner => size_m.map(|m| 0.5 * m),
             _ => [0.0; 3],
         };
-        let middle = |at: Place| -> Place {
+        let middle = |at: Vec3| -> Vec3 {
             std::array::from_fn(|k| match k < self.axes.len() {
                 true => at[k] + half_m[k],
                 // The table has no heights, so the body's own is taken.
                 false => like.map_or(0.0, |body| body.pose.at_m[k]),
             })
         };
-        let turned = |turn: &dyn Fn(&Plane, [f64; 2]) -> [f64; 2], [x, y, z]: Place| {
+        let turned = |turn: &dyn Fn(&Isometry2, [f64; 2]) -> [f64; 2], [x, y, z]: Vec3| {
             let [x, y] = self.plane.as_ref().map_or([x, y], |plane| turn(plane, [x, y]));
             [x, y, z]
         };
         // Trails have their corners along the axes of the columns.
-        let now = here.map(|(now, body)| (now, turned(&Plane::point, body.pose.at_m), None));
+        let now = here.map(|(now, body)| {
+            (now, turned(&Isometry2::inverse_transform_point, body.pose.at_m), None)
+        });
         let rows = rows.into_iter().map(|(cycle, at, ahead)| (cycle, middle(at), ahead)).chain(now);
-        let mut way: Vec<(Cycle, Place)> = Vec::new();
-        let mut left: Option<(Place, u32)> = None;
+        let mut way: Vec<(Cycle, Vec3)> = Vec::new();
+        let mut left: Option<(Vec3, u32)> = None;
         for (cycle, at, ahead) in rows {
             if let Some((from, quarters)) = left {
                 let between = corner(from, quarters, at);
@@ -152,7 +155,7 @@ impl PlaceRows {
             way.push((cycle, at));
             left = ahead.map(|ahead| (at, ahead));
         }
-        way.iter_mut().for_each(|(_, at)| *at = turned(&Plane::place, *at));
+        way.iter_mut().for_each(|(_, at)| *at = turned(&Isometry2::transform_point, *at));
         Some(way)
     }
 }
@@ -170,7 +173,7 @@ impl Axis {
 
 /// Returns the place between two others where a body was if it went ahead before it slipped to a
 /// side: `quarters` is the heading, in quarter turns from east, in which it left the first one.
-pub fn corner(from: Place, quarters: u32, to: Place) -> Place {
+pub fn corner(from: Vec3, quarters: u32, to: Vec3) -> Vec3 {
     if quarters.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
 }
 
@@ -187,27 +190,31 @@ mod tests {
         assert_eq!(corner([5.0, 5.0, 0.0], east, [5.0, 5.0, 0.0]), [5.0, 5.0, 0.0]);
     }
 
-    fn rows() -> PlaceRows {
+    fn rows() -> PositionColumns {
         let axis = |column| Axis { column, scale_m: 0.5, offset_m: 10.0 };
-        PlaceRows {
+        PositionColumns {
             table: "trajectories",
-            kind: Kind::Robot,
+            kind: BodyKind::Robot,
             number: "body",
             part: None,
             axes: vec![axis("col"), axis("row")],
             plane: None,
             is_corner: true,
-            ahead: Some("heading"),
-            every: 1,
-            worth: 400,
+            heading: Some("heading"),
+            interval: 1,
+            history: 400,
         }
     }
 
     /// The trails of a robot of two boxes that slips north while it goes east, until a cycle.
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
-        let robot =
-            Body::new(Kind::Robot, 7, Pose::at([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
+        let robot = Body::new(
+            BodyKind::Robot,
+            7,
+            Pose::from_position([11.5, 11.0, 0.25]),
+            Shape::Cuboid { size_m },
+        );
         let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
         let columns = [
             ("cycle", Values::U64(vec![1, 0, 0].into())),
@@ -225,7 +232,7 @@ mod tests {
             bodies: Vec::new(),
             names: Vec::new(),
         };
-        rows().trails(&scenery, &frame, &[Who::new(Kind::Robot, 7, None)], column)
+        rows().trails(&scenery, &frame, &[BodyId::new(BodyKind::Robot, 7, None)], column)
     }
 
     #[test]
@@ -237,7 +244,10 @@ mod tests {
             (2, [11.5, 10.5, 0.25]),
             (2, [11.5, 11.0, 0.25]),
         ];
-        assert_eq!((trail.of, &trail.way[..]), (Who::new(Kind::Robot, 7, None), &way[..]));
+        assert_eq!(
+            (trail.of, &trail.points[..]),
+            (BodyId::new(BodyKind::Robot, 7, None), &way[..])
+        );
     }
 
     #[test]

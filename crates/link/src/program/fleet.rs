@@ -1,97 +1,106 @@
 //! A fleet: the server of a world as a process, with the nodes that it starts.
 
-use super::crew::Crew;
-use super::lifeline::Lifeline;
+use super::children::NodeProcesses;
 use super::metrics;
-use super::node::wrong_endpoint;
-use super::packets::Packets;
+use super::node::endpoint_error;
+use super::output::print_message;
+use super::packet_table::PacketTable;
+use super::parent_monitor::ParentMonitor;
 use super::scenario::Scenario;
-use super::shown::{self, Shown};
-use super::told::tell;
-use crate::deployed::Deployed;
-use crate::mail::Mail;
-use crate::server::{Attendant, Broken, Look, SILENT, Seat, Server, Terms};
-use crate::stage::Stage;
-use crate::wire::Party;
-use crate::wire::endpoint::{WireError, hold};
-use crate::wire::window::Window;
+use super::view::{self, ViewPublisher};
+use crate::distributed::DistributedWorld;
+use crate::hosted_run::HostedRun;
+use crate::messenger::Messenger;
+use crate::protocol::{ClockMode, PacketRecord, Topology, Welcome};
+use crate::server::{
+    FleetError, FleetView, NodeEntry, SILENCE_TIMEOUT, Server, ServerConfig, ServerHooks,
+};
+use crate::wire::Peer;
+use crate::wire::endpoint::{WireError, reserve_port};
+use crate::wire::view_server::ViewServer;
 use crate::wire::zenoh::ZenohWire;
-use crate::words::{Clock, Logged, Topology, Welcome};
 use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
-use sidestep_session::fleet::{Common, FleetJob, FleetNow, NodeJob, NodeNow, Staged, Told};
-use sidestep_session::{Error, Journey, Keep, Watcher};
+use sidestep_session::fleet::{
+    CommonSettings, FleetJob, FleetScene, FleetStatus, LinkMessage, NodeJob, NodeStatus,
+};
+use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Time between two reports.
-const REPORT: Duration = Duration::from_millis(500);
+const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Flies a fleet to its end.
 ///
 /// # Errors
 /// When anything is wrong with the job, a node is gone in lockstep, or results cannot be stored.
-pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
+pub(super) fn fly(job: &FleetJob, lifeline: &ParentMonitor) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
     let fingerprint = scenario.fingerprint()?;
-    let overrides = scenario.needs(job.clock, job.out.is_some());
-    let scenario = scenario.with(&overrides)?;
-    let listen = endpoints(&job.listen).map_err(wrong_endpoint)?;
-    let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(wrong_endpoint)?;
-    let told = metrics::Board::open(job.common.metrics.as_deref())?;
-    let keep = Keep { folder: job.out.as_deref(), mcap: None, replace: job.replace };
-    let journey = Journey::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
-    tell(&Told::Listens(listen.clone()));
-    let scene = shown::scene(&staged(journey.simulation()));
-    let shown = Shown::new(Window::open(&wire, scene).map_err(wrong_endpoint)?);
-    let mail = Mail::new(Party::Server, Box::new(wire));
+    let overrides = scenario.required_overrides(job.clock, job.out.is_some());
+    let scenario = scenario.with_overrides(&overrides)?;
+    let listen = bound_endpoints(&job.listen).map_err(endpoint_error)?;
+    let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
+    let told = metrics::MetricsExporter::open(job.common.metrics.as_deref())?;
+    let keep = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
+    let journey = ManagedRun::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
+    print_message(&LinkMessage::Listens(listen.clone()));
+    let scene = view::scene_json(&fleet_scene(journey.simulation()));
+    let shown = ViewPublisher::new(ViewServer::open(&wire, scene).map_err(endpoint_error)?);
+    let mail = Messenger::new(Peer::Server, Box::new(wire));
     let welcome =
         Welcome { clock: job.clock, topology: job.topology, overrides, logs_packets: job.packets };
-    let terms = Terms {
+    let terms = ServerConfig {
         scenario: fingerprint,
-        build: sidestep_session::build().into(),
+        build: sidestep_session::build_id().into(),
         welcome,
         lease: Duration::from_secs_f64(job.common.lease_s),
         has_faults: scenario.world.has_faults(),
     };
     let jobs = node_jobs(job, &listen, scenario.world.as_ref());
-    let restarts = job.clock != Clock::Lockstep || scenario.world.waits_for_lost();
-    let crew = Crew::start(jobs, restarts)?;
-    let mut stage = Stage::new(journey, scenario.world, &Watched);
-    let plan = stage.run().plan().clone();
-    let mut captain = Captain::new(crew, lifeline, plan.cycles, told, shown);
-    captain.packets = packets(job, &scenario.source.text, plan.seed)?;
+    let restarts = job.clock != ClockMode::Lockstep || scenario.world.waits_for_lost_nodes();
+    let crew = NodeProcesses::start(jobs, restarts)?;
+    let mut stage = HostedRun::new(journey, scenario.world, &TracingWatcher);
+    let plan = stage.run().config().clone();
+    let mut captain = FleetSupervisor::new(crew, lifeline, plan.cycles, told, shown);
+    captain.packets = create_packet_table(job, &scenario.source.text, plan.seed)?;
     let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
-    captain.crew.end();
+    captain.crew.shut_down();
     let flown = flown.and_then(|()| captain.finish_packets());
-    let Captain { now, shown, .. } = captain;
-    let done = finish(stage.into_journey(), flown, now);
-    shown.linger();
+    let FleetSupervisor { now, shown, .. } = captain;
+    let done = finish(stage.into_managed_run(), flown, now);
+    shown.wait_for_viewers();
     done
 }
 
 /// Returns the unchanging part of a run that is watched.
-fn staged(run: &dyn Simulation) -> Staged {
-    Staged {
-        build: sidestep_session::build().into(),
+fn fleet_scene(run: &dyn Simulation) -> FleetScene {
+    FleetScene {
+        build: sidestep_session::build_id().into(),
         world: run.world().into(),
         agent: run.agent().into(),
-        seed: run.plan().seed,
+        seed: run.config().seed,
         scenery: run.scenery(),
     }
 }
 
 /// Begins the table of all packets, if it is wanted.
-fn packets(job: &FleetJob, text: &str, seed: u64) -> Result<Option<Packets>, RecordError> {
+fn create_packet_table(
+    job: &FleetJob,
+    text: &str,
+    seed: u64,
+) -> Result<Option<PacketTable>, RecordError> {
     let folder = job.out.as_ref().filter(|_| job.packets);
-    folder.map(|folder| Packets::begin(folder, text, seed)).transpose()
+    folder.map(|folder| PacketTable::create(folder, text, seed)).transpose()
 }
 
 /// Returns the endpoints at which the server listens, each with a port.
-fn endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
+fn bound_endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
     // The ports are free again when the list is complete, and taken right away.
-    let held = listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<_>, _>>()?;
+    let held =
+        listen.iter().map(|endpoint| reserve_port(endpoint)).collect::<Result<Vec<_>, _>>()?;
     Ok(held.into_iter().map(|held| held.endpoint).collect())
 }
 
@@ -99,16 +108,16 @@ fn endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
 fn node_jobs(
     job: &FleetJob,
     connect: &[String],
-    world: &dyn Deployed,
+    world: &dyn DistributedWorld,
 ) -> BTreeMap<EntityId, NodeJob> {
     let any = match job.topology {
         // As with the server's own: these nodes are on its machine.
-        Topology::Mesh => vec![any_port(&connect[0])],
+        Topology::Mesh => vec![with_any_port(&connect[0])],
         Topology::Star => Vec::new(),
     };
     let one = |agent| {
         let job = NodeJob {
-            common: Common { metrics: None, ..job.common.clone() },
+            common: CommonSettings { metrics: None, ..job.common.clone() },
             agent: world.name(agent),
             connect: connect.to_vec(),
             listen: any.clone(),
@@ -120,74 +129,78 @@ fn node_jobs(
     (0..count as EntityId).map(one).collect()
 }
 
-fn any_port(endpoint: &str) -> String {
+fn with_any_port(endpoint: &str) -> String {
     let host = endpoint.rsplit_once(':').map_or(endpoint, |(host, _)| host);
     format!("{host}:0")
 }
 
 /// Stores and tells the results.
-fn finish(journey: Journey, flown: Result<(), Broken>, fleet: FleetNow) -> Result<(), Error> {
-    if let Err(Broken::World(error)) = flown {
+fn finish(
+    journey: ManagedRun,
+    flown: Result<(), FleetError>,
+    fleet: FleetStatus,
+) -> Result<(), Error> {
+    if let Err(FleetError::World(error)) = flown {
         // A record that failed before would fail again.
         return Err(error);
     }
-    let summary = journey.finish(&Watched)?;
+    let summary = journey.finish(&TracingWatcher)?;
     let (folder, outcome) = (summary.folder.clone(), summary.outcome.clone());
     let summary = serde_json::to_value(&summary).expect("summaries are plain data");
-    tell(&Told::Ended { summary, outcome, fleet });
+    print_message(&LinkMessage::Ended { summary, outcome, fleet });
     match flown {
         Ok(()) => Ok(()),
-        Err(Broken::Stopped) => Err(Error::Interrupted),
-        Err(Broken::World(error)) => Err(error),
-        Err(gone @ Broken::Gone { .. }) => {
+        Err(FleetError::Interrupted) => Err(Error::Interrupted),
+        Err(FleetError::World(error)) => Err(error),
+        Err(gone @ FleetError::Gone { .. }) => {
             let remedy = match folder {
                 Some(folder) => {
                     format!("go on without nodes: sidestep resume {}", folder.display())
                 }
                 None => "start the fleet again; with --out DIR it could be resumed".into(),
             };
-            Err(Error::stopped(gone.to_string(), remedy))
+            Err(Error::other(gone.to_string(), remedy))
         }
     }
 }
 
 /// The program as a watcher of the run, which goes on cycle by cycle: the attendant of the fleet decides when to
 /// stop.
-struct Watched;
+struct TracingWatcher;
 
-impl Watcher for Watched {
+impl Watcher for TracingWatcher {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
     }
 }
 
 /// The attendant of the fleet: looks after nodes, and tells the fleet's state.
-struct Captain<'a> {
-    crew: Crew,
-    lifeline: &'a Lifeline,
+struct FleetSupervisor<'a> {
+    crew: NodeProcesses,
+    lifeline: &'a ParentMonitor,
     cycles: u64,
-    board: metrics::Board,
-    shown: Shown,
+    board: metrics::MetricsExporter,
+    shown: ViewPublisher,
     report_at: Instant,
     /// Time at which all nodes had joined.
     began: Option<Instant>,
-    now: FleetNow,
+    now: FleetStatus,
     /// Packets and bytes of each node at the last report, and its time.
     before: BTreeMap<EntityId, (u64, u64)>,
     reported: Instant,
     /// The table of all packets, if it is wanted.
-    packets: Option<Packets>,
+    packets: Option<PacketTable>,
     /// The reason why it cannot be written.
     unwritten: Option<RecordError>,
 }
 
-impl<'a> Captain<'a> {
+impl<'a> FleetSupervisor<'a> {
     fn new(
-        crew: Crew,
-        lifeline: &'a Lifeline,
+        crew: NodeProcesses,
+        lifeline: &'a ParentMonitor,
         cycles: u64,
-        board: metrics::Board,
-        shown: Shown,
+        board: metrics::MetricsExporter,
+        shown: ViewPublisher,
     ) -> Self {
         let now = Instant::now();
         Self {
@@ -198,7 +211,7 @@ impl<'a> Captain<'a> {
             shown,
             report_at: now,
             began: None,
-            now: FleetNow { cycles, ..FleetNow::default() },
+            now: FleetStatus { cycles, ..FleetStatus::default() },
             before: BTreeMap::new(),
             reported: now,
             packets: None,
@@ -207,21 +220,21 @@ impl<'a> Captain<'a> {
     }
 
     /// Completes the table of packets.
-    fn finish_packets(&mut self) -> Result<(), Broken> {
-        let finished = self.packets.take().map_or(Ok(()), Packets::finish);
+    fn finish_packets(&mut self) -> Result<(), FleetError> {
+        let finished = self.packets.take().map_or(Ok(()), PacketTable::finish);
         let stored = self.unwritten.take().map_or(finished, Err);
-        stored.map_err(|e| Broken::World(e.into()))
+        stored.map_err(|e| FleetError::World(e.into()))
     }
 
-    fn look(&mut self, fleet: &Look<'_>) {
+    fn update_status(&mut self, fleet: &FleetView<'_>) {
         let passed_s = self.reported.elapsed().as_secs_f64().max(1e-3);
         self.reported = Instant::now();
         let nodes =
-            fleet.seats.iter().map(|(&agent, seat)| self.node(fleet, agent, seat, passed_s));
+            fleet.seats.iter().map(|(&agent, seat)| self.node_status(fleet, agent, seat, passed_s));
         let nodes = nodes.collect();
         let world = fleet.stage.world();
         let quantile_ms = |q: f64| fleet.tally.talked.quantile(q).map(|s| 1e3 * s);
-        self.now = FleetNow {
+        self.now = FleetStatus {
             cycle: fleet.stage.cycle(),
             cycles: self.cycles,
             has_begun: fleet.has_begun,
@@ -236,23 +249,29 @@ impl<'a> Captain<'a> {
     }
 
     /// Returns the present state of a node, a number of seconds after the last look.
-    fn node(&mut self, fleet: &Look<'_>, agent: EntityId, seat: &Seat, passed_s: f64) -> NodeNow {
+    fn node_status(
+        &mut self,
+        fleet: &FleetView<'_>,
+        agent: EntityId,
+        seat: &NodeEntry,
+        passed_s: f64,
+    ) -> NodeStatus {
         let status = &seat.status;
         let before = self.before.insert(agent, (status.packets, status.bytes));
         let (packets, bytes) = before.unwrap_or_default();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed_s;
-        let silent = fleet.mail.silent_for(Party::Node(agent));
+        let silent = fleet.mail.silent_for(Peer::Node(agent));
         let state = match &seat.member {
             None => "awaited",
             Some(_) if seat.is_gone => "gone",
-            Some(_) if silent.is_some_and(|silent| silent > SILENT) => "silent",
+            Some(_) if silent.is_some_and(|silent| silent > SILENCE_TIMEOUT) => "silent",
             Some(_) if !fleet.has_begun => "joined",
             Some(_) if seat.control.is_some() => "done",
             Some(_) => &status.doing,
         };
         let name = fleet.stage.world().name(agent);
         let (number, part) = name.body();
-        NodeNow {
+        NodeStatus {
             agent,
             name: name.to_string(),
             number,
@@ -275,51 +294,51 @@ impl<'a> Captain<'a> {
     }
 }
 
-impl Attendant for Captain<'_> {
-    fn attend(&mut self, fleet: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+impl ServerHooks for FleetSupervisor<'_> {
+    fn on_poll(&mut self, fleet: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
         if self.lifeline.has_ended() {
-            return Err(Broken::Stopped);
+            return Err(FleetError::Interrupted);
         }
         if let Some(error) = self.unwritten.take() {
-            return Err(Broken::World(error.into()));
+            return Err(FleetError::World(error.into()));
         }
         if fleet.has_begun {
             self.began.get_or_insert_with(Instant::now);
         }
         if Instant::now() >= self.report_at {
-            self.report_at = Instant::now() + REPORT;
-            self.look(fleet);
-            self.board.show(|| metrics::of_fleet(&self.now, fleet));
-            tell(&Told::Fleet(self.now.clone()));
+            self.report_at = Instant::now() + REPORT_INTERVAL;
+            self.update_status(fleet);
+            self.board.publish(|| metrics::fleet_metrics(&self.now, fleet));
+            print_message(&LinkMessage::Fleet(self.now.clone()));
             if self.shown.is_watched() {
-                self.shown.show(&self.now, false);
+                self.shown.publish(&self.now, false);
             }
         }
         let member = |agent: EntityId| fleet.seats.get(&agent)?.member.clone();
-        let gone = self.crew.look(|agent| member(agent).map(|member| member.listens))?;
+        let gone = self.crew.poll(|agent| member(agent).map(|member| member.listens))?;
         if let Some((agent, reason)) = gone.first().filter(|_| !fleet.has_begun) {
-            let (agent, reason) = (fleet.stage.called(*agent), reason.clone());
-            return Err(Broken::Gone { agent, cycle: fleet.stage.cycle(), reason });
+            let (agent, reason) = (fleet.stage.agent_label(*agent), reason.clone());
+            return Err(FleetError::Gone { agent, cycle: fleet.stage.cycle(), reason });
         }
         Ok(gone)
     }
 
-    fn look_back(&mut self, fleet: &Look<'_>) {
-        self.look(fleet);
-        self.shown.show(&self.now, true);
+    fn on_end(&mut self, fleet: &FleetView<'_>) {
+        self.update_status(fleet);
+        self.shown.publish(&self.now, true);
     }
 
     fn wants_frame(&self, cycle: Cycle) -> bool {
         self.shown.wants_frame(cycle)
     }
 
-    fn take_frame(&mut self, frame: Frame) {
+    fn on_frame(&mut self, frame: Frame) {
         self.now.cycle = frame.cycle;
-        self.shown.take(frame);
-        self.shown.show(&self.now, false);
+        self.shown.push_frame(frame);
+        self.shown.publish(&self.now, false);
     }
 
-    fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {
+    fn on_packets(&mut self, packets: Vec<(EntityId, PacketRecord)>) {
         if let Some(table) = &mut self.packets
             && let Err(error) = table.add(packets)
         {

@@ -1,19 +1,19 @@
 //! Metrics in Prometheus' text format (version 0.0.4), served at an address.
 
-use crate::server::Look;
-use crate::server::tally::Histogram;
-use crate::wire::board::serve;
-use crate::words::Status;
+use crate::protocol::Status;
+use crate::server::FleetView;
+use crate::server::histogram::Histogram;
+use crate::wire::http_text::serve;
 use sidestep::kernel::InputError;
-use sidestep_session::fleet::{AgentName, FleetNow, NodeNow};
+use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The place where metrics are shown; without an address it shows none.
 #[derive(Debug, Default)]
-pub(super) struct Board(Option<Arc<Mutex<String>>>);
+pub(super) struct MetricsExporter(Option<Arc<Mutex<String>>>);
 
-impl Board {
+impl MetricsExporter {
     /// Opens a board at an address, if one is given.
     ///
     /// # Errors
@@ -29,7 +29,7 @@ impl Board {
     }
 
     /// Shows a text, which is made only if there is an address.
-    pub(super) fn show(&self, text: impl FnOnce() -> String) {
+    pub(super) fn publish(&self, text: impl FnOnce() -> String) {
         if let Some(shown) = &self.0 {
             *shown.lock().unwrap_or_else(PoisonError::into_inner) = text();
         }
@@ -38,137 +38,137 @@ impl Board {
 
 /// A text under construction.
 #[derive(Default)]
-struct Text(String);
+struct MetricsText(String);
 
-impl Text {
+impl MetricsText {
     /// Begins a metric.
-    fn metric(&mut self, name: &str, kind: &str, help: &str) {
+    fn push_header(&mut self, name: &str, kind: &str, help: &str) {
         let _ = writeln!(self.0, "# HELP sidestep_{name} {help}\n# TYPE sidestep_{name} {kind}");
     }
 
-    fn value(&mut self, name: &str, labels: &str, value: impl std::fmt::Display) {
+    fn push_sample(&mut self, name: &str, labels: &str, value: impl std::fmt::Display) {
         let labels = if labels.is_empty() { String::new() } else { format!("{{{labels}}}") };
         let _ = writeln!(self.0, "sidestep_{name}{labels} {value}");
     }
 
-    fn histogram(&mut self, name: &str, help: &str, histogram: &Histogram) {
-        self.metric(name, "histogram", help);
+    fn push_histogram(&mut self, name: &str, help: &str, histogram: &Histogram) {
+        self.push_header(name, "histogram", help);
         for (bound_s, count) in histogram.cumulative() {
-            self.value(&format!("{name}_bucket"), &format!("le=\"{bound_s}\""), count);
+            self.push_sample(&format!("{name}_bucket"), &format!("le=\"{bound_s}\""), count);
         }
-        self.value(&format!("{name}_bucket"), "le=\"+Inf\"", histogram.count());
-        self.value(&format!("{name}_sum"), "", histogram.sum_s);
-        self.value(&format!("{name}_count"), "", histogram.count());
+        self.push_sample(&format!("{name}_bucket"), "le=\"+Inf\"", histogram.count());
+        self.push_sample(&format!("{name}_sum"), "", histogram.sum_s);
+        self.push_sample(&format!("{name}_count"), "", histogram.count());
     }
 
     /// Adds a metric with a value for each agent, named by a label.
-    fn each(
+    fn push_per_agent(
         &mut self,
         name: &str,
         kind: &str,
         help: &str,
         values: impl Iterator<Item = (String, f64)>,
     ) {
-        self.metric(name, kind, help);
+        self.push_header(name, kind, help);
         for (agent, value) in values {
-            self.value(name, &agent, value);
+            self.push_sample(name, &agent, value);
         }
     }
 }
 
 /// Returns the metrics of a fleet.
-pub(super) fn of_fleet(now: &FleetNow, fleet: &Look<'_>) -> String {
-    let mut text = Text::default();
-    text.metric("cycle", "gauge", "Cycles done.");
-    text.value("cycle", "", now.cycle);
+pub(super) fn fleet_metrics(now: &FleetStatus, fleet: &FleetView<'_>) -> String {
+    let mut text = MetricsText::default();
+    text.push_header("cycle", "gauge", "Cycles done.");
+    text.push_sample("cycle", "", now.cycle);
     let tally = fleet.tally;
-    text.histogram(
+    text.push_histogram(
         "talk_seconds",
         "Time from the percepts of a cycle to its last control.",
         &tally.talked,
     );
-    text.histogram(
+    text.push_histogram(
         "advance_seconds",
         "Time in which the world went on by a cycle.",
         &tally.advanced,
     );
-    text.histogram(
+    text.push_histogram(
         "late_seconds",
         "In real time: by how much later than due a cycle began.",
         &tally.late,
     );
-    text.metric(
+    text.push_header(
         "late_cycles_total",
         "counter",
         "Cycles that began later than a tenth of their length.",
     );
-    text.value("late_cycles_total", "", tally.late_cycles);
-    text.metric("absurd_controls_total", "counter", "Controls that could not be flown.");
-    text.value("absurd_controls_total", "", tally.absurd_controls);
-    text.metric("refused_total", "counter", "Nodes that were refused, by reason.");
+    text.push_sample("late_cycles_total", "", tally.late_cycles);
+    text.push_header("absurd_controls_total", "counter", "Controls that could not be flown.");
+    text.push_sample("absurd_controls_total", "", tally.absurd_controls);
+    text.push_header("refused_total", "counter", "Nodes that were refused, by reason.");
     for (reason, count) in &tally.refused {
-        text.value("refused_total", &label("reason", reason), count);
+        text.push_sample("refused_total", &format_label("reason", reason), count);
     }
-    text.metric("frames_total", "counter", "Frames that the server has sent.");
-    text.value("frames_total", "", fleet.mail.counts().frames);
-    text.metric("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
-    text.value("frame_bytes_total", "", fleet.mail.counts().bytes);
-    of_nodes(&mut text, now, fleet);
+    text.push_header("frames_total", "counter", "Frames that the server has sent.");
+    text.push_sample("frames_total", "", fleet.mail.stats().frames);
+    text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
+    text.push_sample("frame_bytes_total", "", fleet.mail.stats().bytes);
+    push_node_metrics(&mut text, now, fleet);
     text.0
 }
 
 /// A metric with a value for each node.
-struct OfNode {
+struct NodeMetric {
     name: &'static str,
     kind: &'static str,
     help: &'static str,
-    value: fn(&NodeNow) -> f64,
+    value: fn(&NodeStatus) -> f64,
 }
 
-const OF_NODES: [OfNode; 8] = [
-    OfNode {
+const NODE_METRICS: [NodeMetric; 8] = [
+    NodeMetric {
         name: "node_up",
         kind: "gauge",
         help: "Whether the node of an agent is there.",
         value: |node| f64::from(!["awaited", "gone"].contains(&&*node.state)),
     },
-    OfNode {
+    NodeMetric {
         name: "controls_flown_total",
         kind: "counter",
         help: "Controls that were flown.",
         value: |node| node.flown as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "controls_late_total",
         kind: "counter",
         help: "Controls that were not there in time.",
         value: |node| node.late as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "node_lives_total",
         kind: "counter",
         help: "Times that a node has joined.",
         value: |node| node.lives as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "packets_total",
         kind: "counter",
         help: "Packets that a node has sent.",
         value: |node| node.packets as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "packet_bytes_total",
         kind: "counter",
         help: "Bytes of these.",
         value: |node| node.bytes as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "epoch",
         kind: "gauge",
         help: "Epoch of the coordinator that a node follows.",
         value: |node| node.epoch as f64,
     },
-    OfNode {
+    NodeMetric {
         name: "heard",
         kind: "gauge",
         help: "Other agents that a node has heard in a cycle.",
@@ -176,52 +176,63 @@ const OF_NODES: [OfNode; 8] = [
     },
 ];
 
-fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
-    for OfNode { name, kind, help, value } in &OF_NODES {
-        let values = now.nodes.iter().map(|node| (label(&now.noun, &node.name), value(node)));
-        text.each(name, kind, help, values);
+fn push_node_metrics(text: &mut MetricsText, now: &FleetStatus, fleet: &FleetView<'_>) {
+    for NodeMetric { name, kind, help, value } in &NODE_METRICS {
+        let values =
+            now.nodes.iter().map(|node| (format_label(&now.noun, &node.name), value(node)));
+        text.push_per_agent(name, kind, help, values);
     }
     let statuses = now.nodes.iter().filter_map(|node| {
-        Some((label(&now.noun, &node.name), &fleet.seats.get(&node.agent)?.status))
+        Some((format_label(&now.noun, &node.name), &fleet.seats.get(&node.agent)?.status))
     });
-    of_mail(text, &statuses.collect::<Vec<_>>());
+    push_messenger_metrics(text, &statuses.collect::<Vec<_>>());
 }
 
 /// Returns a label with its value between quotes, where a quote, a backslash and the end of a line are escaped.
-fn label(name: &str, value: &str) -> String {
+fn format_label(name: &str, value: &str) -> String {
     let value = value.replace('\\', r"\\").replace('"', "\\\"").replace('\n', r"\n");
     format!("{name}=\"{value}\"")
 }
 
 /// Adds the mail counts of nodes, by the labels of their agents.
-fn of_mail(text: &mut Text, statuses: &[(String, &Status)]) {
+fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]) {
     let retries = statuses.iter().map(|(agent, status)| (agent.clone(), status.retries as f64));
-    text.each("retries_total", "counter", "Letters that a node has sent again.", retries);
-    text.metric(
+    text.push_per_agent("retries_total", "counter", "Letters that a node has sent again.", retries);
+    text.push_header(
         "dropped_total",
         "counter",
         "Frames and packets that a node has dropped, by reason.",
     );
     for (agent, status) in statuses {
         for (reason, count) in &status.dropped {
-            let labels = format!("{agent},{}", label("reason", reason));
-            text.value("dropped_total", &labels, count);
+            let labels = format!("{agent},{}", format_label("reason", reason));
+            text.push_sample("dropped_total", &labels, count);
         }
     }
 }
 
 /// Returns the metrics of a node.
-pub(super) fn of_node(agent: AgentName, status: &Status) -> String {
-    let mut text = Text::default();
-    let agent = label(agent.noun(), &agent.to_string());
+pub(super) fn node_metrics(agent: AgentName, status: &Status) -> String {
+    let mut text = MetricsText::default();
+    let agent = format_label(agent.noun(), &agent.to_string());
     let one = |value: u64| std::iter::once((agent.clone(), value as f64));
-    text.each("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
-    text.each("packets_total", "counter", "Packets that a node has sent.", one(status.packets));
-    text.each("packet_bytes_total", "counter", "Bytes of these.", one(status.bytes));
-    text.each("epoch", "gauge", "Epoch of the coordinator that a node follows.", one(status.epoch));
+    text.push_per_agent("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
+    text.push_per_agent(
+        "packets_total",
+        "counter",
+        "Packets that a node has sent.",
+        one(status.packets),
+    );
+    text.push_per_agent("packet_bytes_total", "counter", "Bytes of these.", one(status.bytes));
+    text.push_per_agent(
+        "epoch",
+        "gauge",
+        "Epoch of the coordinator that a node follows.",
+        one(status.epoch),
+    );
     let heard = one(status.heard.len() as u64);
-    text.each("heard", "gauge", "Other agents that a node has heard in a cycle.", heard);
-    of_mail(&mut text, &[(agent.clone(), status)]);
+    text.push_per_agent("heard", "gauge", "Other agents that a node has heard in a cycle.", heard);
+    push_messenger_metrics(&mut text, &[(agent.clone(), status)]);
     text.0
 }
 
@@ -231,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_name_of_any_letters_stays_one_label() {
-        assert_eq!(label("airplane", "A12"), r#"airplane="A12""#);
-        assert_eq!(label("airplane", "a\"b\\c\nd"), r#"airplane="a\"b\\c\nd""#);
+        assert_eq!(format_label("airplane", "A12"), r#"airplane="A12""#);
+        assert_eq!(format_label("airplane", "a\"b\\c\nd"), r#"airplane="a\"b\\c\nd""#);
     }
 }

@@ -10,24 +10,24 @@
 //! ```
 
 mod certificates;
-mod crew;
+mod children;
 mod fleet;
-mod lifeline;
 mod log;
 mod metrics;
 mod node;
-mod packets;
+mod output;
+mod packet_table;
+mod parent_monitor;
 mod scenario;
-mod shown;
-mod told;
+mod view;
 mod watch;
 
-use lifeline::Lifeline;
+use output::print_message;
+use parent_monitor::ParentMonitor;
 use sidestep_session::Error;
-use sidestep_session::fleet::{Common, Failed, Job, Told};
+use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
 use std::io::BufRead;
 use std::process::ExitCode;
-use told::tell;
 
 /// Words for a user who starts the program by hand.
 const USAGE: &str = "\
@@ -47,7 +47,7 @@ pub fn main() -> ExitCode {
     let job = std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string());
     let job = job.and_then(|_| serde_json::from_str::<Job>(&line).map_err(|e| e.to_string()));
     match job {
-        Ok(job) => exit_code(do_job(job)),
+        Ok(job) => exit_code(run_job(job)),
         Err(reason) => {
             eprintln!("error: standard input has no job: {reason}\n{USAGE}");
             ExitCode::from(2)
@@ -56,31 +56,31 @@ pub fn main() -> ExitCode {
 }
 
 fn version() -> String {
-    format!("sidestep-link {}", sidestep_session::build())
+    format!("sidestep-link {}", sidestep_session::build_id())
 }
 
-fn do_job(job: Job) -> Result<(), Error> {
+fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
-            prepare(&job.common, &job.listen)?;
-            fleet::fly(&job, &Lifeline::watch())
+            check_and_start_log(&job.common, &job.listen)?;
+            fleet::fly(&job, &ParentMonitor::watch())
         }
         Job::Node(job) => {
-            prepare(&job.common, job.connect.iter().chain(&job.listen))?;
-            Lifeline::end_with();
+            check_and_start_log(&job.common, job.connect.iter().chain(&job.listen))?;
+            ParentMonitor::exit_with_parent();
             node::fly(&job)
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
             certificates::check_all(&job.connect, job.tls.as_ref())?;
-            watch::watch(&job, &Lifeline::watch())
+            watch::watch(&job, &ParentMonitor::watch())
         }
     }
 }
 
 /// Checks the options that server and nodes share, and begins their log.
-fn prepare<'a>(
-    common: &Common,
+fn check_and_start_log<'a>(
+    common: &CommonSettings,
     endpoints: impl IntoIterator<Item = &'a String>,
 ) -> Result<(), Error> {
     log::start(common.json_log, &common.log)?;
@@ -91,7 +91,7 @@ fn prepare<'a>(
 
 /// Refuses the job of another build: all that decide must be of the same build.
 fn check_build(build: &str) -> Result<(), Error> {
-    let own = sidestep_session::build();
+    let own = sidestep_session::build_id();
     if build == own {
         return Ok(());
     }
@@ -103,12 +103,12 @@ fn check_build(build: &str) -> Result<(), Error> {
 /// Tells why a job failed, and returns the exit code.
 fn exit_code(done: Result<(), Error>) -> ExitCode {
     let Err(error) = done else { return ExitCode::SUCCESS };
-    let failed = Failed::from(&error);
+    let failed = JobError::from(&error);
     let code = match () {
         () if failed.is_input => 2,
         () if failed.is_interrupted => 130,
         () => 1,
     };
-    tell(&Told::Failed(failed));
+    print_message(&LinkMessage::Failed(failed));
     ExitCode::from(code)
 }

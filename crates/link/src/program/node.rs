@@ -1,13 +1,13 @@
 //! A node as a process.
 
-use super::metrics::{Board, of_node};
+use super::metrics::{MetricsExporter, node_metrics};
 use super::scenario::Scenario;
-use crate::mail::Mail;
-use crate::node::{Asked, Node, NodeError, join};
-use crate::wire::Party;
-use crate::wire::endpoint::{Held, WireError, hold};
+use crate::messenger::Messenger;
+use crate::node::{JoinConfig, Node, NodeError, join};
+use crate::protocol::{Join, JoinError, Topology};
+use crate::wire::Peer;
+use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
-use crate::words::{Join, Refusal, Topology};
 use sidestep::kernel::InputError;
 use sidestep_session::Error;
 use sidestep_session::fleet::NodeJob;
@@ -20,16 +20,20 @@ use std::time::Duration;
 pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
     let agent = scenario.world.find(job.agent)?;
-    let ports = job.listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<Held>, _>>();
-    let ports = ports.map_err(wrong_endpoint)?;
+    let ports = job
+        .listen
+        .iter()
+        .map(|endpoint| reserve_port(endpoint))
+        .collect::<Result<Vec<PortReservation>, _>>();
+    let ports = ports.map_err(endpoint_error)?;
     let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
-    let board = Board::open(job.common.metrics.as_deref())?;
+    let board = MetricsExporter::open(job.common.metrics.as_deref())?;
     let patience = Duration::from_secs_f64(job.patience_s);
     let tls = job.common.tls.as_ref();
-    let wire = ZenohWire::node(Party::Node(agent), &job.connect, tls, patience);
-    let wire = wire.map_err(wrong_endpoint)?.listening(ports);
-    let mut mail = Mail::new(Party::Node(agent), Box::new(wire));
-    let build = sidestep_session::build();
+    let wire = ZenohWire::node(Peer::Node(agent), &job.connect, tls, patience);
+    let wire = wire.map_err(endpoint_error)?.with_listeners(ports);
+    let mut mail = Messenger::new(Peer::Node(agent), Box::new(wire));
+    let build = sidestep_session::build_id();
     let question = Join {
         agent,
         scenario: scenario.fingerprint()?,
@@ -37,27 +41,27 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
         listens,
         process: std::process::id(),
     };
-    let welcome =
-        join(&mut mail, &Asked { join: question, patience }).map_err(|e| failed(e, job))?;
+    let welcome = join(&mut mail, &JoinConfig { join: question, timeout: patience })
+        .map_err(|e| node_error(e, job))?;
     if welcome.topology == Topology::Mesh && job.listen.is_empty() {
         let cause = "in a mesh other nodes must reach this one";
         let remedy =
             "give it an address of this machine: --listen tcp/ADDRESS:PORT (port 0 for any)";
         return Err(InputError::new("--listen", cause, remedy).into());
     }
-    let scenario = scenario.with(&welcome.overrides)?;
+    let scenario = scenario.with_overrides(&welcome.overrides)?;
     let program = scenario.world.program(agent, build);
     let channel = scenario.world.channel(agent);
     let lease = Duration::from_secs_f64(job.common.lease_s);
     let name = job.agent;
     tracing::info!(agent, who = format!("{} {name}", name.noun()), "joined");
     let node = Node::new(agent, mail, program, channel, &welcome, lease);
-    let node = node.watched(move |status| board.show(|| of_node(name, status)));
-    node.run().map(drop).map_err(|e| failed(e, job))
+    let node = node.with_listener(move |status| board.publish(|| node_metrics(name, status)));
+    node.run().map(drop).map_err(|e| node_error(e, job))
 }
 
 /// Returns the error of a wire that could not be made.
-pub(super) fn wrong_endpoint(error: WireError) -> Error {
+pub(super) fn endpoint_error(error: WireError) -> Error {
     let cause = error.to_string();
     match error {
         WireError::NoEndpoint(endpoint) => {
@@ -76,22 +80,22 @@ pub(super) fn wrong_endpoint(error: WireError) -> Error {
         WireError::NoAnswer { .. } => {
             let remedy = "start the fleet first, and see whether its address can be reached; where it asks for \
                           certificates, give --tls-ca, --tls-cert and --tls-key";
-            Error::stopped(cause, remedy)
+            Error::other(cause, remedy)
         }
     }
 }
 
-fn failed(error: NodeError, job: &NodeJob) -> Error {
+fn node_error(error: NodeError, job: &NodeJob) -> Error {
     let cause = error.to_string();
     match error {
-        NodeError::Refused(Refusal { remedy, .. }) => {
+        NodeError::Refused(JoinError { remedy, .. }) => {
             InputError::new(job.connect.join(", "), cause, remedy).into()
         }
-        NodeError::Wire(error) => wrong_endpoint(error),
-        NodeError::Dismissed(Refusal { remedy, .. }) => Error::stopped(cause, remedy),
+        NodeError::Wire(error) => endpoint_error(error),
+        NodeError::Dismissed(JoinError { remedy, .. }) => Error::other(cause, remedy),
         NodeError::Silence(_) => {
-            Error::stopped(cause, "see whether the server runs, and start both again")
+            Error::other(cause, "see whether the server runs, and start both again")
         }
-        NodeError::Percept(_) => Error::stopped(cause, "please report it with the scenario"),
+        NodeError::Percept(_) => Error::other(cause, "please report it with the scenario"),
     }
 }

@@ -1,19 +1,19 @@
 //! The scenario that a server and its nodes fly.
 
-use crate::deployed::Deployed;
-use crate::words::{Clock, Fingerprint};
-use crate::worlds::{deployed, fingerprint};
+use crate::distributed::DistributedWorld;
+use crate::protocol::{ClockMode, Fingerprint};
+use crate::worlds::{distributed_world, fingerprint};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Source};
+use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::WORLDS;
-use sidestep_session::fleet::Flown;
+use sidestep_session::fleet::JobScenario;
 use std::sync::Arc;
 
 /// A scenario, read and compiled.
 pub(super) struct Scenario {
     pub(super) source: Source,
-    pub(super) compiled: Box<dyn Compiled>,
-    pub(super) world: Arc<dyn Deployed>,
+    pub(super) compiled: Box<dyn CompiledScenario>,
+    pub(super) world: Arc<dyn DistributedWorld>,
 }
 
 impl Scenario {
@@ -21,13 +21,17 @@ impl Scenario {
     ///
     /// # Errors
     /// When it is wrong, or its agents cannot be flown by nodes.
-    pub(super) fn read(flown: &Flown) -> Result<Self, InputError> {
-        let (source, compiled) = sidestep_session::read(WORLDS, &flown.file, &flown.overrides)?;
-        Self::of(source, compiled)
+    pub(super) fn read(flown: &JobScenario) -> Result<Self, InputError> {
+        let (source, compiled) =
+            sidestep_session::read_scenario(WORLDS, &flown.file, &flown.overrides)?;
+        Self::from_compiled(source, compiled)
     }
 
-    fn of(source: Source, compiled: Box<dyn Compiled>) -> Result<Self, InputError> {
-        let world = deployed(compiled.as_ref(), &source)?;
+    fn from_compiled(
+        source: Source,
+        compiled: Box<dyn CompiledScenario>,
+    ) -> Result<Self, InputError> {
+        let world = distributed_world(compiled.as_ref(), &source)?;
         Ok(Self { source, compiled, world })
     }
 
@@ -35,13 +39,13 @@ impl Scenario {
     ///
     /// # Errors
     /// When one of them does not fit.
-    pub(super) fn with(self, overrides: &[String]) -> Result<Self, InputError> {
+    pub(super) fn with_overrides(self, overrides: &[String]) -> Result<Self, InputError> {
         if overrides.is_empty() {
             return Ok(self);
         }
-        let source = self.source.with(overrides)?;
+        let source = self.source.with_overrides(overrides)?;
         let compiled = WORLDS.compile(&source)?;
-        Self::of(source, compiled)
+        Self::from_compiled(source, compiled)
     }
 
     /// Returns the fingerprint.
@@ -54,13 +58,13 @@ impl Scenario {
 
     /// Returns the changes that a fleet needs: controls that are recorded, so that the run can be computed again, and in
     /// real time a network on which no agent waits forever for one that is gone.
-    pub(super) fn needs(&self, clock: Clock, is_recorded: bool) -> Vec<String> {
+    pub(super) fn required_overrides(&self, clock: ClockMode, is_recorded: bool) -> Vec<String> {
         let mut needs = Vec::new();
         if is_recorded {
             needs.push("record.controls=true".to_string());
         }
-        if let Clock::Realtime { speed } = clock {
-            needs.extend(self.world.patience(speed));
+        if let ClockMode::Realtime { speed } = clock {
+            needs.extend(self.world.timeout_override(speed));
         }
         needs
     }

@@ -1,7 +1,7 @@
 //! Lockstep: the server waits for every control, so that a fleet gives the same results as one process, bit for bit.
 
 use super::rounds::Group;
-use super::{Broken, LOOK, Server};
+use super::{FleetError, POLL_INTERVAL, Server};
 use std::time::Instant;
 
 impl Server<'_> {
@@ -10,25 +10,25 @@ impl Server<'_> {
     /// # Errors
     /// When a node that the fleet needs is gone, the world cannot go on, or the fleet is asked to
     /// end.
-    pub(super) fn cycle_in_lockstep(&mut self) -> Result<(), Broken> {
+    pub(super) fn run_lockstep_cycle(&mut self) -> Result<(), FleetError> {
         // Time stands still while a node is missing: only the cycle under way at its loss was made without it.
         self.wait_for_all()?;
         let began = Instant::now();
         loop {
-            let groups = self.hand_out_sights();
-            let is_last = groups.is_empty() || self.stage.further_rounds(groups.len()) == 0;
+            let groups = self.send_percepts();
+            let is_last = groups.is_empty() || self.stage.max_further_rounds(groups.len()) == 0;
             if self.terms.has_faults {
-                self.count_ticks(&groups)?;
+                self.run_ticks(&groups)?;
             }
             while !groups.iter().all(|group| self.has_decided(group)) {
-                self.hear(LOOK)?;
+                self.receive(POLL_INTERVAL)?;
             }
-            self.take_controls(&groups);
+            self.accept_controls(&groups);
             if is_last {
                 break;
             }
         }
-        self.tally.talked.add(began.elapsed());
+        self.tally.talked.record(began.elapsed());
         self.advance()
     }
 

@@ -7,38 +7,38 @@
 //! ticks.rs     counted time, on a network with faults
 //! ```
 //!
-//! It names no socket: all its words go over [`Mail`].
+//! It names no socket: all its words go over [`Messenger`].
 
+pub mod histogram;
+mod join;
+mod liveness;
 mod lockstep;
-mod missing;
-mod muster;
+mod node_entry;
 mod realtime;
 mod rounds;
-mod seat;
-pub mod tally;
 mod ticks;
 
-use crate::mail::{Heard, Mail};
-use crate::stage::Stage;
-use crate::wire::Party;
-use crate::words::{Clock, Fingerprint, Logged, Ticked, Welcome, Word};
-pub use missing::SILENT;
-pub use seat::Seat;
+use crate::hosted_run::HostedRun;
+use crate::messenger::{Messenger, Received};
+use crate::protocol::{AdvanceDone, ClockMode, Fingerprint, Message, PacketRecord, Welcome};
+use crate::wire::Peer;
+use histogram::Histogram;
+pub use liveness::SILENCE_TIMEOUT;
+pub use node_entry::NodeEntry;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
-use tally::Histogram;
 
 /// The longest wait of the server before it looks around.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Time between two signs of life to all nodes.
-const BEAT: Duration = Duration::from_millis(500);
+const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 
 /// The terms on which nodes join, and how the fleet is flown.
 #[derive(Debug, Clone)]
-pub struct Terms {
+pub struct ServerConfig {
     /// Fingerprint of the scenario.
     pub scenario: Fingerprint,
     /// The build of the program.
@@ -53,10 +53,10 @@ pub struct Terms {
 
 /// The reason why a fleet ends before its world.
 #[derive(Debug, thiserror::Error)]
-pub enum Broken {
+pub enum FleetError {
     /// It was asked to end.
     #[error("interrupted")]
-    Stopped,
+    Interrupted,
     /// A node is gone, and lockstep does not go on without it.
     #[error("the node of {agent} is gone in cycle {cycle}: {reason}")]
     Gone {
@@ -72,16 +72,16 @@ pub enum Broken {
     World(#[from] sidestep_session::Error),
 }
 
-/// The fleet as seen by its [`Attendant`] now and then.
-pub struct Look<'a> {
+/// The fleet as seen by its [`ServerHooks`] now and then.
+pub struct FleetView<'a> {
     /// The seats.
-    pub seats: &'a BTreeMap<EntityId, Seat>,
+    pub seats: &'a BTreeMap<EntityId, NodeEntry>,
     /// The counts of the server.
-    pub tally: &'a Tally,
+    pub tally: &'a ServerMetrics,
     /// The mail of the server.
-    pub mail: &'a Mail,
+    pub mail: &'a Messenger,
     /// The stage.
-    pub stage: &'a Stage,
+    pub stage: &'a HostedRun,
     /// Whether all nodes are there.
     pub has_begun: bool,
     /// Agents for which all wait, because nothing is heard of their nodes.
@@ -89,16 +89,16 @@ pub struct Look<'a> {
 }
 
 /// An attendant, which looks after the fleet while the server waits.
-pub trait Attendant {
+pub trait ServerHooks {
     /// Looks at the fleet, 50 times a second or so. Returns the nodes that have ended, with the reason.
     ///
     /// # Errors
     /// When the fleet is to end.
-    fn attend(&mut self, fleet: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken>;
+    fn on_poll(&mut self, fleet: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError>;
 
     /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
     /// with its sender.
-    fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
+    fn on_packets(&mut self, _: Vec<(EntityId, PacketRecord)>) {}
 
     /// Returns whether a watcher has no frame of this cycle yet.
     fn wants_frame(&self, _: Cycle) -> bool {
@@ -106,15 +106,15 @@ pub trait Attendant {
     }
 
     /// Takes a frame that it wanted.
-    fn take_frame(&mut self, _: Frame) {}
+    fn on_frame(&mut self, _: Frame) {}
 
     /// Looks at the fleet when all nodes have sent their last words.
-    fn look_back(&mut self, _: &Look<'_>) {}
+    fn on_end(&mut self, _: &FleetView<'_>) {}
 }
 
 /// Counts of a server.
 #[derive(Debug, Clone, Default)]
-pub struct Tally {
+pub struct ServerMetrics {
     /// Time from the sights to the last control of a cycle.
     pub talked: Histogram,
     /// Time to advance the world by one cycle.
@@ -133,34 +133,34 @@ pub struct Tally {
 
 /// The server of a fleet.
 pub struct Server<'a> {
-    mail: Mail,
-    stage: &'a mut Stage,
-    attendant: &'a mut dyn Attendant,
-    terms: Terms,
-    seats: BTreeMap<EntityId, Seat>,
-    tally: Tally,
+    mail: Messenger,
+    stage: &'a mut HostedRun,
+    attendant: &'a mut dyn ServerHooks,
+    terms: ServerConfig,
+    seats: BTreeMap<EntityId, NodeEntry>,
+    tally: ServerMetrics,
     has_begun: bool,
     /// Agents for which all wait, because nothing is heard of their nodes.
     waits_for: Vec<EntityId>,
     beat_at: Instant,
     look_at: Instant,
     /// Reports of nodes that have done a tick.
-    ticked: Vec<(EntityId, Ticked)>,
+    ticked: Vec<(EntityId, AdvanceDone)>,
     /// Packets that nodes have sent, where all are recorded.
-    packets: Vec<(EntityId, Logged)>,
+    packets: Vec<(EntityId, PacketRecord)>,
 }
 
 impl<'a> Server<'a> {
     /// Returns a server that no node has joined yet.
     pub fn new(
-        mail: Mail,
-        stage: &'a mut Stage,
-        attendant: &'a mut dyn Attendant,
-        terms: Terms,
+        mail: Messenger,
+        stage: &'a mut HostedRun,
+        attendant: &'a mut dyn ServerHooks,
+        terms: ServerConfig,
     ) -> Self {
-        let seats = stage.agents().map(|agent| (agent, Seat::default())).collect();
+        let seats = stage.agents().map(|agent| (agent, NodeEntry::default())).collect();
         let (beat_at, look_at) = (Instant::now(), Instant::now());
-        let (tally, ticked, packets) = (Tally::default(), Vec::new(), Vec::new());
+        let (tally, ticked, packets) = (ServerMetrics::default(), Vec::new(), Vec::new());
         Self {
             mail,
             stage,
@@ -181,113 +181,118 @@ impl<'a> Server<'a> {
     ///
     /// # Errors
     /// When it ends before.
-    pub fn run(mut self) -> (Result<(), Broken>, Tally) {
-        let flown = self.muster().and_then(|()| self.fly());
-        self.end();
+    pub fn run(mut self) -> (Result<(), FleetError>, ServerMetrics) {
+        let flown = self.wait_for_nodes().and_then(|()| self.fly());
+        self.shut_down();
         (flown, self.tally)
     }
 
-    fn fly(&mut self) -> Result<(), Broken> {
+    fn fly(&mut self) -> Result<(), FleetError> {
         self.has_begun = true;
         match self.terms.welcome.clock {
-            Clock::Lockstep => {
+            ClockMode::Lockstep => {
                 while !self.stage.is_over() {
-                    self.cycle_in_lockstep()?;
+                    self.run_lockstep_cycle()?;
                 }
                 Ok(())
             }
-            Clock::Realtime { speed } => self.fly_in_real_time(speed),
+            ClockMode::Realtime { speed } => self.fly_in_real_time(speed),
         }
     }
 
     /// Tells all nodes that the fleet has ended, and waits a little until they have sent their last words.
-    fn end(&mut self) {
-        let seated: Vec<EntityId> = self.seated().collect();
-        seated.iter().for_each(|&agent| self.mail.letter(Party::Node(agent), Word::End));
-        let until = Instant::now() + BEAT;
-        while self.seated().any(|agent| !self.seats[&agent].has_left) && Instant::now() < until {
-            if let Some(heard) = self.mail.receive(LOOK) {
-                self.take(heard);
+    fn shut_down(&mut self) {
+        let seated: Vec<EntityId> = self.joined_agents().collect();
+        seated.iter().for_each(|&agent| self.mail.send_reliable(Peer::Node(agent), Message::End));
+        let until = Instant::now() + HEARTBEAT_INTERVAL;
+        while self.joined_agents().any(|agent| !self.seats[&agent].has_left)
+            && Instant::now() < until
+        {
+            if let Some(heard) = self.mail.receive(POLL_INTERVAL) {
+                self.on_message(heard);
             }
         }
-        self.attendant.take_packets(std::mem::take(&mut self.packets));
+        self.attendant.on_packets(std::mem::take(&mut self.packets));
         self.waits_for.clear();
-        self.show();
+        self.publish_frame();
         let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
         let has_begun = *has_begun;
-        self.attendant.look_back(&Look { seats, tally, mail, stage, has_begun, waits_for });
+        self.attendant.on_end(&FleetView { seats, tally, mail, stage, has_begun, waits_for });
     }
 
     /// Agents with nodes that are there, rising.
-    fn seated(&self) -> impl Iterator<Item = EntityId> + '_ {
-        self.seats.iter().filter(|(_, seat)| seat.life().is_some()).map(|(&agent, _)| agent)
+    fn joined_agents(&self) -> impl Iterator<Item = EntityId> + '_ {
+        self.seats.iter().filter(|(_, seat)| seat.incarnation().is_some()).map(|(&agent, _)| agent)
     }
 
     /// Hears the words that come within some time, at most until the next look around.
     ///
     /// # Errors
     /// When the fleet is to end.
-    fn hear(&mut self, within: Duration) -> Result<(), Broken> {
-        if let Some(heard) = self.mail.receive(within.min(LOOK)) {
-            self.take(heard);
+    fn receive(&mut self, within: Duration) -> Result<(), FleetError> {
+        if let Some(heard) = self.mail.receive(within.min(POLL_INTERVAL)) {
+            self.on_message(heard);
         }
         let now = Instant::now();
         if now >= self.look_at {
             // Words that came while this process stood still are heard before any node counts as missing.
             while let Some(heard) = self.mail.receive(Duration::ZERO) {
-                self.take(heard);
+                self.on_message(heard);
             }
-            self.look_at = now + LOOK;
-            self.look_around(now)?;
+            self.look_at = now + POLL_INTERVAL;
+            self.poll(now)?;
         }
         Ok(())
     }
 
-    fn look_around(&mut self, now: Instant) -> Result<(), Broken> {
+    fn poll(&mut self, now: Instant) -> Result<(), FleetError> {
         if now >= self.beat_at {
-            self.beat_at = now + BEAT;
-            let seated: Vec<EntityId> = self.seated().collect();
-            seated.into_iter().for_each(|agent| self.mail.note(Party::Node(agent), Word::Beat));
+            self.beat_at = now + HEARTBEAT_INTERVAL;
+            let seated: Vec<EntityId> = self.joined_agents().collect();
+            seated
+                .into_iter()
+                .for_each(|agent| self.mail.send_best_effort(Peer::Node(agent), Message::Beat));
         }
-        self.show();
+        self.publish_frame();
         let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
         let has_begun = *has_begun;
-        let look = Look { seats, tally, mail, stage, has_begun, waits_for };
-        let mut gone = self.attendant.attend(&look)?;
+        let look = FleetView { seats, tally, mail, stage, has_begun, waits_for };
+        let mut gone = self.attendant.on_poll(&look)?;
         let lease = self.terms.lease;
-        let silent = self.seated().filter(|&agent| self.is_silent(agent, lease));
+        let silent = self.joined_agents().filter(|&agent| self.is_silent(agent, lease));
         let reason = || format!("not heard for {} s", lease.as_secs_f64());
         gone.extend(silent.map(|agent| (agent, reason())));
-        gone.into_iter().try_for_each(|(agent, reason)| self.lose(agent, reason))?;
-        self.note_waits();
+        gone.into_iter().try_for_each(|(agent, reason)| self.mark_lost(agent, reason))?;
+        self.report_waits();
         Ok(())
     }
 
     /// Shows the world to its watchers.
-    fn show(&mut self) {
+    fn publish_frame(&mut self) {
         if self.attendant.wants_frame(self.stage.cycle()) {
-            self.attendant.take_frame(self.stage.frame());
+            self.attendant.on_frame(self.stage.frame());
         }
     }
 
-    fn take(&mut self, Heard { from, life, word }: Heard) {
-        let Party::Node(agent) = from else { return };
-        if let Word::Join(join) = word {
+    fn on_message(&mut self, Received { from, life, word }: Received) {
+        let Peer::Node(agent) = from else { return };
+        if let Message::Join(join) = word {
             self.on_join(agent, life, join);
             return;
         }
-        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life() == Some(life)) else {
+        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.incarnation() == Some(life))
+        else {
             return self.dismiss(agent, life);
         };
         match word {
-            Word::Ready => seat.is_ready = true,
-            Word::Status(status) => seat.status = status,
-            Word::Control(control) => self.on_control(agent, control),
-            Word::Ticked(ticked) => self.ticked.push((agent, ticked)),
-            Word::Log(sent) => {
+            Message::Ready => seat.is_ready = true,
+            Message::Status(status) => seat.status = status,
+            Message::Control(control) => self.on_control(agent, control),
+            Message::Ticked(ticked) => self.ticked.push((agent, ticked)),
+            Message::Log(sent) => {
                 self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
             }
-            Word::Left => seat.has_left = true,
+            Message::Left => seat.has_left = true,
             // From a node, a word that only other parties send.
             _ => {}
         }

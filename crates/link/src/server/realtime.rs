@@ -4,32 +4,32 @@
 //! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment that
 //! it has heard of the cycle. Clocks are never compared, so one that is wrong, or jumps, changes nothing.
 
-use super::{Broken, Server};
+use super::{FleetError, Server};
 use std::time::{Duration, Instant};
 
 /// Part of a cycle by which it may begin later than due without being counted as late.
-const LATE_PART: f64 = 0.1;
+const LATE_FRACTION: f64 = 0.1;
 
 /// The shortest cycle: below it only lateness would be seen.
-const SHORTEST: Duration = Duration::from_millis(1);
+const MIN_CYCLE: Duration = Duration::from_millis(1);
 
 impl Server<'_> {
     /// Flies the world to its end, `speed` times as fast as in the scenario.
     ///
     /// # Errors
     /// When the world cannot go on, or the fleet is asked to end.
-    pub(super) fn fly_in_real_time(&mut self, speed: f64) -> Result<(), Broken> {
-        let cycle = Duration::from_secs_f64(self.stage.world().cycle_s() / speed).max(SHORTEST);
+    pub(super) fn fly_in_real_time(&mut self, speed: f64) -> Result<(), FleetError> {
+        let cycle = Duration::from_secs_f64(self.stage.world().cycle_s() / speed).max(MIN_CYCLE);
         let mut due = Instant::now();
         while !self.stage.is_over() {
-            self.note_lateness(due.elapsed(), cycle);
+            self.record_lateness(due.elapsed(), cycle);
             let began = Instant::now();
             // A server that was stopped for a while does not rush to catch up.
             due = (due + cycle).max(began + cycle / 2);
-            self.talk_until(due)?;
+            self.run_rounds_until(due)?;
             let left = || due.saturating_duration_since(Instant::now());
             while !left().is_zero() {
-                self.hear(left())?;
+                self.receive(left())?;
             }
             self.advance()?;
         }
@@ -38,11 +38,11 @@ impl Server<'_> {
 
     /// Lets the agents of a cycle talk, round after round. Each round has an equal part of the remaining time, so
     /// that a late agent costs later rounds nothing more.
-    fn talk_until(&mut self, due: Instant) -> Result<(), Broken> {
+    fn run_rounds_until(&mut self, due: Instant) -> Result<(), FleetError> {
         let began = Instant::now();
         loop {
-            let groups = self.hand_out_sights();
-            let further = self.stage.further_rounds(groups.len());
+            let groups = self.send_percepts();
+            let further = self.stage.max_further_rounds(groups.len());
             let left = due.saturating_duration_since(Instant::now());
             let ends = Instant::now() + left / (further as u32 + 1);
             let is_there =
@@ -54,20 +54,20 @@ impl Server<'_> {
                 if !is_in_time {
                     break;
                 }
-                self.hear(left)?;
+                self.receive(left)?;
             }
-            self.take_controls(&groups);
+            self.accept_controls(&groups);
             if groups.is_empty() || further == 0 {
                 let talked = if is_in_time { began.elapsed() } else { due - began };
-                self.tally.talked.add(talked);
+                self.tally.talked.record(talked);
                 return Ok(());
             }
         }
     }
 
-    fn note_lateness(&mut self, late: Duration, cycle: Duration) {
-        self.tally.late.add(late);
-        if late > cycle.mul_f64(LATE_PART) {
+    fn record_lateness(&mut self, late: Duration, cycle: Duration) {
+        self.tally.late.record(late);
+        if late > cycle.mul_f64(LATE_FRACTION) {
             self.tally.late_cycles += 1;
             tracing::warn!(
                 cycle = self.stage.cycle(),

@@ -1,10 +1,10 @@
 //! Rounds of a cycle: percepts go out to the agents that decide next, and controls come in; after the last round the
 //! world goes on.
 
-use super::{Broken, Server};
-use crate::ports::{Absurd, Controls, Sight};
-use crate::wire::Party;
-use crate::words::{Control, Word};
+use super::{FleetError, Server};
+use crate::agent::{AgentPercept, Controls, InvalidControl};
+use crate::protocol::{Control, Message};
+use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::time::Instant;
 
@@ -13,11 +13,11 @@ pub(super) type Group = Vec<EntityId>;
 
 impl Server<'_> {
     /// Hands each agent that decides next its percept; returns the groups of agents that decide together.
-    pub(super) fn hand_out_sights(&mut self) -> Vec<Group> {
+    pub(super) fn send_percepts(&mut self) -> Vec<Group> {
         self.seats.values_mut().for_each(|seat| seat.control = None);
         let mut groups = Vec::new();
-        for Sight { agent, group, begin } in self.stage.sights() {
-            self.mail.letter(Party::Node(agent), Word::Begin(begin));
+        for AgentPercept { agent, group, begin } in self.stage.percepts() {
+            self.mail.send_reliable(Peer::Node(agent), Message::Begin(begin));
             if group.first() == Some(&agent) {
                 groups.push(group);
             }
@@ -38,7 +38,7 @@ impl Server<'_> {
     }
 
     /// Takes the controls that are there, and counts those that are not.
-    pub(super) fn take_controls(&mut self, groups: &[Group]) {
+    pub(super) fn accept_controls(&mut self, groups: &[Group]) {
         let mut controls = Controls::new();
         let mut gone = Vec::new();
         for &agent in groups.iter().flatten() {
@@ -47,25 +47,25 @@ impl Server<'_> {
             }
             match self.take_control(agent) {
                 Some(control) => controls.push((agent, control)),
-                None => self.note_late(agent),
+                None => self.record_late(agent),
             }
         }
-        let absurd = self.stage.take(groups, controls, &gone);
-        self.note_absurd(absurd);
+        let absurd = self.stage.accept_controls(groups, controls, &gone);
+        self.record_invalid(absurd);
     }
 
     /// Takes the control of an agent, if there is one that counts.
     fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
-        let is_heeded = !self.is_gone(agent) || self.stage.world().heeds_lost();
+        let is_heeded = !self.is_gone(agent) || self.stage.world().keeps_controls_of_lost_nodes();
         let seat = self.seats.get_mut(&agent)?;
         let control = seat.control.take().filter(|_| is_heeded)?;
         seat.flown += 1;
         Some(control)
     }
 
-    fn note_late(&mut self, agent: EntityId) {
+    fn record_late(&mut self, agent: EntityId) {
         let Some(seat) = self.seats.get_mut(&agent) else { return };
-        let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
+        let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
         let talk = &*seat.status.doing;
         tracing::info!(agent, who, cycle, talk, "a control is late");
         seat.late += 1;
@@ -76,21 +76,21 @@ impl Server<'_> {
     ///
     /// # Errors
     /// When it cannot.
-    pub(super) fn advance(&mut self) -> Result<(), Broken> {
+    pub(super) fn advance(&mut self) -> Result<(), FleetError> {
         let began = Instant::now();
         let cycle = self.stage.cycle();
         let absurd = self.stage.advance()?;
-        self.note_absurd(absurd);
-        self.tally.advanced.add(began.elapsed());
+        self.record_invalid(absurd);
+        self.tally.advanced.record(began.elapsed());
         // A node may report on a cycle until it hears of the next one.
         let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
-        self.attendant.take_packets(past);
+        self.attendant.on_packets(past);
         Ok(())
     }
 
-    fn note_absurd(&mut self, absurd: Vec<Absurd>) {
-        for Absurd { agent, reason } in absurd {
-            let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
+    fn record_invalid(&mut self, absurd: Vec<InvalidControl>) {
+        for InvalidControl { agent, reason } in absurd {
+            let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
             tracing::warn!(agent, who, cycle, reason, "an absurd control");
             self.tally.absurd_controls += 1;
             if let Some(seat) = self.seats.get_mut(&agent) {
@@ -104,15 +104,15 @@ impl Server<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mail::Mail;
-    use crate::server::{Attendant, Look, Terms};
-    use crate::stage::Stage;
-    use crate::wire::memory::Exchange;
-    use crate::words::{Clock, Life, Member, Topology, Welcome};
-    use crate::worlds::deployed;
+    use crate::hosted_run::HostedRun;
+    use crate::messenger::Messenger;
+    use crate::protocol::{ClockMode, Incarnation, Member, Topology, Welcome};
+    use crate::server::{FleetView, ServerConfig, ServerHooks};
+    use crate::wire::memory::MemoryHub;
+    use crate::worlds::distributed_world;
     use sidestep::scenario::Source;
     use sidestep::worlds::WORLDS;
-    use sidestep_session::{Journey, Keep, Unwatched};
+    use sidestep_session::{ManagedRun, NoWatcher, OutputPaths};
     use std::time::Duration;
 
     const CHAIN: &str = "format = 1\nworld = \"chain\"\nseed = 1\ncycles = 9\n[chain]\ndt_s = 0.05\n\
@@ -126,24 +126,25 @@ mod tests {
 
     struct Nobody;
 
-    impl Attendant for Nobody {
-        fn attend(&mut self, _: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+    impl ServerHooks for Nobody {
+        fn on_poll(&mut self, _: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
             Ok(Vec::new())
         }
     }
 
-    fn stage(text: &str) -> Stage {
+    fn stage(text: &str) -> HostedRun {
         let source = Source::new("s.toml", text, "");
         let compiled = WORLDS.compile(&source).expect("a scenario");
-        let world = deployed(compiled.as_ref(), &source).expect("agents of their own");
-        let keep = Keep::default();
-        let journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
-        Stage::new(journey, world, &Unwatched)
+        let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
+        let keep = OutputPaths::default();
+        let journey =
+            ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+        HostedRun::new(journey, world, &NoWatcher)
     }
 
-    fn terms() -> Terms {
-        let (clock, topology, overrides) = (Clock::Lockstep, Topology::Star, Vec::new());
-        Terms {
+    fn terms() -> ServerConfig {
+        let (clock, topology, overrides) = (ClockMode::Lockstep, Topology::Star, Vec::new());
+        ServerConfig {
             scenario: String::new(),
             build: "test".into(),
             welcome: Welcome { clock, topology, overrides, logs_packets: false },
@@ -153,10 +154,10 @@ mod tests {
     }
 
     /// Returns the decisions of agents with these percepts that hear each other completely.
-    fn decided(stage: &Stage, sights: &[Sight]) -> Controls {
-        let program = |sight: &Sight| {
+    fn decided(stage: &HostedRun, sights: &[AgentPercept]) -> Controls {
+        let program = |sight: &AgentPercept| {
             let mut program = stage.world().program(sight.agent, "test");
-            program.begin(sight.begin.cycle, &sight.begin.sight).expect("a percept");
+            program.start_cycle(sight.begin.cycle, &sight.begin.sight).expect("a percept");
             program
         };
         let mut programs: Vec<_> = sights.iter().map(program).collect();
@@ -178,23 +179,23 @@ mod tests {
 
     /// Makes a cycle in which all have decided before the node of agent 1 is lost. Returns the numbers of controls
     /// flown and not flown for each agent.
-    fn with_a_loss(stage: &mut Stage) -> Vec<(u64, u64)> {
-        let sights = stage.sights();
+    fn with_a_loss(stage: &mut HostedRun) -> Vec<(u64, u64)> {
+        let sights = stage.percepts();
         let controls = decided(stage, &sights);
         let mut nobody = Nobody;
-        let mail = Mail::new(Party::Server, Box::new(Exchange::default().wire(Party::Server)));
+        let mail = Messenger::new(Peer::Server, Box::new(MemoryHub::default().wire(Peer::Server)));
         let mut server = Server::new(mail, stage, &mut nobody, terms());
         server.has_begun = true;
         for agent in 0..3 {
-            let member = Member { agent, life: Life(1), listens: Vec::new() };
-            server.seats.get_mut(&agent).expect("a seat").take(member, 0);
+            let member = Member { agent, life: Incarnation(1), listens: Vec::new() };
+            server.seats.get_mut(&agent).expect("a seat").assign(member, 0);
         }
-        let groups = server.hand_out_sights();
+        let groups = server.send_percepts();
         for (agent, control) in controls {
             server.on_control(agent, Control { cycle: 0, control });
         }
-        let _ = server.lose(1, "it was killed".into());
-        server.take_controls(&groups);
+        let _ = server.mark_lost(1, "it was killed".into());
+        server.accept_controls(&groups);
         server.advance().expect("the world goes on");
         server.seats.values().map(|seat| (seat.flown, seat.late)).collect()
     }

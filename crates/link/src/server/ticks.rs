@@ -6,15 +6,15 @@
 //! there: the server tells it their number.
 
 use super::rounds::Group;
-use super::{Broken, LOOK, Server};
-use crate::wire::Party;
-use crate::words::{Tick, Ticked, Word};
+use super::{FleetError, POLL_INTERVAL, Server};
+use crate::protocol::{AdvanceDone, AdvanceGrant, Message};
+use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 
 /// The server's knowledge of a node in a cycle.
 #[derive(Debug, Default)]
-struct Course {
+struct NodeClock {
     /// The tick of its next timer.
     timer: Option<u64>,
     /// Number of packets that arrive at it, by tick.
@@ -26,15 +26,15 @@ struct Course {
     is_out: bool,
 }
 
-impl Course {
+impl NodeClock {
     /// Returns the next tick in which something happens.
-    fn next(&self) -> Option<u64> {
+    fn next_tick(&self) -> Option<u64> {
         let arrival = self.arrivals.keys().next().copied();
         self.timer.into_iter().chain(arrival).min()
     }
 
     /// Goes on to a tick, and returns the number of packets that have arrived by then.
-    fn go_on_to(&mut self, tick: u64) -> u64 {
+    fn advance_to(&mut self, tick: u64) -> u64 {
         let later = self.arrivals.split_off(&(tick + 1));
         self.arrived += self.arrivals.values().sum::<u64>();
         self.arrivals = later;
@@ -45,19 +45,19 @@ impl Course {
 
 /// The courses of the nodes of one group, with ticks of its own.
 #[derive(Debug, Default)]
-struct Talk {
-    courses: BTreeMap<EntityId, Course>,
+struct GroupClock {
+    courses: BTreeMap<EntityId, NodeClock>,
     is_over: bool,
 }
 
-impl Talk {
+impl GroupClock {
     fn new(group: &[EntityId]) -> Self {
-        let out = || Course { is_out: true, ..Course::default() };
+        let out = || NodeClock { is_out: true, ..NodeClock::default() };
         let courses = group.iter().map(|&agent| (agent, out())).collect();
         Self { courses, is_over: false }
     }
 
-    fn note(&mut self, agent: EntityId, report: Ticked) {
+    fn record(&mut self, agent: EntityId, report: AdvanceDone) {
         for (receiver, arrives) in report.sent {
             if let Some(course) = self.courses.get_mut(&receiver) {
                 *course.arrivals.entry(arrives).or_default() += 1;
@@ -70,19 +70,19 @@ impl Talk {
 
     /// Returns the nodes that go on, with the packets that have arrived at each by then, and the tick; none before all
     /// have reported. When all are done, or nothing more can happen, the talk is over.
-    fn go_on(&mut self) -> Vec<(EntityId, u64, u64)> {
+    fn advance(&mut self) -> Vec<(EntityId, u64, u64)> {
         if self.is_over || self.courses.values().any(|course| course.is_out) {
             return Vec::new();
         }
-        let next = self.courses.values().filter_map(Course::next).min();
+        let next = self.courses.values().filter_map(NodeClock::next_tick).min();
         let next = next.filter(|&tick| tick < u64::MAX);
         let is_done = self.courses.values().all(|course| course.is_done);
         let Some(tick) = next.filter(|_| !is_done) else {
             self.is_over = true;
             return Vec::new();
         };
-        let go = self.courses.iter_mut().filter(|(_, course)| course.next() == Some(tick));
-        go.map(|(&agent, course)| (agent, course.go_on_to(tick), tick)).collect()
+        let go = self.courses.iter_mut().filter(|(_, course)| course.next_tick() == Some(tick));
+        go.map(|(&agent, course)| (agent, course.advance_to(tick), tick)).collect()
     }
 }
 
@@ -91,36 +91,40 @@ impl Server<'_> {
     ///
     /// # Errors
     /// When a node that the fleet needs is gone, or the fleet is asked to end.
-    pub(super) fn count_ticks(&mut self, groups: &[Group]) -> Result<(), Broken> {
+    pub(super) fn run_ticks(&mut self, groups: &[Group]) -> Result<(), FleetError> {
         let cycle = self.stage.cycle();
-        let mut talks: Vec<Talk> = groups.iter().map(|group| Talk::new(group)).collect();
+        let mut talks: Vec<GroupClock> =
+            groups.iter().map(|group| GroupClock::new(group)).collect();
         while talks.iter().any(|talk| !talk.is_over) {
-            self.hear(LOOK)?;
+            self.receive(POLL_INTERVAL)?;
             for talk in &mut talks {
                 // Others may wait forever for one that is gone.
                 talk.is_over |= talk.courses.keys().any(|&agent| self.is_gone(agent));
             }
             for (agent, report) in std::mem::take(&mut self.ticked) {
-                let of = |talk: &&mut Talk| talk.courses.contains_key(&agent);
+                let of = |talk: &&mut GroupClock| talk.courses.contains_key(&agent);
                 if let Some(talk) = talks.iter_mut().find(of)
                     && report.cycle == cycle
                 {
-                    talk.note(agent, report);
-                    self.let_go_on(talk);
+                    talk.record(agent, report);
+                    self.send_grants(talk);
                 }
             }
         }
         Ok(())
     }
 
-    fn let_go_on(&mut self, talk: &mut Talk) {
+    fn send_grants(&mut self, talk: &mut GroupClock) {
         let cycle = self.stage.cycle();
-        for (agent, packets, tick) in talk.go_on() {
-            self.mail.letter(Party::Node(agent), Word::Tick(Tick { cycle, tick, packets }));
+        for (agent, packets, tick) in talk.advance() {
+            self.mail.send_reliable(
+                Peer::Node(agent),
+                Message::Tick(AdvanceGrant { cycle, tick, packets }),
+            );
         }
         if talk.is_over {
             for &agent in talk.courses.keys() {
-                self.mail.letter(Party::Node(agent), Word::Close(cycle));
+                self.mail.send_reliable(Peer::Node(agent), Message::Close(cycle));
             }
         }
     }

@@ -50,7 +50,7 @@ pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
 
 /// A port held until another socket may have it.
 #[derive(Debug)]
-pub struct Held {
+pub struct PortReservation {
     /// The endpoint, with a port.
     pub endpoint: String,
     _port: TcpListener,
@@ -58,13 +58,13 @@ pub struct Held {
 
 /// Lowest port that is tried where any will do, and their number: below those that systems give to outgoing
 /// connections, one of which could take it first.
-const PORTS: (u16, u16) = (20_000, 12_000);
+const PORT_RANGE: (u16, u16) = (20_000, 12_000);
 
 /// Holds the port of an endpoint; port 0 stands for any free one.
 ///
 /// # Errors
 /// When it cannot be taken, or the text is no endpoint.
-pub fn hold(endpoint: &str) -> Result<Held, WireError> {
+pub fn reserve_port(endpoint: &str) -> Result<PortReservation, WireError> {
     let (host, port) = host_and_port(endpoint)?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     let bind = |port: u16| {
@@ -76,26 +76,26 @@ pub fn hold(endpoint: &str) -> Result<Held, WireError> {
         format!("{}{port}", &endpoint[..start])
     };
     if port > 0 {
-        let held = bind(port).map_err(|reason| taken(&[endpoint.into()], reason))?;
-        return Ok(Held { endpoint: endpoint.into(), _port: held });
+        let held = bind(port).map_err(|reason| endpoint_in_use(&[endpoint.into()], reason))?;
+        return Ok(PortReservation { endpoint: endpoint.into(), _port: held });
     }
-    let first = (std::process::id().wrapping_mul(97) % u32::from(PORTS.1)) as u16;
+    let first = (std::process::id().wrapping_mul(97) % u32::from(PORT_RANGE.1)) as u16;
     let mut why = String::new();
-    for k in 0..PORTS.1 {
-        let port = PORTS.0 + (first + k) % PORTS.1;
+    for k in 0..PORT_RANGE.1 {
+        let port = PORT_RANGE.0 + (first + k) % PORT_RANGE.1;
         match bind(port) {
-            Ok(held) => return Ok(Held { endpoint: with(port), _port: held }),
+            Ok(held) => return Ok(PortReservation { endpoint: with(port), _port: held }),
             Err(reason) => why = reason,
         }
     }
-    Err(taken(&[endpoint.into()], why))
+    Err(endpoint_in_use(&[endpoint.into()], why))
 }
 
 /// Checks that listening at an endpoint is possible.
-pub(super) fn vacant(endpoint: &str) -> Result<(), WireError> {
-    hold(endpoint).map(drop)
+pub(super) fn check_vacant(endpoint: &str) -> Result<(), WireError> {
+    reserve_port(endpoint).map(drop)
 }
 
-pub(super) fn taken(endpoints: &[String], reason: String) -> WireError {
+pub(super) fn endpoint_in_use(endpoints: &[String], reason: String) -> WireError {
     WireError::Taken { endpoint: endpoints.join(", "), reason }
 }

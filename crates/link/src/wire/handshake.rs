@@ -12,16 +12,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Time that each step may take.
-const PATIENCE: Duration = Duration::from_secs(1);
+const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Returns why one of the two ends does not take the other's certificate; none if both do, or no one is there.
-pub(super) fn distrust(endpoint: &str, tls: &Tls) -> Option<String> {
+pub(super) fn certificate_problem(endpoint: &str, tls: &Tls) -> Option<String> {
     let (host, port) = host_and_port(endpoint).ok()?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     let address = (bare, port).to_socket_addrs().ok()?.next()?;
-    let mut stream = TcpStream::connect_timeout(&address, PATIENCE).ok()?;
-    stream.set_read_timeout(Some(PATIENCE)).ok()?;
-    stream.set_write_timeout(Some(PATIENCE)).ok()?;
+    let mut stream = TcpStream::connect_timeout(&address, STEP_TIMEOUT).ok()?;
+    stream.set_read_timeout(Some(STEP_TIMEOUT)).ok()?;
+    stream.set_write_timeout(Some(STEP_TIMEOUT)).ok()?;
     let name = ServerName::try_from(bare.to_string()).ok()?;
     let mut connection = match config(tls) {
         Ok(config) => ClientConnection::new(Arc::new(config), name).ok()?,
@@ -29,7 +29,7 @@ pub(super) fn distrust(endpoint: &str, tls: &Tls) -> Option<String> {
     };
     // The other end checks this one's certificate last: its verdict is the first thing that comes.
     let heard = Stream::new(&mut connection, &mut stream).read(&mut [0]);
-    words(heard.err()?, tls)
+    describe_error(heard.err()?, tls)
 }
 
 fn config(tls: &Tls) -> Result<ClientConfig, Error> {
@@ -51,7 +51,7 @@ fn config(tls: &Tls) -> Result<ClientConfig, Error> {
 }
 
 /// Returns words for an end of a handshake, if certificates are the reason.
-fn words(error: io::Error, tls: &Tls) -> Option<String> {
+fn describe_error(error: io::Error, tls: &Tls) -> Option<String> {
     match error.get_ref()?.downcast_ref::<Error>()? {
         Error::AlertReceived(alert) => {
             let own = tls.certificate.display();

@@ -8,15 +8,15 @@
 //! endpoint.rs notation of endpoints, and ports that are held
 //! ```
 
-pub mod board;
 pub mod endpoint;
 mod handshake;
+pub mod http_text;
 pub mod memory;
-pub mod window;
+pub mod view_server;
 pub mod zenoh;
 
-pub use crate::party::Party;
-use crate::words::Member;
+pub use crate::peer::Peer;
+use crate::protocol::Member;
 pub use endpoint::WireError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
@@ -24,7 +24,7 @@ use std::time::Duration;
 /// Carries frames between parties. A frame may be lost without notice.
 pub trait Wire: Send {
     /// Sends a frame to other parties, without waiting for them. Further parties may hear it.
-    fn send(&mut self, to: &[Party], frame: &[u8]);
+    fn send(&mut self, to: &[Peer], frame: &[u8]);
 
     /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none came.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
@@ -33,13 +33,13 @@ pub trait Wire: Send {
     ///
     /// # Errors
     /// When an endpoint cannot be taken.
-    fn join(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
+    fn connect_mesh(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
         Ok(())
     }
 
     /// Asks the other end of a direct link, and returns whether the link seems to be open and all questions have been
     /// left unanswered for some time. Ends answer by themselves, however busy their nodes are.
-    fn is_deaf_to(&mut self, _member: &Member, _within: Duration) -> bool {
+    fn is_half_open(&mut self, _member: &Member, _within: Duration) -> bool {
         false
     }
 
@@ -47,13 +47,13 @@ pub trait Wire: Send {
     ///
     /// # Errors
     /// When an endpoint cannot be taken again: there are no direct links then, and it can be tried once more.
-    fn reopen(&mut self) -> Result<(), WireError> {
+    fn reopen_links(&mut self) -> Result<(), WireError> {
         Ok(())
     }
 }
 
 impl<W: Wire + ?Sized> Wire for Box<W> {
-    fn send(&mut self, to: &[Party], frame: &[u8]) {
+    fn send(&mut self, to: &[Peer], frame: &[u8]) {
         (**self).send(to, frame);
     }
 
@@ -61,15 +61,15 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
         (**self).receive(within)
     }
 
-    fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
-        (**self).join(me, members)
+    fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        (**self).connect_mesh(me, members)
     }
 
-    fn is_deaf_to(&mut self, member: &Member, within: Duration) -> bool {
-        (**self).is_deaf_to(member, within)
+    fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
+        (**self).is_half_open(member, within)
     }
 
-    fn reopen(&mut self) -> Result<(), WireError> {
-        (**self).reopen()
+    fn reopen_links(&mut self) -> Result<(), WireError> {
+        (**self).reopen_links()
     }
 }

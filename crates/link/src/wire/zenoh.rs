@@ -6,10 +6,10 @@
 
 mod echo;
 
-use super::endpoint::{Held, WireError, host_and_port, taken, vacant};
-use super::{Party, Wire, handshake};
-use crate::words::Member;
-use echo::Echoes;
+use super::endpoint::{PortReservation, WireError, check_vacant, endpoint_in_use, host_and_port};
+use super::{Peer, Wire, handshake};
+use crate::protocol::Member;
+use echo::EchoProbes;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
@@ -28,15 +28,15 @@ const LEASE_MS: u64 = 2_000;
 
 /// Time that opening a link may take at either end, in milliseconds. With Zenoh's own limit, ten seconds, coming back
 /// after a partition takes as long. It must not be short either: a link with an opening that is broken off at the
-/// very end stays alive and deaf (`Wire::reopen`).
-const OPENED_WITHIN_MS: u64 = 3_000;
+/// very end stays alive and deaf (`Wire::reopen_links`).
+const OPEN_TIMEOUT_MS: u64 = 3_000;
 
 /// Time in which the endpoints of a closed session can usually be taken again.
-const FREED_WITHIN: Duration = Duration::from_secs(1);
+const RELEASE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Settings of a Zenoh session.
 #[derive(Debug, Clone, Default)]
-struct Settings<'a> {
+struct ZenohConfig<'a> {
     /// Name by which others know the session; none for one that Zenoh makes up.
     id: Option<String>,
     mode: &'a str,
@@ -47,7 +47,7 @@ struct Settings<'a> {
     tls: Option<&'a Tls>,
 }
 
-impl Settings<'_> {
+impl ZenohConfig<'_> {
     /// Returns the keys of Zenoh's configuration, as JSON. Its queues by priority stay, although each link has eight
     /// of them with buffers: without them (`transport/unicast/qos/enabled`) a session turns deaf now and then.
     fn keys(&self) -> Vec<(&'static str, String)> {
@@ -73,8 +73,8 @@ impl Settings<'_> {
             ),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
             ("transport/link/tx/keep_alive", "4".into()),
-            ("transport/unicast/open_timeout", OPENED_WITHIN_MS.to_string()),
-            ("transport/unicast/accept_timeout", OPENED_WITHIN_MS.to_string()),
+            ("transport/unicast/open_timeout", OPEN_TIMEOUT_MS.to_string()),
+            ("transport/unicast/accept_timeout", OPEN_TIMEOUT_MS.to_string()),
         ];
         if let Some(id) = &self.id {
             keys.push(("id", format!("{id:?}")));
@@ -107,20 +107,20 @@ impl Settings<'_> {
 
 /// A wire over one or two Zenoh sessions.
 pub struct ZenohWire {
-    me: Party,
+    me: Peer,
     arrived: Receiver<Vec<u8>>,
     arrives: Sender<Vec<u8>>,
     /// The session with the server, or the server's own.
-    hub: Line,
+    hub: ZenohLink,
     /// The session with all other nodes, in a mesh.
-    mesh: Option<Line>,
+    mesh: Option<ZenohLink>,
     /// The endpoints at which they reach this one, none in a star.
     listens: Vec<String>,
     /// The ports of those, until it listens.
-    ports: Vec<Held>,
+    ports: Vec<PortReservation>,
     tls: Option<Tls>,
     /// All other nodes, rising.
-    others: Vec<Party>,
+    others: Vec<Peer>,
     /// The endpoints to which this one opens links.
     connect: Vec<String>,
     /// The name by which they know this one.
@@ -128,26 +128,26 @@ pub struct ZenohWire {
     /// Number of times that it has opened them.
     opened: u32,
     /// Questions to the other ends of the mesh.
-    echoes: Echoes,
+    echoes: EchoProbes,
 }
 
 /// A session, and the receivers reached over it.
-struct Line {
-    keys: BTreeMap<Party, KeyExpr<'static>>,
+struct ZenohLink {
+    keys: BTreeMap<Peer, KeyExpr<'static>>,
     _heard: Vec<Subscriber<()>>,
     session: Session,
 }
 
 /// The bits of a session's name that identify its node: the other bits count the times that that node has opened it.
-const NAME: u128 = u128::MAX >> 32;
+const ZENOH_ID_MASK: u128 = u128::MAX >> 32;
 
 /// Returns the name of a node in its present life.
-fn name(member: &Member) -> u128 {
+fn zenoh_id(member: &Member) -> u128 {
     u128::from(member.agent) << 64 | u128::from(member.life.0)
 }
 
 /// The key under which frames for most nodes are published. No party has that name.
-const ALL: &str = "sidestep/all";
+const BROADCAST_KEY: &str = "sidestep/all";
 
 impl fmt::Debug for ZenohWire {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -156,22 +156,22 @@ impl fmt::Debug for ZenohWire {
 }
 
 /// The key under which frames for a party are published.
-fn key(to: Party) -> String {
+fn peer_key(to: Peer) -> String {
     format!("sidestep/{to}")
 }
 
-impl Line {
+impl ZenohLink {
     fn new(
         session: Session,
-        me: Party,
+        me: Peer,
         arrives: &Sender<Vec<u8>>,
-        echoes: &Echoes,
+        echoes: &EchoProbes,
     ) -> Result<Self, String> {
         let hear = |key: &str| {
             let arrives = arrives.clone();
             let is_echo = match me {
-                Party::Node(agent) => Some(echoes.taking(agent, session.clone())),
-                Party::Server => None,
+                Peer::Node(agent) => Some(echoes.handler(agent, session.clone())),
+                Peer::Server => None,
             };
             let took = move |sample: Sample| {
                 if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
@@ -183,18 +183,18 @@ impl Line {
         };
         // Others see them in this order: a party that can reach this one reaches it with frames for most, too. No
         // frame for most nodes is for the server.
-        let for_most = (me != Party::Server).then(|| ALL.to_string());
+        let for_most = (me != Peer::Server).then(|| BROADCAST_KEY.to_string());
         let heard = for_most
             .into_iter()
-            .chain([key(me)])
+            .chain([peer_key(me)])
             .map(|key| hear(&key))
             .collect::<Result<_, _>>()?;
         Ok(Self { keys: BTreeMap::new(), _heard: heard, session })
     }
 
-    fn send(&mut self, to: Party, frame: &[u8]) {
+    fn send(&mut self, to: Peer, frame: &[u8]) {
         let key = self.keys.entry(to).or_insert_with(|| {
-            KeyExpr::try_from(key(to)).expect("a path of letters and digits is a key")
+            KeyExpr::try_from(peer_key(to)).expect("a path of letters and digits is a key")
         });
         put(&self.session, key, frame, None);
     }
@@ -202,14 +202,14 @@ impl Line {
     /// Returns whether there is a link to another node that shows signs of life, even if nothing else comes through.
     fn is_open_to(&self, member: &Member) -> bool {
         let is_it = |id: zenoh::session::ZenohId| {
-            u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)
+            u128::from_le_bytes(id.to_le_bytes()) & ZENOH_ID_MASK == zenoh_id(member)
         };
         self.session.info().peers_zid().wait().any(is_it)
     }
 
     /// Sends a frame to all that hear this session except itself.
     fn send_to_all(&self, frame: &[u8]) {
-        let key = KeyExpr::try_from(ALL).expect("a path of letters is a key");
+        let key = KeyExpr::try_from(BROADCAST_KEY).expect("a path of letters is a key");
         put(&self.session, &key, frame, None);
     }
 }
@@ -228,9 +228,10 @@ impl ZenohWire {
     /// # Errors
     /// When one of them cannot be taken.
     pub fn server(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
-        listen.iter().try_for_each(|endpoint| vacant(endpoint))?;
-        let settings = Settings { mode: "router", listen, tls, ..Settings::default() };
-        Self::over(Party::Server, &settings).map_err(|reason| taken(listen, reason))
+        listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
+        let settings = ZenohConfig { mode: "router", listen, tls, ..ZenohConfig::default() };
+        Self::with_one_session(Peer::Server, &settings)
+            .map_err(|reason| endpoint_in_use(listen, reason))
     }
 
     /// Returns the wire of a node to its server, at one of some endpoints.
@@ -238,25 +239,30 @@ impl ZenohWire {
     /// # Errors
     /// When none of them answers within some time, or a certificate is not taken.
     pub fn node(
-        me: Party,
+        me: Peer,
         connect: &[String],
         tls: Option<&Tls>,
         within: Duration,
     ) -> Result<Self, WireError> {
-        trusted(connect, tls)?;
+        check_trust(connect, tls)?;
         let connected_within = Some(within);
-        let settings =
-            Settings { mode: "client", connect, tls, connected_within, ..Settings::default() };
-        Self::over(me, &settings).map_err(|reason| {
+        let settings = ZenohConfig {
+            mode: "client",
+            connect,
+            tls,
+            connected_within,
+            ..ZenohConfig::default()
+        };
+        Self::with_one_session(me, &settings).map_err(|reason| {
             // The other end may have begun to listen meanwhile.
             let endpoint = connect.join(", ");
-            trusted(connect, tls).err().unwrap_or(WireError::NoAnswer { endpoint, reason })
+            check_trust(connect, tls).err().unwrap_or(WireError::NoAnswer { endpoint, reason })
         })
     }
 
-    fn over(me: Party, settings: &Settings<'_>) -> Result<Self, String> {
-        let ((arrives, arrived), echoes) = (channel(), Echoes::default());
-        let hub = Line::new(settings.open()?, me, &arrives, &echoes)?;
+    fn with_one_session(me: Peer, settings: &ZenohConfig<'_>) -> Result<Self, String> {
+        let ((arrives, arrived), echoes) = (channel(), EchoProbes::default());
+        let hub = ZenohLink::new(settings.open()?, me, &arrives, &echoes)?;
         Ok(Self {
             me,
             arrived,
@@ -275,7 +281,7 @@ impl ZenohWire {
     }
 
     /// Lets this node be reached by others at endpoints of its own, once it joins them.
-    pub fn listening(self, ports: Vec<Held>) -> Self {
+    pub fn with_listeners(self, ports: Vec<PortReservation>) -> Self {
         let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
         Self { listens, ports, ..self }
     }
@@ -287,10 +293,11 @@ impl ZenohWire {
         self.opened += 1;
         let id = Some(format!("{:x}", u128::from(self.opened) << 96 | self.me_there));
         let (listen, connect, tls) = (&self.listens, &self.connect, self.tls.as_ref());
-        let settings = Settings { id, mode: "peer", listen, connect, tls, connected_within: None };
-        let line = |session| Line::new(session, self.me, &self.arrives, &self.echoes);
+        let settings =
+            ZenohConfig { id, mode: "peer", listen, connect, tls, connected_within: None };
+        let line = |session| ZenohLink::new(session, self.me, &self.arrives, &self.echoes);
         let open = settings.open().and_then(line);
-        self.mesh = Some(open.map_err(|reason| taken(listen, reason))?);
+        self.mesh = Some(open.map_err(|reason| endpoint_in_use(listen, reason))?);
         Ok(())
     }
 }
@@ -306,7 +313,7 @@ impl ZenohWire {
 ///
 /// # Errors
 /// When none of some endpoints answers within some time.
-pub(super) fn asking(
+pub(super) fn open_query_session(
     connect: &[String],
     tls: Option<&Tls>,
     within: Duration,
@@ -316,15 +323,15 @@ pub(super) fn asking(
     }
     let connected_within = Some(within);
     let settings =
-        Settings { mode: "client", connect, tls, connected_within, ..Settings::default() };
+        ZenohConfig { mode: "client", connect, tls, connected_within, ..ZenohConfig::default() };
     let no_answer = |reason| WireError::NoAnswer { endpoint: connect.join(", "), reason };
     settings.open().map_err(no_answer)
 }
 
 impl Wire for ZenohWire {
-    fn send(&mut self, to: &[Party], frame: &[u8]) {
+    fn send(&mut self, to: &[Peer], frame: &[u8]) {
         let line = match &mut self.mesh {
-            Some(mesh) if !to.contains(&Party::Server) => mesh,
+            Some(mesh) if !to.contains(&Peer::Server) => mesh,
             _ => &mut self.hub,
         };
         // One frame for all is worth it although some of them have no use for it.
@@ -340,8 +347,8 @@ impl Wire for ZenohWire {
         self.arrived.recv_timeout(within).ok()
     }
 
-    fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
-        let others = members.iter().map(|member| Party::Node(member.agent));
+    fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        let others = members.iter().map(|member| Peer::Node(member.agent));
         self.others = others.filter(|&party| party != self.me).collect();
         self.others.sort_unstable();
         // The session reconnects to returning nodes by itself.
@@ -351,28 +358,28 @@ impl Wire for ZenohWire {
         // One connection for each pair: opened by the node with the higher id.
         let before = members.iter().filter(|member| member.agent < me);
         self.connect = before.flat_map(|member| member.listens.clone()).collect();
-        self.me_there = members.iter().find(|member| member.agent == me).map_or(0, name);
+        self.me_there = members.iter().find(|member| member.agent == me).map_or(0, zenoh_id);
         self.open_mesh()
     }
 
-    fn is_deaf_to(&mut self, member: &Member, within: Duration) -> bool {
-        let (Some(mesh), Party::Node(me)) = (&self.mesh, self.me) else { return false };
-        mesh.is_open_to(member) && self.echoes.are_missing(&mesh.session, me, member.agent, within)
+    fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
+        let (Some(mesh), Peer::Node(me)) = (&self.mesh, self.me) else { return false };
+        mesh.is_open_to(member) && self.echoes.probe(&mesh.session, me, member.agent, within)
     }
 
-    fn reopen(&mut self) -> Result<(), WireError> {
+    fn reopen_links(&mut self) -> Result<(), WireError> {
         if let Some(mesh) = self.mesh.take() {
             // Unsent frames are lost, like frames in transit.
             let _ = mesh.session.close().wait();
         }
-        self.echoes.forget();
+        self.echoes.clear();
         if self.listens.is_empty() {
             return Ok(());
         }
-        let until = Instant::now() + FREED_WITHIN;
+        let until = Instant::now() + RELEASE_TIMEOUT;
         loop {
             match self.open_mesh() {
-                Err(_) if Instant::now() < until => std::thread::sleep(FREED_WITHIN / 100),
+                Err(_) if Instant::now() < until => std::thread::sleep(RELEASE_TIMEOUT / 100),
                 opened => return opened,
             }
         }
@@ -380,11 +387,11 @@ impl Wire for ZenohWire {
 }
 
 /// Finds out whether certificates are the reason why no endpoint can be reached: Zenoh gives none.
-fn trusted(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
+fn check_trust(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
     let Some(tls) = tls else { return Ok(()) };
     let mut first = Ok(());
     for endpoint in connect {
-        match handshake::distrust(endpoint, tls) {
+        match handshake::certificate_problem(endpoint, tls) {
             // One that can be reached is enough.
             None => return Ok(()),
             Some(reason) if first.is_ok() => {

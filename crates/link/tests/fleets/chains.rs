@@ -2,17 +2,19 @@
 //! them is missing.
 
 use crate::input::refused;
-use crate::processes::{Program, folder, job, signal};
-use crate::support::{alone, chain_in_space, two_chains, untimed};
-use crate::threads::over_memory;
+use crate::processes::{LinkProcess, folder, job, signal};
+use crate::support::{chain_in_space, run_in_one_process, two_chains, untimed};
+use crate::threads::run_over_memory;
 use sidestep::kernel::EntityId;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_link::stage::Stage;
-use sidestep_link::worlds::deployed;
+use sidestep_link::hosted_run::HostedRun;
+use sidestep_link::worlds::distributed_world;
 use sidestep_record::read_table;
-use sidestep_session::fleet::{AgentName, Clock, FleetJob, FleetNow, Job, NodeJob, Told, Topology};
-use sidestep_session::{Journey, Keep, Recorded, Status, Unwatched, replay_all};
+use sidestep_session::fleet::{
+    AgentName, ClockMode, FleetJob, FleetStatus, Job, LinkMessage, NodeJob, Topology,
+};
+use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, RunStatus, replay_all};
 use std::path::Path;
 
 const LOSSY: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_s = 2e-5, range_m = 0.34, \
@@ -21,7 +23,7 @@ const LOSSY: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_s = 2e
 #[test]
 fn threads_come_out_as_one_process_does_in_the_plane_and_in_space() {
     for text in [two_chains(5, 40, ""), chain_in_space(7, 40, "")] {
-        let (threads, one) = (over_memory(&text), alone(&text));
+        let (threads, one) = (run_over_memory(&text), run_in_one_process(&text));
         assert!(one.metrics["messages"].as_u64() > Some(100), "{}", one.metrics);
         assert_eq!(threads, one, "{text}");
     }
@@ -30,7 +32,7 @@ fn threads_come_out_as_one_process_does_in_the_plane_and_in_space() {
 #[test]
 fn the_scenarios_own_faults_are_the_same_ones_in_threads_to_the_last_message() {
     for text in [two_chains(4, 15, LOSSY), chain_in_space(5, 15, LOSSY)] {
-        let (threads, one) = (over_memory(&text), alone(&text));
+        let (threads, one) = (run_over_memory(&text), run_in_one_process(&text));
         assert!(one.metrics["contacts_lost"].as_u64() > Some(0), "{}", one.metrics);
         assert_eq!(threads, one, "{text}");
     }
@@ -41,28 +43,28 @@ fn chains_that_may_meet_decide_one_after_the_other_in_rounds_of_one_cycle() {
     let text = two_chains(5, 40, "");
     let source = Source::new("s.toml", text, "");
     let compiled = WORLDS.compile(&source).expect("a scenario");
-    let world = deployed(compiled.as_ref(), &source).expect("connectors");
-    let journey =
-        Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
-    let mut stage = Stage::new(journey, world, &Unwatched);
+    let world = distributed_world(compiled.as_ref(), &source).expect("connectors");
+    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+        .expect("started");
+    let mut stage = HostedRun::new(journey, world, &NoWatcher);
     let (first, second): (Vec<EntityId>, Vec<EntityId>) = ((0..5).collect(), (5..10).collect());
     for (group, further) in [(first, 1), (second, 0)] {
-        let sights = stage.sights();
+        let sights = stage.percepts();
         let agents: Vec<EntityId> = sights.iter().map(|sight| sight.agent).collect();
-        assert_eq!((&agents, stage.further_rounds(1)), (&group, further));
+        assert_eq!((&agents, stage.max_further_rounds(1)), (&group, further));
         assert!(sights.iter().all(|sight| sight.group == group && sight.begin.cycle == 0));
-        assert!(stage.take(&[group], Vec::new(), &[]).is_empty());
+        assert!(stage.accept_controls(&[group], Vec::new(), &[]).is_empty());
     }
-    assert!(stage.sights().is_empty());
+    assert!(stage.percepts().is_empty());
     stage.advance().expect("it goes on, and both stand");
-    assert_eq!((stage.cycle(), stage.sights().len()), (1, 5));
+    assert_eq!((stage.cycle(), stage.percepts().len()), (1, 5));
     assert_eq!(stage.run().metrics()["stood"], 2, "{}", stage.run().metrics());
 }
 
-fn end(program: &Program) -> (serde_json::Value, FleetNow) {
+fn end(program: &LinkProcess) -> (serde_json::Value, FleetStatus) {
     program.until("the end", |told| match told {
-        Told::Ended { summary, fleet, .. } => Some((summary, fleet)),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     })
 }
@@ -74,23 +76,23 @@ fn processes_come_out_as_one_process_does_and_leave_a_folder_that_is_replayed() 
     for (text, topology) in [mesh, star] {
         let folder = folder(&text);
         let out = folder.path().join("run");
-        let job = job(folder.path(), topology, Clock::Lockstep);
-        let program = Program::start(&Job::Fleet(FleetJob { out: Some(out.clone()), ..job }));
+        let job = job(folder.path(), topology, ClockMode::Lockstep);
+        let program = LinkProcess::start(&Job::Fleet(FleetJob { out: Some(out.clone()), ..job }));
         let (summary, fleet) = end(&program);
         assert_eq!(program.end(), (Some(0), None));
-        let one = alone(&text);
+        let one = run_in_one_process(&text);
         assert_eq!(summary["digest"], one.digest, "{text}");
         assert_eq!(untimed(summary["metrics"].clone()), one.metrics);
         let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
         assert_eq!(summary["metrics"]["messages"], packets, "nodes count what the run does");
         assert!(fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
-        let recorded = Recorded::open(WORLDS, &out).expect("an ordinary folder");
-        replay_all(&recorded, 1, &Unwatched).expect("computed again, to the same digest");
+        let recorded = RecordedRun::open(WORLDS, &out).expect("an ordinary folder");
+        replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
     }
 }
 
 /// The job of a fleet that flies for a long time.
-fn long(folder: &Path, topology: Topology, clock: Clock, lease_s: f64) -> FleetJob {
+fn long(folder: &Path, topology: Topology, clock: ClockMode, lease_s: f64) -> FleetJob {
     let mut job = job(folder, topology, clock);
     job.common.lease_s = lease_s;
     FleetJob { out: Some(folder.join("run")), ..job }
@@ -111,18 +113,18 @@ fn events(out: &Path, kind: &str) -> Vec<(u64, u64)> {
 }
 
 /// Ends a fleet that would fly on, and lets its run go on to the end in one process; then replays it.
-fn resumed(mut program: Program, out: &Path) {
+fn resumed(mut program: LinkProcess, out: &Path) {
     drop(program.stdin.take());
     assert_eq!(program.end().0, Some(130));
-    let journey = Journey::resume(WORLDS, out, 1, None).expect("it can be resumed");
-    let summary = journey.travel(&Unwatched).expect("flown to the end");
-    assert_eq!(summary.status, Status::Complete);
-    let recorded = Recorded::open(WORLDS, out).expect("an ordinary folder");
-    replay_all(&recorded, 1, &Unwatched).expect("computed again, to the same digest");
+    let journey = ManagedRun::resume(WORLDS, out, 1, None).expect("it can be resumed");
+    let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
+    assert_eq!(summary.status, RunStatus::Complete);
+    let recorded = RecordedRun::open(WORLDS, out).expect("an ordinary folder");
+    replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
 }
 
 /// Checks that a fleet has waited for a node, said so, and gone on once it was back in another life.
-fn waits_and_goes_on(program: &Program, again: impl FnOnce()) {
+fn waits_and_goes_on(program: &LinkProcess, again: impl FnOnce()) {
     let waits = program.fleet("it is missed", |now| now.waits_for == ["0.2"]);
     assert_eq!((&*waits.nodes[2].state, &*waits.noun), ("gone", "connector"), "{waits:?}");
     again();
@@ -136,9 +138,9 @@ fn waits_and_goes_on(program: &Program, again: impl FnOnce()) {
 #[test]
 fn a_chain_stands_while_a_node_that_was_killed_is_started_again_and_says_for_whom_it_waits() {
     let folder = folder(&two_chains(3, 6_000, ""));
-    let mut job = long(folder.path(), Topology::Mesh, Clock::Lockstep, 10.0);
+    let mut job = long(folder.path(), Topology::Mesh, ClockMode::Lockstep, 10.0);
     job.common.log = "warn".into();
-    let program = Program::start(&Job::Fleet(job));
+    let program = LinkProcess::start(&Job::Fleet(job));
     let now = program.fleet("some cycles", |now| now.cycle >= 1);
     signal(now.nodes[2].process.expect("a process"), "KILL");
     waits_and_goes_on(&program, || {});
@@ -158,8 +160,8 @@ fn a_chain_stands_while_a_node_that_was_killed_is_started_again_and_says_for_who
 fn a_chain_waits_for_a_node_that_is_stopped_and_comes_out_as_in_one_process_when_it_goes_on() {
     let text = two_chains(2, 2_000, "");
     let folder = folder(&text);
-    let job = job(folder.path(), Topology::Star, Clock::Lockstep);
-    let program = Program::start(&Job::Fleet(job));
+    let job = job(folder.path(), Topology::Star, ClockMode::Lockstep);
+    let program = LinkProcess::start(&Job::Fleet(job));
     let now = program.fleet("some cycles", |now| now.cycle >= 1);
     let stopped = now.nodes[1].process.expect("a process");
     signal(stopped, "STOP");
@@ -169,15 +171,15 @@ fn a_chain_waits_for_a_node_that_is_stopped_and_comes_out_as_in_one_process_when
     assert_eq!(still.cycle, waits.cycle, "time stands still");
     signal(stopped, "CONT");
     let (summary, fleet) = end(&program);
-    assert_eq!(summary["digest"], alone(&text).digest);
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert!(fleet.nodes.iter().all(|node| node.lives == 1 && node.late == 0), "{fleet:?}");
 }
 
 #[test]
 fn a_node_that_is_stopped_for_longer_than_its_lease_starts_anew_when_it_goes_on() {
     let folder = folder(&two_chains(3, 6_000, ""));
-    let job = long(folder.path(), Topology::Star, Clock::Lockstep, 1.5);
-    let program = Program::start(&Job::Fleet(job));
+    let job = long(folder.path(), Topology::Star, ClockMode::Lockstep, 1.5);
+    let program = LinkProcess::start(&Job::Fleet(job));
     let now = program.fleet("some cycles", |now| now.cycle >= 1);
     let stopped = now.nodes[2].process.expect("a process");
     signal(stopped, "STOP");
@@ -190,8 +192,8 @@ fn in_real_time_a_chain_stands_in_the_cycles_in_which_a_connector_is_late_and_go
     let folder = folder(&chain_in_space(4, 1_000_000, ""));
     let out = folder.path().join("run");
     // Ten cycles a second.
-    let job = long(folder.path(), Topology::Mesh, Clock::Realtime { speed: 0.5 }, 10.0);
-    let mut program = Program::start(&Job::Fleet(job));
+    let job = long(folder.path(), Topology::Mesh, ClockMode::Realtime { speed: 0.5 }, 10.0);
+    let mut program = LinkProcess::start(&Job::Fleet(job));
     let now = program.fleet("some cycles", |now| now.cycle >= 5 && now.nodes[1].flown >= 5);
     let stopped = now.nodes[1].process.expect("a process");
     signal(stopped, "STOP");
@@ -202,7 +204,7 @@ fn in_real_time_a_chain_stands_in_the_cycles_in_which_a_connector_is_late_and_go
     program.fleet("it flies again", |now| now.nodes[1].flown >= late.nodes[1].flown + 4);
     drop(program.stdin.take());
     let metrics = program.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["metrics"].clone()),
+        LinkMessage::Ended { summary, .. } => Some(summary["metrics"].clone()),
         _ => None,
     });
     program.end();
@@ -215,7 +217,7 @@ fn in_real_time_a_chain_stands_in_the_cycles_in_which_a_connector_is_late_and_go
 #[test]
 fn chains_of_which_somebody_must_see_all_are_refused_with_the_reason() {
     let folder = folder(&two_chains(3, 20, ""));
-    let right = long(folder.path(), Topology::Star, Clock::Lockstep, 10.0);
+    let right = long(folder.path(), Topology::Star, ClockMode::Lockstep, 10.0);
     let with = |key: &str| {
         let mut job = right.clone();
         job.common.flown.overrides.push(key.into());
@@ -251,11 +253,12 @@ fn chains_of_which_somebody_must_see_all_are_refused_with_the_reason() {
 fn a_node_joins_a_chain_by_the_name_of_its_connector_and_not_twice() {
     let text = two_chains(2, 20, "");
     let folder = folder(&text);
-    let fleet = FleetJob { nodes: Some(3), ..job(folder.path(), Topology::Star, Clock::Lockstep) };
+    let fleet =
+        FleetJob { nodes: Some(3), ..job(folder.path(), Topology::Star, ClockMode::Lockstep) };
     let common = fleet.common.clone();
-    let program = Program::start(&Job::Fleet(fleet));
+    let program = LinkProcess::start(&Job::Fleet(fleet));
     let connect = program.until("its endpoints", |told| match told {
-        Told::Listens(endpoints) => Some(endpoints),
+        LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
     program.fleet("the others", |now| now.nodes[0].state == "joined");
@@ -266,8 +269,8 @@ fn a_node_joins_a_chain_by_the_name_of_its_connector_and_not_twice() {
     };
     let said = refused(&node(0));
     assert!(said.contains("connector 0.0 has a node already"), "{said}");
-    let last = Program::start(&node(3));
+    let last = LinkProcess::start(&node(3));
     let (summary, _) = end(&program);
-    assert_eq!(summary["digest"], alone(&text).digest);
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert_eq!((program.end(), last.end()), ((Some(0), None), (Some(0), None)));
 }

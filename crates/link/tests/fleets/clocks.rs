@@ -1,14 +1,16 @@
 //! Clocks: they are never compared, so one that is wrong, or jumps, changes nothing.
 
-use crate::processes::{Program, folder, job};
-use crate::support::{alone, superconflict, wide};
+use crate::processes::{LinkProcess, folder, job};
+use crate::support::{run_in_one_process, superconflict, wide};
 use serde_json::Value;
-use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Told, Topology};
+use sidestep_session::fleet::{
+    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
+};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const FAST: Clock = Clock::Realtime { speed: 20.0 };
+const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).expect("a folder");
@@ -59,10 +61,10 @@ fn jumping_clock(folder: &Path) -> Option<PathBuf> {
     Some(library)
 }
 
-fn start(job: &FleetJob, clock: &Path) -> Program {
+fn start(job: &FleetJob, clock: &Path) -> LinkProcess {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
     command.env("LD_PRELOAD", clock);
-    Program::start_by(command, &Job::Fleet(job.clone()))
+    LinkProcess::start_by(command, &Job::Fleet(job.clone()))
 }
 
 #[test]
@@ -83,7 +85,9 @@ fn a_wall_clock_that_jumps_makes_nobody_late_or_lost() {
     assert!(hours.len() > 1, "the clock has jumped: {hours:?}");
     drop(program.stdin.take());
     let losses = program.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["metrics"]["losses_of_separation"].clone()),
+        LinkMessage::Ended { summary, .. } => {
+            Some(summary["metrics"]["losses_of_separation"].clone())
+        }
         _ => None,
     });
     assert_eq!(losses, 0);
@@ -100,11 +104,12 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
         sidestep_testing::skip("time namespaces need privileges that this user does not have");
         return;
     }
-    let fleet = FleetJob { nodes: Some(2), ..job(folder.path(), Topology::Mesh, Clock::Lockstep) };
+    let fleet =
+        FleetJob { nodes: Some(2), ..job(folder.path(), Topology::Mesh, ClockMode::Lockstep) };
     let common = fleet.common.clone();
-    let server = Program::start(&Job::Fleet(fleet));
+    let server = LinkProcess::start(&Job::Fleet(fleet));
     let connect = server.until("its endpoints", |told| match told {
-        Told::Listens(endpoints) => Some(endpoints),
+        LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
     let agent = AgentName::Airplane(2);
@@ -112,12 +117,12 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
     let node = Job::Node(NodeJob { common, agent, connect, listen, patience_s });
     let mut command = Command::new("unshare");
     command.args(shifted).arg(env!("CARGO_BIN_EXE_sidestep-link"));
-    let node = Program::start_by(command, &node);
+    let node = LinkProcess::start_by(command, &node);
     let digest = server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
-    assert_eq!(digest, alone(&text).digest);
+    assert_eq!(digest, run_in_one_process(&text).digest);
     assert_eq!((server.end(), node.end()), ((Some(0), None), (Some(0), None)));
 }

@@ -1,24 +1,24 @@
 //! Faults of real processes, in real time: killed and stopped nodes, a stopped server. Airplanes stay apart.
 
-use crate::processes::{Program, folder, job, signal};
+use crate::processes::{LinkProcess, folder, job, signal};
 use crate::support::{superconflict, wide};
-use sidestep_session::fleet::{Clock, FleetJob, FleetNow, Job, Told, Topology};
+use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
 use std::time::Duration;
 
 /// A second for 20 of the scenario: four cycles.
-const FAST: Clock = Clock::Realtime { speed: 20.0 };
+const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };
 
-fn program(folder: &std::path::Path, topology: Topology) -> Program {
+fn program(folder: &std::path::Path, topology: Topology) -> LinkProcess {
     let mut job = job(folder, topology, FAST);
     job.common.lease_s = 3.0;
-    Program::start(&Job::Fleet(FleetJob { ..job }))
+    LinkProcess::start(&Job::Fleet(FleetJob { ..job }))
 }
 
 /// Ends a fleet, and returns the losses of separation and the fleet at the end.
-fn ended(mut program: Program) -> (u64, FleetNow) {
+fn ended(mut program: LinkProcess) -> (u64, FleetStatus) {
     drop(program.stdin.take());
     let came = program.until("the end", |told| match told {
-        Told::Ended { summary, fleet, .. } => {
+        LinkMessage::Ended { summary, fleet, .. } => {
             Some((summary["metrics"]["losses_of_separation"].as_u64().expect("counted"), fleet))
         }
         _ => None,

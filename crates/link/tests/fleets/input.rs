@@ -1,18 +1,19 @@
 //! Wrong input: exit code 2, nothing started or written, the remedy said.
 
-use crate::processes::{Program, folder, job};
-use crate::support::{alone, superconflict};
+use crate::processes::{LinkProcess, folder, job};
+use crate::support::{run_in_one_process, superconflict};
 use sidestep_session::fleet::{
-    AgentName, Clock, Common, FleetJob, Flown, Job, NodeJob, Told, Topology,
+    AgentName, ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, NodeJob,
+    Topology,
 };
 use std::net::TcpListener;
 use std::path::Path;
 
 fn fleet(folder: &Path) -> FleetJob {
-    job(folder, Topology::Star, Clock::Lockstep)
+    job(folder, Topology::Star, ClockMode::Lockstep)
 }
 
-fn flown(job: &FleetJob, change: impl FnOnce(&mut Flown)) -> FleetJob {
+fn flown(job: &FleetJob, change: impl FnOnce(&mut JobScenario)) -> FleetJob {
     let mut job = job.clone();
     change(&mut job.common.flown);
     job
@@ -24,7 +25,7 @@ fn with(job: &FleetJob, key: &str) -> FleetJob {
 
 /// Does a job that is wrong, and returns the message.
 pub(crate) fn refused(job: &Job) -> String {
-    let (code, failed) = Program::start(job).end();
+    let (code, failed) = LinkProcess::start(job).end();
     let failed = failed.expect("it says why");
     let said = format!("{}: {}; {}", failed.place, failed.cause, failed.remedy);
     assert!(failed.is_input && !failed.remedy.is_empty(), "{said}");
@@ -42,7 +43,7 @@ fn a_fleet_that_cannot_be_flown_is_refused_before_anything_is_started() {
     let taken = taken.local_addr().expect("bound").to_string();
     let listen = |endpoint: &str| FleetJob { listen: vec![endpoint.into()], ..right.clone() };
     let metrics = |address: &str| {
-        let common = Common { metrics: Some(address.into()), ..right.common.clone() };
+        let common = CommonSettings { metrics: Some(address.into()), ..right.common.clone() };
         FleetJob { common, ..right.clone() }
     };
     let wrong = [
@@ -60,7 +61,7 @@ fn a_fleet_that_cannot_be_flown_is_refused_before_anything_is_started() {
         assert!(said.contains(cause), "{cause} in {said}");
         assert!(!out.exists(), "{cause}: nothing is written");
     }
-    let level = Common { log: "loud".into(), ..right.common.clone() };
+    let level = CommonSettings { log: "loud".into(), ..right.common.clone() };
     assert!(refused(&Job::Fleet(FleetJob { common: level, ..right.clone() })).contains("loud"));
     std::fs::create_dir(&out).expect("made");
     std::fs::write(out.join("something"), "").expect("written");
@@ -73,9 +74,9 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
     let text = superconflict(2, "compact-team", 20, "");
     let folder = folder(&text);
     let fleet = FleetJob { nodes: Some(1), ..fleet(folder.path()) };
-    let program = Program::start(&Job::Fleet(fleet.clone()));
+    let program = LinkProcess::start(&Job::Fleet(fleet.clone()));
     let connect = program.until("its endpoints", |told| match told {
-        Told::Listens(endpoints) => Some(endpoints),
+        LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
     program.fleet("the first node", |now| now.nodes[0].state == "joined");
@@ -95,12 +96,12 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
         let said = refused(&job);
         assert!(said.contains(cause), "{cause} in {said}");
     }
-    let last = Program::start(&node(&fleet, 1));
+    let last = LinkProcess::start(&node(&fleet, 1));
     let digest = program.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
+        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         _ => None,
     });
-    assert_eq!(digest, alone(&text).digest);
+    assert_eq!(digest, run_in_one_process(&text).digest);
     assert_eq!((program.end(), last.end()), ((Some(0), None), (Some(0), None)));
 }
 
@@ -115,7 +116,7 @@ fn a_node_whose_server_is_not_there_gives_up_in_time() {
         listen: Vec::new(),
         patience_s: 0.5,
     };
-    let (code, failed) = Program::start(&Job::Node(job)).end();
+    let (code, failed) = LinkProcess::start(&Job::Node(job)).end();
     let failed = failed.expect("it says why");
     assert_eq!(code, Some(1));
     assert!(failed.cause.contains("nobody answers"), "{failed:?}");

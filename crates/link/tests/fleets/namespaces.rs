@@ -1,8 +1,10 @@
 //! Two machines, as two network namespaces with a cable between them that can be pulled.
 
-use crate::processes::{Program, folder, job};
-use crate::support::{alone, superconflict, wide};
-use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Told, Topology};
+use crate::processes::{LinkProcess, folder, job};
+use crate::support::{run_in_one_process, superconflict, wide};
+use sidestep_session::fleet::{
+    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
+};
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -79,19 +81,19 @@ impl Drop for Machines {
 }
 
 /// Starts a fleet on the first machine, with the nodes of two airplanes there and two on the second.
-fn start(machines: &Machines, mut fleet: FleetJob) -> (Program, Vec<Program>) {
+fn start(machines: &Machines, mut fleet: FleetJob) -> (LinkProcess, Vec<LinkProcess>) {
     fleet.nodes = Some(2);
     fleet.listen = vec![format!("tcp/{}:7600", ADDRESSES[0])];
     let common = fleet.common.clone();
     let connect = fleet.listen.clone();
-    let server = Program::start_in(&machines.names[0], &Job::Fleet(fleet));
-    server.until("it listens", |told| matches!(told, Told::Listens(_)).then_some(()));
+    let server = LinkProcess::start_in(&machines.names[0], &Job::Fleet(fleet));
+    server.until("it listens", |told| matches!(told, LinkMessage::Listens(_)).then_some(()));
     let node = |airplane| {
         let (common, connect) = (common.clone(), connect.clone());
         let listen = vec![format!("tcp/{}:0", ADDRESSES[1])];
         let agent = AgentName::Airplane(airplane);
         let job = NodeJob { common, agent, connect, listen, patience_s: 30.0 };
-        Program::start_in(&machines.names[1], &Job::Node(job))
+        LinkProcess::start_in(&machines.names[1], &Job::Node(job))
     };
     (server, [2, 3].map(node).into())
 }
@@ -101,13 +103,13 @@ fn two_machines_come_out_as_one_process_does() {
     let Some(machines) = Machines::new() else { return };
     let text = superconflict(4, "compact-team", 15, "");
     let folder = folder(&text);
-    let (server, nodes) = start(&machines, job(folder.path(), Topology::Mesh, Clock::Lockstep));
+    let (server, nodes) = start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
     let digest = server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
-    assert_eq!(digest, alone(&text).digest);
+    assert_eq!(digest, run_in_one_process(&text).digest);
     assert_eq!(server.end(), (Some(0), None));
     for node in nodes {
         assert_eq!(node.end(), (Some(0), None));
@@ -124,23 +126,24 @@ fn a_cable_that_loses_packets_costs_time_and_no_bit() {
     }
     let text = superconflict(4, "compact-team", 6, "");
     let folder = folder(&text);
-    let (server, _nodes) = start(&machines, job(folder.path(), Topology::Mesh, Clock::Lockstep));
+    let (server, _nodes) =
+        start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
     let digest = server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
-    assert_eq!(digest, alone(&text).digest);
+    assert_eq!(digest, run_in_one_process(&text).digest);
 }
 
-const FAST: Clock = Clock::Realtime { speed: 20.0 };
+const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };
 
 /// Ends a fleet, and returns the losses of separation.
-fn losses(mut server: Program) -> u64 {
+fn losses(mut server: LinkProcess) -> u64 {
     drop(server.stdin.take());
     let losses = |summary: &serde_json::Value| summary["metrics"]["losses_of_separation"].as_u64();
     server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => losses(&summary),
+        LinkMessage::Ended { summary, .. } => losses(&summary),
         _ => None,
     })
 }

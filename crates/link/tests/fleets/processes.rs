@@ -1,11 +1,12 @@
 //! Fleets as processes: the program `sidestep-link` as started by `sidestep fleet`.
 
-use crate::support::{alone, superconflict, untimed, wide};
+use crate::support::{run_in_one_process, superconflict, untimed, wide};
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
-    Clock, Common, Failed, FleetJob, FleetNow, Flown, Job, Told, Topology,
+    ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobError, JobScenario, LinkMessage,
+    Topology,
 };
-use sidestep_session::{Journey, Status, Unwatched};
+use sidestep_session::{ManagedRun, NoWatcher, RunStatus};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -14,18 +15,18 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Time longer than anything here takes.
-const LONG: Duration = Duration::from_secs(60);
+const TEST_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A job of the scenario `s.toml` of a folder.
-pub(crate) fn job(folder: &Path, topology: Topology, clock: Clock) -> FleetJob {
-    let flown = Flown {
+pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJob {
+    let flown = JobScenario {
         file: folder.join("s.toml"),
         overrides: Vec::new(),
-        build: sidestep_session::build().into(),
+        build: sidestep_session::build_id().into(),
     };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
-        common: Common { flown, tls, lease_s: 10.0, metrics, json_log: false, log },
+        common: CommonSettings { flown, tls, lease_s: 10.0, metrics, json_log: false, log },
         nodes: None,
         clock,
         topology,
@@ -37,15 +38,15 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: Clock) -> FleetJob {
 }
 
 /// A program that does a job. It is killed when it is dropped.
-pub(crate) struct Program {
+pub(crate) struct LinkProcess {
     pub(crate) child: Child,
     pub(crate) stdin: Option<ChildStdin>,
-    told: Receiver<Told>,
+    told: Receiver<LinkMessage>,
     /// The lines that it, and the nodes that it starts, have logged so far.
     logged: Arc<Mutex<Vec<String>>>,
 }
 
-impl Program {
+impl LinkProcess {
     pub(crate) fn start(job: &Job) -> Self {
         Self::start_by(Command::new(env!("CARGO_BIN_EXE_sidestep-link")), job)
     }
@@ -87,8 +88,8 @@ impl Program {
     }
 
     /// Returns the next line for which something holds.
-    pub(crate) fn until<T>(&self, what: &str, wanted: impl Fn(Told) -> Option<T>) -> T {
-        self.until_within(what, LONG, wanted)
+    pub(crate) fn until<T>(&self, what: &str, wanted: impl Fn(LinkMessage) -> Option<T>) -> T {
+        self.until_within(what, TEST_TIMEOUT, wanted)
     }
 
     /// Returns the same, where it takes longer.
@@ -96,7 +97,7 @@ impl Program {
         &self,
         what: &str,
         within: Duration,
-        wanted: impl Fn(Told) -> Option<T>,
+        wanted: impl Fn(LinkMessage) -> Option<T>,
     ) -> T {
         let until = Instant::now() + within;
         loop {
@@ -109,26 +110,26 @@ impl Program {
     }
 
     /// Returns the fleet once something holds for it.
-    pub(crate) fn fleet(&self, what: &str, holds: impl Fn(&FleetNow) -> bool) -> FleetNow {
+    pub(crate) fn fleet(&self, what: &str, holds: impl Fn(&FleetStatus) -> bool) -> FleetStatus {
         self.until(what, |told| match told {
-            Told::Fleet(now) if holds(&now) => Some(now),
-            Told::Failed(failed) => panic!("{failed:?}"),
+            LinkMessage::Fleet(now) if holds(&now) => Some(now),
+            LinkMessage::Failed(failed) => panic!("{failed:?}"),
             _ => None,
         })
     }
 
     /// Returns the exit code, and the reason if it failed.
-    pub(crate) fn end(mut self) -> (Option<i32>, Option<Failed>) {
+    pub(crate) fn end(mut self) -> (Option<i32>, Option<JobError>) {
         let status = self.child.wait().expect("it ends");
         let failed = self.told.iter().find_map(|told| match told {
-            Told::Failed(failed) => Some(failed),
+            LinkMessage::Failed(failed) => Some(failed),
             _ => None,
         });
         (status.code(), failed)
     }
 }
 
-impl Drop for Program {
+impl Drop for LinkProcess {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -149,7 +150,7 @@ fn is_alive(process: u32) -> bool {
         .is_some_and(|rest| !rest.is_empty() && !rest.trim_start().starts_with('Z'))
 }
 
-pub(crate) fn wait_until_gone(fleet: &FleetNow, within: Duration) {
+pub(crate) fn wait_until_gone(fleet: &FleetStatus, within: Duration) {
     let until = Instant::now() + within;
     let processes: Vec<u32> = fleet.nodes.iter().filter_map(|node| node.process).collect();
     while let Some(left) = processes.iter().find(|&&process| is_alive(process)) {
@@ -175,22 +176,24 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
     let text = superconflict(4, "compact-team", 40, "");
     let folder = folder(&text);
     let out = folder.path().join("run");
-    let job =
-        FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, Clock::Lockstep) };
-    let program = Program::start(&Job::Fleet(job));
+    let job = FleetJob {
+        out: Some(out.clone()),
+        ..job(folder.path(), Topology::Mesh, ClockMode::Lockstep)
+    };
+    let program = LinkProcess::start(&Job::Fleet(job));
     let (summary, fleet) = program.until("the end", |told| match told {
-        Told::Ended { summary, fleet, .. } => Some((summary, fleet)),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
     assert_eq!(program.end(), (Some(0), None));
-    let one = alone(&text);
+    let one = run_in_one_process(&text);
     assert_eq!(summary["digest"], one.digest);
     assert_eq!(untimed(summary["metrics"].clone()), one.metrics);
     let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
     assert_eq!(summary["metrics"]["messages"], packets, "nodes count what the run does");
     assert!(fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
-    let recorded = sidestep_session::stored_summary(&out).expect("an ordinary folder");
+    let recorded = sidestep_session::read_summary(&out).expect("an ordinary folder");
     assert_eq!(recorded.expect("a summary")["digest"], one.digest);
 }
 
@@ -202,14 +205,14 @@ fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment
         for network in ["", "network = { loss = 0.1, max_delay_s = 0.003 }"] {
             let text = wide(&superconflict(10, deployment, 1_000, network), 4_000);
             let folder = folder(&text);
-            let job = job(folder.path(), Topology::Mesh, Clock::Lockstep);
-            let program = Program::start(&Job::Fleet(job));
-            let digest = program.until_within("the end", 60 * LONG, |told| match told {
-                Told::Ended { summary, .. } => Some(summary["digest"].clone()),
-                Told::Failed(failed) => panic!("{failed:?}"),
+            let job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
+            let program = LinkProcess::start(&Job::Fleet(job));
+            let digest = program.until_within("the end", 60 * TEST_TIMEOUT, |told| match told {
+                LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
+                LinkMessage::Failed(failed) => panic!("{failed:?}"),
                 _ => None,
             });
-            assert_eq!(digest, alone(&text).digest, "{deployment} {network}");
+            assert_eq!(digest, run_in_one_process(&text).digest, "{deployment} {network}");
         }
     }
 }
@@ -218,15 +221,17 @@ fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment
 fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
     let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
     let out = folder.path().join("run");
-    let job =
-        FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Star, Clock::Lockstep) };
-    let mut program = Program::start(&Job::Fleet(job));
+    let job = FleetJob {
+        out: Some(out.clone()),
+        ..job(folder.path(), Topology::Star, ClockMode::Lockstep)
+    };
+    let mut program = LinkProcess::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 3);
     drop(program.stdin.take());
     let (code, failed) = program.end();
     assert_eq!(code, Some(130), "{failed:?}");
     wait_until_gone(&fleet, Duration::ZERO);
-    let stored = sidestep_session::stored_summary(&out).expect("stored").expect("a summary");
+    let stored = sidestep_session::read_summary(&out).expect("stored").expect("a summary");
     assert_eq!(stored["status"], "incomplete");
 }
 
@@ -237,23 +242,23 @@ fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
         + "[record]\ncheckpoint_every = 5\n";
     let folder = folder(&text);
     let out = folder.path().join("run");
-    let slow = Clock::Realtime { speed: 100.0 };
+    let slow = ClockMode::Realtime { speed: 100.0 };
     let job = FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, slow) };
-    let mut program = Program::start(&Job::Fleet(job));
+    let mut program = LinkProcess::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 10);
     program.child.kill().expect("killed");
     wait_until_gone(&fleet, Duration::from_secs(10));
-    let journey = Journey::resume(WORLDS, &out, 1, None).expect("it can be resumed");
+    let journey = ManagedRun::resume(WORLDS, &out, 1, None).expect("it can be resumed");
     assert!(journey.cycle() >= 5);
-    let summary = journey.travel(&Unwatched).expect("flown to the end");
-    assert_eq!(summary.status, Status::Complete);
+    let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
+    assert_eq!(summary.status, RunStatus::Complete);
 }
 
 #[test]
 fn lockstep_does_not_go_on_without_a_node_that_is_killed() {
     let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
-    let job = job(folder.path(), Topology::Mesh, Clock::Lockstep);
-    let program = Program::start(&Job::Fleet(job));
+    let job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
+    let program = LinkProcess::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 3);
     signal(fleet.nodes[2].process.expect("a process"), "KILL");
     let (code, failed) = program.end();

@@ -3,10 +3,10 @@
 //! `SIDESTEP_SOAK_S` is the number of seconds (60 if not set), `PROPTEST_RNG_SEED` the seed. The same seed gives the
 //! same faults at the same times; everything between them is up to the machine.
 
-use crate::processes::{Program, folder, job, try_signal, wait_until_gone};
+use crate::processes::{LinkProcess, folder, job, try_signal, wait_until_gone};
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{EntityId, Seed};
-use sidestep_session::fleet::{Clock, FleetNow, Job, NodeNow, Told, Topology};
+use sidestep_session::fleet::{ClockMode, FleetStatus, Job, LinkMessage, NodeStatus, Topology};
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ const AIRPLANES: EntityId = 6;
 const SPEED: f64 = 20.0;
 
 /// Longest time in which a node does not fly: a stop, the lease, the longest wait before it is started again, and joining.
-const MOST_AWAY: Duration = Duration::from_secs(60);
+const MAX_ABSENCE: Duration = Duration::from_secs(60);
 
 /// A fault of a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ enum Fault {
 
 /// All faults, from a seed.
 #[derive(Debug, PartialEq)]
-struct Plan {
+struct FaultPlan {
     seed: u64,
     deployment: &'static str,
     topology: Topology,
@@ -37,7 +37,7 @@ struct Plan {
     network: String,
 }
 
-impl Plan {
+impl FaultPlan {
     fn new(seed: u64, lasts: Duration) -> Self {
         let streams = Streams::new(Seed(seed));
         let draw = |k: u64, purpose| streams.block(0, k, Purpose(purpose), 0);
@@ -121,22 +121,22 @@ fn network(seconds: u64, draw: impl Fn(u64) -> [u32; 4]) -> String {
 }
 
 /// Figures that are watched while a fleet flies.
-struct Watch {
+struct ResourceMonitor {
     /// Controls that each node has flown, and when that was last seen to rise.
     flown: Vec<(u64, Instant)>,
 }
 
-impl Watch {
+impl ResourceMonitor {
     fn new() -> Self {
         Self { flown: vec![(0, Instant::now()); AIRPLANES as usize] }
     }
 
-    fn look(&mut self, now: &FleetNow) {
+    fn sample(&mut self, now: &FleetStatus) {
         for (node, (flown, since)) in now.nodes.iter().zip(&mut self.flown) {
             if node.flown > *flown {
                 (*flown, *since) = (node.flown, Instant::now());
             }
-            assert!(since.elapsed() < MOST_AWAY, "airplane {} hangs: {now:?}", node.agent);
+            assert!(since.elapsed() < MAX_ABSENCE, "airplane {} hangs: {now:?}", node.agent);
         }
     }
 }
@@ -149,15 +149,15 @@ fn own_memory_kb(process: u32) -> Option<u64> {
 }
 
 /// Lets the faults happen, and returns the fleet at the end of the time.
-fn fly(program: &Program, plan: &Plan, lasts: Duration) -> FleetNow {
+fn fly(program: &LinkProcess, plan: &FaultPlan, lasts: Duration) -> FleetStatus {
     let mut faults = plan.faults.iter().peekable();
     let mut stopped: Vec<(Instant, u32)> = Vec::new();
-    let mut watch = Watch::new();
+    let mut watch = ResourceMonitor::new();
     let began = Instant::now();
     let mut early = None;
     loop {
         let now = program.fleet("news of the fleet", |now| now.has_begun);
-        watch.look(&now);
+        watch.sample(&now);
         // A twelfth of the time: five minutes of an hour.
         if early.is_none() && began.elapsed() > lasts / 12 {
             early = own_memory_kb(program.child.id());
@@ -204,23 +204,25 @@ fn variable(name: &str) -> Option<u64> {
 fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() {
     let lasts = Duration::from_secs(variable("SIDESTEP_SOAK_S").unwrap_or(60));
     let seed = variable("PROPTEST_RNG_SEED").unwrap_or(1);
-    let plan = Plan::new(seed, lasts);
-    assert_eq!(plan, Plan::new(seed, lasts), "the same faults again");
+    let plan = FaultPlan::new(seed, lasts);
+    assert_eq!(plan, FaultPlan::new(seed, lasts), "the same faults again");
     println!("seed {seed}, {} s: {} in a {:?}", lasts.as_secs(), plan.deployment, plan.topology);
     let folder = folder(&plan.scenario(lasts));
-    let mut job = job(folder.path(), plan.topology, Clock::Realtime { speed: SPEED });
+    let mut job = job(folder.path(), plan.topology, ClockMode::Realtime { speed: SPEED });
     job.common.lease_s = 3.0;
-    let mut program = Program::start(&Job::Fleet(job));
+    let mut program = LinkProcess::start(&Job::Fleet(job));
     let now = fly(&program, &plan, lasts);
     drop(program.stdin.take());
     let losses = program.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["metrics"]["losses_of_separation"].clone()),
+        LinkMessage::Ended { summary, .. } => {
+            Some(summary["metrics"]["losses_of_separation"].clone())
+        }
         _ => None,
     });
     assert_eq!(losses, 0);
     assert_eq!(program.end().0, Some(130), "it was told to end");
     wait_until_gone(&now, Duration::from_secs(5));
-    let sum = |count: fn(&NodeNow) -> u64| now.nodes.iter().map(count).sum::<u64>();
+    let sum = |count: fn(&NodeStatus) -> u64| now.nodes.iter().map(count).sum::<u64>();
     let (flown, late, lives) = (sum(|n| n.flown), sum(|n| n.late), sum(|n| n.lives));
     let faults = plan.faults.len();
     println!(

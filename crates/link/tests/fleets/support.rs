@@ -2,24 +2,26 @@
 
 use serde_json::Value;
 use sidestep::kernel::{Cycle, EntityId};
-use sidestep::scenario::{Compiled, Source};
+use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::WORLDS;
-use sidestep_link::deployed::Deployed;
-use sidestep_link::mail::Mail;
-use sidestep_link::node::{Asked, Node, NodeError, join};
-use sidestep_link::ports::{Doing, Outgoing, Program};
-use sidestep_link::server::{Attendant, Broken, Look, Server, Tally, Terms};
-use sidestep_link::stage::Stage;
-use sidestep_link::wire::{Party, Wire};
-use sidestep_link::words::{Clock, Join, Status, Topology, Welcome};
-use sidestep_link::worlds::{deployed, fingerprint};
-use sidestep_session::{Journey, Keep, Unwatched};
+use sidestep_link::agent::{Activity, AgentProgram, OutgoingPacket};
+use sidestep_link::distributed::DistributedWorld;
+use sidestep_link::hosted_run::HostedRun;
+use sidestep_link::messenger::Messenger;
+use sidestep_link::node::{JoinConfig, Node, NodeError, join};
+use sidestep_link::protocol::{ClockMode, Join, Status, Topology, Welcome};
+use sidestep_link::server::{
+    FleetError, FleetView, Server, ServerConfig, ServerHooks, ServerMetrics,
+};
+use sidestep_link::wire::{Peer, Wire};
+use sidestep_link::worlds::{distributed_world, fingerprint};
+use sidestep_session::{ManagedRun, NoWatcher, OutputPaths};
 use std::sync::Arc;
 use std::thread::{JoinHandle, spawn};
 use std::time::Duration;
 
 /// Time longer than any test needs.
-pub(crate) const LONG: Duration = Duration::from_secs(60);
+pub(crate) const TEST_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Returns the text of a scenario: `n` airplanes on a circle, each of which wants to get to the other side.
 pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str) -> String {
@@ -65,12 +67,12 @@ pub(crate) fn wide(text: &str, radius_m: u32) -> String {
 
 /// The outcome of a run: the digest of its state, and the metrics except those that a clock measures.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Came {
+pub(crate) struct RunResult {
     pub(crate) digest: String,
     pub(crate) metrics: Value,
 }
 
-fn compiled(text: &str) -> (Source, Box<dyn Compiled>) {
+fn compiled(text: &str) -> (Source, Box<dyn CompiledScenario>) {
     let source = Source::new("s.toml", text, "");
     let compiled = WORLDS.compile(&source).expect("a scenario");
     (source, compiled)
@@ -83,50 +85,51 @@ pub(crate) fn untimed(mut metrics: Value) -> Value {
     metrics
 }
 
-fn came(journey: Journey) -> Came {
-    let summary = journey.finish(&Unwatched).expect("stored");
-    Came { digest: summary.digest, metrics: untimed(summary.metrics) }
+fn run_result(journey: ManagedRun) -> RunResult {
+    let summary = journey.finish(&NoWatcher).expect("stored");
+    RunResult { digest: summary.digest, metrics: untimed(summary.metrics) }
 }
 
 /// Returns the outcome of a scenario in one process.
-pub(crate) fn alone(text: &str) -> Came {
+pub(crate) fn run_in_one_process(text: &str) -> RunResult {
     let (source, compiled) = compiled(text);
     let mut journey =
-        Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
-    let cycles = journey.simulation().plan().cycles;
-    journey.advance_to(cycles, &Unwatched).expect("flown");
-    came(journey)
+        ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+            .expect("started");
+    let cycles = journey.simulation().config().cycles;
+    journey.advance_to(cycles, &NoWatcher).expect("flown");
+    run_result(journey)
 }
 
 /// An attendant that leaves a fleet alone.
-pub(crate) struct Nobody;
+pub(crate) struct NoHooks;
 
-impl Attendant for Nobody {
-    fn attend(&mut self, _: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+impl ServerHooks for NoHooks {
+    fn on_poll(&mut self, _: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
         Ok(Vec::new())
     }
 }
 
 /// The way in which a fleet is flown in a test.
-pub(crate) struct Way<'a> {
-    pub(crate) clock: Clock,
+pub(crate) struct FleetSetup<'a> {
+    pub(crate) clock: ClockMode,
     pub(crate) topology: Topology,
     pub(crate) lease: Duration,
     /// The wire of each party.
-    pub(crate) wire: &'a dyn Fn(Party) -> Box<dyn Wire>,
+    pub(crate) wire: &'a dyn Fn(Peer) -> Box<dyn Wire>,
     /// Endpoints at which a node is reached.
     pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
-    pub(crate) attendant: &'a mut dyn Attendant,
+    pub(crate) attendant: &'a mut dyn ServerHooks,
     /// The agent with a node that sends nonsense instead of its control.
     pub(crate) liar: Option<EntityId>,
 }
 
 /// The program of an agent that sends nonsense instead of its control.
-struct Liar(Box<dyn Program>);
+struct FaultyProgram(Box<dyn AgentProgram>);
 
-impl Program for Liar {
-    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
-        self.0.begin(cycle, sight)
+impl AgentProgram for FaultyProgram {
+    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
+        self.0.start_cycle(cycle, sight)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
@@ -141,7 +144,7 @@ impl Program for Liar {
         self.0.next_timer()
     }
 
-    fn take_packets(&mut self) -> Vec<Outgoing> {
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
         self.0.take_packets()
     }
 
@@ -153,44 +156,47 @@ impl Program for Liar {
         self.0.control().map(|control| control[..control.len() / 2].to_vec())
     }
 
-    fn doing(&self) -> Doing {
-        self.0.doing()
+    fn activity(&self) -> Activity {
+        self.0.activity()
     }
 
-    fn heard(&self) -> Vec<EntityId> {
-        self.0.heard()
+    fn heard_agents(&self) -> Vec<EntityId> {
+        self.0.heard_agents()
     }
 
-    fn dropped(&self) -> Vec<(String, u64)> {
-        self.0.dropped()
+    fn drop_counts(&self) -> Vec<(String, u64)> {
+        self.0.drop_counts()
     }
 }
 
 /// Flies a scenario with a thread for each agent.
-pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>, Tally) {
+pub(crate) fn run_in_threads(
+    text: &str,
+    way: FleetSetup<'_>,
+) -> (RunResult, Result<(), FleetError>, ServerMetrics) {
     let (source, compiled) = compiled(text);
     let scenario = fingerprint(compiled.as_ref(), &source).expect("a fingerprint");
-    let world = deployed(compiled.as_ref(), &source).expect("agents of their own");
+    let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
     let welcome = Welcome {
         clock: way.clock,
         topology: way.topology,
         overrides: Vec::new(),
         logs_packets: false,
     };
-    let terms = Terms {
+    let terms = ServerConfig {
         scenario: scenario.clone(),
         build: "test".into(),
         welcome,
         lease: way.lease,
         has_faults: world.has_faults(),
     };
-    let journey =
-        Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
-    let mut stage = Stage::new(journey, world.clone(), &Unwatched);
-    let mail = Mail::new(Party::Server, (way.wire)(Party::Server));
+    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+        .expect("started");
+    let mut stage = HostedRun::new(journey, world.clone(), &NoWatcher);
+    let mail = Messenger::new(Peer::Server, (way.wire)(Peer::Server));
     let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.count() as EntityId)
         .map(|agent| {
-            let mail = Mail::new(Party::Node(agent), (way.wire)(Party::Node(agent)));
+            let mail = Messenger::new(Peer::Node(agent), (way.wire)(Peer::Node(agent)));
             let (listens, scenario) = ((way.listens)(agent), scenario.clone());
             let join = Join { agent, scenario, build: "test".into(), listens, process: 0 };
             let (world, lease, is_liar) = (world.clone(), way.lease, way.liar == Some(agent));
@@ -205,18 +211,19 @@ pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>,
             (Err(broken), ended) => println!("{broken}; a node: {ended:?}"),
         }
     }
-    (came(stage.into_journey()), flown, tally)
+    (run_result(stage.into_managed_run()), flown, tally)
 }
 
 fn node(
-    mut mail: Mail,
+    mut mail: Messenger,
     question: Join,
-    world: Arc<dyn Deployed>,
+    world: Arc<dyn DistributedWorld>,
     (lease, is_liar): (Duration, bool),
 ) -> Result<Status, NodeError> {
     let agent = question.agent;
-    let welcome = join(&mut mail, &Asked { join: question, patience: LONG })?;
+    let welcome = join(&mut mail, &JoinConfig { join: question, timeout: TEST_TIMEOUT })?;
     let program = world.program(agent, "test");
-    let program: Box<dyn Program> = if is_liar { Box::new(Liar(program)) } else { program };
+    let program: Box<dyn AgentProgram> =
+        if is_liar { Box::new(FaultyProgram(program)) } else { program };
     Node::new(agent, mail, program, world.channel(agent), &welcome, lease).run()
 }

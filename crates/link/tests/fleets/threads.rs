@@ -1,12 +1,14 @@
 //! In lockstep a fleet gives the same results as one process: in threads, over memory and over sockets.
 
-use crate::support::{LONG, Nobody, Way, alone, in_threads, superconflict};
+use crate::support::{
+    FleetSetup, NoHooks, TEST_TIMEOUT, run_in_one_process, run_in_threads, superconflict,
+};
 use sidestep::kernel::EntityId;
-use sidestep_link::wire::endpoint::hold;
-use sidestep_link::wire::memory::Exchange;
+use sidestep_link::protocol::{ClockMode, Topology};
+use sidestep_link::wire::endpoint::reserve_port;
+use sidestep_link::wire::memory::MemoryHub;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Party, Wire};
-use sidestep_link::words::{Clock, Topology};
+use sidestep_link::wire::{Peer, Wire};
 use std::time::Duration;
 
 /// Deployments in which each airplane has a program of its own.
@@ -18,18 +20,18 @@ const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_
     partitions = [{ sides = [[0, 1], [2, 3]], from_s = 20, until_s = 50 }], \
     one_way = [{ sender = 0, receiver = 3, from_s = 60 }] }";
 
-pub(crate) fn over_memory(text: &str) -> crate::support::Came {
-    let exchange = Exchange::default();
-    let way = Way {
-        clock: Clock::Lockstep,
+pub(crate) fn run_over_memory(text: &str) -> crate::support::RunResult {
+    let exchange = MemoryHub::default();
+    let way = FleetSetup {
+        clock: ClockMode::Lockstep,
         topology: Topology::Star,
-        lease: LONG,
+        lease: TEST_TIMEOUT,
         wire: &|me| Box::new(exchange.wire(me)),
         listens: &|_| Vec::new(),
-        attendant: &mut Nobody,
+        attendant: &mut NoHooks,
         liar: None,
     };
-    let (came, flown, tally) = in_threads(text, way);
+    let (came, flown, tally) = run_in_threads(text, way);
     flown.expect("flown to the end");
     assert_eq!((tally.late_controls, tally.absurd_controls), (0, 0));
     came
@@ -39,7 +41,7 @@ pub(crate) fn over_memory(text: &str) -> crate::support::Came {
 fn threads_come_out_as_one_process_does_in_every_deployment() {
     for deployment in DEPLOYMENTS {
         let text = superconflict(4, deployment, 30, "");
-        assert_eq!(over_memory(&text), alone(&text), "{deployment}");
+        assert_eq!(run_over_memory(&text), run_in_one_process(&text), "{deployment}");
     }
 }
 
@@ -47,7 +49,7 @@ fn threads_come_out_as_one_process_does_in_every_deployment() {
 fn the_scenarios_own_faults_are_the_same_ones_in_threads_to_the_last_message() {
     for deployment in DEPLOYMENTS {
         let text = superconflict(4, deployment, 20, BAD_NETWORK);
-        let (threads, one) = (over_memory(&text), alone(&text));
+        let (threads, one) = (run_over_memory(&text), run_in_one_process(&text));
         assert!(one.metrics["contacts_lost"].as_u64() > Some(0), "{}", one.metrics);
         assert_eq!(threads, one, "{deployment}");
     }
@@ -58,7 +60,7 @@ fn the_scenarios_own_faults_are_the_same_ones_in_threads_to_the_last_message() {
 fn airplanes_that_find_their_groups_come_out_as_in_one_process() {
     for more in ["groups = \"heard\"".to_string(), format!("groups = \"heard\"\n{BAD_NETWORK}")] {
         let text = superconflict(4, "compact-team", 20, &more);
-        let (threads, one) = (over_memory(&text), alone(&text));
+        let (threads, one) = (run_over_memory(&text), run_in_one_process(&text));
         assert!(one.metrics["beacons"].as_u64() > Some(0), "{}", one.metrics);
         assert_eq!(threads, one, "{more}");
     }
@@ -67,7 +69,7 @@ fn airplanes_that_find_their_groups_come_out_as_in_one_process() {
 #[test]
 fn messages_that_take_time_by_their_size_take_it_in_threads_too() {
     let text = superconflict(4, "team", 6, "network = { bandwidth_bit_s = 1e6, loss = 0.05 }");
-    assert_eq!(over_memory(&text), alone(&text));
+    assert_eq!(run_over_memory(&text), run_in_one_process(&text));
 }
 
 /// Sockets of this machine, in both topologies.
@@ -80,33 +82,33 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
         let count = if topology == Topology::Mesh { 5 } else { 1 };
         // All are held at once, so that they differ.
         let held: Vec<_> =
-            (0..count).map(|_| hold("tcp/127.0.0.1:0").expect("a free port")).collect();
+            (0..count).map(|_| reserve_port("tcp/127.0.0.1:0").expect("a free port")).collect();
         let mut ports: Vec<String> = held.iter().map(|held| held.endpoint.clone()).collect();
         drop(held);
         let server = ports.remove(0);
         let listens = |agent: EntityId| ports.get(agent as usize).cloned().into_iter().collect();
-        let wire = |me: Party| -> Box<dyn Wire> {
+        let wire = |me: Peer| -> Box<dyn Wire> {
             let at = std::slice::from_ref(&server);
-            let Party::Node(agent) = me else {
+            let Peer::Node(agent) = me else {
                 return Box::new(ZenohWire::server(at, None).expect("a server"));
             };
-            let wire = ZenohWire::node(me, at, None, LONG).expect("the server answers");
-            let held = ports.get(agent as usize).map(|port| hold(port).expect("free"));
-            Box::new(wire.listening(held.into_iter().collect()))
+            let wire = ZenohWire::node(me, at, None, TEST_TIMEOUT).expect("the server answers");
+            let held = ports.get(agent as usize).map(|port| reserve_port(port).expect("free"));
+            Box::new(wire.with_listeners(held.into_iter().collect()))
         };
-        let (clock, lease) = (Clock::Lockstep, Duration::from_secs(10));
-        let way = Way {
+        let (clock, lease) = (ClockMode::Lockstep, Duration::from_secs(10));
+        let way = FleetSetup {
             clock,
             topology,
             lease,
             wire: &wire,
             listens: &listens,
-            attendant: &mut Nobody,
+            attendant: &mut NoHooks,
             liar: None,
         };
-        let (came, flown, _) = in_threads(&text, way);
+        let (came, flown, _) = run_in_threads(&text, way);
         flown.expect("flown to the end");
-        assert_eq!(came, alone(&text), "{topology:?} {more}");
+        assert_eq!(came, run_in_one_process(&text), "{topology:?} {more}");
     }
 }
 
@@ -114,18 +116,18 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
 /// the network is reliable, because plans are safe only if all fly them.
 #[test]
 fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
-    let exchange = Exchange::default();
+    let exchange = MemoryHub::default();
     let text = superconflict(3, "compact-team", 8, "");
-    let way = Way {
-        clock: Clock::Lockstep,
+    let way = FleetSetup {
+        clock: ClockMode::Lockstep,
         topology: Topology::Star,
-        lease: LONG,
+        lease: TEST_TIMEOUT,
         wire: &|me| Box::new(exchange.wire(me)),
         listens: &|_| Vec::new(),
-        attendant: &mut Nobody,
+        attendant: &mut NoHooks,
         liar: Some(1),
     };
-    let (came, flown, tally) = in_threads(&text, way);
+    let (came, flown, tally) = run_in_threads(&text, way);
     flown.expect("flown to the end");
     assert_eq!(tally.absurd_controls, 8);
     assert_eq!(came.metrics["losses_of_separation"], 0);

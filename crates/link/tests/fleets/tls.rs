@@ -1,11 +1,13 @@
 //! Encrypted links, at which both ends prove their identity.
 
-use crate::processes::{Program, folder, job};
-use crate::support::{alone, superconflict};
-use sidestep_link::wire::endpoint::hold;
+use crate::processes::{LinkProcess, folder, job};
+use crate::support::{run_in_one_process, superconflict};
+use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Party, WireError};
-use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Tls, Told, Topology};
+use sidestep_link::wire::{Peer, WireError};
+use sidestep_session::fleet::{
+    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Tls, Topology,
+};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -48,7 +50,7 @@ fn certificate(folder: &Path, authority: &str, name: &str, days: i32) -> Option<
 }
 
 fn fleet(folder: &Path, tls: Option<Tls>) -> FleetJob {
-    let mut fleet = job(folder, Topology::Mesh, Clock::Lockstep);
+    let mut fleet = job(folder, Topology::Mesh, ClockMode::Lockstep);
     fleet.common.tls = tls;
     fleet.listen = vec!["tls/127.0.0.1:0".into()];
     fleet
@@ -63,17 +65,17 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     let Some(others) = authority(folder.path(), "others", 2) else { return };
     let mut job = FleetJob { nodes: Some(1), ..fleet(folder.path(), Some(ours.clone())) };
     job.common.log = "warn".into();
-    let server = Program::start(&Job::Fleet(job));
+    let server = LinkProcess::start(&Job::Fleet(job));
     let connect = server.until("its endpoints", |told| match told {
-        Told::Listens(endpoints) => Some(endpoints),
-        Told::Failed(failed) => panic!("{failed:?}"),
+        LinkMessage::Listens(endpoints) => Some(endpoints),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
     server.fleet("the first node", |now| now.nodes[0].state == "joined");
     let node = |tls: Option<Tls>, patience_s| {
         let common = fleet(folder.path(), tls).common;
         let (connect, listen) = (connect.clone(), vec!["tls/127.0.0.1:0".into()]);
-        Program::start(&Job::Node(NodeJob {
+        LinkProcess::start(&Job::Node(NodeJob {
             common,
             agent: AgentName::Airplane(1),
             connect,
@@ -98,10 +100,10 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     assert!(server.logged().iter().any(says), "{:?}", server.logged());
     let last = node(Some(ours), 30.0);
     let digest = server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
+        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         _ => None,
     });
-    assert_eq!(digest, alone(&text).digest);
+    assert_eq!(digest, run_in_one_process(&text).digest);
     assert_eq!((server.end(), last.end()), ((Some(0), None), (Some(0), None)));
 }
 
@@ -110,7 +112,7 @@ fn certificates_that_are_none_or_out_of_date_are_refused_before_anything_starts(
     let folder = folder(&superconflict(2, "compact-team", 10, ""));
     let Some(ours) = authority(folder.path(), "ours", 2) else { return };
     let refused = |tls: Tls, cause: &str| {
-        let (code, failed) = Program::start(&Job::Fleet(fleet(folder.path(), Some(tls)))).end();
+        let (code, failed) = LinkProcess::start(&Job::Fleet(fleet(folder.path(), Some(tls)))).end();
         let failed = failed.expect("it says why");
         assert_eq!(code, Some(2), "{failed:?}");
         assert!(failed.is_input && format!("{failed:?}").contains(cause), "{cause} in {failed:?}");
@@ -125,7 +127,7 @@ fn certificates_that_are_none_or_out_of_date_are_refused_before_anything_starts(
     refused(old, "it holds from");
     let mut open = fleet(folder.path(), Some(ours));
     open.listen = vec!["tcp/127.0.0.1:0".into()];
-    let (code, failed) = Program::start(&Job::Fleet(open)).end();
+    let (code, failed) = LinkProcess::start(&Job::Fleet(open)).end();
     let failed = failed.expect("it says why");
     assert_eq!(code, Some(2), "{failed:?}");
     assert!(failed.remedy.contains("tls/HOST:PORT"), "{failed:?}");
@@ -137,9 +139,9 @@ fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let Some(ours) = authority(folder.path(), "ours", 2) else { return };
     let Some(old) = certificate(folder.path(), "ours", "old", -1) else { return };
-    let at = [hold("tls/127.0.0.1:0").expect("a free port").endpoint];
+    let at = [reserve_port("tls/127.0.0.1:0").expect("a free port").endpoint];
     let _server = ZenohWire::server(&at, Some(&ours)).expect("a server");
-    let node = |tls: &Tls| ZenohWire::node(Party::Node(0), &at, Some(tls), Duration::from_secs(30));
+    let node = |tls: &Tls| ZenohWire::node(Peer::Node(0), &at, Some(tls), Duration::from_secs(30));
     match node(&old).map(drop) {
         Err(WireError::Distrust { endpoint, reason }) => {
             assert_eq!(endpoint, at[0]);

@@ -7,12 +7,12 @@ use super::{FreeSpace, STEPS};
 pub struct Distances {
     width: u32,
     height: u32,
-    /// Steps, row by row from the bottom, or [`Distances::UNREACHED`].
+    /// Steps, row by row from the bottom, or [`Distances::UNREACHABLE`].
     steps: Vec<u32>,
 }
 
 impl Distances {
-    pub(super) const UNREACHED: u32 = u32::MAX;
+    pub(super) const UNREACHABLE: u32 = u32::MAX;
 
     /// Computes the distances to the nearest of `goals` (column, row) for a body of `size` x `size`
     /// boxes that has to fit into `free` on its way; boxes and goals mean its lower-left box. Goals
@@ -21,17 +21,17 @@ impl Distances {
     /// # Panics
     /// When `size` is 0.
     pub fn to_nearest(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
-        Self::between_anchors(&free.anchors(size), goals)
+        Self::from_anchors(&free.anchors(size), goals)
     }
 
     /// Computes the distances in the space of a body's anchors.
-    pub(super) fn between_anchors(anchors: &FreeSpace, goals: &[(u32, u32)]) -> Self {
+    pub(super) fn from_anchors(anchors: &FreeSpace, goals: &[(u32, u32)]) -> Self {
         let mut distances = Self {
             width: anchors.width(),
             height: anchors.height(),
-            steps: vec![Self::UNREACHED; anchors.len()],
+            steps: vec![Self::UNREACHABLE; anchors.len()],
         };
-        let mut queue = distances.start(anchors, goals);
+        let mut queue = distances.insert_goals(anchors, goals);
         let mut head = 0;
         while let Some(&at) = queue.get(head) {
             head += 1;
@@ -46,12 +46,12 @@ impl Distances {
             return None;
         }
         let steps = self.steps[row as usize * self.width as usize + col as usize];
-        (steps != Self::UNREACHED).then_some(steps)
+        (steps != Self::UNREACHABLE).then_some(steps)
     }
 
     /// Returns the largest number of steps of any box with a path to a goal; `None` without a goal.
-    pub fn max(&self) -> Option<u32> {
-        self.steps.iter().copied().filter(|&steps| steps != Self::UNREACHED).max()
+    pub fn max_steps(&self) -> Option<u32> {
+        self.steps.iter().copied().filter(|&steps| steps != Self::UNREACHABLE).max()
     }
 
     /// Number of columns of the grid.
@@ -65,16 +65,16 @@ impl Distances {
     }
 
     /// Returns the steps of all boxes, row by row from the bottom.
-    pub(super) fn all(&self) -> &[u32] {
+    pub(super) fn as_slice(&self) -> &[u32] {
         &self.steps
     }
 
     /// Sets the goals to 0; returns their boxes, each once.
-    fn start(&mut self, anchors: &FreeSpace, goals: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    fn insert_goals(&mut self, anchors: &FreeSpace, goals: &[(u32, u32)]) -> Vec<(u32, u32)> {
         let mut queue = Vec::new();
         for &(col, row) in goals.iter().filter(|&&(col, row)| anchors.is_free(col, row)) {
             let steps = &mut self.steps[anchors.index(col, row)];
-            if *steps == Self::UNREACHED {
+            if *steps == Self::UNREACHABLE {
                 *steps = 0;
                 queue.push((col, row));
             }
@@ -89,7 +89,7 @@ impl Distances {
             let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
             if next.0 < self.width && next.1 < self.height {
                 let index = anchors.index(next.0, next.1);
-                if self.steps[index] == Self::UNREACHED && anchors.has(index) {
+                if self.steps[index] == Self::UNREACHABLE && anchors.contains(index) {
                     self.steps[index] = steps;
                     queue.push(next);
                 }
@@ -101,7 +101,7 @@ impl Distances {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planning::drawn as space;
+    use crate::planning::parse_free_space as space;
 
     #[test]
     fn steps_go_around_walls_and_not_through_corners() {
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(distances.steps(2, 0), Some(6));
         assert_eq!(distances.steps(1, 0), None, "a wall");
         assert_eq!(distances.steps(3, 0), None, "outside");
-        assert_eq!(distances.max(), Some(6));
+        assert_eq!(distances.max_steps(), Some(6));
     }
 
     #[test]
@@ -119,7 +119,7 @@ mod tests {
         let distances = Distances::to_nearest(&free, 1, &[(0, 0), (0, 0), (3, 0), (4, 0), (9, 9)]);
         let steps: Vec<_> = (0..5).map(|col| distances.steps(col, 0)).collect();
         assert_eq!(steps, [Some(0), Some(1), Some(1), Some(0), None]);
-        assert_eq!(Distances::to_nearest(&free, 1, &[(4, 0)]).max(), None);
+        assert_eq!(Distances::to_nearest(&free, 1, &[(4, 0)]).max_steps(), None);
     }
 
     #[test]

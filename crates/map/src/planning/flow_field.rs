@@ -22,7 +22,7 @@ pub struct FlowField {
 /// Code of a goal; the codes below are `direction + 4 * (distance % 3)`.
 const GOAL: u8 = 12;
 /// Code of a box without a path to a goal.
-const UNREACHED: u8 = 13;
+const UNREACHABLE: u8 = 13;
 
 impl FlowField {
     /// Computes the field for a body of `size` x `size` boxes that has to fit into `free` on its
@@ -31,14 +31,14 @@ impl FlowField {
     ///
     /// # Panics
     /// When `size` is 0.
-    pub fn toward(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
-        Self::descending(&Distances::to_nearest(free, size, goals))
+    pub fn to_nearest(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
+        Self::from_distances(&Distances::to_nearest(free, size, goals))
     }
 
     /// Computes the field that descends along `distances`.
-    pub fn descending(distances: &Distances) -> Self {
+    pub fn from_distances(distances: &Distances) -> Self {
         let (width, height) = (distances.width(), distances.height());
-        let boxes = distances.all().len();
+        let boxes = distances.as_slice().len();
         let mut field = Self { width, height, codes: vec![0; boxes.div_ceil(2)] };
         for row in 0..height {
             for col in 0..width {
@@ -59,7 +59,7 @@ impl FlowField {
     pub fn rise(&self, col: u32, row: u32, direction: u8) -> Option<i8> {
         let (east, north) = STEPS[usize::from(direction % 4)];
         let rest =
-            |code: u8| (code != UNREACHED).then_some(if code == GOAL { 0 } else { code / 4 });
+            |code: u8| (code != UNREACHABLE).then_some(if code == GOAL { 0 } else { code / 4 });
         let here = rest(self.code(col, row)?)?;
         let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
         let there = rest(self.code(next.0, next.1)?)?;
@@ -73,7 +73,7 @@ impl FlowField {
 
     /// Returns whether a path leads from the box to a goal; a goal reaches itself.
     pub fn reaches_goal(&self, col: u32, row: u32) -> bool {
-        self.code(col, row).is_some_and(|code| code != UNREACHED)
+        self.code(col, row).is_some_and(|code| code != UNREACHABLE)
     }
 
     /// Number of columns of the grid.
@@ -107,7 +107,7 @@ impl FlowField {
 
 fn code(distances: &Distances, col: u32, row: u32) -> u8 {
     match distances.steps(col, row) {
-        None => UNREACHED,
+        None => UNREACHABLE,
         Some(0) => GOAL,
         Some(steps) => downhill(distances, (col, row), steps - 1) + 4 * (steps % 3) as u8,
     }
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn of_equal_ways_the_lowest_direction_is_taken() {
-        let field = FlowField::toward(&open(3, 3), 1, &[(1, 1)]);
+        let field = FlowField::to_nearest(&open(3, 3), 1, &[(1, 1)]);
         let row = |row| [0, 1, 2].map(|col| field.direction(col, row));
         assert_eq!(row(0), [Some(0), Some(1), Some(1)]);
         assert_eq!(row(1), [Some(0), None, Some(2)]);
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn goals_unreachable_boxes_and_the_outside_have_no_direction() {
         let free = FreeSpace::new(4, 1, |col, _| col != 2);
-        let field = FlowField::toward(&free, 1, &[(1, 0), (2, 0)]);
+        let field = FlowField::to_nearest(&free, 1, &[(1, 0), (2, 0)]);
         assert!(field.is_goal(1, 0) && field.reaches_goal(1, 0) && field.reaches_goal(0, 0));
         assert!(!field.is_goal(2, 0) && !field.reaches_goal(2, 0) && !field.reaches_goal(3, 0));
         let directions = [0, 1, 2, 3, 4].map(|col| field.direction(col, 0));
@@ -161,7 +161,7 @@ mod tests {
             let is_wall = |col, row| walls.iter().all(|w| w.rotate_right(row * 15 + col) & 1 == 1);
             let free = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
             let distances = Distances::to_nearest(&free, size, &goals);
-            let field = FlowField::toward(&free, size, &goals);
+            let field = FlowField::to_nearest(&free, size, &goals);
             let anchors = free.anchors(size);
             for (col, row) in (0..width).flat_map(|col| (0..height).map(move |row| (col, row))) {
                 let (mut at, mut steps) = ((col, row), 0);

@@ -27,7 +27,7 @@ impl FreeSpace {
 
     /// Creates the set of free boxes of `map`, without unknown boxes (see
     /// [`GridMap::with_unknown`]).
-    pub fn of_map(map: &GridMap) -> Self {
+    pub fn from_map(map: &GridMap) -> Self {
         Self::new(map.width(), map.height(), |col, row| map.cell(col, row) == Cell::Free)
     }
 
@@ -43,7 +43,7 @@ impl FreeSpace {
 
     /// Returns whether the box is free; a box outside the grid is not.
     pub fn is_free(&self, col: u32, row: u32) -> bool {
-        col < self.width && row < self.height && self.has(self.index(col, row))
+        col < self.width && row < self.height && self.contains(self.index(col, row))
     }
 
     /// Returns the anchors of a body of `size` x `size` boxes: the boxes that can be the lower-left
@@ -95,7 +95,7 @@ impl FreeSpace {
     }
 
     /// Returns whether the box at `index` is free.
-    pub(super) fn has(&self, index: usize) -> bool {
+    pub(super) fn contains(&self, index: usize) -> bool {
         self.bits[index / 64] >> (index % 64) & 1 == 1
     }
 
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn only_free_boxes_of_a_map_are_free() {
         let map = GridMap::new(3, 1, 1.0, vec![Cell::Free, Cell::Wall, Cell::Unknown]);
-        let space = FreeSpace::of_map(&map);
+        let space = FreeSpace::from_map(&map);
         assert_eq!([0, 1, 2].map(|col| space.is_free(col, 0)), [true, false, false]);
     }
 

@@ -20,10 +20,10 @@ pub const STEPS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
 /// Returns the free boxes of a drawing with the north edge as its first line; `#` is a wall.
 #[cfg(test)]
-fn drawn(art: &str) -> FreeSpace {
+fn parse_free_space(art: &str) -> FreeSpace {
     use crate::{Cell, GridMap};
     let rows: Vec<&str> = art.lines().rev().collect();
     let cell = |sign| if sign == '#' { Cell::Wall } else { Cell::Free };
     let cells = rows.iter().flat_map(|row| row.chars().map(cell)).collect();
-    FreeSpace::of_map(&GridMap::new(rows[0].len() as u32, rows.len() as u32, 1.0, cells))
+    FreeSpace::from_map(&GridMap::new(rows[0].len() as u32, rows.len() as u32, 1.0, cells))
 }

@@ -18,7 +18,8 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
     }
     let mut best = vec![f64::INFINITY; free.len()];
     best[free.index(start.0, start.1)] = 0.0;
-    let mut open = BinaryHeap::from([Reverse(Visit::new(start, Length::default(), goal))]);
+    let mut open =
+        BinaryHeap::from([Reverse(FrontierNode::new(start, PathLength::default(), goal))]);
     while let Some(Reverse(visit)) = open.pop() {
         if visit.at == goal {
             return Some(visit.length.in_boxes());
@@ -27,11 +28,11 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
         if visit.length.in_boxes() > best[free.index(visit.at.0, visit.at.1)] {
             continue;
         }
-        for (next, length) in moves(free, visit.at, visit.length) {
+        for (next, length) in neighbors(free, visit.at, visit.length) {
             let known = &mut best[free.index(next.0, next.1)];
             if length.in_boxes() < *known {
                 *known = length.in_boxes();
-                open.push(Reverse(Visit::new(next, length, goal)));
+                open.push(Reverse(FrontierNode::new(next, length, goal)));
             }
         }
     }
@@ -40,12 +41,12 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
 
 /// A length in straight and diagonal steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct Length {
+struct PathLength {
     straight: u32,
     diagonal: u32,
 }
 
-impl Length {
+impl PathLength {
     fn in_boxes(self) -> f64 {
         f64::from(self.straight) + f64::from(self.diagonal) * SQRT_2
     }
@@ -59,18 +60,18 @@ impl Length {
 
 /// A box on the search's frontier; the least is expanded next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Visit {
+struct FrontierNode {
     /// Bits of the least length of a path through this box: lengths are not negative, so their bits
     /// have the same order as the lengths.
     estimate_bits: u64,
     at: (u32, u32),
-    length: Length,
+    length: PathLength,
 }
 
-impl Visit {
-    fn new(at: (u32, u32), length: Length, goal: (u32, u32)) -> Self {
-        let rest = Length::between(at, goal);
-        let whole = Length {
+impl FrontierNode {
+    fn new(at: (u32, u32), length: PathLength, goal: (u32, u32)) -> Self {
+        let rest = PathLength::between(at, goal);
+        let whole = PathLength {
             straight: length.straight + rest.straight,
             diagonal: length.diagonal + rest.diagonal,
         };
@@ -79,16 +80,16 @@ impl Visit {
 }
 
 /// Returns the boxes one step away and the length of the path to them.
-fn moves(
+fn neighbors(
     free: &FreeSpace,
     (col, row): (u32, u32),
-    length: Length,
-) -> impl Iterator<Item = ((u32, u32), Length)> {
+    length: PathLength,
+) -> impl Iterator<Item = ((u32, u32), PathLength)> {
     let shifted =
         move |east, north| (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
     let is_free = move |(col, row): (u32, u32)| free.is_free(col, row);
-    let straight = Length { straight: length.straight + 1, ..length };
-    let diagonal = Length { diagonal: length.diagonal + 1, ..length };
+    let straight = PathLength { straight: length.straight + 1, ..length };
+    let diagonal = PathLength { diagonal: length.diagonal + 1, ..length };
     let along = STEPS.into_iter().map(move |(east, north)| shifted(east, north));
     let across = [(1, 1), (-1, 1), (-1, -1), (1, -1)].into_iter();
     let across = across
@@ -103,7 +104,7 @@ fn moves(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planning::drawn as space;
+    use crate::planning::parse_free_space as space;
 
     #[test]
     fn an_open_grid_is_crossed_by_diagonals() {

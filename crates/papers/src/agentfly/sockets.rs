@@ -5,9 +5,9 @@
 //! a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on other load
 //! on it.
 
-use super::{AIRPLANES, AgentflyPlan, SCENARIO, claim};
-use crate::claims::{Comparison, judged, listed};
-use crate::study::{Progress, finish, setting, source};
+use super::{AIRPLANES, AgentflyConfig, SCENARIO, claim};
+use crate::claims::{ThresholdTest, join_texts, judge_thresholds};
+use crate::study::{Progress, run_to_end, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airspace_run;
@@ -20,7 +20,7 @@ const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim
 
 /// A flight, as it was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Measured {
+pub struct FlightMeasurement {
     /// Seconds by a clock.
     pub elapsed_s: f64,
     /// Messages, one per receiver.
@@ -30,32 +30,32 @@ pub struct Measured {
 }
 
 /// Flies a scenario by processes, given its text.
-pub type Flies<'a, E> = dyn FnMut(&str) -> Result<Measured, E> + 'a;
+pub type FleetRunner<'a, E> = dyn FnMut(&str) -> Result<FlightMeasurement, E> + 'a;
 
 /// The measurements over sockets, or the reason why there are none.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Sockets {
+pub enum SocketMeasurements {
     /// They were left out.
     LeftOut {
         /// The reason, and how to get them.
         reason: String,
     },
     /// Cases by number of airplanes, and then by deployment.
-    Measured(Vec<Case>),
+    Measured(Vec<SocketCase>),
 }
 
 /// The flights of some airplanes with one deployment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Case {
+pub struct SocketCase {
     /// Number of airplanes.
     pub airplanes: usize,
     /// The deployment.
     pub deployment: &'static str,
     /// Runs by seed, in one process.
-    pub alone: Vec<Measured>,
+    pub alone: Vec<FlightMeasurement>,
     /// Runs by seed, over sockets.
-    pub over_sockets: Vec<Measured>,
+    pub over_sockets: Vec<FlightMeasurement>,
 }
 
 /// Measures the flights of a plan in one process, and by `flies`.
@@ -63,10 +63,10 @@ pub struct Case {
 /// # Errors
 /// When the plan asks for an impossible scenario, and those of `flies`.
 pub fn measure<E: From<InputError>>(
-    plan: &AgentflyPlan,
-    flies: &mut Flies<'_, E>,
+    plan: &AgentflyConfig,
+    flies: &mut FleetRunner<'_, E>,
     progress: &mut Progress<'_>,
-) -> Result<Sockets, E> {
+) -> Result<SocketMeasurements, E> {
     let all = plan.sockets.airplanes.iter().flat_map(|&n| DEPLOYMENTS.map(|name| (n, name)));
     let all: Vec<(usize, &'static str)> = all.collect();
     let mut cases = Vec::with_capacity(all.len());
@@ -81,61 +81,71 @@ pub fn measure<E: From<InputError>>(
                 setting("cycles", plan.sockets.cycles as i64),
             ];
             let text = source(SCENARIO, &settings)?.text;
-            alone.push(in_one_process(&text)?);
+            alone.push(measure_in_one_process(&text)?);
             over_sockets.push(flies(&text)?);
         }
-        cases.push(Case { airplanes, deployment, alone, over_sockets });
+        cases.push(SocketCase { airplanes, deployment, alone, over_sockets });
     }
-    Ok(Sockets::Measured(cases))
+    Ok(SocketMeasurements::Measured(cases))
 }
 
-fn in_one_process(text: &str) -> Result<Measured, InputError> {
+fn measure_in_one_process(text: &str) -> Result<FlightMeasurement, InputError> {
     let mut run = airspace_run(&source(text, &[])?, 1)?;
     let began = Instant::now();
-    finish(&mut run, |_| {});
+    run_to_end(&mut run, |_| {});
     let (elapsed_s, metrics) = (began.elapsed().as_secs_f64(), run.metrics());
-    Ok(Measured { elapsed_s, messages: metrics.messages as f64, bytes: metrics.bytes as f64 })
+    Ok(FlightMeasurement {
+        elapsed_s,
+        messages: metrics.messages as f64,
+        bytes: metrics.bytes as f64,
+    })
 }
 
-fn each(measured: &[Measured], of: fn(&Measured) -> f64) -> Vec<Option<f64>> {
+fn values_of(
+    measured: &[FlightMeasurement],
+    of: fn(&FlightMeasurement) -> f64,
+) -> Vec<Option<f64>> {
     measured.iter().map(|one| Some(of(one))).collect()
 }
 
-impl Case {
+impl SocketCase {
     /// Returns how many times as long the flight takes over sockets, seed by seed.
-    fn slower(&self) -> Estimate {
-        let [sockets, alone] = [&self.over_sockets, &self.alone].map(|m| each(m, |m| m.elapsed_s));
-        Estimate::ratio(&sockets, &alone)
+    fn slowdown(&self) -> Estimate {
+        let [sockets, alone] =
+            [&self.over_sockets, &self.alone].map(|m| values_of(m, |m| m.elapsed_s));
+        Estimate::geometric_ratio(&sockets, &alone)
     }
 
-    fn cells(&self) -> Vec<String> {
-        let of: [fn(&Measured) -> f64; 3] = [|m| m.elapsed_s, |m| m.messages, |m| m.bytes];
-        let pair = |of| [&self.alone, &self.over_sockets].map(|all| Estimate::of(each(all, of)));
+    fn table_cells(&self) -> Vec<String> {
+        let of: [fn(&FlightMeasurement) -> f64; 3] = [|m| m.elapsed_s, |m| m.messages, |m| m.bytes];
+        let pair = |of| {
+            [&self.alone, &self.over_sockets].map(|all| Estimate::from_values(values_of(all, of)))
+        };
         let case = [self.airplanes.to_string(), self.deployment.to_string()];
         let numbers = of.into_iter().flat_map(pair).map(|estimate| estimate.to_string());
-        case.into_iter().chain(numbers).chain([self.slower().to_string()]).collect()
+        case.into_iter().chain(numbers).chain([self.slowdown().to_string()]).collect()
     }
 }
 
-impl Sockets {
+impl SocketMeasurements {
     /// Returns the claim about time, judged by the measurements; none without any.
     pub(super) fn claim(&self) -> Option<Claim> {
         let Self::Measured(cases) = self else { return None };
         let times = |name: &str, airplanes: usize| {
-            let is_it = |case: &&Case| case.deployment == name && case.airplanes == airplanes;
-            let of = |case: &Case| each(&case.over_sockets, |m| m.elapsed_s);
+            let is_it = |case: &&SocketCase| case.deployment == name && case.airplanes == airplanes;
+            let of = |case: &SocketCase| values_of(&case.over_sockets, |m| m.elapsed_s);
             cases.iter().find(is_it).map_or_else(Vec::new, of)
         };
         let teams = cases.iter().filter(|case| case.deployment == "team");
-        let ratio = |case: &Case| {
-            Estimate::ratio(
+        let ratio = |case: &SocketCase| {
+            Estimate::geometric_ratio(
                 &times("pim", case.airplanes),
-                &each(&case.over_sockets, |m| m.elapsed_s),
+                &values_of(&case.over_sockets, |m| m.elapsed_s),
             )
         };
         let ratios: Vec<Estimate> = teams.map(ratio).collect();
-        let verdict = judged(ratios.iter().map(|ratio| Comparison::above(ratio, 1.0)));
-        let ours = format!("pim / team: {}", listed(&ratios, ToString::to_string));
+        let verdict = judge_thresholds(ratios.iter().map(|ratio| ThresholdTest::above(ratio, 1.0)));
+        let ours = format!("pim / team: {}", join_texts(&ratios, ToString::to_string));
         Some(claim("A-7", verdict, ours))
     }
 
@@ -166,7 +176,7 @@ impl Sockets {
         ];
         let mut table = Table::new("Over real sockets", note, &heads);
         if let Self::Measured(cases) = self {
-            cases.iter().for_each(|case| table.row(case.cells()));
+            cases.iter().for_each(|case| table.push_row(case.table_cells()));
         }
         table
     }
@@ -174,33 +184,36 @@ impl Sockets {
 
 #[cfg(test)]
 mod tests {
-    use super::super::SocketsPlan;
+    use super::super::SocketsConfig;
     use super::*;
     use sidestep_document::claim::Verdict;
 
-    fn plan(seeds: usize) -> AgentflyPlan {
-        let sockets = SocketsPlan { airplanes: vec![3], seeds, cycles: 8 };
-        AgentflyPlan { sockets, ..AgentflyPlan::quick() }
+    fn plan(seeds: usize) -> AgentflyConfig {
+        let sockets = SocketsConfig { airplanes: vec![3], seeds, cycles: 8 };
+        AgentflyConfig { sockets, ..AgentflyConfig::quick() }
     }
 
     /// Returns measurements in which the flights of a deployment take as long as `times` says.
-    fn measured(seeds: usize, times: impl Fn(&str) -> f64) -> Sockets {
-        let mut flies = |text: &str| -> Result<Measured, InputError> {
+    fn measured(seeds: usize, times: impl Fn(&str) -> f64) -> SocketMeasurements {
+        let mut flies = |text: &str| -> Result<FlightMeasurement, InputError> {
             let name = DEPLOYMENTS.iter().find(|name| text.contains(&format!("\"{name}\"")));
-            let alone = in_one_process(text)?;
-            Ok(Measured { elapsed_s: times(name.expect("a deployment")), ..alone })
+            let alone = measure_in_one_process(text)?;
+            Ok(FlightMeasurement { elapsed_s: times(name.expect("a deployment")), ..alone })
         };
         measure(&plan(seeds), &mut flies, &mut |_, _| ()).expect("right")
     }
 
     #[test]
     fn every_deployment_is_measured_beside_itself_in_one_process() {
-        let Sockets::Measured(cases) = measured(2, |_| 3.0) else { panic!("measured") };
+        let SocketMeasurements::Measured(cases) = measured(2, |_| 3.0) else { panic!("measured") };
         assert_eq!(cases.iter().map(|case| case.deployment).collect::<Vec<_>>(), DEPLOYMENTS);
         for case in &cases {
             assert!(case.alone[0].messages > 0.0, "{case:?}");
             assert_eq!(case.alone[0].messages, case.over_sockets[0].messages);
-            assert_eq!(case.cells().len(), Sockets::Measured(Vec::new()).table().columns.len());
+            assert_eq!(
+                case.table_cells().len(),
+                SocketMeasurements::Measured(Vec::new()).table().columns.len()
+            );
         }
     }
 
@@ -215,7 +228,7 @@ mod tests {
 
     #[test]
     fn what_was_left_out_judges_nothing_and_says_why() {
-        let left_out = Sockets::LeftOut { reason: "it is not there; get it".into() };
+        let left_out = SocketMeasurements::LeftOut { reason: "it is not there; get it".into() };
         assert_eq!(left_out.claim(), None);
         assert_eq!(left_out.table().note, "Left out: it is not there; get it");
     }

@@ -22,9 +22,9 @@
 //! Both sides are divided by `n + m` before fitting, so that all runs have equal weight; the share
 //! of variance explained is that of the cost *per body*, a harder test than that of whole cycles.
 
-use super::LoriaPlan;
+use super::LoriaConfig;
 use super::floor::Floor;
-use super::timing::Load;
+use super::timing::Workload;
 use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
@@ -38,7 +38,7 @@ use std::sync::Arc;
 
 /// A run with one worker, per cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Point {
+pub(super) struct CostSample {
     /// Robots, `n`.
     pub(super) agents: f64,
     /// People and doors, `m`.
@@ -72,7 +72,7 @@ pub(super) struct Parameter {
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct CostModel {
     /// The runs.
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<CostSample>,
     /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty if they cannot be separated.
     pub(super) parameters: Vec<Parameter>,
     /// Share of the variance of the cost per body explained, of step one and of step two.
@@ -93,7 +93,7 @@ const PARAMETERS: [(&str, &str); 5] = [
 
 impl CostModel {
     /// Measures and fits.
-    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let loads = grid(plan);
         let mut points = Vec::new();
         for (index, load) in loads.iter().enumerate() {
@@ -104,17 +104,18 @@ impl CostModel {
     }
 
     /// Fits the model to runs.
-    pub(super) fn fit(points: Vec<Point>) -> Self {
-        let bodies = |p: &Point| p.agents + p.objects;
-        let per_body = |p: &Point, values: &[f64]| values.iter().map(|v| v / bodies(p)).collect();
-        let fit = |row: fn(&Point) -> Vec<f64>, y: fn(&Point) -> f64| {
+    pub(super) fn fit(points: Vec<CostSample>) -> Self {
+        let bodies = |p: &CostSample| p.agents + p.objects;
+        let per_body =
+            |p: &CostSample, values: &[f64]| values.iter().map(|v| v / bodies(p)).collect();
+        let fit = |row: fn(&CostSample) -> Vec<f64>, y: fn(&CostSample) -> f64| {
             let x: Vec<Vec<f64>> = points.iter().map(|p| per_body(p, &row(p))).collect();
             let y: Vec<f64> = points.iter().map(|p| y(p) / bodies(p)).collect();
             Fit::new(&x, &y)
         };
         let first = fit(first_row, |p| p.first_ns);
         let second = fit(second_row, |p| p.second_ns);
-        let share = |p: &Point| p.in_conflict / bodies(p);
+        let share = |p: &CostSample| p.in_conflict / bodies(p);
         let least = points.iter().map(share).fold(f64::INFINITY, f64::min);
         let greatest = points.iter().map(share).fold(0.0, f64::max);
         let explained = |fit: &Option<Fit>| fit.as_ref().map_or(0.0, |f| f.r_squared);
@@ -141,10 +142,10 @@ impl CostModel {
              cycles {:.3}. t_p and t_o are told apart by n : m, c_s by crowding, e_u by body \
              size, c_d is the rest per body.",
             self.points.len(),
-            least(&self.points, |p| p.agents),
-            greatest(&self.points, |p| p.agents),
-            least(&self.points, |p| p.objects),
-            greatest(&self.points, |p| p.objects),
+            min_value(&self.points, |p| p.agents),
+            max_value(&self.points, |p| p.agents),
+            min_value(&self.points, |p| p.objects),
+            max_value(&self.points, |p| p.objects),
             self.conflict_share.0,
             self.conflict_share.1,
             self.r_squared[0],
@@ -170,7 +171,7 @@ impl CostModel {
     /// Returns a figure of predicted against measured time of a cycle.
     pub(super) fn figure(&self) -> Figure {
         let value = |name| self.parameter(name).map_or(0.0, |p| p.value_ns);
-        let predict = |p: &Point| {
+        let predict = |p: &CostSample| {
             let first = dot(&first_row(p), &[value("t_p"), value("t_o")]);
             first + dot(&second_row(p), &[value("c_d"), value("c_s"), value("e_u")])
         };
@@ -194,11 +195,11 @@ impl CostModel {
     }
 }
 
-fn first_row(p: &Point) -> Vec<f64> {
+fn first_row(p: &CostSample) -> Vec<f64> {
     vec![p.agents, p.objects]
 }
 
-fn second_row(p: &Point) -> Vec<f64> {
+fn second_row(p: &CostSample) -> Vec<f64> {
     vec![p.agents + p.objects, p.in_conflict, p.boxes]
 }
 
@@ -206,11 +207,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-fn least(points: &[Point], of: fn(&Point) -> f64) -> f64 {
+fn min_value(points: &[CostSample], of: fn(&CostSample) -> f64) -> f64 {
     points.iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
-fn greatest(points: &[Point], of: fn(&Point) -> f64) -> f64 {
+fn max_value(points: &[CostSample], of: fn(&CostSample) -> f64) -> f64 {
     points.iter().map(of).fold(0.0, f64::max)
 }
 
@@ -233,12 +234,12 @@ fn parameters(first: &Option<Fit>, second: &Option<Fit>) -> Vec<Parameter> {
 }
 
 /// Returns the share of the variance of whole cycles' times that both fits together explain.
-fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> f64 {
+fn whole_cycles(points: &[CostSample], first: &Option<Fit>, second: &Option<Fit>) -> f64 {
     let (Some(first), Some(second)) = (first, second) else { return 0.0 };
     let measured: Vec<f64> = points.iter().map(|p| p.first_ns + p.second_ns).collect();
     let mean = measured.iter().sum::<f64>() / measured.len() as f64;
     let square = |x: f64| x * x;
-    let predict = |p: &Point| first.predict(&first_row(p)) + second.predict(&second_row(p));
+    let predict = |p: &CostSample| first.predict(&first_row(p)) + second.predict(&second_row(p));
     let left: f64 = points.iter().zip(&measured).map(|(p, y)| square(y - predict(p))).sum();
     let all: f64 = measured.iter().map(|y| square(y - mean)).sum();
     1.0 - left / all.max(f64::MIN_POSITIVE)
@@ -248,13 +249,14 @@ fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> 
 const SIZES: [u32; 3] = [1, 2, 3];
 
 /// Returns loads of different numbers, crowding and size.
-fn grid(plan: &LoriaPlan) -> Vec<Load> {
+fn grid(plan: &LoriaConfig) -> Vec<Workload> {
     let small = (Arc::new(Floor::small()), [20, 50, 80], [0, 30, 80]);
     let large = (Arc::new(Floor::large()), [100, 300, 800], [0, 200, 600]);
     let mut loads = Vec::new();
     for (floor, agents, objects) in [small, large] {
         for (robots, people) in agents.into_iter().flat_map(|n| objects.map(|m| (n, m))) {
-            let load = |size| Load { robots, people, size, operations: 0, floor: floor.clone() };
+            let load =
+                |size| Workload { robots, people, size, operations: 0, floor: floor.clone() };
             loads.extend(SIZES.map(load));
         }
     }
@@ -274,7 +276,7 @@ struct Totals {
     boxes: f64,
 }
 
-fn measure(load: &Load, robot_cycles: u64) -> Point {
+fn measure(load: &Workload, robot_cycles: u64) -> CostSample {
     let cycles = load.cycles(robot_cycles);
     let mut run = load.simulation(1);
     advance(&mut run, cycles);
@@ -290,7 +292,7 @@ fn measure(load: &Load, robot_cycles: u64) -> Point {
     let best = |of| per_cycle(of).into_iter().fold(f64::INFINITY, f64::min);
     let mean = |of| per_cycle(of).iter().sum::<f64>() / BLOCKS as f64;
     let (agents, bodies) = (f64::from(load.robots), run.world().bodies.len() as f64);
-    Point {
+    CostSample {
         agents,
         objects: bodies - agents,
         size: load.size,
@@ -334,7 +336,7 @@ mod tests {
         for (k, n) in [20.0, 100.0, 400.0, 800.0].into_iter().enumerate() {
             for (m, size) in [(0.0, 1), (n / 2.0, 2), (3.0 * n, 3)] {
                 let (in_conflict, boxes) = (0.1 * k as f64 * n, f64::from(size) * n);
-                let mut p = Point {
+                let mut p = CostSample {
                     agents: n,
                     objects: m,
                     size,
@@ -360,7 +362,7 @@ mod tests {
 
     #[test]
     fn parameters_that_cannot_be_told_apart_are_not_given() {
-        let p = Point {
+        let p = CostSample {
             agents: 9.0,
             objects: 9.0,
             size: 1,
@@ -376,7 +378,7 @@ mod tests {
     #[test]
     fn measured_bodies_and_conflicts_are_plausible() {
         let floor = Arc::new(Floor::small());
-        let load = Load { robots: 50, people: 30, size: 2, operations: 0, floor };
+        let load = Workload { robots: 50, people: 30, size: 2, operations: 0, floor };
         let p = measure(&load, 20_000);
         assert_eq!((p.agents, p.objects), (50.0, 38.0), "30 people and 8 doors");
         assert!(p.in_conflict > 1.0 && p.in_conflict < 88.0);

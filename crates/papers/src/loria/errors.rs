@@ -24,7 +24,7 @@ const OBSERVATIONS: [&str; 5] = ["nothing", "wall", "door", "person", "robot"];
 /// The distribution of the error mass in a sensor's row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Spread {
+pub(super) enum ErrorSpread {
     /// Evenly over all other observations: a thing is missed with probability `e / 4`, and
     /// otherwise taken for another thing.
     Even,
@@ -32,7 +32,7 @@ pub(super) enum Spread {
     Blind,
 }
 
-impl Spread {
+impl ErrorSpread {
     /// Both recipes.
     pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
 
@@ -61,7 +61,7 @@ impl Spread {
 /// The number of beams that a robot has for the same thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Beams {
+pub(super) enum BeamCount {
     /// The Nomad's ring: three beams look ahead, five to each side.
     Sixteen,
     /// One beam in each direction, for a robot of one box: nothing compensates for an error. This
@@ -69,7 +69,7 @@ pub(super) enum Beams {
     Four,
 }
 
-impl Beams {
+impl BeamCount {
     /// Returns the bearings of the beams in degrees.
     pub(super) fn bearings_deg(self) -> Vec<f64> {
         let (n, step) = match self {
@@ -104,7 +104,7 @@ fn outcomes(n: usize, e: f64) -> Vec<f64> {
 
 /// Returns settings of the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario,
 /// so that they err at level `e`.
-pub(super) fn settings(e: f64, spread: Spread, beams: Beams) -> Vec<Setting> {
+pub(super) fn settings(e: f64, spread: ErrorSpread, beams: BeamCount) -> Vec<Setting> {
     let list = |row: &[f64]| Value::from(row.to_vec());
     let under = |section: &str, key: &str, value: Value| setting(&[section, key].join("."), value);
     let mut all = vec![under("sensors.equal-ring", "bearings_deg", list(&beams.bearings_deg()))];
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn rows_of_the_equal_level_recipe_sum_to_one_and_err_as_often_as_said() {
         for e in [0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.75] {
-            for spread in Spread::ALL {
+            for spread in ErrorSpread::ALL {
                 for (truth, row) in spread.confusion(e).iter().enumerate() {
                     assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
                     assert!((1.0 - row[truth] - e).abs() < 1e-12);
@@ -151,8 +151,8 @@ mod tests {
 
     #[test]
     fn recipes_differ_in_how_often_a_thing_is_missed() {
-        assert_eq!(Spread::Even.confusion(0.2)[1][0], 0.05);
-        assert_eq!(Spread::Blind.confusion(0.2)[1][0], 0.2);
-        assert_eq!(Spread::Blind.confusion(0.2)[0], Spread::Even.confusion(0.2)[0]);
+        assert_eq!(ErrorSpread::Even.confusion(0.2)[1][0], 0.05);
+        assert_eq!(ErrorSpread::Blind.confusion(0.2)[1][0], 0.2);
+        assert_eq!(ErrorSpread::Blind.confusion(0.2)[0], ErrorSpread::Even.confusion(0.2)[0]);
     }
 }

@@ -16,7 +16,7 @@ const END_BOXES: u32 = 4;
 /// The way of a robot that goes to and fro past obstacles, by the names of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Mind {
+pub(super) enum AvoidancePolicy {
     /// Keeps to its way until it touches something.
     Touch,
     /// Steps around things that its sonar reports, as soon as one beam does.
@@ -25,7 +25,7 @@ pub(super) enum Mind {
     Filter,
 }
 
-impl Mind {
+impl AvoidancePolicy {
     /// All three.
     #[cfg(test)]
     pub(super) const ALL: [Self; 3] = [Self::Touch, Self::Avoid, Self::Filter];
@@ -51,26 +51,27 @@ pub(super) struct Floor {
 
 /// The parts of a scenario that the experiments must know.
 #[derive(Deserialize)]
-struct Told {
-    map: Map,
-    robots: Vec<Group>,
-    people: Vec<Group>,
+struct ScenarioExcerpt {
+    map: MapSection,
+    robots: Vec<GroupSection>,
+    people: Vec<GroupSection>,
 }
 
 #[derive(Deserialize)]
-struct Map {
+struct MapSection {
     box_size_m: f64,
     office: OfficeSpec,
 }
 
 #[derive(Deserialize)]
-struct Group {
+struct GroupSection {
     count: u32,
 }
 
 impl Floor {
     fn new(name: &'static str, scenario: &'static str) -> Self {
-        let told: Told = toml::from_str(scenario).expect("the experiments' scenarios are valid");
+        let told: ScenarioExcerpt =
+            toml::from_str(scenario).expect("the experiments' scenarios are valid");
         let office = told.map.office.build(told.map.box_size_m);
         Self {
             name,

@@ -3,9 +3,9 @@
 //! The paper changed the number of occupied boxes in its source, and wrote code for the camera.
 //! Here the scenario states both, and the behavior accepts any beams.
 
-use super::LoriaPlan;
+use super::LoriaConfig;
 use super::floor::Floor;
-use super::measure::{Outcome, Variant, measure_all, values};
+use super::measure::{LoriaVariant, RunMeasures, measure_all, values};
 use super::reliability::{CONTACTS, TRIP};
 use crate::cells::{figure, table};
 use crate::study::Progress;
@@ -19,34 +19,39 @@ pub(super) const SIZES: [u32; 5] = [1, 2, 3, 4, 5];
 
 /// Outcomes of one body size and set of sensors.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Build {
+pub(super) struct BuildOutcomes {
     /// Side of the body in boxes.
     pub(super) size: u32,
     /// Whether a camera was added to the sonar ring.
     pub(super) camera: bool,
     /// Outcomes by seed.
-    pub(super) outcomes: Vec<Outcome>,
+    pub(super) outcomes: Vec<RunMeasures>,
 }
 
 /// The genericity experiment.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Genericity {
+pub(super) struct GenericityResults {
     /// All builds.
-    pub(super) builds: Vec<Build>,
+    pub(super) builds: Vec<BuildOutcomes>,
     /// Cycles of each run.
     pub(super) cycles: u64,
 }
 
-impl Genericity {
+impl GenericityResults {
     /// Runs the experiment: both sensors and effectors unreliable, medium floor.
-    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let floor = Arc::new(Floor::medium());
-        let build = |(camera, size)| Variant { size, camera, ..Variant::new(&floor, Regime::Both) };
+        let build = |(camera, size)| LoriaVariant {
+            size,
+            camera,
+            ..LoriaVariant::new(&floor, Regime::Both)
+        };
         let builds = [false, true].into_iter().flat_map(|camera| SIZES.map(|size| (camera, size)));
-        let variants: Vec<Variant> = builds.map(build).collect();
+        let variants: Vec<LoriaVariant> = builds.map(build).collect();
         let outcomes = measure_all(&variants, plan, "genericity", report);
         let builds = variants.iter().zip(outcomes);
-        let builds = builds.map(|(v, outcomes)| Build { size: v.size, camera: v.camera, outcomes });
+        let builds =
+            builds.map(|(v, outcomes)| BuildOutcomes { size: v.size, camera: v.camera, outcomes });
         Self { builds: builds.collect(), cycles: plan.cycles }
     }
 
@@ -65,7 +70,7 @@ impl Genericity {
             let builds = self.builds.iter().filter(move |b| b.camera == camera);
             builds.flat_map(|b| values(&b.outcomes, CONTACTS)).collect::<Vec<_>>()
         };
-        Estimate::paired(&contacts(true), &contacts(false))
+        Estimate::paired_difference(&contacts(true), &contacts(false))
     }
 
     /// Returns contacts and trips by size and sensors.
@@ -77,7 +82,9 @@ impl Genericity {
              boxes jam in corridors of 12 boxes.",
             self.cycles
         );
-        let estimate = |b: &Build, measure| Estimate::of(values(&b.outcomes, measure)).to_string();
+        let estimate = |b: &BuildOutcomes, measure| {
+            Estimate::from_values(values(&b.outcomes, measure)).to_string()
+        };
         table(
             "Body sizes and an added camera",
             note,
@@ -97,8 +104,9 @@ impl Genericity {
     pub(super) fn figure(&self) -> Figure {
         let series = [false, true].map(|camera| {
             let builds = self.builds.iter().filter(|b| b.camera == camera);
-            let point =
-                |b: &Build| Estimate::of(values(&b.outcomes, CONTACTS)).point(f64::from(b.size));
+            let point = |b: &BuildOutcomes| {
+                Estimate::from_values(values(&b.outcomes, CONTACTS)).point(f64::from(b.size))
+            };
             Series { name: sensors(camera).into(), points: builds.filter_map(point).collect() }
         });
         figure(

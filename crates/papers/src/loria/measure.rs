@@ -1,14 +1,14 @@
 //! One run of one variant, and its results.
 
-use super::LoriaPlan;
-use super::errors::{self, Beams, Spread};
-use super::floor::{Floor, Mind, ends};
-use crate::study::{Progress, all_of, setting, source};
+use super::LoriaConfig;
+use super::errors::{self, BeamCount, ErrorSpread};
+use super::floor::{AvoidancePolicy, Floor, ends};
+use crate::study::{Progress, run_all, setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::baseline::breach;
+use sidestep::worlds::robots::baseline::find_violation;
 use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::world::Regime;
 use sidestep::worlds::robots::{RobotsRun, robots_run};
@@ -16,21 +16,21 @@ use std::convert::Infallible;
 use std::sync::Arc;
 
 /// The medium floor, with sensors and effectors of an equal error level.
-const EQUAL: &str = include_str!("../../scenarios/loria/equal.toml");
+const EQUAL_ERRORS: &str = include_str!("../../scenarios/loria/equal.toml");
 
 /// The tables by which sensors and effectors err.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Tables {
+pub(super) enum ErrorTables {
     /// The presets `sonar-ring` and `nomad`.
     Presets,
     /// Those of an equal error level, see [`errors`].
-    Equal(f64, Spread, Beams),
+    Equal(f64, ErrorSpread, BeamCount),
 }
 
 /// The settings that differ between runs; the seed is not among them.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Variant {
+pub(super) struct LoriaVariant {
     /// The building with its robots and people.
     #[serde(skip)]
     pub(super) floor: Arc<Floor>,
@@ -39,16 +39,16 @@ pub(super) struct Variant {
     /// The law for blocked paths.
     pub(super) obstacle_rule: ObstacleRule,
     /// The behavior of robots.
-    pub(super) mind: Mind,
+    pub(super) mind: AvoidancePolicy,
     /// The errors of sensors and effectors.
-    pub(super) tables: Tables,
+    pub(super) tables: ErrorTables,
     /// Robots cover `size` x `size` boxes.
     pub(super) size: u32,
     /// Whether robots have a camera beside the sonar ring.
     pub(super) camera: bool,
 }
 
-impl Variant {
+impl LoriaVariant {
     /// Returns a variant with robots of 2 x 2 boxes with a sonar ring, which avoid the things that
     /// it reports, under the presets and the rule `cut`.
     pub(super) fn new(floor: &Arc<Floor>, regime: Regime) -> Self {
@@ -56,8 +56,8 @@ impl Variant {
             floor: Arc::clone(floor),
             regime,
             obstacle_rule: ObstacleRule::Cut,
-            mind: Mind::Avoid,
-            tables: Tables::Presets,
+            mind: AvoidancePolicy::Avoid,
+            tables: ErrorTables::Presets,
             size: 2,
             camera: false,
         }
@@ -72,8 +72,8 @@ impl Variant {
         ];
         let mut text = self.floor.scenario;
         let mut sensors = vec!["sonar-ring"];
-        if let Tables::Equal(e, spread, beams) = self.tables {
-            (text, sensors) = (EQUAL, vec!["equal-ring"]);
+        if let ErrorTables::Equal(e, spread, beams) = self.tables {
+            (text, sensors) = (EQUAL_ERRORS, vec!["equal-ring"]);
             settings.extend(errors::settings(e, spread, beams));
         }
         sensors.extend(self.camera.then_some("camera"));
@@ -92,7 +92,7 @@ impl Variant {
 
 /// Results of a run of a variant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub(super) struct Outcome {
+pub(super) struct RunMeasures {
     /// Contacts per 1000 actions, with anything.
     pub(super) contacts: Option<f64>,
     /// Contacts per 1000 actions, with walls.
@@ -113,10 +113,10 @@ pub(super) struct Outcome {
 }
 
 /// A measure of an outcome.
-pub(super) type Measure = fn(&Outcome) -> Option<f64>;
+pub(super) type Measure = fn(&RunMeasures) -> Option<f64>;
 
 /// Returns the values of a measure by run.
-pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>> {
+pub(super) fn values(outcomes: &[RunMeasures], measure: Measure) -> Vec<Option<f64>> {
     outcomes.iter().map(measure).collect()
 }
 
@@ -124,36 +124,40 @@ pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>>
 pub(super) const WINDOW_CYCLES: usize = 20;
 
 /// Shortest path of a window that has a meaningful shape, in boxes.
-const SHORTEST_PATH_BOXES: f64 = 10.0;
+const MIN_PATH_BOXES: f64 = 10.0;
 
 /// Runs every variant with the seeds of a plan, from 1 on; the outcomes are by variant, then by seed.
 ///
 /// All variants use the same seeds: starts, and every draw that a variant does not itself change,
 /// are the same, so that differences between variants are paired by seed.
 pub(super) fn measure_all(
-    variants: &[Variant],
-    plan: &LoriaPlan,
+    variants: &[LoriaVariant],
+    plan: &LoriaConfig,
     what: &str,
     report: &mut Progress<'_>,
-) -> Vec<Vec<Outcome>> {
-    let &LoriaPlan { seeds, cycles, workers, .. } = plan;
+) -> Vec<Vec<RunMeasures>> {
+    let &LoriaConfig { seeds, cycles, workers, .. } = plan;
     let run = |i: &usize| {
         let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
         Ok::<_, Infallible>(measure(&variants[v], seed, cycles))
     };
     let numbers: Vec<usize> = (0..variants.len() * seeds).collect();
-    let Ok(outcomes) = all_of(&numbers, workers, |share| report(what, share), run);
-    outcomes.chunks(seeds).map(<[Outcome]>::to_vec).collect()
+    let Ok(outcomes) = run_all(&numbers, workers, |share| report(what, share), run);
+    outcomes.chunks(seeds).map(<[RunMeasures]>::to_vec).collect()
 }
 
 /// Runs one variant once, on one worker.
-pub(super) fn measure(variant: &Variant, seed: u64, cycles: u64) -> Outcome {
-    let (simulation, tracks) = recorded(variant, seed, cycles);
-    outcome(&simulation, &tracks)
+pub(super) fn measure(variant: &LoriaVariant, seed: u64, cycles: u64) -> RunMeasures {
+    let (simulation, tracks) = run_recorded(variant, seed, cycles);
+    run_measures(&simulation, &tracks)
 }
 
 /// Returns a variant's run at its end, and the poses of its robots by entity id.
-pub(super) fn recorded(variant: &Variant, seed: u64, cycles: u64) -> (RobotsRun, Vec<Track>) {
+pub(super) fn run_recorded(
+    variant: &LoriaVariant,
+    seed: u64,
+    cycles: u64,
+) -> (RobotsRun, Vec<Track>) {
     let run = robots_run(&variant.source(seed), 1);
     let mut simulation = run.expect("the experiments' scenarios are valid");
     let tracks = record(&mut simulation, cycles);
@@ -165,7 +169,7 @@ pub(super) type Track = Vec<(u32, u32, u8)>;
 
 /// Runs and keeps the poses of the robots, by entity id.
 fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
-    simulation.begin_recording();
+    simulation.start_recording();
     let schemas = simulation.schemas();
     let mut tracks = vec![Track::with_capacity(cycles as usize); simulation.agents()];
     let mut done = 0;
@@ -174,12 +178,12 @@ fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
         // One recorder per stretch, so that memory does not grow with the run.
         let mut recorder = MemoryRecorder::new(&schemas);
         simulation.record(&mut recorder).expect("memory takes every row of its schema");
-        append(&mut tracks, &recorder);
+        append_poses(&mut tracks, &recorder);
     }
     tracks
 }
 
-fn append(tracks: &mut [Track], recorder: &MemoryRecorder) {
+fn append_poses(tracks: &mut [Track], recorder: &MemoryRecorder) {
     let column = |name| match recorder.column("trajectories", name) {
         Some(Values::U32(values) | Values::Label(values)) => &values[..],
         _ => &[],
@@ -192,11 +196,11 @@ fn append(tracks: &mut [Track], recorder: &MemoryRecorder) {
     }
 }
 
-fn outcome(simulation: &RobotsRun, tracks: &[Track]) -> Outcome {
+fn run_measures(simulation: &RobotsRun, tracks: &[Track]) -> RunMeasures {
     let total = simulation.metrics().total;
     let per_1000 = |n: u64| (total.actions > 0).then(|| 1e3 * n as f64 / total.actions as f64);
     let of_kind = |kind: &str| per_1000(total.contacts_by_kind.get(kind).copied().unwrap_or(0));
-    Outcome {
+    RunMeasures {
         contacts: per_1000(total.contacts),
         wall_contacts: of_kind("wall"),
         robot_contacts: of_kind("robot"),
@@ -205,7 +209,7 @@ fn outcome(simulation: &RobotsRun, tracks: &[Track]) -> Outcome {
         straightness: straightness(tracks),
         lateral_moves: per_1000(tracks.iter().map(|track| lateral_moves(track)).sum()),
         lawful: total.actions == simulation.cycle() * simulation.agents() as u64
-            && breach(simulation.world(), &simulation.saved()).is_none(),
+            && find_violation(simulation.world(), &simulation.snapshot()).is_none(),
     }
 }
 
@@ -224,7 +228,7 @@ fn straightness_of(window: &[(u32, u32, u8)]) -> Option<f64> {
     };
     let path: f64 = window.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
     let net = distance(*window.first()?, *window.last()?);
-    (path >= SHORTEST_PATH_BOXES).then(|| net / path)
+    (path >= MIN_PATH_BOXES).then(|| net / path)
 }
 
 /// Returns the number of moves between two cycles that lead aside from the heading before.
@@ -255,17 +259,17 @@ mod tests {
     #[test]
     fn where_all_is_perfect_nobody_moves_sideways() {
         let floor = Arc::new(Floor::small());
-        for mind in Mind::ALL {
-            let variant = Variant { mind, ..Variant::new(&floor, Regime::Reliable) };
+        for mind in AvoidancePolicy::ALL {
+            let variant = LoriaVariant { mind, ..LoriaVariant::new(&floor, Regime::Reliable) };
             let outcome = measure(&variant, 1, 600);
             assert_eq!(outcome.lateral_moves, Some(0.0));
             assert!(outcome.trips > Some(0.5), "{outcome:?}");
         }
-        let level_0 = Variant {
-            tables: Tables::Equal(0.0, Spread::Blind, Beams::Sixteen),
-            ..Variant::new(&floor, Regime::Both)
+        let level_0 = LoriaVariant {
+            tables: ErrorTables::Equal(0.0, ErrorSpread::Blind, BeamCount::Sixteen),
+            ..LoriaVariant::new(&floor, Regime::Both)
         };
-        let reliable = Variant { regime: Regime::Reliable, ..level_0.clone() };
+        let reliable = LoriaVariant { regime: Regime::Reliable, ..level_0.clone() };
         let [a, b] = [level_0, reliable].map(|v| measure(&v, 1, 300));
         assert_eq!(a, b, "errors of level 0 are none");
     }
@@ -273,8 +277,8 @@ mod tests {
     #[test]
     fn outcomes_do_not_depend_on_how_many_runs_are_done_at_once() {
         let floor = Arc::new(Floor::small());
-        let variants = [Regime::Reliable, Regime::Both].map(|r| Variant::new(&floor, r));
-        let plan = |workers| LoriaPlan { seeds: 3, cycles: 200, workers, ..LoriaPlan::quick() };
+        let variants = [Regime::Reliable, Regime::Both].map(|r| LoriaVariant::new(&floor, r));
+        let plan = |workers| LoriaConfig { seeds: 3, cycles: 200, workers, ..LoriaConfig::quick() };
         let all = |workers| measure_all(&variants, &plan(workers), "", &mut |_, _| {});
         let (one, three) = (all(1), all(3));
         assert_eq!(one, three);

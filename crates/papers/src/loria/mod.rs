@@ -26,23 +26,23 @@ pub mod scenes;
 mod strategies;
 mod timing;
 
-use crate::claims::Parts;
-use crate::study::{Progress, stage};
+use crate::claims::ReportParts;
+use crate::study::{Progress, sub_progress};
 use cost_model::CostModel;
-use genericity::Genericity;
-use performance::Performance;
-use reliability::Reliability;
+use genericity::GenericityResults;
+use performance::PerformanceResults;
+use reliability::ReliabilityResults;
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema};
-use sidestep::kernel::workers::available;
-use sidestep_document::claim::{Claim, tally};
+use sidestep::kernel::workers::available_workers;
+use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::{Document, Experiment, Picture};
-use strategies::Strategies;
+use strategies::StrategyResults;
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LoriaPlan {
+pub struct LoriaConfig {
     /// Seeds per variant, at least 2 (an interval needs two).
     pub seeds: usize,
     /// Cycles of each run in which behavior is measured.
@@ -65,15 +65,15 @@ pub struct LoriaPlan {
     pub quick: bool,
 }
 
-impl Default for LoriaPlan {
+impl Default for LoriaConfig {
     /// The full plan: 24 seeds; a few minutes on two processors.
     fn default() -> Self {
         Self {
             seeds: 24,
             cycles: 4000,
             error_levels: vec![0.02, 0.05, 0.1, 0.2, 0.3, 0.4],
-            workers: available(),
-            most_workers: available().min(16),
+            workers: available_workers(),
+            most_workers: available_workers().min(16),
             repeats: 9,
             robots: vec![250, 1500],
             operations: vec![0, 1000, 10_000],
@@ -84,9 +84,9 @@ impl Default for LoriaPlan {
 }
 
 /// Upper bound of a plan: a machine can do this much in a day.
-const MOST: u64 = 1_000_000;
+const MAX_AMOUNT: u64 = 1_000_000;
 
-impl LoriaPlan {
+impl LoriaConfig {
     /// Returns a rehearsal of seconds: everything is run once, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
@@ -117,7 +117,11 @@ impl LoriaPlan {
         let bad_level = levels.is_empty() || levels.iter().any(|&e| !(e > 0.0 && e < 1.0));
         let count = |n: usize| n as u64;
         refuse("seeds", outside(count(self.seeds), 2, 100_000), "give 2 to 100000 seeds")?;
-        refuse("cycles", outside(self.cycles, 100, 10 * MOST), "give 100 to 10000000 cycles")?;
+        refuse(
+            "cycles",
+            outside(self.cycles, 100, 10 * MAX_AMOUNT),
+            "give 100 to 10000000 cycles",
+        )?;
         refuse("error_levels", bad_level, "give levels above 0 and below 1")?;
         refuse("workers", outside(count(self.workers), 1, 1024), "give 1 to 1024 workers")?;
         refuse(
@@ -131,7 +135,7 @@ impl LoriaPlan {
         let robots = none_or(self.robots.iter().any(bad_robots), self.robots.is_empty());
         refuse("robots", robots, "give numbers from 1 to 3000: more do not fit the floor")?;
         refuse("operations", self.operations.is_empty(), "give at least one cost, e.g. 0")?;
-        let decisions = outside(self.timed_robot_cycles, 100, 1000 * MOST);
+        let decisions = outside(self.timed_robot_cycles, 100, 1000 * MAX_AMOUNT);
         refuse("timed_robot_cycles", decisions, "give 100 to 1000000000")
     }
 }
@@ -160,15 +164,15 @@ pub enum LoriaError {
 
 /// All results of the experiments.
 #[derive(Debug, Clone, Serialize)]
-pub struct Report {
+pub struct LoriaReport {
     /// The plan that was run.
-    pub plan: LoriaPlan,
+    pub plan: LoriaConfig,
     /// Version of the program.
     pub program_version: String,
-    reliability: Reliability,
-    genericity: Genericity,
-    performance: Performance,
-    strategies: Strategies,
+    reliability: ReliabilityResults,
+    genericity: GenericityResults,
+    performance: PerformanceResults,
+    strategies: StrategyResults,
     cost_model: CostModel,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
@@ -180,7 +184,7 @@ pub struct Report {
 ///
 /// # Errors
 /// When the plan is out of range.
-pub fn run(plan: &LoriaPlan, progress: &mut Progress<'_>) -> Result<Report, LoriaError> {
+pub fn run(plan: &LoriaConfig, progress: &mut Progress<'_>) -> Result<LoriaReport, LoriaError> {
     run_recorded(plan, &mut in_memory, progress)
 }
 
@@ -189,18 +193,19 @@ pub fn run(plan: &LoriaPlan, progress: &mut Progress<'_>) -> Result<Report, Lori
 /// # Errors
 /// When the plan is out of range, or a recording fails.
 pub fn run_recorded(
-    plan: &LoriaPlan,
+    plan: &LoriaConfig,
     recorders: &mut NewRecorder<'_>,
     progress: &mut Progress<'_>,
-) -> Result<Report, LoriaError> {
+) -> Result<LoriaReport, LoriaError> {
     plan.check()?;
     // Shares of the whole by the time they take on two processors.
-    let reliability = Reliability::run(plan, &mut stage(progress, 0.0, 0.45));
-    let genericity = Genericity::run(plan, &mut stage(progress, 0.45, 0.55));
-    let performance = Performance::run(plan, recorders, &mut stage(progress, 0.55, 0.8))?;
-    let strategies = Strategies::run(plan, &mut stage(progress, 0.8, 0.93));
-    let cost_model = CostModel::run(plan, &mut stage(progress, 0.93, 1.0));
-    let mut report = Report {
+    let reliability = ReliabilityResults::run(plan, &mut sub_progress(progress, 0.0, 0.45));
+    let genericity = GenericityResults::run(plan, &mut sub_progress(progress, 0.45, 0.55));
+    let performance =
+        PerformanceResults::run(plan, recorders, &mut sub_progress(progress, 0.55, 0.8))?;
+    let strategies = StrategyResults::run(plan, &mut sub_progress(progress, 0.8, 0.93));
+    let cost_model = CostModel::run(plan, &mut sub_progress(progress, 0.93, 1.0));
+    let mut report = LoriaReport {
         plan: plan.clone(),
         program_version: env!("CARGO_PKG_VERSION").into(),
         reliability,
@@ -215,10 +220,10 @@ pub fn run_recorded(
     Ok(report)
 }
 
-impl Report {
+impl LoriaReport {
     /// Returns the experiments in the order of the report.
     fn experiments(&self) -> Vec<Experiment> {
-        claims::WORDS.experiments([
+        claims::CLAIMS.experiments([
             (self.reliability.figures(), self.reliability.tables()),
             (vec![self.genericity.figure()], vec![self.genericity.table()]),
             (self.performance.figures(), self.performance.tables()),
@@ -234,7 +239,7 @@ impl Report {
         let lead = format!(
             "{} The paper's tables are lost; every number here is ours. Version {}; seeds 1 to {} \
              for every variant, {} cycles a run, {} repeats of every timing, {} processors.",
-            tally(&self.claims),
+            verdict_summary(&self.claims),
             self.program_version,
             plan.seeds,
             plan.cycles,
@@ -242,8 +247,8 @@ impl Report {
             self.performance.processors,
         );
         let experiments = self.experiments();
-        let parts = Parts { claims: &self.claims, pictures, experiments };
-        claims::WORDS.document(lead, plan.quick, parts, self.command())
+        let parts = ReportParts { claims: &self.claims, pictures, experiments };
+        claims::CLAIMS.document(lead, plan.quick, parts, self.command())
     }
 
     fn command(&self) -> String {
@@ -266,7 +271,7 @@ mod tests {
     #[test]
     fn a_quick_plan_judges_every_claim_and_gives_text_figures_and_json() {
         let mut shares = Vec::new();
-        let report = run(&LoriaPlan::quick(), &mut |_, share| shares.push(share)).unwrap();
+        let report = run(&LoriaConfig::quick(), &mut |_, share| shares.push(share)).unwrap();
         assert!(shares.is_sorted() && shares.last() == Some(&1.0));
         for number in 1..=15 {
             let id = format!("E-{number}");
@@ -288,26 +293,26 @@ mod tests {
 
     #[test]
     fn plans_out_of_range_are_refused_before_anything_runs() {
-        let quick = LoriaPlan::quick();
+        let quick = LoriaConfig::quick();
         let wrong = [
-            LoriaPlan { seeds: 1, ..quick.clone() },
-            LoriaPlan { cycles: u64::MAX, ..quick.clone() },
-            LoriaPlan { error_levels: vec![f64::NAN], ..quick.clone() },
-            LoriaPlan { workers: 0, ..quick.clone() },
-            LoriaPlan { robots: vec![4_000_000_000], ..quick.clone() },
-            LoriaPlan { operations: Vec::new(), ..quick.clone() },
+            LoriaConfig { seeds: 1, ..quick.clone() },
+            LoriaConfig { cycles: u64::MAX, ..quick.clone() },
+            LoriaConfig { error_levels: vec![f64::NAN], ..quick.clone() },
+            LoriaConfig { workers: 0, ..quick.clone() },
+            LoriaConfig { robots: vec![4_000_000_000], ..quick.clone() },
+            LoriaConfig { operations: Vec::new(), ..quick.clone() },
         ];
         for plan in wrong {
             let outcome = run(&plan, &mut |_, _| panic!("nothing runs"));
             assert!(matches!(outcome, Err(LoriaError::Plan(_))), "{plan:?}");
         }
-        assert!(LoriaPlan::default().check().is_ok() && quick.check().is_ok());
+        assert!(LoriaConfig::default().check().is_ok() && quick.check().is_ok());
     }
 
     #[test]
     fn a_failing_recorder_ends_the_experiment_with_its_error() {
         let mut full = |_: &[TableSchema]| Err(RecordError::new("disk", "full"));
-        let outcome = run_recorded(&LoriaPlan::quick(), &mut full, &mut |_, _| {});
+        let outcome = run_recorded(&LoriaConfig::quick(), &mut full, &mut |_, _| {});
         assert!(matches!(outcome, Err(LoriaError::Record(e)) if e.cause == "full"));
     }
 }

@@ -6,8 +6,8 @@
 //! speed-up is the most that the machine could give at that moment.
 
 use super::floor::Floor;
-use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
-use super::{LoriaPlan, NewRecorder};
+use super::timing::{SEGMENTS, TimedRun, Workload, arithmetic, time_interleaved, time_s};
+use super::{LoriaConfig, NewRecorder};
 use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use serde::Serialize;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// Times of a load with a number of workers.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Timing {
+pub(super) struct LoadTiming {
     /// Number of the load.
     pub(super) load: usize,
     /// Workers.
@@ -37,7 +37,7 @@ pub(super) struct Timing {
 
 /// The cost of a run before its first cycle.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Initialization {
+pub(super) struct InitializationCost {
     /// Number of the load.
     pub(super) load: usize,
     /// Seconds to read the scenario, compile the world and place all bodies.
@@ -56,15 +56,15 @@ const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
 /// The parallel performance experiment.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Performance {
+pub(super) struct PerformanceResults {
     /// Processors that the run may use.
     pub(super) processors: usize,
     /// The timed loads.
-    pub(super) loads: Vec<Load>,
+    pub(super) loads: Vec<Workload>,
     /// The times.
-    pub(super) timings: Vec<Timing>,
+    pub(super) timings: Vec<LoadTiming>,
     /// Initialization of each load.
-    pub(super) initialization: Vec<Initialization>,
+    pub(super) initialization: Vec<InitializationCost>,
     /// Digest after the same cycles of the same run, by number of workers.
     pub(super) digests: Vec<(usize, String)>,
     /// Digest of the same run recorded.
@@ -72,9 +72,9 @@ pub(super) struct Performance {
 }
 
 /// Returns the loads of the experiment: sparse and dense, each at every cost of a decision.
-pub(super) fn loads(plan: &LoriaPlan) -> Vec<Load> {
+pub(super) fn loads(plan: &LoriaConfig) -> Vec<Workload> {
     let floor = Arc::new(Floor::large());
-    let load = |&(robots, operations): &(u32, u32)| Load {
+    let load = |&(robots, operations): &(u32, u32)| Workload {
         robots,
         people: robots / 5,
         size: 2,
@@ -95,13 +95,13 @@ pub(super) fn worker_counts(most: usize) -> Vec<usize> {
     counts
 }
 
-impl Performance {
+impl PerformanceResults {
     /// Runs the experiment.
     ///
     /// # Errors
     /// When a recording fails.
     pub(super) fn run(
-        plan: &LoriaPlan,
+        plan: &LoriaConfig,
         recorders: &mut NewRecorder<'_>,
         report: &mut Progress<'_>,
     ) -> Result<Self, RecordError> {
@@ -111,12 +111,12 @@ impl Performance {
             report("parallel performance", index as f64 / loads.len() as f64);
             let times = time_load(plan, load, recorders)?;
             let of_load = timings.len()..;
-            timings.extend(times.into_iter().map(|timing| Timing { load: index, ..timing }));
+            timings.extend(times.into_iter().map(|timing| LoadTiming { load: index, ..timing }));
             initialization.push(initialize(index, load, &timings[of_load], plan.repeats));
         }
         let (digests, recorded_digest) = digests(&loads[0], recorders)?;
         Ok(Self {
-            processors: sidestep::kernel::workers::available(),
+            processors: sidestep::kernel::workers::available_workers(),
             loads,
             timings,
             initialization,
@@ -131,53 +131,53 @@ impl Performance {
     }
 
     /// Returns the greatest number of workers that was timed.
-    pub(super) fn most_workers(&self) -> usize {
+    pub(super) fn max_workers(&self) -> usize {
         self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
     }
 
     /// Returns the timings with the most workers.
-    pub(super) fn at_most_workers(&self, recorded: bool) -> impl Iterator<Item = &Timing> {
-        let most = self.most_workers();
+    pub(super) fn at_max_workers(&self, recorded: bool) -> impl Iterator<Item = &LoadTiming> {
+        let most = self.max_workers();
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
     }
 
     /// Returns whether the machine itself gave less than this share of the workers' worth: then other
     /// processes were using it, and times mean little.
-    pub(super) fn was_busy(&self) -> bool {
+    pub(super) fn is_machine_busy(&self) -> bool {
         const SHARE: f64 = 0.85;
-        let least = SHARE * self.most_workers() as f64;
-        self.at_most_workers(false).any(|timing| timing.machine.or_zero() < least)
+        let least = SHARE * self.max_workers() as f64;
+        self.at_max_workers(false).any(|timing| timing.machine.mean_or_zero() < least)
     }
 
     /// Returns the mean efficiency of all loads, unrecorded, with the most workers, by repeat.
     pub(super) fn efficiency(&self) -> Estimate {
-        let workers = self.most_workers() as f64;
-        let loads: Vec<&Timing> = self.at_most_workers(false).collect();
+        let workers = self.max_workers() as f64;
+        let loads: Vec<&LoadTiming> = self.at_max_workers(false).collect();
         let repeats = loads.iter().map(|t| t.ratios.len()).min().unwrap_or(0);
         let mean = |k: usize| {
             let of_repeat: Option<Vec<f64>> = loads.iter().map(|t| t.ratios[k]).collect();
             Some(sidestep::statistics::mean(&of_repeat?)? / workers)
         };
-        Estimate::of_factors((0..repeats).map(mean))
+        Estimate::from_factors((0..repeats).map(mean))
     }
 
     /// Returns the speed-up of the costliest decisions minus that of the cheapest, same robots,
     /// unrecorded, with the most workers; one value per repeat and number of robots.
     pub(super) fn gain_by_cost(&self) -> Estimate {
         let (mut cheap, mut costly) = (Vec::new(), Vec::new());
-        let cost = |timing: &Timing| self.loads[timing.load].operations;
+        let cost = |timing: &LoadTiming| self.loads[timing.load].operations;
         let extremes = [
             self.loads.iter().map(|l| l.operations).min(),
             self.loads.iter().map(|l| l.operations).max(),
         ];
-        for timing in self.at_most_workers(false) {
+        for timing in self.at_max_workers(false) {
             if Some(cost(timing)) == extremes[0] {
                 cheap.extend(timing.ratios.iter().copied());
             } else if Some(cost(timing)) == extremes[1] {
                 costly.extend(timing.ratios.iter().copied());
             }
         }
-        Estimate::paired(&costly, &cheap)
+        Estimate::paired_difference(&costly, &cheap)
     }
 
     /// Returns the tables of this experiment.
@@ -187,7 +187,7 @@ impl Performance {
 
     fn times_table(&self) -> Table {
         let note = format!(
-            "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
+            "Mean [95 % interval] over repeats, each the best of {SEGMENTS} stretches that take \
              turns; {} processors. Time includes recording where it says so, and excludes \
              initialization. The machine's speed-up is that of mere arithmetic, timed in turn: \
              where it is well below the number of workers, others were using the machine. The \
@@ -195,7 +195,8 @@ impl Performance {
              to the faster.",
             self.processors
         );
-        let per = |timing: &Timing, of: f64| format!("{:.2}", timing.speed_up.or_zero() / of);
+        let per =
+            |timing: &LoadTiming, of: f64| format!("{:.2}", timing.speed_up.mean_or_zero() / of);
         table(
             "Execution time, speed-up and efficiency",
             note,
@@ -209,14 +210,14 @@ impl Performance {
                 ("efficiency", &|timing| per(timing, timing.workers as f64)),
                 ("the machine's speed-up", &|timing| timing.machine.to_string()),
                 ("share of it", &|timing| {
-                    per(timing, timing.machine.or_zero().max(f64::MIN_POSITIVE))
+                    per(timing, timing.machine.mean_or_zero().max(f64::MIN_POSITIVE))
                 }),
             ],
         )
     }
 
     fn initialization_table(&self) -> Table {
-        let most = self.most_workers();
+        let most = self.max_workers();
         let title = format!("Initialization, of a run of {REFERENCE_CYCLES} cycles");
         let together = format!("share, {most} workers");
         let note = "Median of seconds, mean of shares over repeats. Initialization is not parallel: \
@@ -240,16 +241,16 @@ impl Performance {
                     the digest with that of another machine.";
         let mut table = Table::new("The same bits", note, &["workers", "recorded", "digest"]);
         for (workers, digest) in &self.digests {
-            table.row([workers.to_string(), "no".into(), digest.clone()]);
+            table.push_row([workers.to_string(), "no".into(), digest.clone()]);
         }
-        table.row(["2".into(), "yes".into(), self.recorded_digest.clone()]);
+        table.push_row(["2".into(), "yes".into(), self.recorded_digest.clone()]);
         table
     }
 
     /// Returns the figures of this experiment: speed-up and time over workers.
     pub(super) fn figures(&self) -> Vec<Figure> {
-        let speed_up: fn(&Timing) -> &Estimate = |t| &t.speed_up;
-        let cycle_ms: fn(&Timing) -> &Estimate = |t| &t.cycle_ms;
+        let speed_up: fn(&LoadTiming) -> &Estimate = |t| &t.speed_up;
+        let cycle_ms: fn(&LoadTiming) -> &Estimate = |t| &t.cycle_ms;
         vec![
             self.figure("Speed-up", "time of 1 worker / time", false, speed_up),
             self.figure("Speed-up, recorded", "time of 1 worker / time", true, speed_up),
@@ -262,9 +263,9 @@ impl Performance {
         title: &str,
         y_label: &str,
         recorded: bool,
-        quantity: fn(&Timing) -> &Estimate,
+        quantity: fn(&LoadTiming) -> &Estimate,
     ) -> Figure {
-        let line = |(index, load): (usize, &Load)| {
+        let line = |(index, load): (usize, &Workload)| {
             let timings = self.timings.iter().filter(|t| t.load == index && t.recorded == recorded);
             let points = timings.filter_map(|t| quantity(t).point(t.workers as f64)).collect();
             Series { name: load.name(), points }
@@ -278,86 +279,93 @@ impl Performance {
 }
 
 /// A participant of the timings, which take turns.
-enum Contestant {
-    Run(Box<Timed>, usize, bool),
+enum TimedCandidate {
+    Run(Box<TimedRun>, usize, bool),
     Arithmetic(usize),
 }
 
 /// Returns all contestants of a load: unrecorded, recorded, and arithmetic, each with every number
 /// of workers; each has been run once.
-fn contestants(
-    plan: &LoriaPlan,
-    load: &Load,
+fn timed_candidates(
+    plan: &LoriaConfig,
+    load: &Workload,
     recorders: &mut NewRecorder<'_>,
-) -> Result<Vec<Contestant>, RecordError> {
+) -> Result<Vec<TimedCandidate>, RecordError> {
     let counts = worker_counts(plan.most_workers);
     let mut all = Vec::new();
     for &workers in &counts {
-        let mut plain = Timed::new(load, workers);
-        let mut recorded = Timed::recorded(load, workers, recorders)?;
+        let mut plain = TimedRun::new(load, workers);
+        let mut recorded = TimedRun::recorded(load, workers, recorders)?;
         for run in [&mut plain, &mut recorded] {
             run.run(load.cycles(plan.timed_robot_cycles))?;
         }
-        all.push(Contestant::Run(Box::new(plain), workers, false));
-        all.push(Contestant::Run(Box::new(recorded), workers, true));
+        all.push(TimedCandidate::Run(Box::new(plain), workers, false));
+        all.push(TimedCandidate::Run(Box::new(recorded), workers, true));
     }
-    all.extend(counts.into_iter().map(Contestant::Arithmetic));
+    all.extend(counts.into_iter().map(TimedCandidate::Arithmetic));
     Ok(all)
 }
 
 /// Times one load, unrecorded and recorded, with every number of workers.
 fn time_load(
-    plan: &LoriaPlan,
-    load: &Load,
+    plan: &LoriaConfig,
+    load: &Workload,
     recorders: &mut NewRecorder<'_>,
-) -> Result<Vec<Timing>, RecordError> {
+) -> Result<Vec<LoadTiming>, RecordError> {
     let cycles = load.cycles(plan.timed_robot_cycles);
-    let mut all = contestants(plan, load, recorders)?;
-    let times_s = race(&mut all, plan.repeats, |contestant| match contestant {
-        Contestant::Run(run, ..) => run.run(cycles),
-        Contestant::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
+    let mut all = timed_candidates(plan, load, recorders)?;
+    let times_s = time_interleaved(&mut all, plan.repeats, |contestant| match contestant {
+        TimedCandidate::Run(run, ..) => run.run(cycles),
+        TimedCandidate::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
     })?;
     let machine = |wanted: usize| {
-        let is = |c: &Contestant| matches!(c, Contestant::Arithmetic(w) if *w == wanted);
+        let is = |c: &TimedCandidate| matches!(c, TimedCandidate::Arithmetic(w) if *w == wanted);
         all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
     };
     let alone = |wanted: bool| {
-        let is = |c: &Contestant| matches!(c, Contestant::Run(_, 1, r) if *r == wanted);
+        let is = |c: &TimedCandidate| matches!(c, TimedCandidate::Run(_, 1, r) if *r == wanted);
         all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
     };
-    let timing = |(contestant, times_s): (&Contestant, &Vec<Option<f64>>)| {
-        let &Contestant::Run(_, workers, recorded) = contestant else { return None };
+    let timing = |(contestant, times_s): (&TimedCandidate, &Vec<Option<f64>>)| {
+        let &TimedCandidate::Run(_, workers, recorded) = contestant else { return None };
         let ratio = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
         let ratios: Vec<Option<f64>> = alone(recorded).iter().zip(times_s).map(ratio).collect();
-        Some(Timing {
+        Some(LoadTiming {
             load: 0,
             workers,
             recorded,
-            cycle_ms: Estimate::of(times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::of_factors(ratios.iter().copied()),
+            cycle_ms: Estimate::from_values(
+                times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64)),
+            ),
+            speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::ratio(machine(1), machine(workers)),
+            machine: Estimate::geometric_ratio(machine(1), machine(workers)),
         })
     };
-    let mut timings: Vec<Timing> = all.iter().zip(&times_s).filter_map(timing).collect();
+    let mut timings: Vec<LoadTiming> = all.iter().zip(&times_s).filter_map(timing).collect();
     timings.sort_by_key(|timing| (timing.recorded, timing.workers));
     for contestant in all {
-        if let Contestant::Run(run, ..) = contestant {
+        if let TimedCandidate::Run(run, ..) = contestant {
             run.finish()?;
         }
     }
     Ok(timings)
 }
 
-fn initialize(index: usize, load: &Load, timings: &[Timing], repeats: usize) -> Initialization {
-    let times_s: Vec<f64> = (0..repeats).map(|_| seconds(|| load.simulation(1)).0).collect();
+fn initialize(
+    index: usize,
+    load: &Workload,
+    timings: &[LoadTiming],
+    repeats: usize,
+) -> InitializationCost {
+    let times_s: Vec<f64> = (0..repeats).map(|_| time_s(|| load.simulation(1)).0).collect();
     let unrecorded = || timings.iter().filter(|t| !t.recorded);
-    let share = |timing: Option<&Timing>| {
-        let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.or_zero()) * 1e-3;
+    let share = |timing: Option<&LoadTiming>| {
+        let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.mean_or_zero()) * 1e-3;
         let of = |s: &f64| Some(s / (s + cycle_s * REFERENCE_CYCLES as f64));
-        Estimate::of(times_s.iter().map(of))
+        Estimate::from_values(times_s.iter().map(of))
     };
-    Initialization {
+    InitializationCost {
         load: index,
         seconds: median(times_s.iter().copied()),
         share_alone: share(unrecorded().next()),
@@ -367,7 +375,7 @@ fn initialize(index: usize, load: &Load, timings: &[Timing], repeats: usize) -> 
 
 /// Returns the digests of one run by number of workers, and of the recorded run.
 fn digests(
-    load: &Load,
+    load: &Workload,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<(Vec<(usize, String)>, String), RecordError> {
     const CYCLES: u64 = 100;
@@ -377,7 +385,7 @@ fn digests(
         run.advance(CYCLES);
         digests.push((workers, run.digest().to_string()));
     }
-    let mut run = Timed::recorded(load, 2, recorders)?;
+    let mut run = TimedRun::recorded(load, 2, recorders)?;
     run.run(CYCLES)?;
     let recorded = run.simulation().digest().to_string();
     run.finish()?;

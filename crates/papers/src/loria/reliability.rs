@@ -1,10 +1,10 @@
 //! Reliability: the same floors under the four regimes, and sensors against effectors at equal
 //! error level.
 
-use super::LoriaPlan;
-use super::errors::{Beams, Spread};
-use super::floor::{Floor, Mind};
-use super::measure::{Measure, Outcome, Tables, Variant, measure_all, values};
+use super::LoriaConfig;
+use super::errors::{BeamCount, ErrorSpread};
+use super::floor::{AvoidancePolicy, Floor};
+use super::measure::{ErrorTables, LoriaVariant, Measure, RunMeasures, measure_all, values};
 use crate::cells::figure;
 use crate::study::Progress;
 use serde::Serialize;
@@ -20,14 +20,14 @@ pub(super) struct VariantOutcomes {
     /// Name of the floor.
     pub(super) floor: String,
     /// The variant that was run.
-    pub(super) variant: Variant,
+    pub(super) variant: LoriaVariant,
     /// Its outcomes.
-    pub(super) outcomes: Vec<Outcome>,
+    pub(super) outcomes: Vec<RunMeasures>,
 }
 
 /// All runs of the reliability experiment.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Reliability {
+pub(super) struct ReliabilityResults {
     /// The floors, in words.
     pub(super) floors: Vec<String>,
     /// Every variant with its outcomes.
@@ -38,24 +38,24 @@ pub(super) struct Reliability {
 
 /// The selection of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Key<'a> {
+pub(super) struct CellKey<'a> {
     /// Name of the floor.
     pub(super) floor: &'a str,
     /// Law for blocked paths.
     pub(super) rule: ObstacleRule,
     /// The behavior of the robots.
-    pub(super) mind: Mind,
+    pub(super) mind: AvoidancePolicy,
     /// Their errors.
-    pub(super) tables: Tables,
+    pub(super) tables: ErrorTables,
 }
 
-impl Key<'_> {
+impl CellKey<'_> {
     /// The medium floor, rule `cut`, avoiding robots, presets.
-    pub(super) const BASE: Key<'static> = Key {
+    pub(super) const BASE: CellKey<'static> = CellKey {
         floor: "medium",
         rule: ObstacleRule::Cut,
-        mind: Mind::Avoid,
-        tables: Tables::Presets,
+        mind: AvoidancePolicy::Avoid,
+        tables: ErrorTables::Presets,
     };
 }
 
@@ -78,13 +78,13 @@ pub(super) const STRAIGHTNESS: Measure = MEASURES[4].1;
 /// Sideways moves per 1000 actions.
 pub(super) const LATERAL: Measure = MEASURES[5].1;
 
-impl Reliability {
+impl ReliabilityResults {
     /// Runs the experiment.
-    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
         let outcomes = measure_all(&variants, plan, "reliability", report);
-        let cell = |(variant, outcomes): (Variant, _)| VariantOutcomes {
+        let cell = |(variant, outcomes): (LoriaVariant, _)| VariantOutcomes {
             floor: variant.floor.name.into(),
             variant,
             outcomes,
@@ -98,9 +98,12 @@ impl Reliability {
 
     /// Returns made-up outcomes of every variant, by seed.
     #[cfg(test)]
-    pub(super) fn made_up(plan: &LoriaPlan, of: impl Fn(&Variant, usize) -> Outcome) -> Self {
+    pub(super) fn synthetic(
+        plan: &LoriaConfig,
+        of: impl Fn(&LoriaVariant, usize) -> RunMeasures,
+    ) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
-        let cell = |variant: Variant| VariantOutcomes {
+        let cell = |variant: LoriaVariant| VariantOutcomes {
             floor: variant.floor.name.into(),
             outcomes: (1..=plan.seeds).map(|seed| of(&variant, seed)).collect(),
             variant,
@@ -112,7 +115,7 @@ impl Reliability {
     /// Returns the values by seed of one measure in one cell; empty for a cell that was not run.
     pub(super) fn values(
         &self,
-        key: Key<'_>,
+        key: CellKey<'_>,
         regime: Regime,
         measure: Measure,
     ) -> Vec<Option<f64>> {
@@ -128,67 +131,79 @@ impl Reliability {
     }
 
     /// Returns the mean of a measure in one cell.
-    pub(super) fn estimate(&self, key: Key<'_>, regime: Regime, measure: Measure) -> Estimate {
-        Estimate::of(self.values(key, regime, measure))
+    pub(super) fn estimate(&self, key: CellKey<'_>, regime: Regime, measure: Measure) -> Estimate {
+        Estimate::from_values(self.values(key, regime, measure))
     }
 
     /// Returns the paired difference of a measure between two regimes, `a - b`.
     pub(super) fn difference(
         &self,
-        key: Key<'_>,
+        key: CellKey<'_>,
         [a, b]: [Regime; 2],
         measure: Measure,
     ) -> Estimate {
-        Estimate::paired(&self.values(key, a, measure), &self.values(key, b, measure))
+        Estimate::paired_difference(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
     /// Returns the ratio of a measure between two regimes seed by seed, `a / b`.
-    pub(super) fn ratio(&self, key: Key<'_>, [a, b]: [Regime; 2], measure: Measure) -> Estimate {
-        Estimate::ratio(&self.values(key, a, measure), &self.values(key, b, measure))
+    pub(super) fn ratio(
+        &self,
+        key: CellKey<'_>,
+        [a, b]: [Regime; 2],
+        measure: Measure,
+    ) -> Estimate {
+        Estimate::geometric_ratio(&self.values(key, a, measure), &self.values(key, b, measure))
     }
 
     /// Returns the paired difference of a measure between two minds under one regime, `a - b`.
-    pub(super) fn between_minds(
+    pub(super) fn between_policies(
         &self,
-        [a, b]: [Mind; 2],
+        [a, b]: [AvoidancePolicy; 2],
         regime: Regime,
         measure: Measure,
     ) -> Estimate {
-        let of = |mind| self.values(Key { mind, ..Key::BASE }, regime, measure);
-        Estimate::paired(&of(a), &of(b))
+        let of = |mind| self.values(CellKey { mind, ..CellKey::BASE }, regime, measure);
+        Estimate::paired_difference(&of(a), &of(b))
     }
 
     /// Returns keys of the places where the four regimes were run under the presets.
-    pub(super) fn places(&self) -> Vec<Key<'static>> {
-        let rules = ObstacleRule::ALL.map(|rule| Key { rule, ..Key::BASE });
-        let floors = ["small", "large"].map(|floor| Key { floor, ..Key::BASE });
-        let minds = [Mind::Touch, Mind::Filter].map(|mind| Key { mind, ..Key::BASE });
+    pub(super) fn base_keys(&self) -> Vec<CellKey<'static>> {
+        let rules = ObstacleRule::ALL.map(|rule| CellKey { rule, ..CellKey::BASE });
+        let floors = ["small", "large"].map(|floor| CellKey { floor, ..CellKey::BASE });
+        let minds = [AvoidancePolicy::Touch, AvoidancePolicy::Filter]
+            .map(|mind| CellKey { mind, ..CellKey::BASE });
         rules.into_iter().chain(floors).chain(minds).collect()
     }
 
     /// Returns the errors that cause more contacts, at every point of the sweep over equal error levels.
-    pub(super) fn larger(&self) -> Vec<Larger> {
+    pub(super) fn dominant_errors(&self) -> Vec<DominantError> {
         let points = SweepCase::all().flat_map(|case| self.levels.iter().map(move |&e| (case, e)));
         let pair = [Regime::Sensors, Regime::Effectors];
         let difference = |case: SweepCase, e| self.difference(case.key(e), pair, CONTACTS);
         let all: Vec<_> = points.map(|(case, e)| (case, e, difference(case, e))).collect();
         let p_values: Vec<_> = all.iter().map(|(.., difference)| difference.p_value(0.0)).collect();
-        let named = |((case, level, of), p): ((SweepCase, f64, Estimate), Option<f64>)| Larger {
-            case,
-            level,
-            by: match (p.is_some_and(|p| p < 0.05), of.or_zero() > 0.0) {
-                (false, _) => NOBODY,
-                (true, true) => SENSORS,
-                (true, false) => EFFECTORS,
-            },
-            sensors_less_effectors: of,
-        };
+        let named =
+            |((case, level, of), p): ((SweepCase, f64, Estimate), Option<f64>)| DominantError {
+                case,
+                level,
+                by: match (p.is_some_and(|p| p < 0.05), of.mean_or_zero() > 0.0) {
+                    (false, _) => INCONCLUSIVE,
+                    (true, true) => SENSORS,
+                    (true, false) => EFFECTORS,
+                },
+                sensors_less_effectors: of,
+            };
         all.into_iter().zip(holm(&p_values)).map(named).collect()
     }
 
     /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
-        vec![self.regimes_table(), self.differences_table(), self.sweep_table(), self.minds_table()]
+        vec![
+            self.regimes_table(),
+            self.differences_table(),
+            self.sweep_table(),
+            self.policies_table(),
+        ]
     }
 
     fn regimes_table(&self) -> Table {
@@ -201,10 +216,12 @@ impl Reliability {
             self.floors.join("; ")
         );
         let mut table = Table::new("Four regimes", note, &columns);
-        for key in self.places() {
+        for key in self.base_keys() {
             for regime in Regime::ALL {
                 let estimates = MEASURES.map(|(_, m)| self.estimate(key, regime, m).to_string());
-                table.row(names(key).into_iter().chain([regime.name().into()]).chain(estimates));
+                table.push_row(
+                    names(key).into_iter().chain([regime.name().into()]).chain(estimates),
+                );
             }
         }
         table
@@ -227,13 +244,13 @@ impl Reliability {
         let note = "Paired by seed: both runs of a pair start alike and share every draw that the \
                     regime does not change. Contacts per 1000 actions; mean [95 % interval].";
         let mut table = Table::new("What each error adds", note, &columns);
-        for key in self.places() {
+        for key in self.base_keys() {
             let contacts = [[Effectors, Reliable], [Sensors, Reliable], [Sensors, Effectors]]
                 .map(|pair| self.difference(key, pair, CONTACTS).to_string());
             let pairs =
                 [[Effectors, Reliable], [Sensors, Reliable], [Both, Reliable], [Both, Sensors]];
             let trips = pairs.map(|pair| self.ratio(key, pair, TRIP).to_string());
-            table.row(names(key).into_iter().chain(contacts).chain(trips));
+            table.push_row(names(key).into_iter().chain(contacts).chain(trips));
         }
         table
     }
@@ -256,17 +273,17 @@ impl Reliability {
                     where it is sure by Holm's correction over all rows.";
         let title = "Sensors against effectors at equal error level e";
         let mut table = Table::new(title, note, &columns);
-        for Larger { case, level, sensors_less_effectors, by } in self.larger() {
+        for DominantError { case, level, sensors_less_effectors, by } in self.dominant_errors() {
             let of = |regime| self.estimate(case.key(level), regime, CONTACTS).to_string();
             let contacts = [of(Regime::Effectors), of(Regime::Sensors)];
             let names = case.names().into_iter().chain([format!("{level}")]);
             let told = [sensors_less_effectors.to_string(), by.into()];
-            table.row(names.chain(contacts).chain(told));
+            table.push_row(names.chain(contacts).chain(told));
         }
         table
     }
 
-    fn minds_table(&self) -> Table {
+    fn policies_table(&self) -> Table {
         let columns = [
             "errors",
             "contacts: touch - avoid",
@@ -279,10 +296,13 @@ impl Reliability {
                     `filter` believes two reports only.";
         let mut table = Table::new("Behaviours under each regime", note, &columns);
         for regime in Regime::ALL {
-            let pairs = [[Mind::Touch, Mind::Avoid], [Mind::Filter, Mind::Avoid]];
-            let contacts = pairs.map(|p| self.between_minds(p, regime, CONTACTS).to_string());
-            let trips = pairs.map(|p| self.between_minds(p, regime, TRIP).to_string());
-            table.row([regime.name().into()].into_iter().chain(contacts).chain(trips));
+            let pairs = [
+                [AvoidancePolicy::Touch, AvoidancePolicy::Avoid],
+                [AvoidancePolicy::Filter, AvoidancePolicy::Avoid],
+            ];
+            let contacts = pairs.map(|p| self.between_policies(p, regime, CONTACTS).to_string());
+            let trips = pairs.map(|p| self.between_policies(p, regime, TRIP).to_string());
+            table.push_row([regime.name().into()].into_iter().chain(contacts).chain(trips));
         }
         table
     }
@@ -290,23 +310,27 @@ impl Reliability {
     /// Returns the figures of this experiment.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let bars = [
-            self.bars("Contacts under the four regimes", "contacts per 1000 actions", CONTACTS),
-            self.bars("A to-and-fro trip under the four regimes", "cycles per trip", TRIP),
-            self.bars(
+            self.regime_bars(
+                "Contacts under the four regimes",
+                "contacts per 1000 actions",
+                CONTACTS,
+            ),
+            self.regime_bars("A to-and-fro trip under the four regimes", "cycles per trip", TRIP),
+            self.regime_bars(
                 "Straightness of trajectories",
                 "net displacement / path length",
                 STRAIGHTNESS,
             ),
         ];
-        let sweeps = SweepCase::MINDS.map(|(mind, beams)| self.sweep_figure(mind, beams));
+        let sweeps = SweepCase::POLICIES.map(|(mind, beams)| self.sweep_figure(mind, beams));
         bars.into_iter().chain(sweeps).collect()
     }
 
     /// Returns one bar per regime, one series per obstacle rule.
-    fn bars(&self, title: &str, y_label: &str, measure: Measure) -> Figure {
+    fn regime_bars(&self, title: &str, y_label: &str, measure: Measure) -> Figure {
         let series = ObstacleRule::ALL.map(|rule| {
             let at = |(x, &regime): (usize, &Regime)| {
-                self.estimate(Key { rule, ..Key::BASE }, regime, measure).point(x as f64)
+                self.estimate(CellKey { rule, ..CellKey::BASE }, regime, measure).point(x as f64)
             };
             let points = Regime::ALL.iter().enumerate().filter_map(at).collect();
             Series { name: format!("rule {}", rule.name()), points }
@@ -318,7 +342,7 @@ impl Reliability {
         }
     }
 
-    fn sweep_figure(&self, mind: Mind, beams: Beams) -> Figure {
+    fn sweep_figure(&self, mind: AvoidancePolicy, beams: BeamCount) -> Figure {
         let line = |name: &str, regime, spread| {
             let case = SweepCase { mind, beams, spread };
             let at = |&e: &f64| self.estimate(case.key(e), regime, CONTACTS).point(e);
@@ -329,9 +353,9 @@ impl Reliability {
             &format!("Contacts at equal error level: {}, {n} beams", mind.name()),
             ["error level e", "contacts per 1000 actions"],
             vec![
-                line("effectors only", Regime::Effectors, Spread::Even),
-                line("sensors only, even", Regime::Sensors, Spread::Even),
-                line("sensors only, blind", Regime::Sensors, Spread::Blind),
+                line("effectors only", Regime::Effectors, ErrorSpread::Even),
+                line("sensors only, even", Regime::Sensors, ErrorSpread::Even),
+                line("sensors only, blind", Regime::Sensors, ErrorSpread::Blind),
             ],
         )
     }
@@ -341,26 +365,29 @@ impl Reliability {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SweepCase {
     /// The behavior of the robots.
-    pub(super) mind: Mind,
+    pub(super) mind: AvoidancePolicy,
     /// Their number of beams.
-    pub(super) beams: Beams,
+    pub(super) beams: BeamCount,
     /// The distribution of the sensor's error mass.
-    pub(super) spread: Spread,
+    pub(super) spread: ErrorSpread,
 }
 
 impl SweepCase {
-    const MINDS: [(Mind, Beams); 3] =
-        [(Mind::Avoid, Beams::Sixteen), (Mind::Filter, Beams::Sixteen), (Mind::Avoid, Beams::Four)];
+    const POLICIES: [(AvoidancePolicy, BeamCount); 3] = [
+        (AvoidancePolicy::Avoid, BeamCount::Sixteen),
+        (AvoidancePolicy::Filter, BeamCount::Sixteen),
+        (AvoidancePolicy::Avoid, BeamCount::Four),
+    ];
 
     /// Returns all cases of the sweep.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let case = |(mind, beams)| Spread::ALL.map(|spread| Self { mind, beams, spread });
-        Self::MINDS.into_iter().flat_map(case)
+        let case = |(mind, beams)| ErrorSpread::ALL.map(|spread| Self { mind, beams, spread });
+        Self::POLICIES.into_iter().flat_map(case)
     }
 
-    fn key(self, e: f64) -> Key<'static> {
-        let tables = Tables::Equal(e, self.spread, self.beams);
-        Key { mind: self.mind, tables, ..Key::BASE }
+    fn key(self, e: f64) -> CellKey<'static> {
+        let tables = ErrorTables::Equal(e, self.spread, self.beams);
+        CellKey { mind: self.mind, tables, ..CellKey::BASE }
     }
 
     /// Returns behavior, number of beams and recipe, for tables.
@@ -375,11 +402,11 @@ pub(super) const SENSORS: &str = "sensors";
 /// See [`SENSORS`].
 pub(super) const EFFECTORS: &str = "effectors";
 /// See [`SENSORS`].
-pub(super) const NOBODY: &str = "cannot be told";
+pub(super) const INCONCLUSIVE: &str = "cannot be told";
 
 /// A point of the sweep over equal error levels.
 #[derive(Debug, Clone)]
-pub(super) struct Larger {
+pub(super) struct DominantError {
     pub(super) case: SweepCase,
     pub(super) level: f64,
     /// Contacts by sensor errors alone minus those by effector errors alone.
@@ -388,41 +415,45 @@ pub(super) struct Larger {
     pub(super) by: &'static str,
 }
 
-fn names(key: Key<'_>) -> [String; 3] {
+fn names(key: CellKey<'_>) -> [String; 3] {
     [key.floor.into(), key.rule.name().into(), key.mind.name().into()]
 }
 
 /// Returns whether two tables err alike under a regime.
-fn same_errors(a: Tables, b: Tables, regime: Regime) -> bool {
+fn same_errors(a: ErrorTables, b: ErrorTables, regime: Regime) -> bool {
     match (a, b, regime) {
-        (Tables::Equal(e, _, m), Tables::Equal(f, _, n), Regime::Effectors) => (e, m) == (f, n),
+        (ErrorTables::Equal(e, _, m), ErrorTables::Equal(f, _, n), Regime::Effectors) => {
+            (e, m) == (f, n)
+        }
         _ => a == b,
     }
 }
 
-fn variants(floors: &[Arc<Floor>; 3], plan: &LoriaPlan) -> Vec<Variant> {
+fn variants(floors: &[Arc<Floor>; 3], plan: &LoriaConfig) -> Vec<LoriaVariant> {
     let [medium, small, large] = floors;
-    let base = |floor, regime| Variant::new(floor, regime);
+    let base = |floor, regime| LoriaVariant::new(floor, regime);
     let mut variants = Vec::new();
     for regime in Regime::ALL {
         let rules = ObstacleRule::ALL;
-        variants
-            .extend(rules.map(|obstacle_rule| Variant { obstacle_rule, ..base(medium, regime) }));
+        variants.extend(
+            rules.map(|obstacle_rule| LoriaVariant { obstacle_rule, ..base(medium, regime) }),
+        );
         variants.extend([small, large].map(|floor| base(floor, regime)));
         variants.extend(
-            [Mind::Touch, Mind::Filter].map(|mind| Variant { mind, ..base(medium, regime) }),
+            [AvoidancePolicy::Touch, AvoidancePolicy::Filter]
+                .map(|mind| LoriaVariant { mind, ..base(medium, regime) }),
         );
     }
-    for (mind, beams) in SweepCase::MINDS {
+    for (mind, beams) in SweepCase::POLICIES {
         for &e in &plan.error_levels {
-            let at = |regime, spread| Variant {
+            let at = |regime, spread| LoriaVariant {
                 mind,
-                tables: Tables::Equal(e, spread, beams),
+                tables: ErrorTables::Equal(e, spread, beams),
                 size: beams.size(),
                 ..base(medium, regime)
             };
-            variants.push(at(Regime::Effectors, Spread::Even));
-            variants.extend(Spread::ALL.map(|spread| at(Regime::Sensors, spread)));
+            variants.push(at(Regime::Effectors, ErrorSpread::Even));
+            variants.extend(ErrorSpread::ALL.map(|spread| at(Regime::Sensors, spread)));
         }
     }
     variants

@@ -1,11 +1,11 @@
 //! Ways of robots as pictures: on the medium floor, without errors and with both kinds.
 
-use super::LoriaPlan;
+use super::LoriaConfig;
 use super::floor::Floor;
-use super::measure::{Track, Variant, recorded};
+use super::measure::{LoriaVariant, Track, run_recorded};
 use crate::Scene;
 use sidestep::kernel::ports::Values;
-use sidestep::kernel::view::{Kind, Look, Trail, Who};
+use sidestep::kernel::view::{BodyId, BodyKind, FrameOptions, Trail};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::worlds::robots::world::Regime;
 use std::sync::Arc;
@@ -13,32 +13,32 @@ use std::sync::Arc;
 /// Cycles of a run: by then all robots are on their way.
 const CYCLES: Cycle = 600;
 /// Cycles at the end of the run for which ways are shown.
-const SEEN: Cycle = 400;
+const TRAIL_CYCLES: Cycle = 400;
 /// The seed of all scenes.
 const SEED: u64 = 1;
 
 /// Returns all pictures: the same floor and seed, without errors and with both.
-pub fn all(plan: &LoriaPlan) -> [Scene; 2] {
+pub fn all(plan: &LoriaConfig) -> [Scene; 2] {
     let floor = Arc::new(Floor::medium());
     let scene =
-        |title, regime| scene(title, &Variant::new(&floor, regime), CYCLES.min(plan.cycles));
+        |title, regime| scene(title, &LoriaVariant::new(&floor, regime), CYCLES.min(plan.cycles));
     [
         scene("Ways of robots, all reliable", Regime::Reliable),
         scene("Ways of the same robots, sensors and effectors unreliable", Regime::Both),
     ]
 }
 
-fn scene(title: &str, variant: &Variant, cycles: Cycle) -> Scene {
-    let (mut run, tracks) = recorded(variant, SEED, cycles);
-    let (scenery, frame) = (run.scenery(), run.frame(Look::BODIES));
-    let columns = columns(&tracks, cycles.saturating_sub(SEEN));
+fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
+    let (mut run, tracks) = run_recorded(variant, SEED, cycles);
+    let (scenery, frame) = (run.scenery(), run.frame(FrameOptions::WITHOUT_SCANS));
+    let columns = columns(&tracks, cycles.saturating_sub(TRAIL_CYCLES));
     let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, values)| values);
-    let robots = frame.bodies.iter().filter(|body| body.kind == Kind::Robot);
-    let whose: Vec<Who> = robots.map(|body| body.who()).collect();
-    let trails = |rows: &sidestep::kernel::view::PlaceRows| {
+    let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot);
+    let whose: Vec<BodyId> = robots.map(|body| body.id()).collect();
+    let trails = |rows: &sidestep::kernel::view::PositionColumns| {
         rows.trails(&scenery, &frame, &whose, column).unwrap_or_default()
     };
-    let trails: Vec<Trail> = run.place_rows().iter().flat_map(trails).collect();
+    let trails: Vec<Trail> = run.position_columns().iter().flat_map(trails).collect();
     Scene {
         title: title.into(),
         caption: format!("Medium floor, seed {SEED}."),
@@ -72,24 +72,25 @@ fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::Place;
+    use sidestep::kernel::view::Vec3;
 
     #[test]
     fn ways_are_whole_and_end_where_the_robots_are() {
-        let scenes = all(&LoriaPlan { cycles: 450, ..LoriaPlan::quick() });
+        let scenes = all(&LoriaConfig { cycles: 450, ..LoriaConfig::quick() });
         for scene in &scenes {
-            let robots = scene.frame.bodies.iter().filter(|body| body.kind == Kind::Robot).count();
+            let robots =
+                scene.frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot).count();
             assert_eq!(scene.trails.len(), robots);
             let box_m = scene.scenery.floor.as_ref().expect("a floor").box_m;
-            let far = |pair: &[(Cycle, Place)]| {
+            let far = |pair: &[(Cycle, Vec3)]| {
                 let (a, b) = (pair[0].1, pair[1].1);
                 (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
             };
             for trail in &scene.trails {
-                assert_eq!((trail.way[0].0, trail.way[trail.way.len() - 1].0), (50, 450));
-                let cycles = trail.way.chunk_by(|a, b| a.0 == b.0).count();
-                assert_eq!(cycles as Cycle, SEEN + 1);
-                let leaps = trail.way.windows(2).filter(|pair| far(pair) > 2.01 * box_m).count();
+                assert_eq!((trail.points[0].0, trail.points[trail.points.len() - 1].0), (50, 450));
+                let cycles = trail.points.chunk_by(|a, b| a.0 == b.0).count();
+                assert_eq!(cycles as Cycle, TRAIL_CYCLES + 1);
+                let leaps = trail.points.windows(2).filter(|pair| far(pair) > 2.01 * box_m).count();
                 assert_eq!(leaps, 0, "no way leaps");
             }
         }

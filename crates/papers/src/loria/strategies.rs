@@ -1,20 +1,20 @@
 //! The double pool against the two strategies that the paper rejects.
 
-use super::LoriaPlan;
+use super::LoriaConfig;
 use super::performance::{loads, worker_counts};
-use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
+use super::timing::{SEGMENTS, Workload, arithmetic, time_interleaved, time_s};
 use crate::cells::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
 use sidestep::worlds::robots::RobotsRun;
-use sidestep::worlds::robots::baseline::{Baseline, Strategy, breach};
+use sidestep::worlds::robots::baseline::{BaselineRun, Strategy, find_violation};
 use sidestep_document::{Estimate, Figure, Series, Table};
 use std::convert::Infallible;
 
 /// Times of a load under a strategy.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Trial {
+pub(super) struct StrategyTiming {
     /// Number of the load.
     pub(super) load: usize,
     /// Name of the strategy.
@@ -41,11 +41,11 @@ pub(super) struct Trial {
 
 /// All trials.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Strategies {
+pub(super) struct StrategyResults {
     /// The timed loads.
-    pub(super) loads: Vec<Load>,
+    pub(super) loads: Vec<Workload>,
     /// The trials.
-    pub(super) trials: Vec<Trial>,
+    pub(super) trials: Vec<StrategyTiming>,
 }
 
 /// Name of the kernel's strategy.
@@ -54,20 +54,20 @@ const DOUBLE_POOL: &str = "double pool";
 const ARITHMETIC: &str = "arithmetic";
 
 /// A participant of the timings: a run under one of the three strategies, or arithmetic.
-enum Run {
+enum StrategyRun {
     DoublePool(Box<RobotsRun>),
-    Baseline(Box<Baseline>),
+    Baseline(Box<BaselineRun>),
     Arithmetic,
 }
 
 /// A run, the name of its strategy and its number of workers.
-struct Contestant {
+struct StrategyCandidate {
     strategy: &'static str,
     workers: usize,
-    run: Run,
+    run: StrategyRun,
 }
 
-impl Run {
+impl StrategyRun {
     fn advance(&mut self, cycles: u64) {
         match self {
             Self::DoublePool(run) => {
@@ -82,25 +82,25 @@ impl Run {
     }
 }
 
-impl Contestant {
+impl StrategyCandidate {
     fn seconds(&mut self, cycles: u64, robot_cycles: u64) -> f64 {
         match self.run {
-            Run::Arithmetic => arithmetic(self.workers, robot_cycles),
-            _ => seconds(|| self.run.advance(cycles)).0,
+            StrategyRun::Arithmetic => arithmetic(self.workers, robot_cycles),
+            _ => time_s(|| self.run.advance(cycles)).0,
         }
     }
 }
 
-impl Strategies {
+impl StrategyResults {
     /// Runs the comparison.
-    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let mut loads = loads(plan);
         let extremes = [plan.operations.iter().min(), plan.operations.iter().max()];
         loads.retain(|load| extremes.contains(&Some(&load.operations)));
         let mut trials = Vec::new();
         for (index, load) in loads.iter().enumerate() {
             report("rejected strategies", index as f64 / loads.len() as f64);
-            trials.extend(try_load(plan, index, load));
+            trials.extend(time_load(plan, index, load));
         }
         Self { loads, trials }
     }
@@ -116,18 +116,21 @@ impl Strategies {
     pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
         let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
         let ratios = |load: usize, name: &str| {
-            let is = |t: &&Trial| (t.load, t.workers, t.strategy.as_str()) == (load, most, name);
+            let is = |t: &&StrategyTiming| {
+                (t.load, t.workers, t.strategy.as_str()) == (load, most, name)
+            };
             self.trials.iter().find(is).map_or(&[][..], |t| &t.ratios[..])
         };
-        let lead =
-            |load| Estimate::paired(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()));
+        let lead = |load| {
+            Estimate::paired_difference(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()))
+        };
         (0..self.loads.len()).map(lead).collect()
     }
 
     /// Returns the comparison as a table.
     pub(super) fn table(&self) -> Table {
         let note = format!(
-            "Mean [95 % interval] over repeats, each the best of {STRETCHES} stretches that take \
+            "Mean [95 % interval] over repeats, each the best of {SEGMENTS} stretches that take \
              turns. The rejected strategies give valid worlds, but other ones: with the \
              partition results depend on the number of workers, with the lock on the moment \
              too. Under the lock fewer contacts count, since a robot sees the moves of those \
@@ -157,7 +160,7 @@ impl Strategies {
 
     /// Returns speed-up over workers, one figure per load.
     pub(super) fn figures(&self) -> Vec<Figure> {
-        let figure = |(index, load): (usize, &Load)| {
+        let figure = |(index, load): (usize, &Workload)| {
             figure(
                 &format!("Strategies: {}", load.name()),
                 ["workers", "speed-up over the double pool with 1 worker"],
@@ -178,29 +181,34 @@ fn names() -> [&'static str; 3] {
     [DOUBLE_POOL, Strategy::SpatialPartition.name(), Strategy::OneLock.name()]
 }
 
-fn try_load(plan: &LoriaPlan, index: usize, load: &Load) -> Vec<Trial> {
+fn time_load(plan: &LoriaConfig, index: usize, load: &Workload) -> Vec<StrategyTiming> {
     let cycles = load.cycles(plan.timed_robot_cycles);
-    let mut all = contestants(plan, load);
+    let mut all = strategy_candidates(plan, load);
     all.iter_mut().for_each(|contestant| contestant.run.advance(cycles));
-    let Ok(times_s) = race(&mut all, plan.repeats, |contestant| {
+    let Ok(times_s) = time_interleaved(&mut all, plan.repeats, |contestant| {
         Ok::<_, Infallible>(contestant.seconds(cycles, plan.timed_robot_cycles))
     });
     let times_of = |strategy: &str, workers: usize| {
-        let is = |c: &Contestant| (c.strategy, c.workers) == (strategy, workers);
+        let is = |c: &StrategyCandidate| (c.strategy, c.workers) == (strategy, workers);
         all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
     };
-    let trial = |(c, own_s): (&Contestant, &Vec<Option<f64>>)| {
-        let (contacts, serial_share, valid, complete) = judge(load, &c.run)?;
+    let trial = |(c, own_s): (&StrategyCandidate, &Vec<Option<f64>>)| {
+        let (contacts, serial_share, valid, complete) = contact_stats(load, &c.run)?;
         let reference = times_of(DOUBLE_POOL, 1).iter().zip(own_s);
         let ratios: Vec<Option<f64>> = reference.map(|(a, b)| Some((*a)? / (*b)?)).collect();
-        Some(Trial {
+        Some(StrategyTiming {
             load: index,
             strategy: c.strategy.into(),
             workers: c.workers,
-            cycle_ms: Estimate::of(own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64))),
-            speed_up: Estimate::of_factors(ratios.iter().copied()),
+            cycle_ms: Estimate::from_values(
+                own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64)),
+            ),
+            speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::ratio(times_of(ARITHMETIC, 1), times_of(ARITHMETIC, c.workers)),
+            machine: Estimate::geometric_ratio(
+                times_of(ARITHMETIC, 1),
+                times_of(ARITHMETIC, c.workers),
+            ),
             contacts,
             serial_share,
             valid,
@@ -211,29 +219,29 @@ fn try_load(plan: &LoriaPlan, index: usize, load: &Load) -> Vec<Trial> {
 }
 
 /// Returns every strategy with every number of workers, and arithmetic.
-fn contestants(plan: &LoriaPlan, load: &Load) -> Vec<Contestant> {
+fn strategy_candidates(plan: &LoriaConfig, load: &Workload) -> Vec<StrategyCandidate> {
     let mut all = Vec::new();
     for workers in worker_counts(plan.most_workers) {
-        let mut add = |strategy, run| all.push(Contestant { strategy, workers, run });
-        add(DOUBLE_POOL, Run::DoublePool(Box::new(load.simulation(workers))));
+        let mut add = |strategy, run| all.push(StrategyCandidate { strategy, workers, run });
+        add(DOUBLE_POOL, StrategyRun::DoublePool(Box::new(load.simulation(workers))));
         for strategy in Strategy::ALL {
-            let run = Baseline::new(load.compiled(), strategy, workers);
-            add(strategy.name(), Run::Baseline(Box::new(run)));
+            let run = BaselineRun::new(load.compiled(), strategy, workers);
+            add(strategy.name(), StrategyRun::Baseline(Box::new(run)));
         }
-        add(ARITHMETIC, Run::Arithmetic);
+        add(ARITHMETIC, StrategyRun::Arithmetic);
     }
     all
 }
 
 /// Returns contacts per 1000 actions, the serial share, and whether laws and counts were kept.
 /// `None` for arithmetic.
-fn judge(load: &Load, run: &Run) -> Option<(f64, f64, bool, bool)> {
+fn contact_stats(load: &Workload, run: &StrategyRun) -> Option<(f64, f64, bool, bool)> {
     let (metrics, snapshot, share) = match run {
-        Run::DoublePool(run) => (run.metrics(), run.saved(), 0.0),
-        Run::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_share()),
-        Run::Arithmetic => return None,
+        StrategyRun::DoublePool(run) => (run.metrics(), run.snapshot(), 0.0),
+        StrategyRun::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_fraction()),
+        StrategyRun::Arithmetic => return None,
     };
-    let valid = breach(&load.compiled().world, &snapshot).is_none();
+    let valid = find_violation(&load.compiled().world, &snapshot).is_none();
     let complete = metrics.total.actions == u64::from(load.robots) * snapshot.cycle;
     Some((1e3 * metrics.contacts_per_action, share, valid, complete))
 }

@@ -20,7 +20,7 @@ const LARGE: &str = include_str!("../../scenarios/loria/wander-large.toml");
 
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Load {
+pub(super) struct Workload {
     /// Robots.
     pub(super) robots: u32,
     /// People, of 2 x 2 boxes.
@@ -34,7 +34,7 @@ pub(super) struct Load {
     pub(super) floor: Arc<Floor>,
 }
 
-impl Load {
+impl Workload {
     /// Returns the share of the free boxes that robots and people cover.
     pub(super) fn density(&self) -> f64 {
         let free = self.floor.office.map.count(sidestep::map::Cell::Free).max(1);
@@ -73,7 +73,7 @@ impl Load {
     /// # Panics
     /// If the load does not fit its floor; the experiments' own do.
     pub(super) fn compiled(&self) -> Compiled {
-        let costly = Costly { wander: Wander::default(), operations: self.operations };
+        let costly = CostlyBehaviour { wander: Wander::default(), operations: self.operations };
         let behaviours = Behaviours::from([("costly".into(), Arc::new(costly) as _)]);
         Compiled::new(&self.source(), &behaviours, StorageOrder::Spatial)
             .expect("the experiments' scenarios are valid")
@@ -87,21 +87,21 @@ impl Load {
 
 /// A behavior that thinks longer: it decides as `wander` does, after extra operations.
 #[derive(Debug, Clone)]
-struct Costly {
+struct CostlyBehaviour {
     wander: Wander,
     /// Dependent multiply-and-adds per decision.
     operations: u32,
 }
 
-impl Behaviour for Costly {
+impl Behaviour for CostlyBehaviour {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        burn(percept.now, self.operations);
+        spend_time(percept.now, self.operations);
         self.wander.decide(percept, memory, draws)
     }
 }
 
 /// Does `operations` dependent multiply-and-adds, only to spend time.
-fn burn(mut x: u64, operations: u32) {
+fn spend_time(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     }
@@ -109,22 +109,22 @@ fn burn(mut x: u64, operations: u32) {
 }
 
 /// Returns the seconds that `work` takes, and its result.
-pub(super) fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
+pub(super) fn time_s<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let clock = SystemClock::default();
     let result = work();
     (clock.now_ns() as f64 * 1e-9, result)
 }
 
 /// Number of stretches of which the best counts as one repeat.
-pub(super) const STRETCHES: usize = 8;
+pub(super) const SEGMENTS: usize = 8;
 
 /// Times contestants in turn. Each gets `repeats` values, and every value is the shortest of
-/// [`STRETCHES`] short stretches: the time of the machine when nothing else disturbs it.
+/// [`SEGMENTS`] short stretches: the time of the machine when nothing else disturbs it.
 /// Contestants take turns stretch by stretch, so that disturbances affect all alike.
 ///
 /// # Errors
 /// The first error that `run` returns.
-pub(super) fn race<C, E>(
+pub(super) fn time_interleaved<C, E>(
     contestants: &mut [C],
     repeats: usize,
     mut run: impl FnMut(&mut C) -> Result<f64, E>,
@@ -132,7 +132,7 @@ pub(super) fn race<C, E>(
     let mut times_s = vec![Vec::with_capacity(repeats); contestants.len()];
     for _ in 0..repeats {
         let mut best_s = vec![f64::INFINITY; contestants.len()];
-        for _ in 0..STRETCHES {
+        for _ in 0..SEGMENTS {
             for (best_s, contestant) in best_s.iter_mut().zip(&mut *contestants) {
                 *best_s = best_s.min(run(contestant)?);
             }
@@ -148,21 +148,21 @@ pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
     const OPERATIONS: u32 = 500;
     let work = |worker: &workers::Worker<'_>, (): &mut ()| {
         worker.for_each_chunk(0, robot_cycles as usize, |tasks| {
-            tasks.for_each(|task| burn(task as u64, OPERATIONS));
+            tasks.for_each(|task| spend_time(task as u64, OPERATIONS));
         });
     };
-    seconds(|| workers::run(&mut vec![(); workers], work)).0
+    time_s(|| workers::run(&mut vec![(); workers], work)).0
 }
 
 /// A run, with the destination of its rows if it is recorded.
-pub(super) struct Timed {
+pub(super) struct TimedRun {
     simulation: RobotsRun,
     recorder: Option<Box<dyn Recorder>>,
 }
 
-impl Timed {
+impl TimedRun {
     /// Returns a run that is not recorded.
-    pub(super) fn new(load: &Load, workers: usize) -> Self {
+    pub(super) fn new(load: &Workload, workers: usize) -> Self {
         Self { simulation: load.simulation(workers), recorder: None }
     }
 
@@ -171,12 +171,12 @@ impl Timed {
     /// # Errors
     /// When the recorder cannot be made.
     pub(super) fn recorded(
-        load: &Load,
+        load: &Workload,
         workers: usize,
         recorders: &mut NewRecorder<'_>,
     ) -> Result<Self, RecordError> {
         let mut simulation = load.simulation(workers);
-        simulation.begin_recording();
+        simulation.start_recording();
         let recorder = Some(recorders(&simulation.schemas())?);
         Ok(Self { simulation, recorder })
     }
@@ -186,7 +186,7 @@ impl Timed {
     /// # Errors
     /// When rows cannot be stored.
     pub(super) fn run(&mut self, cycles: u64) -> Result<f64, RecordError> {
-        let (took_s, result) = seconds(|| {
+        let (took_s, result) = time_s(|| {
             let mut done = 0;
             while done < cycles {
                 done += self.simulation.advance(cycles - done);
@@ -220,21 +220,26 @@ mod tests {
     #[test]
     fn every_repeat_is_the_best_of_its_stretches() {
         let mut n = [0.0, 0.0];
-        let outcome: Result<_, ()> = race(&mut [0, 1], 2, |&mut k| {
+        let outcome: Result<_, ()> = time_interleaved(&mut [0, 1], 2, |&mut k| {
             n[k] += 1.0;
             Ok(100.0 - n[k])
         });
         let expected = vec![Some(92.0), Some(84.0)];
         assert_eq!(outcome, Ok(vec![expected.clone(), expected]));
-        assert_eq!(race(&mut [0], 2, |_| Err("full")), Err("full"));
+        assert_eq!(time_interleaved(&mut [0], 2, |_| Err("full")), Err("full"));
         assert!(arithmetic(2, 100) > 0.0);
     }
 
     #[test]
     fn costlier_loads_are_run_for_fewer_cycles() {
         let floor = Arc::new(Floor::small());
-        let load =
-            |operations| Load { robots: 20, people: 5, size: 2, operations, floor: floor.clone() };
+        let load = |operations| Workload {
+            robots: 20,
+            people: 5,
+            size: 2,
+            operations,
+            floor: floor.clone(),
+        };
         assert!(load(10_000).cycles(100_000) * 10 < load(0).cycles(100_000));
         assert!(load(0).density() > 0.01 && load(0).density() < 0.1);
     }

@@ -2,9 +2,11 @@
 //! by local rules alone and with a planner. Every cycle is looked at: whether a joint is outside its limits or too
 //! fast.
 
-use super::{DT_S, SerpentinePlan, draws};
+use super::{DT_S, SerpentineConfig, draws};
 use crate::cells::{CaseResults, Columns, Value, column};
-use crate::study::{Progress, Study, finish, known, number, outcome, setting};
+use crate::study::{
+    Progress, Study, downcast, outcome_from_values, run_to_end, setting, setting_number,
+};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
 use sidestep::experiment::sweep::{Setting, Variant};
@@ -26,36 +28,36 @@ const PILLARS_M: [Point<2>; 3] = [[0.45, 0.0], [-0.25, 0.42], [-0.25, -0.42]];
 const HEIGHT_M: f64 = 0.7;
 const RADIUS_M: f64 = 0.05;
 /// Least distance of a posture at a target from their axes.
-const AWAY_M: f64 = 0.15;
+const MIN_PILLAR_DISTANCE_M: f64 = 0.15;
 /// Least distance between its own parts there: twice the radius of connectors, and as much as half of one more.
-const OWN_M: f64 = 0.1;
+const MIN_OWN_DISTANCE_M: f64 = 0.1;
 /// Planners of ways.
 pub(super) const PLANNERS: [&str; 2] = ["none", "rrt-connect"];
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("pillars", "pillars", |r| r.set("pillars")),
-        column("planner", "planner", |r| r.set("planner")),
+        column("pillars", "pillars", |r| r.setting("pillars")),
+        column("planner", "planner", |r| r.setting("planner")),
     ],
-    came: &[
-        column("reached", "all reached", |r| r.share(|run| run.is("reached"))),
+    results: &[
+        column("reached", "all reached", |r| r.proportion(|run| run.is_true("reached"))),
         column("targets", "targets reached", |r| r.sum("targets")),
         column("outside", "cycles outside limits", |r| r.sum("outside")),
         column("too_fast", "cycles too fast", |r| r.sum("too_fast")),
-        column("fastest", "fastest joint / its limit", |r| Value::Number(r.most("fastest")))
-            .shown(|c| format!("{:.3}", c.number("fastest"))),
-        column("off_m", "tool off its joints", |r| Value::Number(r.most("off_m")))
-            .shown(|c| format!("{:.1e}", c.number("off_m"))),
+        column("fastest", "fastest joint / its limit", |r| Value::Number(r.max_value("fastest")))
+            .with_format(|c| format!("{:.3}", c.number("fastest"))),
+        column("off_m", "tool off its joints", |r| Value::Number(r.max_value("off_m")))
+            .with_format(|c| format!("{:.1e}", c.number("off_m"))),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         column("seconds", "median time of a run, s", |r| Value::Number(r.median("seconds")))
-            .shown(|c| format!("{:.1}", c.number("seconds"))),
+            .with_format(|c| format!("{:.1}", c.number("seconds"))),
     ],
 };
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Arms {
+pub(super) struct ArmResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
@@ -92,10 +94,10 @@ fn target(arm: &SerialChain, draws: &mut Draws) -> Point<3> {
         let is_clear = |rod: &[Point<3>]| {
             PILLARS_M.iter().all(|[x, y]| {
                 let pillar = [[*x, *y, 0.0], [*x, *y, HEIGHT_M]];
-                between_segments([rod[0], rod[1]], pillar).distance_m > AWAY_M
+                between_segments([rod[0], rod[1]], pillar).distance_m > MIN_PILLAR_DISTANCE_M
             })
         };
-        let is_above = places.iter().all(|p| p[2] > AWAY_M);
+        let is_above = places.iter().all(|p| p[2] > MIN_PILLAR_DISTANCE_M);
         if is_above && is_apart(&places) && places.windows(2).all(is_clear) {
             return places[places.len() - 1];
         }
@@ -111,7 +113,7 @@ fn is_apart(places: &[Point<3>]) -> bool {
     (0..places.len()).all(|c| {
         let connectors = (c + 2..places.len()).map(connector);
         let rods = (0..places.len() - 1).filter(|r| c + 1 < *r || c > r + 2).map(rod);
-        connectors.chain(rods).all(|part| away_m(connector(c), part) > OWN_M)
+        connectors.chain(rods).all(|part| away_m(connector(c), part) > MIN_OWN_DISTANCE_M)
     })
 }
 
@@ -126,7 +128,7 @@ fn settings(case: &Variant, seed: u64) -> Result<Vec<Setting>, InputError> {
         pillar.insert("radius_m".into(), RADIUS_M.into());
         pillar
     };
-    let pillars = &PILLARS_M[..number(case, "pillars") as usize];
+    let pillars = &PILLARS_M[..setting_number(case, "pillars") as usize];
     let planner = case.value("planner").and_then(toml::Value::as_str).unwrap_or_default();
     Ok(vec![
         setting("obstacles", pillars.iter().map(pillar).collect::<Vec<_>>()),
@@ -136,17 +138,17 @@ fn settings(case: &Variant, seed: u64) -> Result<Vec<Setting>, InputError> {
 }
 
 /// Makes a run, and looks at the joints in each of its cycles.
-fn watched(source: &Source) -> Result<Json, InputError> {
+fn run_checking_joints(source: &Source) -> Result<Json, InputError> {
     let arm = arm()?;
     let mut run = WORLDS.compile(source)?.start(source, 1);
     let joints = |run: &dyn Simulation| {
-        let run: &ChainRun<3> = known(run);
+        let run: &ChainRun<3> = downcast(run);
         let body = run.state().body(0);
         (body.joints.clone().unwrap_or_default(), body.chain.points().last().copied())
     };
     let mut before = joints(&*run).0;
     let (mut outside, mut too_fast, mut fastest, mut off_m) = (0, 0, 0.0_f64, 0.0_f64);
-    finish(&mut *run, |run| {
+    run_to_end(&mut *run, |run| {
         let (now, tool) = joints(run);
         outside += u64::from(!arm.outside_limits(&now).is_empty());
         let speeds = arm
@@ -161,8 +163,8 @@ fn watched(source: &Source) -> Result<Json, InputError> {
         off_m = offs.fold(off_m, f64::max);
         before = now;
     });
-    let run: &ChainRun<3> = known(&*run);
-    let came = run.world().metrics_of(run.state(), 0);
+    let run: &ChainRun<3> = downcast(&*run);
+    let came = run.world().chain_metrics(run.state(), 0);
     // The task itself is one of the tasks done, if it ended.
     let targets = TARGETS - came.tally.given_up.len().min(TARGETS);
     let is_over = run.is_over();
@@ -175,24 +177,27 @@ fn watched(source: &Source) -> Result<Json, InputError> {
     }))
 }
 
-impl Arms {
+impl ArmResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let study = Study::of_variants(SCENARIO, cases()).sized(plan.seeds, None);
+        let study = Study::from_variants(SCENARIO, cases()).with_size(plan.seeds, None);
         let settings =
             |case: &Variant, seed| settings(case, seed).expect("the arm of this experiment");
         let what = "an arm of joints";
         let results = study.run_with(plan.workers, what, progress, settings, |source, cell| {
-            Ok(outcome(cell, watched(source)?))
+            Ok(outcome_from_values(cell, run_checking_joints(source)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns the cells with a planner, or those by local rules alone.
-    pub(super) fn with(&self, planner: &'static str) -> impl Iterator<Item = &CaseResults> {
-        self.cells.iter().filter(move |c| c.says("planner", planner))
+    pub(super) fn cells_with_planner(
+        &self,
+        planner: &'static str,
+    ) -> impl Iterator<Item = &CaseResults> {
+        self.cells.iter().filter(move |c| c.has_text("planner", planner))
     }
 
     pub(super) fn table(&self) -> Table {

@@ -3,11 +3,11 @@
 //! wall, and discs that move as fast as it.
 
 use super::corridor::CLEARANCE;
-use super::{SPEED_M_S, SerpentinePlan, draws};
+use super::{SPEED_M_S, SerpentineConfig, draws};
 use crate::cells::{CaseResults, Columns, column, figure, series};
-use crate::study::{Progress, Study, number, setting};
+use crate::study::{Progress, Study, setting, setting_number};
 use serde::Serialize;
-use sidestep::experiment::sweep::{Setting, Variant, start};
+use sidestep::experiment::sweep::{Setting, Variant, start_cell};
 use sidestep::kernel::InputError;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Draws;
@@ -24,7 +24,7 @@ const HALF_M: f64 = 10.0;
 /// Start and target, in opposite corners.
 const ENDS_M: [Point<2>; 2] = [[-8.5, -8.5], [8.5, 8.5]];
 /// Free distance around them.
-const AIR_M: f64 = 1.5;
+const MIN_CLEARANCE_M: f64 = 1.5;
 
 /// Readings of "leaving a wall", and whether the leave rule is added.
 const READINGS: [Reading; 5] = [
@@ -45,14 +45,14 @@ struct Reading {
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("discs", "discs", |r| r.set("discs")),
-        column("speed_ratio", "disc / robot speed", |r| r.set("speed_ratio")),
-        column("leaving", "leaving", |r| r.set("leaving")),
-        column("leave_rule", "leave rule", |r| r.set("leave_rule")),
+        column("discs", "discs", |r| r.setting("discs")),
+        column("speed_ratio", "disc / robot speed", |r| r.setting("speed_ratio")),
+        column("leaving", "leaving", |r| r.setting("leaving")),
+        column("leave_rule", "leave rule", |r| r.setting("leave_rule")),
     ],
-    came: &[
-        column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
-        column("untouched", "untouched", |r| r.share(|run| !run.is("penetrations"))),
+    results: &[
+        column("arrived", "arrived", |r| r.proportion(|run| run.number_or_zero("done") == 1.0)),
+        column("untouched", "untouched", |r| r.proportion(|run| !run.is_true("penetrations"))),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         column("vetoes", "vetoes", |r| r.sum("vetoes")),
@@ -71,7 +71,7 @@ fn case(discs: usize, speed_ratio: f64, reading: Reading) -> Vec<Setting> {
     ]
 }
 
-fn cases(plan: &SerpentinePlan) -> Vec<Vec<Setting>> {
+fn cases(plan: &SerpentineConfig) -> Vec<Vec<Setting>> {
     let discs = || std::iter::once(0).chain(plan.discs.iter().copied());
     let standing = READINGS.into_iter().flat_map(|of| discs().map(move |n| case(n, 0.0, of)));
     let most = plan.discs.iter().max().copied().unwrap_or(0);
@@ -85,8 +85,8 @@ fn settings(case: &Variant, seed: u64) -> Vec<Setting> {
     let draws = &mut draws(seed);
     let heading_deg = 360.0 * draws.uniform();
     let mut discs: Vec<Value> = Vec::new();
-    while discs.len() < number(case, "discs") as usize {
-        discs.extend(disc(draws, number(case, "speed_ratio")));
+    while discs.len() < setting_number(case, "discs") as usize {
+        discs.extend(disc(draws, setting_number(case, "speed_ratio")));
     }
     let navigator = "chains.tasks.navigator";
     let mut settings =
@@ -102,7 +102,7 @@ fn settings(case: &Variant, seed: u64) -> Vec<Setting> {
 fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
     let [u, v, w, turn] = [0; 4].map(|_: u8| draws.uniform());
     let (at, radius_m) = ([u, v].map(|x| HALF_M * (2.0 * x - 1.0)), 0.2 + 0.3 * w);
-    if ENDS_M.iter().any(|end| distance(*end, at) < radius_m + AIR_M) {
+    if ENDS_M.iter().any(|end| distance(*end, at) < radius_m + MIN_CLEARANCE_M) {
         return None;
     }
     let point = |p: Point<2>| Value::from(p.to_vec());
@@ -120,21 +120,21 @@ fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Fields {
+pub(super) struct FieldResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
 
-impl Fields {
+impl FieldResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let study = Study::of_variants(SCENARIO, cases(plan))
-            .sized(plan.field_seeds, Some(plan.field_cycles));
+        let study = Study::from_variants(SCENARIO, cases(plan))
+            .with_size(plan.field_seeds, Some(plan.field_cycles));
         let results =
             study.run_with(plan.workers, "open field", progress, settings, |source, cell| {
-                Ok(start(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
+                Ok(start_cell(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
@@ -145,8 +145,9 @@ impl Fields {
         leaving: &str,
         leave_rule: bool,
     ) -> impl Iterator<Item = &CaseResults> {
-        let is_its =
-            move |c: &&CaseResults| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
+        let is_its = move |c: &&CaseResults| {
+            c.has_text("leaving", leaving) && c.is_true("leave_rule") == leave_rule
+        };
         self.cells.iter().filter(|c| c.number("speed_ratio") == 0.0).filter(is_its)
     }
 

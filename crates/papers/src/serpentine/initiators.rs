@@ -1,17 +1,17 @@
 //! Tests of which parts may start a motion, and which may object (slides R4, R5, R7, R8), and
 //! whether bends keep their limits (slide F1).
 
-use super::{SerpentinePlan, draws};
-use crate::cells::{Share, table};
-use crate::study::{Progress, all_of, finish, known, setting, source};
+use super::{SerpentineConfig, draws};
+use crate::cells::{Proportion, table};
+use crate::study::{Progress, downcast, run_all, run_to_end, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
-use sidestep::worlds::chain::geometry::{Point, along, distance, unit};
+use sidestep::worlds::chain::geometry::{Point, add_scaled, distance, normalized};
 use sidestep::worlds::chain::{
     BEND_TOLERANCE_RAD, Chain, ChainRun, Connector, Mobility, Obstacles, Outcome, Propagator,
-    Reason, Request, Rod, chain_run,
+    Request, Rod, VetoReason, chain_run,
 };
 use sidestep_document::Table;
 
@@ -26,34 +26,34 @@ const MOTIONS: usize = 400;
 
 /// Every connector as initiator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Initiators {
+pub(super) struct InitiatorResults {
     /// Motions that every connector of a free chain started, and that were made.
-    pub(super) moved: Share,
+    pub(super) moved: Proportion,
     /// The share of motions of a connector in the middle after which each half is where it would be
     /// as a chain of its own, to the bit.
-    pub(super) halves_alike: Share,
+    pub(super) halves_alike: Proportion,
     /// Motions of a chain with a fixed base to which the base objected, as fixed.
-    pub(super) base_objected: Share,
+    pub(super) base_objected: Proportion,
     /// Motions of a chain with a failed connector to which that one objected, as failed.
-    pub(super) failed_objected: Share,
+    pub(super) failed_objected: Proportion,
     /// Vetoes that left every bit of the chain as it was.
-    pub(super) kept: Share,
+    pub(super) kept: Proportion,
     /// Runs of a world in which a connector fails on the way, and the veto that the operator
     /// receives names that one.
-    pub(super) told: Share,
+    pub(super) told: Proportion,
     /// Bend limits.
-    pub(super) bends: Vec<Bend>,
+    pub(super) bends: Vec<BendLimitResult>,
 }
 
 /// Results for bend limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Bend {
+pub(super) struct BendLimitResult {
     /// The limit.
     pub(super) limit_deg: f64,
     /// Whether in space, or in the plane.
     pub(super) in_space: bool,
     /// Motions that were made.
-    pub(super) moved: Share,
+    pub(super) moved: Proportion,
     /// Vetoes for another reason than the limit.
     pub(super) other_vetoes: u64,
     /// Motions after which a bend was beyond the limit.
@@ -63,7 +63,7 @@ pub(super) struct Bend {
 }
 
 #[derive(Default)]
-struct Seen {
+struct InitiatorCounts {
     moved: Vec<bool>,
     halves_alike: Vec<bool>,
     base_objected: Vec<bool>,
@@ -73,7 +73,7 @@ struct Seen {
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     let random = std::array::from_fn(|_| normal(draws));
-    unit(random).unwrap_or_else(|| std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))
+    normalized(random).unwrap_or_else(|| std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))
 }
 
 /// A chain of fixed rods that turns a little at every connector.
@@ -81,8 +81,8 @@ fn chain<const D: usize>(draws: &mut Draws, max_bend_rad: f64) -> Result<Chain<D
     let mut u: Point<D> = direction(draws);
     let mut points = vec![[0.0; D]];
     for i in 1..CONNECTORS {
-        u = unit(along(u, direction(draws), 0.2)).unwrap_or(u);
-        points.push(along(points[i - 1], u, 0.5));
+        u = normalized(add_scaled(u, direction(draws), 0.2)).unwrap_or(u);
+        points.push(add_scaled(points[i - 1], u, 0.5));
     }
     let connector = Connector { max_bend_rad, ..Connector::free(0.05) };
     let rods = points.windows(2).map(|ends| Rod::fixed(distance(ends[0], ends[1]), 0.02)).collect();
@@ -99,22 +99,22 @@ fn part(chain: &Chain<3>, range: std::ops::RangeInclusive<usize>) -> Result<Chai
     )
 }
 
-fn propagated(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<Outcome<3>, InputError> {
+fn propagate(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<Outcome<3>, InputError> {
     Propagator::default().propagate(chain, &Obstacles::default(), &Request::exact(k, to))
 }
 
-fn seen(seed: u64) -> Result<Seen, InputError> {
+fn count_motions(seed: u64) -> Result<InitiatorCounts, InputError> {
     let draws = &mut draws(seed);
     let free = chain::<3>(draws, std::f64::consts::PI)?;
-    let mut seen = Seen::default();
+    let mut seen = InitiatorCounts::default();
     for k in 0..CONNECTORS {
-        let to = along(free.points()[k], direction(draws), STEP_M);
+        let to = add_scaled(free.points()[k], direction(draws), STEP_M);
         let mut moved = free.clone();
-        seen.moved.push(propagated(&mut moved, k, to)?.moved().is_some());
+        seen.moved.push(propagate(&mut moved, k, to)?.motion().is_some());
         if (1..CONNECTORS - 1).contains(&k) {
             let (mut low, mut high) = (part(&free, 0..=k)?, part(&free, k..=CONNECTORS - 1)?);
-            propagated(&mut low, k, to)?;
-            propagated(&mut high, 0, to)?;
+            propagate(&mut low, k, to)?;
+            propagate(&mut high, 0, to)?;
             let alike =
                 low.points() == &moved.points()[..=k] && high.points() == &moved.points()[k..];
             seen.halves_alike.push(alike);
@@ -122,15 +122,15 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
         for other in (0..CONNECTORS).filter(|&other| other != k) {
             let mut failing = free.clone();
             failing.set_failed(other, true);
-            let expected = Expected { by: other, reason: Reason::Failed };
-            let objected = objects(&mut failing, k, to, expected, &mut seen)?;
+            let expected = ExpectedVeto { by: other, reason: VetoReason::Failed };
+            let objected = is_vetoed_as_expected(&mut failing, k, to, expected, &mut seen)?;
             seen.failed_objected.push(objected);
         }
         if k > 0 {
             let mut arm = free.clone();
             arm.set_mobility(0, Mobility::Fixed)?;
-            let expected = Expected { by: 0, reason: Reason::Fixed };
-            let objected = objects(&mut arm, k, to, expected, &mut seen)?;
+            let expected = ExpectedVeto { by: 0, reason: VetoReason::Fixed };
+            let objected = is_vetoed_as_expected(&mut arm, k, to, expected, &mut seen)?;
             seen.base_objected.push(objected);
         }
     }
@@ -138,65 +138,66 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
 }
 
 /// The veto that is expected.
-struct Expected {
+struct ExpectedVeto {
     by: usize,
-    reason: Reason,
+    reason: VetoReason,
 }
 
 /// Returns whether the motion of connector `k` is vetoed by the expected connector, for the expected reason.
-fn objects(
+fn is_vetoed_as_expected(
     chain: &mut Chain<3>,
     k: usize,
     to: Point<3>,
-    expected: Expected,
-    seen: &mut Seen,
+    expected: ExpectedVeto,
+    seen: &mut InitiatorCounts,
 ) -> Result<bool, InputError> {
     let before = chain.points().to_vec();
-    let outcome = propagated(chain, k, to)?;
+    let outcome = propagate(chain, k, to)?;
     let Some(veto) = outcome.veto() else { return Ok(false) };
     seen.kept.push(chain.points() == before);
     Ok(veto.by == expected.by && veto.reason == expected.reason)
 }
 
 /// Lets an operator lead a chain of which a connector fails; returns whether the veto names it.
-fn told(seed: u64) -> Result<bool, InputError> {
-    let failing = 1 + (draws(seed).below(14)) as usize;
+fn veto_names_failed(seed: u64) -> Result<bool, InputError> {
+    let failing = 1 + (draws(seed).uniform_below(14)) as usize;
     let source = source(
         FAILING,
         &[setting("chains.changes.connector", failing as i64), setting("seed", seed as i64)],
     )?;
     let mut run = chain_run(&source, 1)?;
-    finish(&mut *run, |_| ());
-    let metrics = known::<ChainRun<2>>(&*run).metrics();
+    run_to_end(&mut *run, |_| ());
+    let metrics = downcast::<ChainRun<2>>(&*run).metrics();
     let by_it = metrics.given_up.iter().map(|given_up| {
         let what = &given_up.what;
-        what.by == Some(failing as u32) && what.reason.as_deref() == Some(Reason::Failed.name())
+        what.by == Some(failing as u32) && what.reason.as_deref() == Some(VetoReason::Failed.name())
     });
     let told: Vec<bool> = by_it.collect();
     Ok(!told.is_empty() && told.iter().all(|&it| it))
 }
 
 /// Results of a wandering head with a bend limit.
-struct Bent {
+struct BendLimitRun {
     moved: Vec<bool>,
     other_vetoes: u64,
     exceeded: u64,
     sharpest_rad: f64,
 }
 
-fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
+fn wander<const D: usize>(limit_rad: f64, seed: u64) -> Result<BendLimitRun, InputError> {
     let draws = &mut draws(seed);
     let mut chain = chain::<D>(draws, limit_rad)?;
     let (mut propagator, nothing) = (Propagator::default(), Obstacles::default());
     let mut u: Point<D> = direction(draws);
-    let mut came = Bent { moved: Vec::new(), other_vetoes: 0, exceeded: 0, sharpest_rad: 0.0 };
+    let mut came =
+        BendLimitRun { moved: Vec::new(), other_vetoes: 0, exceeded: 0, sharpest_rad: 0.0 };
     for _ in 0..MOTIONS {
-        u = unit(along(u, direction(draws), 0.3)).unwrap_or(u);
-        let k = draws.below(CONNECTORS as u32) as usize;
-        let to = along(chain.points()[k], u, STEP_M);
+        u = normalized(add_scaled(u, direction(draws), 0.3)).unwrap_or(u);
+        let k = draws.uniform_below(CONNECTORS as u32) as usize;
+        let to = add_scaled(chain.points()[k], u, STEP_M);
         let outcome = propagator.propagate(&mut chain, &nothing, &Request::exact(k, to))?;
-        came.moved.push(outcome.moved().is_some());
-        let is_other = outcome.veto().is_some_and(|veto| veto.reason != Reason::BendLimit);
+        came.moved.push(outcome.motion().is_some());
+        let is_other = outcome.veto().is_some_and(|veto| veto.reason != VetoReason::BendLimit);
         came.other_vetoes += u64::from(is_other);
         let sharpest_rad = (0..CONNECTORS).filter_map(|i| chain.bend_rad(i)).fold(0.0, f64::max);
         came.exceeded += u64::from(sharpest_rad > limit_rad + BEND_TOLERANCE_RAD);
@@ -205,33 +206,33 @@ fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
     Ok(came)
 }
 
-impl Initiators {
+impl InitiatorResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let seeds: Vec<u64> = (1..=plan.seeds as u64).collect();
         let mut report = |share| progress("who begins, who objects", share);
-        let all = all_of(&seeds, plan.workers, &mut report, |seed| seen(*seed))?;
-        let all = Seen::all(all);
-        let told = all_of(&seeds, plan.workers, &mut report, |seed| told(*seed))?;
+        let all = run_all(&seeds, plan.workers, &mut report, |seed| count_motions(*seed))?;
+        let all = InitiatorCounts::total(all);
+        let told = run_all(&seeds, plan.workers, &mut report, |seed| veto_names_failed(*seed))?;
         let limits = [(90.0, false), (60.0, false), (30.0, false), (60.0, true), (30.0, true)];
         let bends = limits.iter().map(|&(limit_deg, in_space): &(f64, bool)| {
             let limit_rad = limit_deg.to_radians();
-            let runs = all_of(&seeds, plan.workers, &mut report, |&seed| match in_space {
-                true => bent::<3>(limit_rad, seed),
-                false => bent::<2>(limit_rad, seed),
+            let runs = run_all(&seeds, plan.workers, &mut report, |&seed| match in_space {
+                true => wander::<3>(limit_rad, seed),
+                false => wander::<2>(limit_rad, seed),
             })?;
-            Ok(bend(limit_deg, in_space, &runs))
+            Ok(bend_limit_result(limit_deg, in_space, &runs))
         });
-        let bends: Vec<Bend> = bends.collect::<Result<_, InputError>>()?;
+        let bends: Vec<BendLimitResult> = bends.collect::<Result<_, InputError>>()?;
         Ok(Self {
-            moved: Share::of(all.moved),
-            halves_alike: Share::of(all.halves_alike),
-            base_objected: Share::of(all.base_objected),
-            failed_objected: Share::of(all.failed_objected),
-            kept: Share::of(all.kept),
-            told: Share::of(told),
+            moved: Proportion::from_flags(all.moved),
+            halves_alike: Proportion::from_flags(all.halves_alike),
+            base_objected: Proportion::from_flags(all.base_objected),
+            failed_objected: Proportion::from_flags(all.failed_objected),
+            kept: Proportion::from_flags(all.kept),
+            told: Proportion::from_flags(told),
             bends,
         })
     }
@@ -253,7 +254,7 @@ impl Initiators {
             ("operators who are told that the connector that fails on the way objects", &self.told),
         ];
         for (what, share) in rows {
-            who.row([what.to_string(), share.to_string()]);
+            who.push_row([what.to_string(), share.to_string()]);
         }
         let note = "The same chain is moved 400 times by 5 cm, by connectors at random; where the limit \
                     would be exceeded, rods turn back into it, or somebody objects.";
@@ -275,20 +276,20 @@ impl Initiators {
     }
 }
 
-fn bend(limit_deg: f64, in_space: bool, runs: &[Bent]) -> Bend {
-    Bend {
+fn bend_limit_result(limit_deg: f64, in_space: bool, runs: &[BendLimitRun]) -> BendLimitResult {
+    BendLimitResult {
         limit_deg,
         in_space,
-        moved: Share::of(runs.iter().flat_map(|r| r.moved.iter().copied())),
+        moved: Proportion::from_flags(runs.iter().flat_map(|r| r.moved.iter().copied())),
         other_vetoes: runs.iter().map(|r| r.other_vetoes).sum(),
         exceeded: runs.iter().map(|r| r.exceeded).sum(),
         sharpest_deg: runs.iter().map(|r| r.sharpest_rad).fold(0.0, f64::max).to_degrees(),
     }
 }
 
-impl Seen {
+impl InitiatorCounts {
     /// Sums the results of some runs.
-    fn all(runs: Vec<Self>) -> Self {
+    fn total(runs: Vec<Self>) -> Self {
         runs.into_iter().fold(Self::default(), |mut all, run| {
             all.moved.extend(run.moved);
             all.halves_alike.extend(run.halves_alike);

@@ -15,7 +15,7 @@
 //! ```
 
 mod arm;
-mod broken;
+mod broken_chain;
 mod claims;
 mod corridor;
 mod field;
@@ -28,13 +28,13 @@ mod scaling;
 mod scenes;
 mod snake;
 
-use crate::claims::Parts;
-use crate::study::{Progress, stage};
+use crate::claims::ReportParts;
+use crate::study::{Progress, sub_progress};
 use serde::Serialize;
 use sidestep::kernel::stream::{Draws, Purpose, Streams};
-use sidestep::kernel::workers::available;
+use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Seed};
-use sidestep_document::claim::{Claim, tally};
+use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::{Document, Experiment, Picture};
 
 /// Speed of initiators, m/s.
@@ -49,7 +49,7 @@ fn draws(seed: u64) -> Draws {
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SerpentinePlan {
+pub struct SerpentineConfig {
     /// Seeds of every case that is random,
     pub seeds: usize,
     /// of cases of the open field,
@@ -98,7 +98,7 @@ pub struct SerpentinePlan {
     pub quick: bool,
 }
 
-impl Default for SerpentinePlan {
+impl Default for SerpentineConfig {
     /// The full plan: ten minutes on two processors, most of it for discs that move.
     fn default() -> Self {
         Self {
@@ -123,13 +123,13 @@ impl Default for SerpentinePlan {
             ik_links: vec![2, 7, 25, 100, 450],
             ik_targets: 500,
             pictured_cycles: 2500,
-            workers: available(),
+            workers: available_workers(),
             quick: false,
         }
     }
 }
 
-impl SerpentinePlan {
+impl SerpentineConfig {
     /// Returns a rehearsal of seconds: everything is run, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
@@ -167,22 +167,22 @@ impl SerpentinePlan {
 
 /// All results of the experiments.
 #[derive(Debug, Clone, Serialize)]
-pub struct Report {
+pub struct SerpentineReport {
     /// The plan that was run.
-    pub plan: SerpentinePlan,
+    pub plan: SerpentineConfig,
     /// Version of the program.
     pub program_version: String,
-    corridor: corridor::Corridor,
-    rotations: rotation::Rotations,
-    fields: field::Fields,
-    pushing: pushing::Pushing,
-    movers: movers::Movers,
-    snakes: snake::Snakes,
-    scaling: scaling::Scaling,
-    broken: broken::Broken,
-    postures: postures::Postures,
-    initiators: initiators::Initiators,
-    arms: arm::Arms,
+    corridor: corridor::CorridorResults,
+    rotations: rotation::RotationResults,
+    fields: field::FieldResults,
+    pushing: pushing::PushingResults,
+    movers: movers::MoverResults,
+    snakes: snake::SnakeResults,
+    scaling: scaling::ScalingResults,
+    broken: broken_chain::BreakResults,
+    postures: postures::PostureResults,
+    initiators: initiators::InitiatorResults,
+    arms: arm::ArmResults,
     /// The slides' claims and our verdicts.
     pub claims: Vec<Claim>,
     /// Pictures of bodies: no numbers are taken from them.
@@ -196,23 +196,27 @@ pub struct Report {
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario.
-pub fn run(plan: &SerpentinePlan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
+pub fn run(
+    plan: &SerpentineConfig,
+    progress: &mut Progress<'_>,
+) -> Result<SerpentineReport, InputError> {
     plan.check()?;
     // Shares of the whole by the time they take on two processors. Timings come first, when the
     // machine is quiet.
-    let scaling = scaling::Scaling::run(plan, &mut stage(progress, 0.0, 0.05))?;
-    let corridor = corridor::Corridor::run(plan, &mut stage(progress, 0.05, 0.25))?;
-    let rotations = rotation::Rotations::run(plan, &mut stage(progress, 0.25, 0.35))?;
-    let fields = field::Fields::run(plan, &mut stage(progress, 0.35, 0.55))?;
-    let pushing = pushing::Pushing::run(plan, &mut stage(progress, 0.55, 0.6))?;
-    let movers = movers::Movers::run(plan, &mut stage(progress, 0.6, 0.8))?;
-    let snakes = snake::Snakes::run(plan, &mut stage(progress, 0.8, 0.93))?;
-    let broken = broken::Broken::run(plan, &mut stage(progress, 0.93, 0.94))?;
-    let postures = postures::Postures::run(plan, &mut stage(progress, 0.94, 0.97))?;
-    let initiators = initiators::Initiators::run(plan, &mut stage(progress, 0.97, 0.98))?;
-    let arms = arm::Arms::run(plan, &mut stage(progress, 0.98, 0.99))?;
+    let scaling = scaling::ScalingResults::run(plan, &mut sub_progress(progress, 0.0, 0.05))?;
+    let corridor = corridor::CorridorResults::run(plan, &mut sub_progress(progress, 0.05, 0.25))?;
+    let rotations = rotation::RotationResults::run(plan, &mut sub_progress(progress, 0.25, 0.35))?;
+    let fields = field::FieldResults::run(plan, &mut sub_progress(progress, 0.35, 0.55))?;
+    let pushing = pushing::PushingResults::run(plan, &mut sub_progress(progress, 0.55, 0.6))?;
+    let movers = movers::MoverResults::run(plan, &mut sub_progress(progress, 0.6, 0.8))?;
+    let snakes = snake::SnakeResults::run(plan, &mut sub_progress(progress, 0.8, 0.93))?;
+    let broken = broken_chain::BreakResults::run(plan, &mut sub_progress(progress, 0.93, 0.94))?;
+    let postures = postures::PostureResults::run(plan, &mut sub_progress(progress, 0.94, 0.97))?;
+    let initiators =
+        initiators::InitiatorResults::run(plan, &mut sub_progress(progress, 0.97, 0.98))?;
+    let arms = arm::ArmResults::run(plan, &mut sub_progress(progress, 0.98, 0.99))?;
     let scenes = scenes::all(plan)?;
-    let mut report = Report {
+    let mut report = SerpentineReport {
         plan: plan.clone(),
         program_version: env!("CARGO_PKG_VERSION").into(),
         corridor,
@@ -234,11 +238,11 @@ pub fn run(plan: &SerpentinePlan, progress: &mut Progress<'_>) -> Result<Report,
     Ok(report)
 }
 
-impl Report {
+impl SerpentineReport {
     /// Returns the experiments in the order of the report.
     fn experiments(&self) -> Vec<Experiment> {
         let (scaling, corridor) = (&self.scaling, &self.corridor);
-        claims::WORDS.experiments([
+        claims::CLAIMS.experiments([
             (corridor.figures(), vec![corridor.table()]),
             (vec![self.rotations.figure()], vec![self.rotations.table()]),
             (vec![self.fields.figure()], vec![self.fields.table()]),
@@ -260,7 +264,7 @@ impl Report {
         let lead = format!(
             "{} The slides show pictures and hardly a number; every figure here is ours. Version \
              {}; seeds 1 to {} ({} in the open field, {} of the snake), {} workers.",
-            tally(&self.claims),
+            verdict_summary(&self.claims),
             self.program_version,
             plan.seeds,
             plan.field_seeds,
@@ -271,7 +275,7 @@ impl Report {
         let seeds = plan.seeds;
         let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
         let experiments = self.experiments();
-        let parts = Parts { claims: &self.claims, pictures, experiments };
-        claims::WORDS.document(lead, plan.quick, parts, command)
+        let parts = ReportParts { claims: &self.claims, pictures, experiments };
+        claims::CLAIMS.document(lead, plan.quick, parts, command)
     }
 }

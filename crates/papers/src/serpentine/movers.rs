@@ -1,10 +1,10 @@
 //! Discs run into a chain on open ground, slower and faster than it (slides P2, N6): without a
 //! reaction, with one when touched, and with one before.
 
-use super::corridor::{FASTEST, OWN_PARTS, ROD_VIOLATION};
-use super::{SPEED_M_S, SerpentinePlan};
+use super::corridor::{MAX_SPEED, OWN_GAP, ROD_VIOLATION};
+use super::{SPEED_M_S, SerpentineConfig};
 use crate::cells::{CaseResults, Columns, Value, column, figure, series};
-use crate::study::{Progress, Study, number};
+use crate::study::{Progress, Study, setting_number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
 use sidestep::kernel::InputError;
@@ -23,22 +23,22 @@ pub(super) const ESCAPES: [&str; 4] = ["off", "touch", "look-ahead", "look-ahead
 const COLUMNS: Columns = Columns {
     case: &[
         column("moves", "leader", |r| Value::Yes(moves(r.variant())))
-            .shown(|c| if c.is("moves") { "wanders" } else { "rests" }.into()),
+            .with_format(|c| if c.is_true("moves") { "wanders" } else { "rests" }.into()),
         column("escape", "reaction", |r| match r.variant().value("chain.self_collision") {
             Some(_) => Value::Word(ESCAPES[3].into()),
-            None => r.set("chain.escape"),
+            None => r.setting("chain.escape"),
         }),
-        column("discs", "discs", |r| r.set(DISCS)),
+        column("discs", "discs", |r| r.setting(DISCS)),
         column("speed_ratio", "disc / leader speed", |r| Value::Number(ratio(r.variant()))),
     ],
-    came: &[
+    results: &[
         column("inside_percent", "steps inside, %", |r| {
-            r.mean_share(|run| run.percent("penetrations"))
+            r.mean_proportion(|run| run.percent_of_steps("penetrations"))
         }),
         column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
         column("stuck_percent", "no way out, %", |r| r.mean_rate("escapes.vetoes")),
-        FASTEST,
-        OWN_PARTS,
+        MAX_SPEED,
+        OWN_GAP,
         ROD_VIOLATION,
     ],
 };
@@ -51,27 +51,27 @@ fn moves(case: &Variant) -> bool {
 
 /// Returns the speed of the discs divided by the leader's.
 fn ratio(case: &Variant) -> f64 {
-    number(case, SPEED) / SPEED_M_S
+    setting_number(case, SPEED) / SPEED_M_S
 }
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Movers {
+pub(super) struct MoverResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
-pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
-    let study = Study::of_file(SWEEP, SCENARIO)?;
-    let study = study.keep(|v| plan.mover_discs.contains(&(number(v, DISCS) as usize)));
-    let study = study.keep(|v| plan.speed_ratios.contains(&ratio(v)));
-    Ok(study.sized(plan.seeds, Some(plan.mover_cycles)))
+pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
+    let study = Study::from_file(SWEEP, SCENARIO)?;
+    let study = study.filtered(|v| plan.mover_discs.contains(&(setting_number(v, DISCS) as usize)));
+    let study = study.filtered(|v| plan.speed_ratios.contains(&ratio(v)));
+    Ok(study.with_size(plan.seeds, Some(plan.mover_cycles)))
 }
 
-impl Movers {
+impl MoverResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let results = study(plan)?.run(plan.workers, "discs that move", progress)?;
@@ -79,8 +79,11 @@ impl Movers {
     }
 
     /// Returns the cells of a way to react.
-    pub(super) fn of<'a>(&'a self, escape: &'a str) -> impl Iterator<Item = &'a CaseResults> {
-        self.cells.iter().filter(move |c| c.says("escape", escape))
+    pub(super) fn cells_with_escape<'a>(
+        &'a self,
+        escape: &'a str,
+    ) -> impl Iterator<Item = &'a CaseResults> {
+        self.cells.iter().filter(move |c| c.has_text("escape", escape))
     }
 
     pub(super) fn table(&self) -> Table {
@@ -97,7 +100,7 @@ impl Movers {
         let mut lines = Vec::new();
         for (moves, word) in [(true, "leader wanders"), (false, "leader rests")] {
             for escape in ESCAPES {
-                let cells = self.of(escape).filter(|c| c.is("moves") == moves);
+                let cells = self.cells_with_escape(escape).filter(|c| c.is_true("moves") == moves);
                 let cells = cells.filter(|c| Some(c.count("discs")) == most_discs);
                 let name = format!("{escape}, {word}");
                 lines.push(series(name, cells, ["speed_ratio", "inside_percent"]));

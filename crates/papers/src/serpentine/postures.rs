@@ -1,9 +1,9 @@
 //! Inverse kinematics by the chain's own rules (slides F2, E3): a tip is pulled to a target while
 //! the base objects, while it is free, and there and back; and damped least squares beside it.
 
-use super::{SerpentinePlan, draws};
+use super::{SerpentineConfig, draws};
 use crate::cells::{CaseResults, Columns, Value, bars, column, figure};
-use crate::study::{Progress, Study, number, outcome, setting};
+use crate::study::{Progress, Study, outcome_from_values, setting, setting_number};
 use cpu_time::ThreadTime;
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -12,8 +12,8 @@ use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::powf;
 use sidestep::kernel::stream::Draws;
-use sidestep::worlds::chain::geometry::{Point, along, distance, scaled, unit};
-use sidestep::worlds::chain::ik::{Engine, Goal, Solver};
+use sidestep::worlds::chain::geometry::{Point, add_scaled, distance, normalized, scaled};
+use sidestep::worlds::chain::ik::{ChainIkGoal, Engine, IkSolver};
 use sidestep::worlds::chain::{
     Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules,
 };
@@ -21,13 +21,13 @@ use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, FigureKind, Table};
 
 /// Part of the reach within which targets lie.
-const WITHIN: f64 = 0.9;
+const TARGET_REACH_FRACTION: f64 = 0.9;
 /// Distance at which a target counts as reached, in parts of the reach.
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE_FRACTION: f64 = 1e-4;
 
 /// Ways to bring a tip to a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum IkMethod {
     /// One motion of the tip; the base always objects to being moved, as the slides have it.
     Veto,
     /// One motion of the tip, with no connector fixed.
@@ -38,7 +38,7 @@ pub(super) enum Way {
     LeastSquares,
 }
 
-impl Way {
+impl IkMethod {
     const ALL: [Self; 4] = [Self::Veto, Self::FreeBase, Self::ThereAndBack, Self::LeastSquares];
 
     /// Returns its name in settings and JSON.
@@ -46,7 +46,7 @@ impl Way {
         ["veto", "free-base", "there-and-back", "least-squares"][self as usize]
     }
 
-    fn of(key: &str) -> Self {
+    fn from_key(key: &str) -> Self {
         Self::ALL.into_iter().find(|way| way.key() == key).expect("a way of this key")
     }
 
@@ -62,68 +62,74 @@ impl Way {
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("links", "links", |r| r.set("links")),
-        column("slack", "slack", |r| r.set("slack"))
-            .shown(|c| format!("{} %", 100.0 * c.number("slack"))),
-        column("way", "way", |r| r.set("way"))
-            .shown(|c| Way::of(&c.value("way").to_string()).name().into()),
+        column("links", "links", |r| r.setting("links")),
+        column("slack", "slack", |r| r.setting("slack"))
+            .with_format(|c| format!("{} %", 100.0 * c.number("slack"))),
+        column("way", "way", |r| r.setting("way"))
+            .with_format(|c| IkMethod::from_key(&c.value("way").to_string()).name().into()),
     ],
-    came: &[
-        column("reached", "reached", |r| r.share(|run| run.is("reached"))),
-        column("finished", "finished", |r| r.count(|run| run.is("finished"))),
+    results: &[
+        column("reached", "reached", |r| r.proportion(|run| run.is_true("reached"))),
+        column("finished", "finished", |r| r.count(|run| run.is_true("finished"))),
         column("median_us", "median, us", |r| Value::Number(r.median("us")))
-            .shown(|c| format!("{:.1}", c.number("median_us"))),
+            .with_format(|c| format!("{:.1}", c.number("median_us"))),
         column("median_iterations", "passes or steps", |r| Value::Number(r.median("iterations"))),
     ],
 };
 
 /// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
-struct Case {
+struct PostureCase {
     /// The way.
-    way: Way,
+    way: IkMethod,
     /// Rods.
     links: usize,
     /// Largest relative deviation of a rod's length from the mean.
     slack: f64,
 }
 
-impl Case {
+impl PostureCase {
     fn settings(self) -> Vec<Setting> {
         let Self { way, links, slack } = self;
         vec![setting("links", links as i64), setting("slack", slack), setting("way", way.key())]
     }
 
-    fn of(variant: &Variant) -> Self {
-        let way = Way::of(variant.value("way").and_then(toml::Value::as_str).unwrap_or_default());
-        Self { way, links: number(variant, "links") as usize, slack: number(variant, "slack") }
+    fn from_variant(variant: &Variant) -> Self {
+        let way = IkMethod::from_key(
+            variant.value("way").and_then(toml::Value::as_str).unwrap_or_default(),
+        );
+        Self {
+            way,
+            links: setting_number(variant, "links") as usize,
+            slack: setting_number(variant, "slack"),
+        }
     }
 }
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Postures {
+pub(super) struct PostureResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
 
 fn direction(draws: &mut Draws) -> Point<3> {
-    unit([0; 3].map(|_: u8| normal(draws))).unwrap_or([1.0, 0.0, 0.0])
+    normalized([0; 3].map(|_: u8| normal(draws))).unwrap_or([1.0, 0.0, 0.0])
 }
 
 /// Returns a random chain of rods that are as long as on average.
-fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
+fn chain(case: &PostureCase, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     let (slack, n) = (case.slack, case.links);
     let rod = Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 };
     let mut points = vec![[0.0; 3]];
     let mut u = direction(draws);
     for i in 0..n {
-        let turned = along(u, direction(draws), 0.5);
-        u = unit(turned).unwrap_or(u);
-        points.push(along(points[i], u, 1.0));
+        let turned = add_scaled(u, direction(draws), 0.5);
+        u = normalized(turned).unwrap_or(u);
+        points.push(add_scaled(points[i], u, 1.0));
     }
     let mut connectors = vec![Connector::free(0.02); n + 1];
-    if case.way == Way::Veto {
+    if case.way == IkMethod::Veto {
         connectors[0].mobility = Mobility::Fixed;
     }
     // Rods of fixed length take exactly the lengths that the points gave, to the bit.
@@ -135,19 +141,23 @@ fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     Chain::new(points, connectors, rods)
 }
 
-fn solved(case: &Case, seed: u64) -> Result<Json, InputError> {
+fn solve(case: &PostureCase, seed: u64) -> Result<Json, InputError> {
     let draws = &mut draws(seed);
     let mut chain = chain(case, draws)?;
     let (tip, reach_m) = (case.links, case.links as f64);
     let part = powf(draws.uniform(), 1.0 / 3.0);
-    let target = scaled(direction(draws), WITHIN * reach_m * part);
+    let target = scaled(direction(draws), TARGET_REACH_FRACTION * reach_m * part);
     let engine = match case.way {
-        Way::Veto | Way::FreeBase => return pulled(&mut chain, tip, target),
-        Way::ThereAndBack => Engine::Chain,
-        Way::LeastSquares => Engine::Dls,
+        IkMethod::Veto | IkMethod::FreeBase => return pull(&mut chain, tip, target),
+        IkMethod::ThereAndBack => Engine::Chain,
+        IkMethod::LeastSquares => Engine::Dls,
     };
-    let goal = Goal { engine, tolerance_m: TOLERANCE * reach_m, ..Goal::new(tip, 0, target) };
-    let mut solver = Solver::new(Rules::default());
+    let goal = ChainIkGoal {
+        engine,
+        tolerance_m: TOLERANCE_FRACTION * reach_m,
+        ..ChainIkGoal::new(tip, 0, target)
+    };
+    let mut solver = IkSolver::new(Rules::default());
     let began = ThreadTime::now();
     let answer = solver.solve(&chain, &Obstacles::default(), &goal)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
@@ -156,37 +166,37 @@ fn solved(case: &Case, seed: u64) -> Result<Json, InputError> {
     Ok(json!({ "reached": reached, "finished": finished, "us": us, "iterations": iterations }))
 }
 
-fn pulled(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
+fn pull(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
     let request = Request::exact(tip, target);
     let began = ThreadTime::now();
     let outcome = Propagator::default().propagate(chain, &Obstacles::default(), &request)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
-    let reached = outcome.moved().is_some();
+    let reached = outcome.motion().is_some();
     Ok(json!({ "reached": reached, "finished": false, "us": us, "iterations": 1 }))
 }
 
-impl Postures {
+impl PostureResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for &links in &plan.ik_links {
             for slack in [0.0, 0.1] {
-                cases.extend(Way::ALL.map(|way| Case { way, links, slack }.settings()));
+                cases.extend(IkMethod::ALL.map(|way| PostureCase { way, links, slack }.settings()));
             }
         }
-        let study = Study::of_variants("", cases).sized(plan.ik_targets, None);
+        let study = Study::from_variants("", cases).with_size(plan.ik_targets, None);
         let what = "targets of tips";
         let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
-            Ok(outcome(cell, solved(&Case::of(case), cell.seed)?))
+            Ok(outcome_from_values(cell, solve(&PostureCase::from_variant(case), cell.seed)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns the cells of a way.
-    pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &CaseResults> {
-        self.cells.iter().filter(move |c| c.says("way", way.key()))
+    pub(super) fn cells_with_method(&self, way: IkMethod) -> impl Iterator<Item = &CaseResults> {
+        self.cells.iter().filter(move |c| c.has_text("way", way.key()))
     }
 
     pub(super) fn table(&self) -> Table {
@@ -200,15 +210,15 @@ impl Postures {
         let mut links: Vec<String> =
             self.cells.iter().map(|c| c.value("links").to_string()).collect();
         links.dedup();
-        let series = |(way, slack): (Way, f64)| {
-            let cells = self.of(way).filter(|c| c.number("slack") == slack);
+        let series = |(way, slack): (IkMethod, f64)| {
+            let cells = self.cells_with_method(way).filter(|c| c.number("slack") == slack);
             let rods = match slack {
                 0.0 => "fixed rods".into(),
                 _ => format!("\u{b1}{} %", 100.0 * slack),
             };
             bars(format!("{}, {rods}", way.name()), cells, "median_us")
         };
-        let (back, squares) = (Way::ThereAndBack, Way::LeastSquares);
+        let (back, squares) = (IkMethod::ThereAndBack, IkMethod::LeastSquares);
         let all = [(back, 0.0), (back, 0.1), (squares, 0.0), (squares, 0.1)].map(series);
         let labels = ["links", "median, microseconds"];
         let figure = figure("Time to bring a tip to its target", labels, all);

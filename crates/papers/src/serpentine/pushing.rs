@@ -1,15 +1,15 @@
 //! A chain in a straight corridor is pushed back by its head until some part objects, and pulled
 //! back by its tail (slides A3, A4, R4).
 
-use super::{SerpentinePlan, draws};
+use super::{SerpentineConfig, draws};
 use crate::cells::{CaseResults, Columns, Value, bars, column, figure};
-use crate::study::{Progress, Study, number, outcome, setting};
+use crate::study::{Progress, Study, outcome_from_values, setting, setting_number};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
 use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
-use sidestep::worlds::chain::geometry::along;
+use sidestep::worlds::chain::geometry::add_scaled;
 use sidestep::worlds::chain::ground::{Corridor, Leg};
 use sidestep::worlds::chain::{
     Chain, Connector, Obstacles, Outcome, Propagator, Request, Rod, Rules,
@@ -22,30 +22,31 @@ use std::collections::BTreeSet;
 const NOISE_M: f64 = 0.001;
 const STEP_M: f64 = 0.01;
 /// Distance that it is to go.
-const WAY_M: f64 = 12.0;
+const DISTANCE_M: f64 = 12.0;
 const WIDTH_M: f64 = 2.0;
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("by_head", "back by", |r| r.set("by_head"))
-            .shown(|c| if c.is("by_head") { "head (push)" } else { "tail (pull)" }.into()),
-        column("self_collision", "self-collision", |r| r.set("self_collision")),
-        column("max_bend_deg", "bend limit, deg", |r| r.set("max_bend_deg")),
+        column("by_head", "back by", |r| r.setting("by_head")).with_format(|c| {
+            if c.is_true("by_head") { "head (push)" } else { "tail (pull)" }.into()
+        }),
+        column("self_collision", "self-collision", |r| r.setting("self_collision")),
+        column("max_bend_deg", "bend limit, deg", |r| r.setting("max_bend_deg")),
     ],
-    came: &[
+    results: &[
         column("way_m", "way, m", |r| r.mean("way_m")),
         column("vetoed", "vetoed", |r| r.count(|run| !run.text("veto").is_empty()))
-            .shown(|c| format!("{}/{}", c.count("vetoed"), c.count("runs"))),
+            .with_format(|c| format!("{}/{}", c.count("vetoed"), c.count("runs"))),
         column("runs", "", |r| r.count(|_| true)),
         column("reasons", "reasons", |r| {
-            let reasons: BTreeSet<String> = r.each().map(|run| run.text("veto")).collect();
+            let reasons: BTreeSet<String> = r.iter_runs().map(|run| run.text("veto")).collect();
             Value::Words(reasons.into_iter().filter(|reason| !reason.is_empty()).collect())
         }),
         column("sharpest_deg", "sharpest bend, deg", |r| {
-            Value::Number(r.most("sharpest_rad").to_degrees())
+            Value::Number(r.max_value("sharpest_rad").to_degrees())
         })
-        .shown(|c| format!("{:.0}", c.number("sharpest_deg"))),
-        column("rod_violation_m", "", |r| Value::Number(r.most("rod_violation_m"))),
+        .with_format(|c| format!("{:.0}", c.number("sharpest_deg"))),
+        column("rod_violation_m", "", |r| Value::Number(r.max_value("rod_violation_m"))),
     ],
 };
 
@@ -65,7 +66,7 @@ fn cases() -> Vec<Vec<Setting>> {
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Pushing {
+pub(super) struct PushingResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
@@ -78,19 +79,20 @@ fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
 }
 
 /// Runs a case until some part objects; returns the distance and the measures on the way.
-fn pushed(case: &Variant, seed: u64) -> Result<Json, InputError> {
+fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
     let is = |key: &str| case.value(key).and_then(toml::Value::as_bool) == Some(true);
     let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
     let obstacles = Obstacles::new(walls, 1.3)?;
-    let mut chain = chain(number(case, "max_bend_deg"))?;
+    let mut chain = chain(setting_number(case, "max_bend_deg"))?;
     let rules = Rules { self_collision: is("self_collision"), ..Rules::default() };
     let mut propagator = Propagator::new(rules);
     let (draws, k) = (&mut draws(seed), if is("by_head") { 0 } else { 15 });
     let start = chain.points()[k];
     let (mut gone_m, mut reason, mut sharpest_rad, mut rod_violation_m) = (0.0, None, 0.0, 0.0_f64);
-    for step in 1..=(WAY_M / STEP_M) as usize {
+    for step in 1..=(DISTANCE_M / STEP_M) as usize {
         let way_m = STEP_M * step as f64;
-        let to = along(along(start, [-1.0, 0.0], way_m), [0.0, 1.0], NOISE_M * normal(draws));
+        let to =
+            add_scaled(add_scaled(start, [-1.0, 0.0], way_m), [0.0, 1.0], NOISE_M * normal(draws));
         if let Outcome::Vetoed(veto) =
             propagator.propagate(&mut chain, &obstacles, &Request::exact(k, to))?
         {
@@ -110,22 +112,22 @@ fn pushed(case: &Variant, seed: u64) -> Result<Json, InputError> {
     }))
 }
 
-impl Pushing {
+impl PushingResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let study = Study::of_variants("", cases()).sized(plan.seeds, None);
+        let study = Study::from_variants("", cases()).with_size(plan.seeds, None);
         let results =
             study.run_by(plan.workers, "pushed and pulled", progress, |_, case, cell| {
-                Ok(outcome(cell, pushed(case, cell.seed)?))
+                Ok(outcome_from_values(cell, push(case, cell.seed)?))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns cells of pushing, or of pulling.
-    pub(super) fn of(&self, by_head: bool) -> impl Iterator<Item = &CaseResults> {
-        self.cells.iter().filter(move |c| c.is("by_head") == by_head)
+    pub(super) fn cells_by_direction(&self, by_head: bool) -> impl Iterator<Item = &CaseResults> {
+        self.cells.iter().filter(move |c| c.is_true("by_head") == by_head)
     }
 
     pub(super) fn table(&self) -> Table {
@@ -137,13 +139,14 @@ impl Pushing {
 
     pub(super) fn figure(&self) -> Figure {
         let category = |c: &CaseResults| match c.number("max_bend_deg") {
-            _ if !c.is("self_collision") => "no self-collision".to_string(),
+            _ if !c.is_true("self_collision") => "no self-collision".to_string(),
             180.0 => "self-collision".to_string(),
             deg => format!("bends up to {deg}\u{b0}"),
         };
-        let pushed = bars("pushed by the head", self.of(true), "way_m");
-        let pulled = bars("pulled by the tail", self.of(false), "way_m");
-        let kind = FigureKind::Bars { categories: self.of(true).map(category).collect() };
+        let pushed = bars("pushed by the head", self.cells_by_direction(true), "way_m");
+        let pulled = bars("pulled by the tail", self.cells_by_direction(false), "way_m");
+        let kind =
+            FigureKind::Bars { categories: self.cells_by_direction(true).map(category).collect() };
         let title = "How far a chain goes back until somebody objects";
         Figure { kind, ..figure(title, ["", "way of 12 m, m"], [pushed, pulled]) }
     }

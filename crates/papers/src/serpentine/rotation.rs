@@ -1,10 +1,10 @@
 //! Reactions of a rod that hits an obstacle (slide A7): turn to the nearest direction that is free
 //! of everything, turn once as the slides say, or do not turn.
 
-use super::SerpentinePlan;
+use super::SerpentineConfig;
 use super::corridor::{CLEARANCE, ROD_VIOLATION, WIDTH};
-use crate::cells::{CaseResults, Columns, Value, column, figure, least};
-use crate::study::{Progress, Study, finish, known};
+use crate::cells::{CaseResults, Columns, Value, column, figure, min_value};
+use crate::study::{Progress, Study, downcast, run_to_end};
 use serde::Serialize;
 use sidestep::experiment::sweep::Outcome;
 use sidestep::kernel::InputError;
@@ -21,59 +21,59 @@ pub(super) const RULES: [&str; 3] = ["union", "literal", "never"];
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("rotation", "rotation", |r| r.set("chain.rotation")),
-        column("step_m", "step, m", |r| r.set(STEP)),
-        column("width_m", "width, m", |r| r.set(WIDTH)),
+        column("rotation", "rotation", |r| r.setting("chain.rotation")),
+        column("step_m", "step, m", |r| r.setting(STEP)),
+        column("width_m", "width, m", |r| r.setting(WIDTH)),
     ],
-    came: &[
-        column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
+    results: &[
+        column("arrived", "arrived", |r| r.proportion(|run| run.number_or_zero("done") == 1.0)),
         column("progress_percent", "progress, %", |r| {
-            r.mean_share(|run| 100.0 * run.or_zero("furthest"))
+            r.mean_proportion(|run| 100.0 * run.number_or_zero("furthest"))
         }),
         column("vetoes", "vetoes", |r| r.sum("vetoes")),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         CLEARANCE,
         column("slave_over_master", "follower / leader", |r| {
-            Value::Number(r.most("max_slave_step_m") / r.set_number(STEP))
+            Value::Number(r.max_value("max_slave_step_m") / r.setting_number(STEP))
         })
-        .shown(|c| format!("{:.2}", c.number("slave_over_master"))),
+        .with_format(|c| format!("{:.2}", c.number("slave_over_master"))),
         ROD_VIOLATION,
     ],
 };
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Rotations {
+pub(super) struct RotationResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan: corridors of medium width.
-pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
-    let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
-    Ok(study.keep_numbers(STEP, &plan.steps_m).sized(plan.seeds, None))
+pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
+    let study = Study::from_file(SWEEP, SCENARIO)?.filtered_by_number(WIDTH, &plan.widths_m);
+    Ok(study.filtered_by_number(STEP, &plan.steps_m).with_size(plan.seeds, None))
 }
 
-impl Rotations {
+impl RotationResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let what = "rules of rotation";
         let results = study(plan)?.run_by(plan.workers, what, progress, |scenario, _, cell| {
             let mut run = chain_run(&scenario()?, 1)?;
             let mut furthest = 0.0_f64;
-            finish(&mut *run, |run| {
-                let run = known::<ChainRun<2>>(run);
+            run_to_end(&mut *run, |run| {
+                let run = downcast::<ChainRun<2>>(run);
                 let body = run.state().body(0);
                 if body.driving.task == 0 {
                     furthest = furthest.max(run.world().progress(0, &body));
                 }
             });
             let furthest =
-                if known::<ChainRun<2>>(&*run).metrics().done == 1 { 1.0 } else { furthest };
-            let mut outcome = Outcome::of(*cell, &*run);
+                if downcast::<ChainRun<2>>(&*run).metrics().done == 1 { 1.0 } else { furthest };
+            let mut outcome = Outcome::from_simulation(*cell, &*run);
             outcome.metrics.insert("furthest".into(), furthest.into());
             Ok(outcome)
         })?;
@@ -81,8 +81,11 @@ impl Rotations {
     }
 
     /// Returns the cells of a rule.
-    pub(super) fn of<'a>(&'a self, rotation: &'a str) -> impl Iterator<Item = &'a CaseResults> {
-        self.cells.iter().filter(move |c| c.says("rotation", rotation))
+    pub(super) fn cells_with_rule<'a>(
+        &'a self,
+        rotation: &'a str,
+    ) -> impl Iterator<Item = &'a CaseResults> {
+        self.cells.iter().filter(move |c| c.has_text("rotation", rotation))
     }
 
     pub(super) fn table(&self) -> Table {
@@ -93,11 +96,13 @@ impl Rotations {
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let mut steps_m: Vec<f64> = self.of(RULES[0]).map(|c| c.number("step_m")).collect();
+        let mut steps_m: Vec<f64> =
+            self.cells_with_rule(RULES[0]).map(|c| c.number("step_m")).collect();
         steps_m.dedup();
         let deepest = |rule: &str, step_m: f64| {
-            let cells = self.of(rule).filter(|c| c.number("step_m") == step_m);
-            let least_m = least(cells.map(|c| c.maybe("min_clearance_m"))).unwrap_or(0.0);
+            let cells = self.cells_with_rule(rule).filter(|c| c.number("step_m") == step_m);
+            let least_m =
+                min_value(cells.map(|c| c.optional_number("min_clearance_m"))).unwrap_or(0.0);
             1e3 * (-least_m).max(0.0)
         };
         let series = RULES.map(|rule| Series {

@@ -1,14 +1,14 @@
 //! The cost of a motion (slides P5, P6, E4): by the number of connectors, by how many of them it
 //! reaches, and by the number of obstacles that are far away.
 
-use super::{SerpentinePlan, draws};
+use super::{SerpentineConfig, draws};
 use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use cpu_time::ThreadTime;
 use serde::Serialize;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::{Digest, InputError};
-use sidestep::worlds::chain::geometry::{Point, along, unit};
+use sidestep::worlds::chain::geometry::{Point, add_scaled, normalized};
 use sidestep::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
 use sidestep_document::figure::{Point as FigurePoint, Scale};
 use sidestep_document::{Estimate, Figure, Series, Table};
@@ -20,11 +20,11 @@ const ROD_M: f64 = 0.1;
 /// Length of the head's step in a motion.
 const STEP_M: f64 = 0.01;
 /// Connectors of the chain among obstacles.
-const AMONG: usize = 450;
+const CLUTTERED_CONNECTORS: usize = 450;
 
 /// One chain that is led through the open.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Size {
+pub(super) struct OpenTiming {
     /// Connectors.
     pub(super) connectors: usize,
     /// Time of a motion, microseconds: rods of fixed length,
@@ -41,7 +41,7 @@ pub(super) struct Size {
 
 /// One chain among balls, with others far away.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Far {
+pub(super) struct FarObstacleTiming {
     /// Balls that the chain never comes near to.
     pub(super) balls: usize,
     /// Time of a motion, microseconds.
@@ -54,11 +54,11 @@ pub(super) struct Far {
 
 /// All timings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Scaling {
+pub(super) struct ScalingResults {
     /// Sizes by number of connectors.
-    pub(super) sizes: Vec<Size>,
+    pub(super) sizes: Vec<OpenTiming>,
     /// Runs by number of far balls.
-    pub(super) far: Vec<Far>,
+    pub(super) far: Vec<FarObstacleTiming>,
 }
 
 /// Returns a slightly bent chain, so that every connector moves at every motion: a bend lets
@@ -68,8 +68,8 @@ fn snake(n: usize, max_m: f64) -> Result<Chain<3>, InputError> {
     let bent = 0.2_f64.min(90.0 / n as f64);
     for i in 1..n {
         let u = [-1.0, bent * sin(i as f64 * 0.1), bent * cos(i as f64 * 0.07)];
-        let u = unit(u).unwrap_or([-1.0, 0.0, 0.0]);
-        points.push(along(points[i - 1], u, ROD_M));
+        let u = normalized(u).unwrap_or([-1.0, 0.0, 0.0]);
+        points.push(add_scaled(points[i - 1], u, ROD_M));
     }
     let rod = Rod { min_m: ROD_M, max_m, radius_m: 0.01 };
     Chain::new(points, vec![Connector::free(0.02); n], vec![rod; n - 1])
@@ -82,7 +82,7 @@ fn head(k: usize) -> Point<3> {
 }
 
 /// Leads a chain; returns microseconds and connectors per motion.
-fn led(
+fn lead(
     chain: &mut Chain<3>,
     obstacles: &Obstacles<3>,
     motions: std::ops::Range<usize>,
@@ -92,18 +92,18 @@ fn led(
     let began = ThreadTime::now();
     for k in motions {
         let outcome = propagator.propagate(chain, obstacles, &Request::exact(0, head(k)))?;
-        moved += outcome.moved().map_or(0, |m| m.touched.len());
+        moved += outcome.motion().map_or(0, |m| m.touched.len());
     }
     Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))
 }
 
 /// Returns times by repeat, and connectors of a motion of a chain in the open.
-fn in_the_open(n: usize, max_m: f64, motions: usize) -> Result<(Vec<f64>, f64), InputError> {
+fn time_in_open(n: usize, max_m: f64, motions: usize) -> Result<(Vec<f64>, f64), InputError> {
     let mut chain = snake(n, max_m)?;
     let (nothing, mut times_us, mut moved) = (Obstacles::default(), Vec::new(), 0.0);
     for repeat in 0..REPEATS {
         let from = 1 + repeat * motions;
-        let (us, touched) = led(&mut chain, &nothing, from..from + motions)?;
+        let (us, touched) = lead(&mut chain, &nothing, from..from + motions)?;
         times_us.push(us);
         moved += touched / REPEATS as f64;
     }
@@ -118,30 +118,30 @@ fn balls(far: usize) -> Result<Obstacles<3>, InputError> {
     let draws = &mut draws(1);
     for id in 0..far {
         let at: [f64; 3] = [0; 3].map(|_: u8| 2.0 * draws.uniform() - 1.0);
-        let at = along([0.0, 0.0, 500.0], at, 100.0);
+        let at = add_scaled([0.0, 0.0, 500.0], at, 100.0);
         all.push(Obstacle::ball(1000 + id as u32, at, 0.2));
     }
     Obstacles::new(all, ROD_M + 0.1)
 }
 
-fn bits(chain: &Chain<3>) -> Digest {
+fn chain_digest(chain: &Chain<3>) -> Digest {
     let bytes: Vec<u8> = chain.points().iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-    Digest::of(&bytes)
+    Digest::hash_bytes(&bytes)
 }
 
-impl Scaling {
+impl ScalingResults {
     /// Runs the experiment; timings run alone, on one worker.
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let mut sizes = Vec::new();
         for (k, &connectors) in plan.sizes.iter().enumerate() {
             progress("cost of a motion", k as f64 / plan.sizes.len() as f64);
             let motions = (plan.timed_motions / connectors).max(4);
-            let (fixed_us_by_repeat, fixed_moved) = in_the_open(connectors, ROD_M, motions)?;
-            let (slack_us, slack_moved) = in_the_open(connectors, 1.5 * ROD_M, motions)?;
-            sizes.push(Size {
+            let (fixed_us_by_repeat, fixed_moved) = time_in_open(connectors, ROD_M, motions)?;
+            let (slack_us, slack_moved) = time_in_open(connectors, 1.5 * ROD_M, motions)?;
+            sizes.push(OpenTiming {
                 connectors,
                 fixed_us: median(fixed_us_by_repeat.iter().copied()),
                 fixed_us_by_repeat,
@@ -151,20 +151,25 @@ impl Scaling {
             });
         }
         let mut alone = None;
-        let motions = (plan.timed_motions / AMONG).max(50);
+        let motions = (plan.timed_motions / CLUTTERED_CONNECTORS).max(50);
         let mut far = Vec::new();
         for &count in &plan.far_balls {
             let obstacles = balls(count)?;
             let mut times_us = Vec::new();
             let mut end = None;
             for _ in 0..REPEATS {
-                let mut chain = snake(AMONG, ROD_M)?;
-                times_us.push(led(&mut chain, &obstacles, 1..motions)?.0);
-                end = Some(bits(&chain));
+                let mut chain = snake(CLUTTERED_CONNECTORS, ROD_M)?;
+                times_us.push(lead(&mut chain, &obstacles, 1..motions)?.0);
+                end = Some(chain_digest(&chain));
             }
             let alone = *alone.get_or_insert(end);
             let us = median(times_us.iter().copied());
-            far.push(Far { balls: count, us, us_by_repeat: times_us, same: end == alone });
+            far.push(FarObstacleTiming {
+                balls: count,
+                us,
+                us_by_repeat: times_us,
+                same: end == alone,
+            });
         }
         progress("cost of a motion", 1.0);
         Ok(Self { sizes, far })
@@ -172,21 +177,21 @@ impl Scaling {
 
     /// Returns the time per moved connector of the longest chain divided by that of the shortest.
     pub(super) fn growth(&self) -> Estimate {
-        let each = |size: Option<&Size>| -> Vec<Option<f64>> {
-            let per_moved = |s: &Size, us: &f64| Some(us / s.fixed_moved.max(1.0));
+        let each = |size: Option<&OpenTiming>| -> Vec<Option<f64>> {
+            let per_moved = |s: &OpenTiming, us: &f64| Some(us / s.fixed_moved.max(1.0));
             size.iter()
                 .flat_map(|s| s.fixed_us_by_repeat.iter().map(|us| per_moved(s, us)))
                 .collect()
         };
-        Estimate::ratio(&each(self.sizes.last()), &each(self.sizes.first()))
+        Estimate::geometric_ratio(&each(self.sizes.last()), &each(self.sizes.first()))
     }
 
     /// Returns the time of a motion with the most far balls divided by that with the fewest.
     pub(super) fn far_growth(&self) -> Estimate {
-        let each = |far: Option<&Far>| -> Vec<Option<f64>> {
+        let each = |far: Option<&FarObstacleTiming>| -> Vec<Option<f64>> {
             far.iter().flat_map(|f| f.us_by_repeat.iter().map(|us| Some(*us))).collect()
         };
-        Estimate::ratio(&each(self.far.last()), &each(self.far.first()))
+        Estimate::geometric_ratio(&each(self.far.last()), &each(self.far.first()))
     }
 
     pub(super) fn tables(&self) -> [Table; 2] {
@@ -211,13 +216,13 @@ impl Scaling {
         let mut far = Table::new("Cost of a motion with far obstacles", note, &columns);
         for f in &self.far {
             let same = if f.same { "yes" } else { "no" };
-            far.row([f.balls.to_string(), format!("{:.1}", f.us), same.into()]);
+            far.push_row([f.balls.to_string(), format!("{:.1}", f.us), same.into()]);
         }
         [sizes, far]
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let series = |name: &str, ns: fn(&Size) -> f64| Series {
+        let series = |name: &str, ns: fn(&OpenTiming) -> f64| Series {
             name: name.into(),
             points: self
                 .sizes

@@ -1,10 +1,10 @@
 //! A snake of 450 and more connectors creeps at random through space (slides E1, V6, F4): among
 //! balls that stand, and balls that fly.
 
-use super::corridor::{CLEARANCE, FASTEST, OWN_PARTS, ROD_VIOLATION};
-use super::{DT_S, SerpentinePlan};
+use super::corridor::{CLEARANCE, MAX_SPEED, OWN_GAP, ROD_VIOLATION};
+use super::{DT_S, SerpentineConfig};
 use crate::cells::{CaseResults, Columns, Value, column};
-use crate::study::{Progress, Study, number};
+use crate::study::{Progress, Study, setting_number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
 use sidestep::kernel::InputError;
@@ -17,23 +17,25 @@ const CONNECTORS: &str = "chains.connectors";
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("connectors", "connectors", |r| r.set(CONNECTORS)),
+        column("connectors", "connectors", |r| r.setting(CONNECTORS)),
         column("filled", "filled, %", |r| Value::Number(of_fields(r.variant(), "part")))
-            .shown(|c| (100.0 * c.number("filled")).to_string()),
+            .with_format(|c| (100.0 * c.number("filled")).to_string()),
         column("movers", "flying balls", |r| Value::Count(of_fields(r.variant(), "n") as u64)),
     ],
-    came: &[
+    results: &[
         column("steps_per_s", "steps / CPU s", |r| r.mean("steps_per_cpu_s")),
         column("real_time", "times real time", |r| {
-            r.mean_of(|run| run.or_zero("steps_per_cpu_s") * DT_S)
+            r.mean_of(|run| run.number_or_zero("steps_per_cpu_s") * DT_S)
         }),
         column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         CLEARANCE,
-        OWN_PARTS,
-        FASTEST,
-        column("way_percent", "way, %", |r| r.mean_share(|run| 100.0 * run.or_zero("progress"))),
+        OWN_GAP,
+        MAX_SPEED,
+        column("way_percent", "way, %", |r| {
+            r.mean_proportion(|run| 100.0 * run.number_or_zero("progress"))
+        }),
         ROD_VIOLATION,
     ],
 };
@@ -48,21 +50,22 @@ fn of_fields(case: &Variant, key: &str) -> f64 {
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Snakes {
+pub(super) struct SnakeResults {
     /// Results by case.
     pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
-pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
-    let study = Study::of_file(SWEEP, SCENARIO)?;
-    let study = study.keep(|v| plan.snake_connectors.contains(&(number(v, CONNECTORS) as usize)));
-    Ok(study.sized(plan.snake_seeds, Some(plan.snake_cycles)))
+pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
+    let study = Study::from_file(SWEEP, SCENARIO)?;
+    let study = study
+        .filtered(|v| plan.snake_connectors.contains(&(setting_number(v, CONNECTORS) as usize)));
+    Ok(study.with_size(plan.snake_seeds, Some(plan.snake_cycles)))
 }
 
-impl Snakes {
+impl SnakeResults {
     pub(super) fn run(
-        plan: &SerpentinePlan,
+        plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let results = study(plan)?.run(plan.workers, "snake in space", progress)?;

@@ -161,7 +161,7 @@ impl Encoder {
             Self::U64(encoder, _) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
             Self::I64(encoder) => (encoder.take_page(), Encoding::DELTA_BINARY_PACKED),
             Self::F64(page) | Self::Text(page) => (std::mem::take(page), Encoding::PLAIN),
-            Self::Bool(page) => (packed(&std::mem::take(page)), Encoding::PLAIN),
+            Self::Bool(page) => (pack_bools(&std::mem::take(page)), Encoding::PLAIN),
             Self::Label(encoder) => (encoder.take_page(), Encoding::RLE_DICTIONARY),
         }
     }
@@ -184,7 +184,7 @@ fn put_doubles(values: &[f64], page: &mut Vec<u8>) {
 }
 
 /// Packs eight values per byte, the first in the lowest bit.
-fn packed(values: &[bool]) -> Vec<u8> {
+fn pack_bools(values: &[bool]) -> Vec<u8> {
     let byte = |eight: &[bool]| {
         (0..).zip(eight).fold(0, |byte, (bit, &value)| byte | u8::from(value) << bit)
     };

@@ -10,7 +10,7 @@ use ::mcap::records::MessageHeader;
 use ::mcap::{McapError, Writer};
 use sidestep_kernel::ports::RecordError;
 
-use super::writer::{options, said};
+use super::writer::{error_text, write_options};
 
 /// The version of the layout of `metadata.yaml`: that of ROS 2 Humble, which later ones read.
 const METADATA_VERSION: u32 = 5;
@@ -32,13 +32,13 @@ pub struct BagSchema {
 pub struct BagWriter {
     folder: PathBuf,
     writer: Writer<BufWriter<File>>,
-    topics: BTreeMap<String, Topic>,
+    topics: BTreeMap<String, BagTopic>,
     /// First and last time, once there is a message.
     span_ns: Option<(u64, u64)>,
 }
 
 #[derive(Debug)]
-struct Topic {
+struct BagTopic {
     channel: u16,
     schema: BagSchema,
     messages: u32,
@@ -53,8 +53,8 @@ impl BagWriter {
         let path = folder.join(FILE);
         let failed = |cause: String| RecordError::new(path.display(), cause);
         let file = File::create(&path).map_err(|e| failed(e.to_string()))?;
-        let writer = options(version).profile("ros2").create(BufWriter::new(file));
-        let writer = writer.map_err(|e| failed(said(e)))?;
+        let writer = write_options(version).profile("ros2").create(BufWriter::new(file));
+        let writer = writer.map_err(|e| failed(error_text(e)))?;
         let folder = folder.to_path_buf();
         Ok(Self { folder, writer, topics: BTreeMap::new(), span_ns: None })
     }
@@ -72,7 +72,7 @@ impl BagWriter {
     ) -> Result<(), RecordError> {
         let path = self.folder.join(FILE);
         self.append(topic, schema, time_ns, message)
-            .map_err(|e| RecordError::new(path.display(), said(e)))
+            .map_err(|e| RecordError::new(path.display(), error_text(e)))
     }
 
     fn append(
@@ -87,7 +87,7 @@ impl BagWriter {
             let id = self.writer.add_schema(schema.name, "ros2msg", definition)?;
             let about = BTreeMap::from([("offered_qos_profiles".to_string(), String::new())]);
             let channel = self.writer.add_channel(id, topic, CDR, &about)?;
-            self.topics.insert(topic.into(), Topic { channel, schema, messages: 0 });
+            self.topics.insert(topic.into(), BagTopic { channel, schema, messages: 0 });
         }
         let Some(topic) = self.topics.get_mut(topic) else { return Ok(()) };
         let header = MessageHeader {
@@ -109,7 +109,7 @@ impl BagWriter {
     /// An I/O error.
     pub fn finish(mut self) -> Result<(), RecordError> {
         let (path, metadata) = (self.folder.join(FILE), self.metadata());
-        self.writer.finish().map_err(|e| RecordError::new(path.display(), said(e)))?;
+        self.writer.finish().map_err(|e| RecordError::new(path.display(), error_text(e)))?;
         let file = self.writer.into_inner().into_inner().map_err(|e| e.into_error());
         file.and_then(|file| file.sync_all()).map_err(|e| RecordError::new(path.display(), e))?;
         let path = self.folder.join("metadata.yaml");

@@ -18,18 +18,18 @@ use foxglove::{
 use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::view::{Frame, Scenery};
 
+use super::frame_encoder::{FrameEncoder, MessageSink};
 use super::messages::to_ns;
-use super::topics::{Sink, Topics};
 
 /// Bytes that wait for a viewer before the oldest ones are dropped, about.
-const WAITING_BYTES: usize = 64 << 20;
+const MAX_BACKLOG_BYTES: usize = 64 << 20;
 /// Messages that wait at least: as many as there can be topics at once.
-const FEWEST_WAITING: usize = 128;
-const MOST_WAITING: usize = 1024;
+const MIN_BACKLOG_MESSAGES: usize = 128;
+const MAX_BACKLOG_MESSAGES: usize = 1024;
 
 /// The wish of a viewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steering {
+pub struct PlaybackRequest {
     /// Whether the run is to go on.
     pub play: bool,
     /// Simulated seconds per second; any number at all, because it comes from outside.
@@ -42,7 +42,7 @@ pub struct Steering {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
     /// Whether it goes on.
-    pub playing: Playing,
+    pub playing: PlaybackPhase,
     /// Simulated seconds.
     pub time_s: f64,
     /// Simulated seconds per second.
@@ -53,7 +53,7 @@ pub struct Playback {
 
 /// Whether a run goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Playing {
+pub enum PlaybackPhase {
     /// It goes on.
     Playing,
     /// It stands still.
@@ -70,9 +70,9 @@ pub struct LiveServer {
 }
 
 /// The frames of a server, in a form that viewers understand.
-pub struct LiveFrames {
-    topics: Topics,
-    output: Output,
+pub struct LiveFrameWriter {
+    topics: FrameEncoder,
+    output: LiveOutput,
 }
 
 /// Starts a server for a run at `host` and `port` (0 for any free one), with a first frame, and up to `end_s` of
@@ -80,27 +80,28 @@ pub struct LiveFrames {
 ///
 /// # Errors
 /// When the address cannot be had.
-pub fn live(
+pub fn start_live_server(
     host: &str,
     port: u16,
     scenery: &Scenery,
     first: &Frame,
     end_s: f64,
-    steer: impl Fn(Steering) -> Playback + Send + Sync + 'static,
-) -> io::Result<(LiveServer, LiveFrames)> {
+    steer: impl Fn(PlaybackRequest) -> Playback + Send + Sync + 'static,
+) -> io::Result<(LiveServer, LiveFrameWriter)> {
     let context = Context::new();
-    let desk = Arc::new(Desk { latest: Mutex::default(), steer: Box::new(steer) });
-    let output = Output { context: context.clone(), desk: desk.clone(), channels: BTreeMap::new() };
-    let mut frames = LiveFrames { topics: Topics::new(scenery), output };
-    let told = frames.topics.scenery(scenery, &mut frames.output);
-    told.and_then(|()| frames.frame(first)).map_err(io::Error::other)?;
+    let desk = Arc::new(RequestHandler { latest: Mutex::default(), steer: Box::new(steer) });
+    let output =
+        LiveOutput { context: context.clone(), desk: desk.clone(), channels: BTreeMap::new() };
+    let mut frames = LiveFrameWriter { topics: FrameEncoder::new(scenery), output };
+    let told = frames.topics.write_scenery(scenery, &mut frames.output);
+    told.and_then(|()| frames.write_frame(first)).map_err(io::Error::other)?;
     let server = WebSocketServer::new()
         .context(&context)
         .name(format!("sidestep: {}", scenery.name))
         .bind(host, port)
         .capabilities([Capability::PlaybackControl, Capability::Time])
         .playback_time_range(0, to_ns(end_s))
-        .message_backlog_size(desk.waiting())
+        .message_backlog_size(desk.max_backlog_messages())
         .listener(desk)
         .start_blocking();
     let handle = server.map_err(|error| match error {
@@ -117,15 +118,15 @@ impl LiveServer {
     }
 
     /// Returns whether a viewer watches.
-    pub fn is_watched(&self) -> bool {
+    pub fn has_viewers(&self) -> bool {
         self.handle.as_ref().is_some_and(|handle| handle.client_count() > 0)
     }
 
     /// Tells all viewers the state of the run.
-    pub fn tell(&self, playback: Playback) {
+    pub fn broadcast(&self, playback: Playback) {
         if let Some(handle) = &self.handle {
             handle.broadcast_time(to_ns(playback.time_s));
-            handle.broadcast_playback_state(state(playback));
+            handle.broadcast_playback_state(playback_state(playback));
         }
     }
 }
@@ -139,24 +140,24 @@ impl Drop for LiveServer {
     }
 }
 
-impl LiveFrames {
+impl LiveFrameWriter {
     /// Passes a frame on to viewers.
     ///
     /// # Errors
     /// When it cannot be encoded.
-    pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
-        self.topics.frame(frame, &mut self.output)
+    pub fn write_frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        self.topics.write_frame(frame, &mut self.output)
     }
 }
 
-struct Output {
+struct LiveOutput {
     context: Arc<Context>,
-    desk: Arc<Desk>,
+    desk: Arc<RequestHandler>,
     /// Channels by topic.
     channels: BTreeMap<String, Arc<RawChannel>>,
 }
 
-impl Output {
+impl LiveOutput {
     fn channel<T: Encode>(&mut self, topic: &str) -> Result<Arc<RawChannel>, RecordError> {
         if let Some(channel) = self.channels.get(topic) {
             return Ok(channel.clone());
@@ -169,7 +170,7 @@ impl Output {
     }
 }
 
-impl Sink for Output {
+impl MessageSink for LiveOutput {
     fn write<T: Encode>(
         &mut self,
         topic: &str,
@@ -183,7 +184,7 @@ impl Sink for Output {
         // An event is sent once, not whenever a viewer comes.
         if topic != "/log" {
             let id = u64::from(channel.id());
-            self.desk.lock().insert(id, Message { channel, log_time, bytes });
+            self.desk.lock().insert(id, LatestMessage { channel, log_time, bytes });
         }
         Ok(())
     }
@@ -193,32 +194,33 @@ impl Sink for Output {
     }
 }
 
-struct Message {
+struct LatestMessage {
     channel: Arc<RawChannel>,
     log_time: u64,
     bytes: Vec<u8>,
 }
 
 /// The server's side of viewers' requests.
-struct Desk {
+struct RequestHandler {
     /// The last message of each channel, for viewers that come later.
-    latest: Mutex<BTreeMap<u64, Message>>,
-    steer: Box<dyn Fn(Steering) -> Playback + Send + Sync>,
+    latest: Mutex<BTreeMap<u64, LatestMessage>>,
+    steer: Box<dyn Fn(PlaybackRequest) -> Playback + Send + Sync>,
 }
 
-impl Desk {
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Message>> {
+impl RequestHandler {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, LatestMessage>> {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns the number of messages that may wait for a viewer.
-    fn waiting(&self) -> usize {
+    fn max_backlog_messages(&self) -> usize {
         let largest = self.lock().values().map(|message| message.bytes.len()).max();
-        (WAITING_BYTES / largest.unwrap_or(0).max(1)).clamp(FEWEST_WAITING, MOST_WAITING)
+        (MAX_BACKLOG_BYTES / largest.unwrap_or(0).max(1))
+            .clamp(MIN_BACKLOG_MESSAGES, MAX_BACKLOG_MESSAGES)
     }
 }
 
-impl ServerListener for Desk {
+impl ServerListener for RequestHandler {
     fn on_subscribe(&self, client: Client, channel: ChannelView) {
         if let Some(message) = self.lock().get(&u64::from(channel.id())) {
             let meta = PartialMetadata::with_log_time(message.log_time);
@@ -230,20 +232,20 @@ impl ServerListener for Desk {
         &self,
         request: PlaybackControlRequest,
     ) -> Option<PlaybackState> {
-        let steering = Steering {
+        let steering = PlaybackRequest {
             play: request.playback_command == PlaybackCommand::Play,
             speed: f64::from(request.playback_speed),
             seek_s: request.seek_time.map(|ns| ns as f64 * 1e-9),
         };
-        Some(state((self.steer)(steering)))
+        Some(playback_state((self.steer)(steering)))
     }
 }
 
-fn state(playback: Playback) -> PlaybackState {
+fn playback_state(playback: Playback) -> PlaybackState {
     let status = match playback.playing {
-        Playing::Playing => PlaybackStatus::Playing,
-        Playing::Paused => PlaybackStatus::Paused,
-        Playing::Ended => PlaybackStatus::Ended,
+        PlaybackPhase::Playing => PlaybackStatus::Playing,
+        PlaybackPhase::Paused => PlaybackStatus::Paused,
+        PlaybackPhase::Ended => PlaybackStatus::Ended,
     };
     PlaybackState {
         status,

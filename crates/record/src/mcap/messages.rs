@@ -9,8 +9,8 @@ use foxglove::messages::{
     line_primitive, log, packed_element_field, scene_entity_deletion,
 };
 use sidestep_kernel::view::{
-    Body, Floor, Frame, Kind, Level, Occupancy, Place, Plane, Pose as ViewPose, Scan, Scenery,
-    Shape,
+    Body, BodyKind, Frame, Isometry2, Occupancy, OccupancyGrid, Pose as ViewPose, Scan, Scenery,
+    Severity, Shape, Vec3,
 };
 
 use super::WORLD;
@@ -28,11 +28,11 @@ fn timestamp(ns: u64) -> Option<Timestamp> {
 }
 
 /// Returns the time of a log entry.
-pub(super) fn nanoseconds(entry: &Log) -> u64 {
+pub(super) fn log_time_ns(entry: &Log) -> u64 {
     entry.timestamp.map_or(0, |t| u64::from(t.sec()) * NS_PER_S + u64::from(t.nsec()))
 }
 
-fn vector([x, y, z]: Place) -> Option<Vector3> {
+fn vector([x, y, z]: Vec3) -> Option<Vector3> {
     Some(Vector3 { x, y, z })
 }
 
@@ -46,13 +46,13 @@ fn pose(pose: &ViewPose) -> Option<Pose> {
 }
 
 /// Returns a vector that was read; missing numbers are 0.
-pub(super) fn read_vector(read: Option<&Vector3>) -> Place {
+pub(super) fn read_vector(read: Option<&Vector3>) -> Vec3 {
     read.map_or([0.0; 3], |v| [v.x, v.y, v.z])
 }
 
 /// Returns a pose that was read; missing parts are the origin, without a turn.
 pub(super) fn read_pose(read: Option<&Pose>) -> ViewPose {
-    let plain = ViewPose::at([0.0; 3]);
+    let plain = ViewPose::from_position([0.0; 3]);
     read.map_or(plain, |read| ViewPose {
         at_m: read_vector(read.position.as_ref()),
         turn: read.orientation.as_ref().map_or(plain.turn, |q| [q.x, q.y, q.z, q.w]),
@@ -70,18 +70,18 @@ fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
 }
 
 /// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
-pub(super) fn grid(floor: &Floor) -> Grid {
+pub(super) fn grid(floor: &OccupancyGrid) -> Grid {
     let byte = |occupancy: &Occupancy| match occupancy {
         Occupancy::Free => 0,
         Occupancy::Wall => 100,
         Occupancy::Unknown => 255,
     };
     let data: Vec<u8> = floor.boxes.iter().map(byte).collect();
-    let Plane { origin_m: [x_m, y_m], yaw_rad } = floor.plane;
+    let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = floor.plane;
     Grid {
         timestamp: timestamp(0),
         frame_id: WORLD.into(),
-        pose: pose(&ViewPose::heading([x_m, y_m, 0.0], yaw_rad)),
+        pose: pose(&ViewPose::from_heading([x_m, y_m, 0.0], yaw_rad)),
         column_count: floor.width,
         cell_size: Some(Vector2 { x: floor.box_m, y: floor.box_m }),
         row_stride: floor.width,
@@ -130,7 +130,7 @@ pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>)
 }
 
 /// Returns the deletion of everything shown before.
-pub(super) fn all_gone(now_ns: u64) -> Vec<SceneEntityDeletion> {
+pub(super) fn delete_all(now_ns: u64) -> Vec<SceneEntityDeletion> {
     vec![SceneEntityDeletion {
         timestamp: timestamp(now_ns),
         r#type: scene_entity_deletion::Type::All as i32,
@@ -181,17 +181,18 @@ fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
             ..LinePrimitive::default()
         }),
         Shape::Dart { length_m, width_m } => {
-            entity.arrows.push(ArrowPrimitive { color, ..dart(body, *length_m, *width_m) });
+            entity.arrows.push(ArrowPrimitive { color, ..arrow(body, *length_m, *width_m) });
         }
     }
-    if body.kind == Kind::Robot {
-        entity.arrows.extend(heading(body));
+    if body.kind == BodyKind::Robot {
+        entity.arrows.extend(heading_arrow(body));
     }
 }
 
 /// Returns an arrow centered on the body, nearly all head.
-fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
-    let tail = ViewPose { at_m: body.pose.place([-0.5 * length_m, 0.0, 0.0]), ..body.pose };
+fn arrow(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
+    let tail =
+        ViewPose { at_m: body.pose.transform_point([-0.5 * length_m, 0.0, 0.0]), ..body.pose };
     ArrowPrimitive {
         pose: pose(&tail),
         shaft_length: 0.4 * length_m,
@@ -203,13 +204,13 @@ fn dart(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
 }
 
 /// Returns an arrow on top of a body that shows its heading.
-fn heading(body: &Body) -> Option<ArrowPrimitive> {
+fn heading_arrow(body: &Body) -> Option<ArrowPrimitive> {
     let (half_m, top_m) = match body.shape {
         Shape::Cuboid { size_m: [x, _, z] } => (0.5 * x, 0.5 * z),
         Shape::Cylinder { radius_m, height_m } => (radius_m, 0.5 * height_m),
         _ => return None,
     };
-    let from = ViewPose { at_m: body.pose.place([0.0, 0.0, top_m]), ..body.pose };
+    let from = ViewPose { at_m: body.pose.transform_point([0.0, 0.0, top_m]), ..body.pose };
     Some(ArrowPrimitive {
         pose: pose(&from),
         shaft_length: 0.5 * half_m,
@@ -238,7 +239,7 @@ pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
 }
 
 /// Returns the poses of the agents of a kind; `None` if there are none.
-pub(super) fn poses(frame: &Frame, kind: Kind) -> Option<PosesInFrame> {
+pub(super) fn poses(frame: &Frame, kind: BodyKind) -> Option<PosesInFrame> {
     let poses: Vec<Pose> = agents(frame)
         .filter(|body| body.kind == kind)
         .filter_map(|body| pose(&body.pose))
@@ -263,12 +264,12 @@ pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
 
 /// Returns the events of a frame, and how many are left out.
 pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
-    let level = |level: Level| match level {
-        Level::Info => log::Level::Info,
-        Level::Warning => log::Level::Warning,
-        Level::Error => log::Level::Error,
+    let level = |level: Severity| match level {
+        Severity::Info => log::Level::Info,
+        Severity::Warning => log::Level::Warning,
+        Severity::Error => log::Level::Error,
     };
-    let entry = |time_s: f64, of: Level, name: String, message: String| Log {
+    let entry = |time_s: f64, of: Severity, name: String, message: String| Log {
         timestamp: timestamp(to_ns(time_s)),
         level: level(of) as i32,
         message,
@@ -281,7 +282,7 @@ pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
     });
     let more = (frame.log_left_out > 0).then(|| {
         let words = format!("{} more events are not told", frame.log_left_out);
-        entry(frame.time_s, Level::Warning, "log".into(), words)
+        entry(frame.time_s, Severity::Warning, "log".into(), words)
     });
     told.chain(more).collect()
 }
@@ -293,10 +294,16 @@ mod tests {
     #[test]
     fn every_kind_has_the_colors_that_pictures_have() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        for kind in [Kind::Robot, Kind::Person, Kind::Door, Kind::Zone, Kind::Obstacle, Kind::Goal]
-        {
+        for kind in [
+            BodyKind::Robot,
+            BodyKind::Person,
+            BodyKind::Door,
+            BodyKind::Zone,
+            BodyKind::Obstacle,
+            BodyKind::Goal,
+        ] {
             for dimensions in [2, 3] {
-                let body = Body::new(kind, 4, ViewPose::at([0.0; 3]), ball.clone());
+                let body = Body::new(kind, 4, ViewPose::from_position([0.0; 3]), ball.clone());
                 let look = body.appearance(dimensions);
                 let frame = Frame { bodies: vec![body], ..Frame::default() };
                 let update = scene(&frame, dimensions, &mut BTreeSet::new());
@@ -313,6 +320,6 @@ mod tests {
         assert_eq!(to_ns(0.1 * 3.0), 300_000_000);
         assert_eq!(to_ns(-1.0), 0);
         let entry = Log { timestamp: timestamp(7_000_000_001), ..Log::default() };
-        assert_eq!(nanoseconds(&entry), 7_000_000_001);
+        assert_eq!(log_time_ns(&entry), 7_000_000_001);
     }
 }

@@ -22,18 +22,20 @@
 //! with. Because it may miss some, a live `/scene` deletes all bodies before it shows them.
 
 mod bag;
+mod frame_encoder;
 mod live;
 mod messages;
 mod reader;
-mod scenes;
-mod topics;
+mod scene_reader;
 mod writer;
 
 pub use bag::{BagSchema, BagWriter};
-pub use live::{LiveFrames, LiveServer, Playback, Playing, Steering, live};
-pub use reader::{McapRun, is_mcap};
-pub use scenes::McapScenes;
-pub use writer::{McapEnd, McapOrigin, McapRecorder};
+pub use live::{
+    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, start_live_server,
+};
+pub use reader::{McapRunInfo, is_mcap};
+pub use scene_reader::McapSceneReader;
+pub use writer::{McapFooter, McapProvenance, McapRecorder};
 
 /// Name of the metadata record.
 const METADATA: &str = "sidestep";

@@ -26,7 +26,7 @@ pub fn is_mcap(path: &Path) -> bool {
 
 /// A recording made by this program: the description of its run, without its messages.
 #[derive(Debug, Clone, PartialEq)]
-pub struct McapRun {
+pub struct McapRunInfo {
     /// Path of the file.
     pub path: PathBuf,
     /// Version of its format.
@@ -57,16 +57,16 @@ pub struct McapRun {
     pub messages: BTreeMap<String, u64>,
 }
 
-impl McapRun {
+impl McapRunInfo {
     /// Reads the metadata of a recording.
     ///
     /// # Errors
     /// A missing file; one of another program; one that is cut off or damaged; another major
     /// format.
     pub fn open(path: &Path) -> Result<Self, InputError> {
-        let mut source = Source::open(path)?;
+        let mut source = McapFile::open(path)?;
         let summary = source.summary()?;
-        let said = described(&mut source, &summary)?;
+        let said = describe_run(&mut source, &summary)?;
         let text = |key: &str| {
             said.get(key).ok_or_else(|| damaged(path, format!("its metadata has no `{key}`")))
         };
@@ -78,7 +78,7 @@ impl McapRun {
         format.check_readable(path.display())?;
         let mut files = source.attachments(&summary)?;
         let at = files.iter().position(|(name, _)| name == SCENARIO);
-        let (_, scenario) = files.remove(at.ok_or_else(|| foreign(path))?);
+        let (_, scenario) = files.remove(at.ok_or_else(|| not_a_recording(path))?);
         let scenario = String::from_utf8(scenario).map_err(|e| damaged(path, e))?;
         let is_complete = text("status")? == "complete";
         Ok(Self {
@@ -95,35 +95,35 @@ impl McapRun {
             digest: text("digest")?.clone(),
             scenario,
             files,
-            messages: messages(&summary),
+            messages: message_counts(&summary),
         })
     }
 }
 
 /// Returns a recording's description of its run.
-pub(super) fn described(
-    source: &mut Source,
+pub(super) fn describe_run(
+    source: &mut McapFile,
     summary: &Summary,
 ) -> Result<BTreeMap<String, String>, InputError> {
     let index = summary.metadata_indexes.iter().find(|index| index.name == METADATA);
-    let index = index.ok_or_else(|| foreign(&source.path))?;
+    let index = index.ok_or_else(|| not_a_recording(&source.path))?;
     source.metadata(index)
 }
 
-fn messages(summary: &Summary) -> BTreeMap<String, u64> {
+fn message_counts(summary: &Summary) -> BTreeMap<String, u64> {
     let Some(stats) = &summary.stats else { return BTreeMap::new() };
     let counts = stats.channel_message_counts.iter();
     counts.filter_map(|(id, n)| Some((summary.channels.get(id)?.topic.clone(), *n))).collect()
 }
 
 /// An open file.
-pub(super) struct Source {
+pub(super) struct McapFile {
     pub(super) path: PathBuf,
     file: File,
     pub(super) length: u64,
 }
 
-impl Source {
+impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, InputError> {
         let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|e| {
@@ -197,7 +197,7 @@ impl Source {
     }
 }
 
-fn foreign(path: &Path) -> InputError {
+fn not_a_recording(path: &Path) -> InputError {
     let remedy = "name a recording that `sidestep run --mcap` or `sidestep export --to mcap` made";
     InputError::new(path.display(), "the file says nothing of a run of sidestep", remedy)
 }

@@ -12,26 +12,26 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::view::{Frame, Scenery};
 
-use super::topics::{Sink, Topics};
+use super::frame_encoder::{FrameEncoder, MessageSink};
 use super::{METADATA, SCENARIO};
 use crate::disk;
-use crate::folder::Existing;
+use crate::folder::IfExists;
 use crate::format;
 use crate::manifest::Status;
-use crate::schema::Origin;
+use crate::schema::Provenance;
 
 /// Uncompressed bytes of a chunk: the amount a viewer reads to show one moment.
 const CHUNK_BYTES: u64 = 1 << 20;
 
 /// The origin of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct McapOrigin {
+pub struct McapProvenance {
     /// The world, e.g. `robots`.
     pub world: String,
     /// The build that makes the recording.
     pub build: String,
     /// Scenario, seed and version that the frames result from.
-    pub origin: Origin,
+    pub origin: Provenance,
     /// Files that the scenario names, by their path relative to it.
     pub files: Vec<(String, Vec<u8>)>,
     /// Cycles that the scenario asks for.
@@ -42,7 +42,7 @@ pub struct McapOrigin {
 
 /// The end of a recorded run.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct McapEnd {
+pub struct McapFooter {
     /// Whether the run reached its end.
     pub status: Status,
     /// Cycles done.
@@ -53,13 +53,13 @@ pub struct McapEnd {
 
 /// Writes frames to an MCAP file. If it is dropped before it is finished, it deletes the file.
 pub struct McapRecorder {
-    origin: McapOrigin,
-    topics: Topics,
-    output: Output,
+    origin: McapProvenance,
+    topics: FrameEncoder,
+    output: FileOutput,
 }
 
 /// The messages of the file.
-struct Output {
+struct FileOutput {
     path: PathBuf,
     /// `None` once the file is finished.
     writer: Option<Writer<BufWriter<File>>>,
@@ -74,11 +74,11 @@ impl McapRecorder {
     ///
     /// # Errors
     /// Something is there that may not be replaced, or that is not a file.
-    pub fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputError> {
+    pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
         let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
         match fs::metadata(path) {
             Ok(found) if !found.is_file() => refuse("this is no file", "name a new file"),
-            Ok(_) if existing == Existing::Refuse => {
+            Ok(_) if existing == IfExists::Refuse => {
                 refuse("the file exists already", "name another file, or replace it (--replace)")
             }
             _ if path.file_name().is_none() => refuse("this is no file name", "name a new file"),
@@ -91,23 +91,27 @@ impl McapRecorder {
     ///
     /// # Errors
     /// An I/O error.
-    pub fn create(path: &Path, origin: McapOrigin, scenery: &Scenery) -> Result<Self, RecordError> {
-        let growing = disk::partial(path);
+    pub fn create(
+        path: &Path,
+        origin: McapProvenance,
+        scenery: &Scenery,
+    ) -> Result<Self, RecordError> {
+        let growing = disk::partial_path(path);
         let failed = |cause: String| RecordError::new(path.display(), cause);
         let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&growing));
         let file = file.map_err(|e| failed(e.to_string()))?;
-        let options = options(&origin.origin.program_version);
-        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(said(e)));
+        let options = write_options(&origin.origin.program_version);
+        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(error_text(e)));
         let writer = writer.inspect_err(|_| drop(fs::remove_file(&growing)))?;
-        let output = Output {
+        let output = FileOutput {
             path: path.to_path_buf(),
             writer: Some(writer),
             channels: BTreeMap::new(),
             frames: 0,
             buffer: Vec::new(),
         };
-        let mut recorder = Self { origin, topics: Topics::new(scenery), output };
-        recorder.begin(scenery)?;
+        let mut recorder = Self { origin, topics: FrameEncoder::new(scenery), output };
+        recorder.start(scenery)?;
         Ok(recorder)
     }
 
@@ -116,14 +120,14 @@ impl McapRecorder {
         &self.output.path
     }
 
-    fn begin(&mut self, scenery: &Scenery) -> Result<(), RecordError> {
+    fn start(&mut self, scenery: &Scenery) -> Result<(), RecordError> {
         let scenario = self.origin.origin.scenario.clone().into_bytes();
         self.attach(SCENARIO, "application/toml", &scenario)?;
         let files = std::mem::take(&mut self.origin.files);
         files
             .iter()
             .try_for_each(|(name, bytes)| self.attach(name, "application/octet-stream", bytes))?;
-        self.topics.scenery(scenery, &mut self.output)
+        self.topics.write_scenery(scenery, &mut self.output)
     }
 
     fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordError> {
@@ -134,15 +138,15 @@ impl McapRecorder {
             media_type: media_type.into(),
             data: data.into(),
         };
-        self.output.with(|writer| writer.attach(&attachment))
+        self.output.with_writer(|writer| writer.attach(&attachment))
     }
 
     /// Appends a frame; frames must be in order of time.
     ///
     /// # Errors
     /// An I/O error; the recording is over then.
-    pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
-        self.topics.frame(frame, &mut self.output)?;
+    pub fn write_frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        self.topics.write_frame(frame, &mut self.output)?;
         self.output.frames += 1;
         Ok(())
     }
@@ -151,7 +155,7 @@ impl McapRecorder {
     ///
     /// # Errors
     /// An I/O error.
-    pub fn finish(self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+    pub fn finish(self, end: &McapFooter) -> Result<PathBuf, RecordError> {
         let path = self.path().to_path_buf();
         disk::rename(&self.stop(end)?, &path)?;
         Ok(path)
@@ -162,11 +166,11 @@ impl McapRecorder {
     ///
     /// # Errors
     /// An I/O error.
-    pub fn stop(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
+    pub fn stop(mut self, end: &McapFooter) -> Result<PathBuf, RecordError> {
         let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
-        self.output.with(|writer| writer.write_metadata(&metadata))?;
-        self.output.with(|writer| writer.finish().map(drop))?;
-        let growing = disk::partial(self.path());
+        self.output.with_writer(|writer| writer.write_metadata(&metadata))?;
+        self.output.with_writer(|writer| writer.finish().map(drop))?;
+        let growing = disk::partial_path(self.path());
         let Some(writer) = self.output.writer.take() else { return Ok(growing) };
         let ended = writer.into_inner().into_inner().map_err(|e| e.into_error());
         ended.and_then(|file| file.sync_all()).map_err(|e| {
@@ -176,8 +180,8 @@ impl McapRecorder {
         Ok(growing)
     }
 
-    fn metadata(&self, end: &McapEnd) -> BTreeMap<String, String> {
-        let McapOrigin { world, build, origin, cycles_planned, every, .. } = &self.origin;
+    fn metadata(&self, end: &McapFooter) -> BTreeMap<String, String> {
+        let McapProvenance { world, build, origin, cycles_planned, every, .. } = &self.origin;
         let status = match end.status {
             Status::Complete => "complete",
             Status::Running | Status::Incomplete => "incomplete",
@@ -200,7 +204,7 @@ impl McapRecorder {
     }
 }
 
-impl Sink for Output {
+impl MessageSink for FileOutput {
     /// Appends a message, and creates a channel for a new topic.
     fn write<T: Encode>(
         &mut self,
@@ -217,16 +221,16 @@ impl Sink for Output {
         message.encode(&mut bytes).map_err(|e| RecordError::new(self.path.display(), e))?;
         let header =
             MessageHeader { channel_id, sequence: self.frames, log_time, publish_time: log_time };
-        let written = self.with(|writer| writer.write_to_known_channel(&header, &bytes));
+        let written = self.with_writer(|writer| writer.write_to_known_channel(&header, &bytes));
         self.buffer = bytes;
         written
     }
 }
 
-impl Output {
+impl FileOutput {
     fn open_channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordError> {
         let schema = T::get_schema();
-        let id = self.with(|writer| {
+        let id = self.with_writer(|writer| {
             let schema_id = match &schema {
                 Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
                 None => 0,
@@ -237,13 +241,13 @@ impl Output {
         Ok(id)
     }
 
-    fn with<T>(
+    fn with_writer<T>(
         &mut self,
         work: impl FnOnce(&mut Writer<BufWriter<File>>) -> Result<T, McapError>,
     ) -> Result<T, RecordError> {
         let failed = |cause: String| RecordError::new(self.path.display(), cause);
         let writer = self.writer.as_mut().ok_or_else(|| failed("the recording is over".into()))?;
-        work(writer).map_err(|e| failed(said(e)))
+        work(writer).map_err(|e| failed(error_text(e)))
     }
 }
 
@@ -252,13 +256,13 @@ impl Drop for McapRecorder {
         if let Some(writer) = self.output.writer.take() {
             drop(writer.into_inner());
             // An incomplete file, or one that a full disk refused, must not keep its space.
-            let _ = fs::remove_file(disk::partial(&self.output.path));
+            let _ = fs::remove_file(disk::partial_path(&self.output.path));
         }
     }
 }
 
 /// Returns the way in which files are written by a version of the program.
-pub(super) fn options(version: &str) -> WriteOptions {
+pub(super) fn write_options(version: &str) -> WriteOptions {
     // Several threads would compress to bytes that differ from those of one.
     WriteOptions::new()
         .compression(Some(Compression::Zstd))
@@ -268,7 +272,7 @@ pub(super) fn options(version: &str) -> WriteOptions {
 }
 
 /// Returns the system's message, without the library's wrapping.
-pub(super) fn said(error: McapError) -> String {
+pub(super) fn error_text(error: McapError) -> String {
     match error {
         McapError::Io(error) => error.to_string(),
         other => other.to_string(),

@@ -11,9 +11,9 @@ use sidestep_kernel::{Digest, InputError};
 use crate::disk;
 use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
-use crate::manifest::{self, OF_SWEEP as MANIFEST, json};
-use crate::staging::Staging;
-use crate::whole;
+use crate::manifest::{self, SWEEP_MANIFEST as MANIFEST, json};
+use crate::run_table;
+use crate::staging::StagingFolder;
 
 const CELLS: &str = "cells.parquet";
 pub(super) const SHARES: &str = "shares";
@@ -22,7 +22,7 @@ const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
 /// Key of the fingerprint of all scenarios in the key-value pairs of a table.
 pub(super) const FINGERPRINT: &str = "sidestep.fingerprint";
-const SCRATCH: &str = "joining.partial";
+const TEMP_FOLDER: &str = "joining.partial";
 
 /// The content of `sweep.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,16 +49,16 @@ pub struct SweepFolder<P> {
 
 /// A folder that is deleted when this is dropped.
 #[derive(Debug)]
-pub struct Scratch(PathBuf);
+pub struct TempFolder(PathBuf);
 
-impl Scratch {
+impl TempFolder {
     /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.0
     }
 }
 
-impl Drop for Scratch {
+impl Drop for TempFolder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -82,8 +82,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             let cause = "the folder holds a sweep already";
             return Err(InputError::new(path.display(), cause, remedy).into());
         }
-        check_vacant(path, crate::Existing::Refuse)?;
-        let staging = Staging::new(path)?;
+        check_vacant(path, crate::IfExists::Refuse)?;
+        let staging = StagingFolder::new(path)?;
         let (plan, fingerprints, cells) = fill(staging.path())?;
         let manifest = SweepManifest {
             format: format::CURRENT,
@@ -94,11 +94,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         };
         make_folder(&staging.path().join(SHARES))?;
         let cells: Vec<_> = cells.iter().collect();
-        whole::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
+        run_table::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
         let file = staging.path().join(MANIFEST);
         disk::replace(&file, &json(&manifest, &file)?)?;
         disk::sync_below(staging.path())?;
-        staging.take_place()?;
+        staging.commit()?;
         Ok(Self { path: path.to_path_buf(), manifest })
     }
 
@@ -118,9 +118,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         for (name, bytes) in files {
             let file = folder.join(name);
             make_folder(disk::parent(&file))?;
-            disk::put(&file, bytes)?;
+            disk::write_new(&file, bytes)?;
         }
-        disk::put(&folder.join(SCENARIO), text.as_bytes())
+        disk::write_new(&folder.join(SCENARIO), text.as_bytes())
     }
 
     /// Returns whether a folder holds a sweep, even if its manifest is damaged.
@@ -187,7 +187,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
 
     /// Returns one digest of all variants, in hexadecimal.
     pub fn fingerprint(&self) -> String {
-        Digest::of(self.manifest.fingerprints.concat().as_bytes()).to_string()
+        Digest::hash_bytes(self.manifest.fingerprints.concat().as_bytes()).to_string()
     }
 
     /// Returns the folder in which the run of a cell is recorded, if it is.
@@ -200,14 +200,14 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// An I/O error.
-    pub fn scratch(&self) -> Result<Scratch, RecordError> {
-        let path = self.path.join(SCRATCH);
+    pub fn temp_folder(&self) -> Result<TempFolder, RecordError> {
+        let path = self.path.join(TEMP_FOLDER);
         let failed = |e: std::io::Error| RecordError::new(path.display(), e);
         if path.exists() {
             fs::remove_dir_all(&path).map_err(failed)?;
         }
         make_folder(&path)?;
-        Ok(Scratch(path))
+        Ok(TempFolder(path))
     }
 }
 
@@ -216,7 +216,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
 pub fn fingerprint(scenario: &[u8], files: &[(String, Vec<u8>)]) -> String {
     let mut sorted: Vec<_> = files.iter().collect();
     sorted.sort();
-    let print = |bytes: &[u8]| Digest::of(bytes).to_string();
+    let print = |bytes: &[u8]| Digest::hash_bytes(bytes).to_string();
     let files = sorted.into_iter().flat_map(|(name, bytes)| [name.clone(), print(bytes)]);
     let all: Vec<String> = std::iter::once(print(scenario)).chain(files).collect();
     print(all.join("\n").as_bytes())

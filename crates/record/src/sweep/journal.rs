@@ -19,16 +19,16 @@ use crate::format::{self, FormatVersion};
 
 /// Largest age of lines that a power failure may lose: their cells are run again. A kill loses
 /// none.
-const SYNC_EVERY: Duration = Duration::from_millis(200);
+const SYNC_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Number of further tries to lock a journal that is locked,
-const LOCK_TRIES: usize = 5;
+const MAX_LOCK_RETRIES: usize = 5;
 /// and the time between two.
-const LOCK_AGAIN: Duration = Duration::from_millis(10);
+const LOCK_RETRY_DELAY: Duration = Duration::from_millis(10);
 
 /// The sweep that a journal is of.
 #[derive(Debug, Clone, Copy)]
-pub struct Origin<'a> {
+pub struct SweepIdentity<'a> {
     /// Version of the program that makes its runs.
     pub program_version: &'a str,
     /// Fingerprint of its scenarios.
@@ -37,7 +37,7 @@ pub struct Origin<'a> {
 
 /// The first line.
 #[derive(Debug, Serialize, Deserialize)]
-struct Head {
+struct JournalHeader {
     format: FormatVersion,
     program_version: String,
     /// Fingerprint of the scenarios; early journals do not have it.
@@ -63,7 +63,7 @@ impl Journal {
     /// A journal that another process writes, that is damaged, or that another version wrote.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
-        of: Origin<'_>,
+        of: SweepIdentity<'_>,
         each: impl FnMut(T),
     ) -> Result<Self, InputError> {
         let failed = |e: std::io::Error| {
@@ -73,14 +73,14 @@ impl Journal {
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
         let file = file.map_err(failed)?;
         lock(&file, path)?;
-        let length = whole_lines(path, of, each)?;
+        let length = read_complete_lines(path, of, each)?;
         file.set_len(length).map_err(failed)?;
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
         journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
         if length == 0 {
             let (program_version, fingerprint) = (of.program_version.into(), of.fingerprint.into());
             let fingerprint = Some(fingerprint);
-            let head = Head { format: format::CURRENT, program_version, fingerprint };
+            let head = JournalHeader { format: format::CURRENT, program_version, fingerprint };
             journal
                 .append(&head)
                 .and_then(|()| journal.sync())
@@ -102,7 +102,7 @@ impl Journal {
             return Err(RecordError::new(self.path.display(), error));
         }
         self.length += line.len() as u64;
-        if self.synced.elapsed() < SYNC_EVERY { Ok(()) } else { self.sync() }
+        if self.synced.elapsed() < SYNC_INTERVAL { Ok(()) } else { self.sync() }
     }
 
     /// Makes all entries durable against a power failure.
@@ -130,9 +130,9 @@ pub(super) fn is_locked(path: &Path) -> Option<bool> {
 
 /// Locks a file, against other writers. Checking for a lock takes one briefly, so a few further tries are made.
 fn try_lock(file: &File) -> Result<(), TryLockError> {
-    for _ in 0..LOCK_TRIES {
+    for _ in 0..MAX_LOCK_RETRIES {
         match file.try_lock() {
-            Err(TryLockError::WouldBlock) => std::thread::sleep(LOCK_AGAIN),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(LOCK_RETRY_DELAY),
             other => return other,
         }
     }
@@ -163,21 +163,21 @@ fn line(entry: &impl Serialize) -> serde_json::Result<String> {
 /// A journal that cannot be read, is damaged, or was written by another version of the program.
 pub fn read_journal<T: DeserializeOwned>(
     path: &Path,
-    of: Origin<'_>,
+    of: SweepIdentity<'_>,
     each: impl FnMut(T),
 ) -> Result<(), InputError> {
-    whole_lines(path, of, each).map(drop)
+    read_complete_lines(path, of, each).map(drop)
 }
 
 /// Passes on the entries, and returns the number of bytes of complete lines.
-fn whole_lines<T: DeserializeOwned>(
+fn read_complete_lines<T: DeserializeOwned>(
     path: &Path,
-    of: Origin<'_>,
+    of: SweepIdentity<'_>,
     mut each: impl FnMut(T),
 ) -> Result<u64, InputError> {
     let damaged = |line: usize, cause: String| {
         let remedy = "the file is damaged: delete it, and its runs are made again";
-        InputError::new(path.display(), cause, remedy).at(line, 1)
+        InputError::new(path.display(), cause, remedy).with_position(line, 1)
     };
     let file = File::open(path).map_err(|e| damaged(1, e.to_string()))?;
     let mut reader = BufReader::new(file);
@@ -194,7 +194,7 @@ fn whole_lines<T: DeserializeOwned>(
             return Err(damaged(number, "the line does not match its checksum".into()));
         };
         if number == 1 {
-            check_head(path, json, of)?;
+            check_header(path, json, of)?;
         } else {
             each(serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?);
         }
@@ -211,8 +211,8 @@ fn json(line: &[u8]) -> Option<&[u8]> {
     (crc32fast::hash(json) == checksum).then_some(json)
 }
 
-fn check_head(path: &Path, json: &[u8], of: Origin<'_>) -> Result<(), InputError> {
-    let head: Head = serde_json::from_slice(json).map_err(|e| {
+fn check_header(path: &Path, json: &[u8], of: SweepIdentity<'_>) -> Result<(), InputError> {
+    let head: JournalHeader = serde_json::from_slice(json).map_err(|e| {
         InputError::new(path.display(), format!("this is no journal: {e}"), "delete it")
     })?;
     head.format.check_readable(path.display())?;
@@ -236,7 +236,7 @@ fn check_head(path: &Path, json: &[u8], of: Origin<'_>) -> Result<(), InputError
 mod tests {
     use super::*;
 
-    const OF: Origin<'_> = Origin { program_version: "0.1.0", fingerprint: "f" };
+    const OF: SweepIdentity<'_> = SweepIdentity { program_version: "0.1.0", fingerprint: "f" };
 
     fn opened(path: &Path) -> (Journal, Vec<u32>) {
         let mut entries = Vec::new();
@@ -244,7 +244,7 @@ mod tests {
         (journal, entries)
     }
 
-    fn refused(path: &Path, of: Origin<'_>) -> InputError {
+    fn refused(path: &Path, of: SweepIdentity<'_>) -> InputError {
         Journal::open::<u32>(path, of, |_| ()).unwrap_err()
     }
 
@@ -296,9 +296,9 @@ mod tests {
         assert_eq!(is_locked(&path), Some(true));
         drop(journal);
         assert_eq!(is_locked(&path), Some(false), "also after a kill: the system takes locks away");
-        let error = refused(&path, Origin { program_version: "0.2.0", ..OF });
+        let error = refused(&path, SweepIdentity { program_version: "0.2.0", ..OF });
         assert!(error.cause().contains("sidestep 0.1.0"), "{error}");
-        let error = refused(&path, Origin { fingerprint: "g", ..OF });
+        let error = refused(&path, SweepIdentity { fingerprint: "g", ..OF });
         assert!(error.cause().contains("another sweep"), "{error}");
     }
 }

@@ -16,12 +16,12 @@
 //! A killed process leaves at most an incomplete line, which the next one deletes. Only the owner
 //! of a share writes its journal; everything else is written once, and appears by a rename.
 
-mod completion;
 mod folder;
 mod journal;
+mod results;
 mod shares;
 
-pub use completion::Completion;
-pub use folder::{Scratch, SweepFolder, SweepManifest, fingerprint};
-pub use journal::{Journal, Origin, read_journal};
+pub use folder::{SweepFolder, SweepManifest, TempFolder, fingerprint};
+pub use journal::{Journal, SweepIdentity, read_journal};
+pub use results::ResultsWriter;
 pub use shares::Share;

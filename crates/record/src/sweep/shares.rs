@@ -9,8 +9,8 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, RoleColumn};
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
-use super::journal::{Journal, Origin, is_locked, read_journal};
-use crate::whole::{self, WholeTable};
+use super::journal::{Journal, SweepIdentity, is_locked, read_journal};
+use crate::run_table::{self, LoadedTable};
 
 /// A share of the cells: number `index` of `count`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,14 +36,14 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             return Ok(None);
         }
         let path = self.share_file(share, "journal");
-        Journal::open(&path, self.of(&self.fingerprint()), each).map(Some)
+        Journal::open(&path, self.identity(&self.fingerprint()), each).map(Some)
     }
 
     /// Writes the runs of a share as its part, and deletes the journal.
     ///
     /// # Errors
     /// An I/O error; the journal stays then.
-    pub fn end_share<R: Serialize>(
+    pub fn finish_share<R: Serialize>(
         &self,
         share: Share,
         journal: Journal,
@@ -51,7 +51,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ) -> Result<(), RecordError> {
         let version = &self.manifest().program_version;
         let extra = [(FINGERPRINT, self.fingerprint())];
-        whole::write(&self.share_file(share, "parquet"), runs, version, &extra)?;
+        run_table::write(&self.share_file(share, "parquet"), runs, version, &extra)?;
         drop(journal);
         let path = self.share_file(share, "journal");
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
@@ -63,13 +63,13 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// A part that cannot be read; blocks before have been passed on.
     pub fn parts<R: DeserializeOwned + Clone>(
         &self,
-        mut each: impl FnMut(WholeTable<R>),
+        mut each: impl FnMut(LoadedTable<R>),
     ) -> Result<(), InputError> {
         for share in self.shares_with("parquet")? {
             let path = self.share_file(share, "parquet");
             self.check_part(&path)?;
             let mut version = Ok(());
-            whole::read_blocks(&path, |block| {
+            run_table::read_blocks(&path, |block| {
                 version = self.check_version(&path, &block);
                 if version.is_ok() {
                     each(block);
@@ -94,7 +94,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         for share in self.shares_with("journal")? {
             if !done.contains(&share) && Some(share) != but {
                 let path = self.share_file(share, "journal");
-                read_journal(&path, self.of(&fingerprint), &mut each)?;
+                read_journal(&path, self.identity(&fingerprint), &mut each)?;
             }
         }
         Ok(())
@@ -129,16 +129,16 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         each: impl FnMut(T),
     ) -> Result<(), InputError> {
         let path = self.share_file(share, "journal");
-        read_journal(&path, self.of(&self.fingerprint()), each)
+        read_journal(&path, self.identity(&self.fingerprint()), each)
     }
 
-    fn of<'a>(&'a self, fingerprint: &'a str) -> Origin<'a> {
-        Origin { program_version: &self.manifest().program_version, fingerprint }
+    fn identity<'a>(&'a self, fingerprint: &'a str) -> SweepIdentity<'a> {
+        SweepIdentity { program_version: &self.manifest().program_version, fingerprint }
     }
 
     /// Checks that the scenarios of a part are those of this sweep.
     fn check_part(&self, path: &Path) -> Result<(), InputError> {
-        let [fingerprint] = whole::pairs(path, [FINGERPRINT])?;
+        let [fingerprint] = run_table::read_key_values(path, [FINGERPRINT])?;
         // Parts that are older than this check do not say it.
         if fingerprint.is_none_or(|fingerprint| fingerprint == self.fingerprint()) {
             return Ok(());
@@ -147,7 +147,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Err(InputError::new(path.display(), "its runs are of another sweep", remedy))
     }
 
-    fn check_version<R>(&self, path: &Path, table: &WholeTable<R>) -> Result<(), InputError> {
+    fn check_version<R>(&self, path: &Path, table: &LoadedTable<R>) -> Result<(), InputError> {
         let (wrote, ours) = (&table.program_version, &self.manifest().program_version);
         if wrote == ours {
             return Ok(());

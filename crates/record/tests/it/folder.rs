@@ -5,16 +5,16 @@ use std::path::Path;
 use std::process::Command;
 
 use sidestep_kernel::ports::Recorder;
-use sidestep_record::{Existing, ResumePoint, RunFolder, RunView, Status, read_table};
+use sidestep_record::{IfExists, ResumePoint, RunFolder, RunReader, Status, read_table};
 
 use crate::support::{joined, names, new_run, rows, trajectories};
 
 fn create(path: &Path) -> RunFolder {
-    RunFolder::create(path, &new_run(), Existing::Refuse).unwrap()
+    RunFolder::create(path, &new_run(), IfExists::Refuse).unwrap()
 }
 
 /// Returns the reason why `path` cannot become a run folder.
-fn refusal(path: &Path, existing: Existing) -> String {
+fn refusal(path: &Path, existing: IfExists) -> String {
     RunFolder::create(path, &new_run(), existing).unwrap_err().to_string()
 }
 
@@ -28,13 +28,13 @@ fn a_run_from_its_creation_to_its_end() {
     recorder.append(0, &rows(0, 10)).unwrap();
     recorder.seal(10).unwrap();
     folder.save_checkpoint(10, b"state").unwrap();
-    assert_eq!(RunView::open(&path).unwrap().manifest.last_checkpoint, Some(10));
+    assert_eq!(RunReader::open(&path).unwrap().manifest.last_checkpoint, Some(10));
     recorder.append(0, &rows(10, 100)).unwrap();
     recorder.finish().unwrap();
     folder.write_summary(&std::collections::BTreeMap::from([("contacts", 3)])).unwrap();
     folder.complete(100, "abcd").unwrap();
 
-    let view = RunView::open(&path).unwrap();
+    let view = RunReader::open(&path).unwrap();
     assert_eq!(view.scenario, new_run().origin.scenario);
     let m = view.manifest;
     assert_eq!((m.status, m.cycles_done, m.digest), (Status::Complete, 100, Some("abcd".into())));
@@ -93,7 +93,7 @@ fn two_writers_of_one_folder_are_refused() {
     let folder = create(&path);
     let error = RunFolder::resume(&path).unwrap_err();
     assert!(error.cause().contains("another process"), "{error}");
-    assert!(refusal(&path, Existing::Replace).contains("another process"));
+    assert!(refusal(&path, IfExists::Replace).contains("another process"));
     assert_eq!(names(parent.path()), ["a"]);
     drop(folder);
     assert!(RunFolder::resume(&path).is_ok());
@@ -104,14 +104,14 @@ fn only_runs_are_replaced_and_only_on_request() {
     let parent = tempfile::tempdir().unwrap();
     let run = parent.path().join("run");
     create(&run).complete(100, "old").unwrap();
-    assert!(refusal(&run, Existing::Refuse).contains("holds a run already"));
+    assert!(refusal(&run, IfExists::Refuse).contains("holds a run already"));
     let other = parent.path().join("thesis");
     fs::create_dir(&other).unwrap();
     fs::write(other.join("chapter1.tex"), "years of work").unwrap();
-    assert!(refusal(&other, Existing::Replace).contains("something else"));
-    assert!(refusal(&other.join("chapter1.tex"), Existing::Replace).contains("cannot make"));
+    assert!(refusal(&other, IfExists::Replace).contains("something else"));
+    assert!(refusal(&other.join("chapter1.tex"), IfExists::Replace).contains("cannot make"));
 
-    let folder = RunFolder::create(&run, &new_run(), Existing::Replace).unwrap();
+    let folder = RunFolder::create(&run, &new_run(), IfExists::Replace).unwrap();
     assert_eq!(folder.manifest().digest, None);
     assert_eq!(names(parent.path()), ["run", "thesis"]);
 }
@@ -120,18 +120,18 @@ fn only_runs_are_replaced_and_only_on_request() {
 fn an_empty_folder_is_taken() {
     let parent = tempfile::tempdir().unwrap();
     create(parent.path());
-    assert!(RunView::open(parent.path()).is_ok());
+    assert!(RunReader::open(parent.path()).is_ok());
 }
 
 #[test]
 fn a_folder_that_cannot_be_made_leaves_nothing() {
     let parent = tempfile::tempdir().unwrap();
     fs::write(parent.path().join("file"), "").unwrap();
-    assert!(refusal(&parent.path().join("file/runs/a"), Existing::Refuse).contains("cannot make"));
+    assert!(refusal(&parent.path().join("file/runs/a"), IfExists::Refuse).contains("cannot make"));
     let too_long = parent.path().join("new").join("x".repeat(300));
-    assert!(refusal(&too_long, Existing::Refuse).contains("cannot make"));
+    assert!(refusal(&too_long, IfExists::Refuse).contains("cannot make"));
     assert_eq!(names(parent.path()), ["file"]);
-    assert!(refusal(Path::new("/"), Existing::Replace).contains("something else"));
+    assert!(refusal(Path::new("/"), IfExists::Replace).contains("something else"));
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn what_is_no_run_folder_is_refused_with_a_remedy() {
     let parent = tempfile::tempdir().unwrap();
     let refusal = |path: &Path| {
         let error = RunFolder::resume(path).unwrap_err();
-        assert_eq!(error, RunView::open(path).unwrap_err());
+        assert_eq!(error, RunReader::open(path).unwrap_err());
         assert!(!error.remedy().is_empty());
         error.to_string()
     };

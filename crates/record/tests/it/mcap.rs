@@ -3,16 +3,18 @@
 use std::path::Path;
 
 use sidestep_kernel::view::{
-    Body, Condition, Entry, Floor, Frame, Happening, Kind, Level, Occupancy, Plane, Pose, Scan,
-    Scenery, Shape, Who,
+    Body, BodyId, BodyKind, Condition, Frame, Isometry2, LogEvent, LogEventKind, Occupancy,
+    OccupancyGrid, Pose, Scan, Scenery, Severity, Shape,
 };
-use sidestep_record::{Existing, McapEnd, McapOrigin, McapRecorder, McapRun, Status, is_mcap};
+use sidestep_record::{
+    IfExists, McapFooter, McapProvenance, McapRecorder, McapRunInfo, Status, is_mcap,
+};
 
 use crate::support::{names, origin};
 
-fn about() -> McapOrigin {
+fn about() -> McapProvenance {
     let files = vec![("maps/floor.pgm".to_string(), vec![7; 1000])];
-    McapOrigin {
+    McapProvenance {
         world: "robots".into(),
         build: "0.1.0+a".into(),
         origin: origin(),
@@ -24,11 +26,11 @@ fn about() -> McapOrigin {
 
 fn scenery() -> Scenery {
     let boxes = vec![Occupancy::Free, Occupancy::Wall, Occupancy::Unknown, Occupancy::Free];
-    let floor = Floor {
+    let floor = OccupancyGrid {
         width: 2,
         height: 2,
         box_m: 0.5,
-        plane: Plane { origin_m: [1.0, -1.0], yaw_rad: 0.0 },
+        plane: Isometry2 { origin_m: [1.0, -1.0], yaw_rad: 0.0 },
         boxes,
     };
     let wall = Shape::Line { points_m: vec![[0.0; 3], [1.0, 0.0, 0.0]], thickness_m: 0.0 };
@@ -38,37 +40,37 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         names: Vec::new(),
-        bodies: vec![Body::new(Kind::Obstacle, 0, Pose::at([0.0; 3]), wall)],
+        bodies: vec![Body::new(BodyKind::Obstacle, 0, Pose::from_position([0.0; 3]), wall)],
     }
 }
 
 /// Bodies of every kind; the airplane leaves after cycle 4.
 fn frame(cycle: u64) -> Frame {
     let at_m = [0.1 * cycle as f64, 1.0, 0.0];
-    let body = |kind, number, shape| Body::new(kind, number, Pose::heading(at_m, 0.3), shape);
+    let body = |kind, number, shape| Body::new(kind, number, Pose::from_heading(at_m, 0.3), shape);
     let mut bodies = vec![
-        body(Kind::Robot, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
-        body(Kind::Connector, 0, Shape::Sphere { radius_m: 0.1 }).part(0),
-        body(Kind::Zone, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
-            .when(true, Condition::Touching),
+        body(BodyKind::Robot, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
+        body(BodyKind::Connector, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
+        body(BodyKind::Zone, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
+            .with_state_if(true, Condition::Touching),
     ];
     if cycle <= 4 {
-        bodies.push(body(Kind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
+        bodies.push(body(BodyKind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
     }
     let scan = Scan {
-        of: Who::new(Kind::Robot, 0, None),
+        of: BodyId::new(BodyKind::Robot, 0, None),
         sensor: "sonar".into(),
-        pose: Pose::at(at_m),
+        pose: Pose::from_position(at_m),
         bearings_rad: vec![-0.5, 0.0, 0.5],
         ranges_m: vec![1.0, f64::INFINITY, 2.0],
         true_m: Vec::new(),
         range_m: 3.0,
     };
-    let entry = |cycle| Entry {
+    let entry = |cycle| LogEvent {
         cycle,
-        level: Level::Warning,
-        kind: Happening::Contact,
-        who: Who::new(Kind::Robot, 0, None),
+        level: Severity::Warning,
+        kind: LogEventKind::Contact,
+        who: BodyId::new(BodyKind::Robot, 0, None),
         with: None,
         at_m: None,
         value: None,
@@ -86,13 +88,13 @@ fn frame(cycle: u64) -> Frame {
     }
 }
 
-fn end(status: Status) -> McapEnd {
-    McapEnd { status, cycles_done: 10, digest: "abc".into() }
+fn end(status: Status) -> McapFooter {
+    McapFooter { status, cycles_done: 10, digest: "abc".into() }
 }
 
 fn started(path: &Path) -> McapRecorder {
     let mut recorder = McapRecorder::create(path, about(), &scenery()).unwrap();
-    (0..=10).step_by(2).for_each(|cycle| recorder.frame(&frame(cycle)).unwrap());
+    (0..=10).step_by(2).for_each(|cycle| recorder.write_frame(&frame(cycle)).unwrap());
     recorder
 }
 
@@ -104,7 +106,7 @@ fn a_recording_says_what_the_run_was_and_what_is_in_it() {
     assert_eq!(names(folder.path()), ["run.mcap.partial"], "it grows under another name");
     assert_eq!(recorder.finish(&end(Status::Complete)).unwrap(), path);
     assert_eq!(names(folder.path()), ["run.mcap"]);
-    let run = McapRun::open(&path).unwrap();
+    let run = McapRunInfo::open(&path).unwrap();
     assert!(is_mcap(&path));
     assert_eq!((run.world.as_str(), run.seed, run.every), ("robots", u64::MAX, 2));
     assert_eq!((run.status, run.cycles_done, run.cycles_planned), (Status::Complete, 10, 100));
@@ -143,7 +145,7 @@ fn a_stopped_run_keeps_partial_and_a_failed_one_leaves_nothing() {
     let path = folder.path().join("run.mcap");
     let stopped = started(&path).stop(&end(Status::Incomplete)).unwrap();
     assert_eq!(names(folder.path()), ["run.mcap.partial"]);
-    assert_eq!(McapRun::open(&stopped).unwrap().status, Status::Incomplete);
+    assert_eq!(McapRunInfo::open(&stopped).unwrap().status, Status::Incomplete);
     drop(started(&path));
     assert_eq!(names(folder.path()), [""; 0]);
 }
@@ -152,11 +154,11 @@ fn a_stopped_run_keeps_partial_and_a_failed_one_leaves_nothing() {
 fn an_existing_file_is_kept_unless_it_is_to_be_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    assert!(McapRecorder::check_vacant(&path, Existing::Refuse).is_ok());
+    assert!(McapRecorder::check_vacant(&path, IfExists::Refuse).is_ok());
     std::fs::write(&path, "mine").unwrap();
-    assert!(McapRecorder::check_vacant(&path, Existing::Refuse).is_err());
-    assert!(McapRecorder::check_vacant(&path, Existing::Replace).is_ok());
-    assert!(McapRecorder::check_vacant(folder.path(), Existing::Replace).is_err());
+    assert!(McapRecorder::check_vacant(&path, IfExists::Refuse).is_err());
+    assert!(McapRecorder::check_vacant(&path, IfExists::Replace).is_ok());
+    assert!(McapRecorder::check_vacant(folder.path(), IfExists::Replace).is_err());
     // Until the new one is whole, the old one stays.
     let recorder = started(&path);
     assert_eq!(std::fs::read(&path).unwrap(), b"mine");
@@ -170,9 +172,9 @@ fn files_that_lead_out_of_their_folder_are_refused() {
     for name in ["../up.pgm", "/tmp/root.pgm", "a/../../b", ""] {
         let path = folder.path().join("run.mcap");
         let files = vec![(name.to_string(), vec![1])];
-        let recorder = McapRecorder::create(&path, McapOrigin { files, ..about() }, &scenery());
+        let recorder = McapRecorder::create(&path, McapProvenance { files, ..about() }, &scenery());
         recorder.unwrap().finish(&end(Status::Complete)).unwrap();
-        let error = McapRun::open(&path).unwrap_err();
+        let error = McapRunInfo::open(&path).unwrap_err();
         assert!(error.cause().contains("a file named"), "{name}: {error}");
     }
 }
@@ -185,18 +187,18 @@ fn damage_is_an_error_and_never_a_panic() {
     let whole = std::fs::read(&path).unwrap();
     for length in (0..whole.len()).step_by(97) {
         std::fs::write(&path, &whole[..length]).unwrap();
-        assert!(McapRun::open(&path).is_err(), "{length} bytes of {}", whole.len());
+        assert!(McapRunInfo::open(&path).is_err(), "{length} bytes of {}", whole.len());
     }
     // A changed byte may lie where nothing is read from; then the result is as it was.
     let sound = {
         std::fs::write(&path, &whole).unwrap();
-        McapRun::open(&path).unwrap()
+        McapRunInfo::open(&path).unwrap()
     };
     for at in (0..whole.len()).step_by(31) {
         let mut changed = whole.clone();
         changed[at] ^= 0x55;
         std::fs::write(&path, &changed).unwrap();
-        if let Ok(run) = McapRun::open(&path) {
+        if let Ok(run) = McapRunInfo::open(&path) {
             assert_eq!((run.scenario, run.files), (sound.scenario.clone(), sound.files.clone()));
         }
     }

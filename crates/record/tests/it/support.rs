@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
-use sidestep_record::{NewRun, Origin, ParquetRecorder};
+use sidestep_record::{NewRun, ParquetRecorder, Provenance};
 
 /// A column without a meaning.
 pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec {
@@ -47,8 +47,8 @@ pub(crate) fn joined(blocks: &[Vec<Values>]) -> Vec<Values> {
 }
 
 /// The origin of every run in these tests.
-pub(crate) fn origin() -> Origin {
-    Origin { program_version: "0.1.0".into(), scenario: "[world]\n".into(), seed: u64::MAX }
+pub(crate) fn origin() -> Provenance {
+    Provenance { program_version: "0.1.0".into(), scenario: "[world]\n".into(), seed: u64::MAX }
 }
 
 /// A run to make a folder for.

@@ -1,13 +1,13 @@
 //! The parts of a document.
 
-use super::{Part, figures, tables, text};
+use super::{PageBlock, figures, tables, text};
 use maud::{Markup, html};
 use sidestep_document::document::{Block, Code, Text};
 
 /// Number of lines above which text is folded.
-const LONG_LINES: usize = 24;
+const MAX_UNFOLDED_LINES: usize = 24;
 
-pub(super) fn markup(part: &Part<'_>) -> Markup {
+pub(super) fn markup(part: &PageBlock<'_>) -> Markup {
     match part.block {
         Block::Section(_) => html! {},
         Block::Paragraph(words) => html! { p { (text(words)) } },
@@ -25,7 +25,7 @@ fn code(it: &Code) -> Markup {
     // A scrolling block must be reachable by keyboard.
     let text = html! { pre tabindex="0" { code .{ "language-" (it.language) } { (it.text) } } };
     html! {
-        @if it.text.lines().count() > LONG_LINES {
+        @if it.text.lines().count() > MAX_UNFOLDED_LINES {
             details { summary { (it.title) } (text) }
         } @else {
             figure .code { figcaption { (it.title) } (text) }

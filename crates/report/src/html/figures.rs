@@ -9,7 +9,7 @@ use sidestep_document::{Figure, FigureKind, Table};
 use sidestep_draw::series_colors;
 
 /// Largest number of points of a figure that has a table of its numbers.
-const MOST_ROWS: usize = 200;
+const MAX_TABLE_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
     let data = json!({ "figure": figure, "colors": series_colors() });
@@ -17,15 +17,15 @@ pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Mark
         figure .plot id=(id) {
             figcaption { (figure.title) }
             @if let Some(still) = still {
-                (image(&still.svg, Some("still"), &words(figure)))
+                (image(&still.svg, Some("still"), &alt_text(figure)))
             }
             div .drawn hidden {}
             script type="application/json" { (PreEscaped(safe_json(&data))) }
             @if !figure.note.is_empty() { p .note { (figure.note) } }
-            @if let Some(numbers) = numbers(figure) {
+            @if let Some(numbers) = numbers_table(figure) {
                 details .numbers {
                     summary { "Numbers" }
-                    (tables::wide(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
+                    (tables::wide_table(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
                 }
             }
         }
@@ -43,7 +43,7 @@ pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
 }
 
 /// Returns the description of a figure for screen readers.
-fn words(figure: &Figure) -> String {
+fn alt_text(figure: &Figure) -> String {
     let names: Vec<&str> =
         figure.series.iter().map(|s| s.name.as_str()).filter(|n| !n.is_empty()).collect();
     let of = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
@@ -51,9 +51,9 @@ fn words(figure: &Figure) -> String {
 }
 
 /// Returns the figure's points as a table, if they are few.
-fn numbers(figure: &Figure) -> Option<Table> {
+fn numbers_table(figure: &Figure) -> Option<Table> {
     let count: usize = figure.series.iter().map(|s| s.points.len()).sum();
-    if count > MOST_ROWS || figure.kind == FigureKind::Ways {
+    if count > MAX_TABLE_ROWS || figure.kind == FigureKind::Ways {
         return None;
     }
     let mut table = Table::new("", "", &["series"]);
@@ -68,18 +68,19 @@ fn numbers(figure: &Figure) -> Option<Table> {
                 }
                 _ => point.x.to_string(),
             };
-            let end =
-                |of: fn((f64, f64)) -> f64| point.interval.map_or(String::new(), |i| short(of(i)));
+            let end = |of: fn((f64, f64)) -> f64| {
+                point.interval.map_or(String::new(), |i| format_short(of(i)))
+            };
             let n = point.n.map_or(String::new(), |n| n.to_string());
             let (low, high) = (end(|i| i.0), end(|i| i.1));
-            table.row([series.name.clone(), x, short(point.y), low, high, n]);
+            table.push_row([series.name.clone(), x, format_short(point.y), low, high, n]);
         }
     }
     Some(table)
 }
 
 /// Formats a value with six digits, which distinguish any two measurements.
-fn short(value: f64) -> String {
+fn format_short(value: f64) -> String {
     let digits = format!("{value:.5e}").parse::<f64>();
     digits.map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
 }
@@ -94,13 +95,13 @@ fn image(svg: &str, class: Option<&str>, words: &str) -> Markup {
     let class = class.map_or_else(String::new, |class| format!(" class=\"{class}\""));
     let words = html! { (words) }.into_string();
     // In single quotes, of which pictures have few: every double one would take three bytes.
-    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{words}\">", data_address(svg)))) }
+    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{words}\">", data_uri(svg)))) }
 }
 
 /// Returns an SVG as the address of an image, for an attribute in single quotes. Addresses take marks of
 /// HTML as they are, and so do attributes, so that only characters that would end either are written in
 /// another way.
-fn data_address(svg: &str) -> String {
+fn data_uri(svg: &str) -> String {
     let mut address = String::with_capacity(svg.len() + svg.len() / 8);
     address.push_str("data:image/svg+xml;charset=utf-8,");
     for c in svg.chars() {

@@ -23,7 +23,7 @@ const FIGURES_SCRIPT: &str =
     concat!(include_str!("axes.js"), include_str!("figures.js"), include_str!("mouse.js"));
 
 /// Security policy: nothing may be loaded; inline styles and scripts may be used.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
 
 /// A hint on how to use figures with a mouse.
@@ -31,22 +31,23 @@ const HINT: &str = "Figures: point at a mark for its values, drag to zoom, doubl
                     all again, click a name in a legend to hide or show its series.";
 
 /// Number of sections from which the page has a table of contents.
-const LONG: usize = 3;
+const MIN_CONTENTS_SECTIONS: usize = 3;
 
 /// Returns the page; `pictures` has one for each figure and picture, in order.
 pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
-    let sections = Section::all(document, pictures);
-    let has_contents = sections.iter().filter(|s| s.title.is_some()).count() >= LONG;
+    let sections = PageSection::all(document, pictures);
+    let has_contents =
+        sections.iter().filter(|s| s.title.is_some()).count() >= MIN_CONTENTS_SECTIONS;
     let has_figures = document.blocks.iter().any(|block| matches!(block, Block::Figure(_)));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta http-equiv="Content-Security-Policy" content=(CONTENT_SECURITY_POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                meta name="description" content=(document.lead.words());
+                meta name="description" content=(document.lead.plain_text());
                 meta name="generator" content={ "sidestep " (env!("CARGO_PKG_VERSION")) };
                 title { (document.title) }
                 style { (PreEscaped(STYLE)) }
@@ -56,7 +57,7 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
                     h1 { (document.title) }
                     p .lead { (text(&document.lead)) }
                 }
-                @if has_contents { (contents(&sections)) }
+                @if has_contents { (table_of_contents(&sections)) }
                 main { @for section in &sections { (section.markup()) } }
                 footer {
                     p { "Made by sidestep " (env!("CARGO_PKG_VERSION"))
@@ -72,20 +73,20 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
 }
 
 /// A part of the page under one heading.
-struct Section<'a> {
+struct PageSection<'a> {
     title: Option<&'a str>,
     id: String,
-    blocks: Vec<Part<'a>>,
+    blocks: Vec<PageBlock<'a>>,
 }
 
 /// A block, its place in the page, and its picture if it has one.
-struct Part<'a> {
+struct PageBlock<'a> {
     block: &'a Block,
     id: String,
     picture: Option<&'a SvgFile>,
 }
 
-impl<'a> Section<'a> {
+impl<'a> PageSection<'a> {
     /// Returns the blocks of a document by section.
     fn all(document: &'a Document, pictures: &'a [SvgFile]) -> Vec<Self> {
         let mut sections = vec![Self { title: None, id: String::new(), blocks: Vec::new() }];
@@ -101,7 +102,7 @@ impl<'a> Section<'a> {
             let picture = if is_picture { pictures.next() } else { None };
             let id = id(title_of(block).unwrap_or("part"));
             if let Some(section) = sections.last_mut() {
-                section.blocks.push(Part { block, id, picture });
+                section.blocks.push(PageBlock { block, id, picture });
             }
         }
         sections.retain(|s| s.title.is_some() || !s.blocks.is_empty());
@@ -132,7 +133,7 @@ fn title_of(block: &Block) -> Option<&str> {
     }
 }
 
-fn contents(sections: &[Section<'_>]) -> Markup {
+fn table_of_contents(sections: &[PageSection<'_>]) -> Markup {
     let link = |id: &str, title: &str| html! { a href={ "#" (id) } { (title) } };
     html! {
         nav .contents aria-label="Contents" {

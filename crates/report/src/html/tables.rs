@@ -10,18 +10,18 @@ use sidestep_document::document::Text;
 /// button; a folded table is shown by a click on its title.
 pub(super) fn table(table: &Table, id: &str) -> Markup {
     let note = html! {
-        @if !table.note.is_empty() { p .note { (text(&Text::marked(&table.note))) } }
+        @if !table.note.is_empty() { p .note { (text(&Text::from_markup(&table.note))) } }
     };
     html! {
         @if table.is_folded {
             details .table id=(id) {
                 summary { (table.title) }
-                (wide(&table.title, grid(table, None)))
+                (wide_table(&table.title, grid(table, None)))
                 (note)
             }
         } @else {
             div .table id=(id) {
-                (wide(&table.title, grid(table, Some(&table.title))))
+                (wide_table(&table.title, grid(table, Some(&table.title))))
                 (note)
             }
         }
@@ -30,21 +30,22 @@ pub(super) fn table(table: &Table, id: &str) -> Markup {
 
 /// Returns columns and rows, with the title as caption.
 pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
-    let numbers: Vec<bool> = (0..table.columns.len()).map(|k| holds_numbers(table, k)).collect();
+    let numbers: Vec<bool> =
+        (0..table.columns.len()).map(|k| is_numeric_column(table, k)).collect();
     html! {
         table .sortable {
             @if let Some(caption) = caption { caption { (caption) } }
             thead { tr {
                 @for (head, number) in table.columns.iter().zip(&numbers) {
-                    th scope="col" class=[class(*number)] { (breakable(head)) }
+                    th scope="col" class=[class(*number)] { (breakable_name(head)) }
                 }
             } }
             tbody {
                 @for row in &table.rows {
                     tr {
                         @for (k, cell) in table.cells(row).enumerate() {
-                            @if k == 0 { th scope="row" class=[class(numbers[k])] { (breakable(cell)) } }
-                            @else { td class=[(!numbers[k]).then_some("words")] { (kept(cell)) } }
+                            @if k == 0 { th scope="row" class=[class(numbers[k])] { (breakable_name(cell)) } }
+                            @else { td class=[(!numbers[k]).then_some("words")] { (non_breaking(cell)) } }
                         }
                     }
                 }
@@ -60,7 +61,7 @@ fn class(is_number: bool) -> Option<&'static str> {
 }
 
 /// Returns a name that may break between its words; numbers never do.
-fn breakable(name: &str) -> Markup {
+fn breakable_name(name: &str) -> Markup {
     let ends_word = |part: &str| {
         part.ends_with(['_', '.', '/']) && part.starts_with(|c: char| c.is_ascii_alphabetic())
     };
@@ -72,7 +73,7 @@ fn breakable(name: &str) -> Markup {
 }
 
 /// Returns a cell in which the two ends of an interval stay on one line, and an exponent with its number.
-fn kept(cell: &str) -> String {
+fn non_breaking(cell: &str) -> String {
     match cell.contains('[') {
         true => cell.replace(", ", ",\u{a0}").replace("e-", "e-\u{2060}"),
         false => cell.into(),
@@ -81,13 +82,13 @@ fn kept(cell: &str) -> String {
 
 /// Returns the place of a table: the page's script takes the last columns away where they have no room,
 /// and offers them. Without scripts it scrolls, and so it has a name and can be reached by keyboard.
-pub(super) fn wide(name: &str, inside: Markup) -> Markup {
+pub(super) fn wide_table(name: &str, inside: Markup) -> Markup {
     // Not the name alone: a section may have the same.
     html! { div .wide { div .scrolled role="region" tabindex="0" aria-label={ "Table: " (name) } { (inside) } } }
 }
 
 /// Returns whether every cell that is not empty starts like a number, or like a bound of one: `< 0.0001`.
-fn holds_numbers(table: &Table, k: usize) -> bool {
+fn is_numeric_column(table: &Table, k: usize) -> bool {
     let cells = || table.rows.iter().filter_map(|row| row.get(k));
     let is_number = |cell: &str| {
         let digits = cell.trim_start_matches(['<', ' ', '-', '+', '\u{2212}']);
@@ -120,8 +121,8 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
                 span .count { (badge(verdict)) " " strong { (claim::count(claims, verdict)) } } " "
             }
         }
-        (wide("Claims", table))
-        p .note { (text(&Text::marked(claim::NOTE))) }
+        (wide_table("Claims", table))
+        p .note { (text(&Text::from_markup(claim::READING_NOTE))) }
     }
 }
 
@@ -130,15 +131,15 @@ fn claim_row(claim: &Claim, has_figure: bool) -> Markup {
         tr id={ "claim-" (claim.id.replace([' ', ','], "")) } {
             th scope="row" { (claim.id) }
             td { (badge(claim.verdict)) }
-            td { (text(&Text::marked(claim.paper))) }
+            td { (text(&Text::from_markup(claim.paper))) }
             @if has_figure {
                 @match claim.papers_figure {
                     Some(figure) => td { (figure) },
                     None => td .none { "none" },
                 }
             }
-            td { (text(&Text::marked(&claim.ours))) }
-            td .why { (text(&Text::marked(&claim.reason))) }
+            td { (text(&Text::from_markup(&claim.ours))) }
+            td .why { (text(&Text::from_markup(&claim.reason))) }
         }
     }
 }

@@ -3,17 +3,17 @@
 use super::layout::{Layout, Step, above_comments, line_start};
 use super::section::section_text;
 use super::splice::{Splice, delete, insert, replace};
-use super::{Refusal, refusal};
+use super::{EditError, edit_error};
 use serde_json::Value as Json;
 use std::ops::Range;
 
 /// Removes all lines of the item at a path.
-pub(super) fn taken(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
-    layout.runs(path).iter().map(|run| delete(removable(layout, run))).collect()
+pub(super) fn remove_lines(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
+    layout.statement_runs(path).iter().map(|run| delete(removable_lines(layout, run))).collect()
 }
 
 /// Returns the lines that go with removed statements: their comment, and a blank line.
-fn removable(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
+fn removable_lines(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
     let text = layout.text;
     let mut lines = layout.lines(run);
     let is_section = layout.statements[run.start].is_header;
@@ -47,34 +47,34 @@ fn blank_after(text: &str, end: usize) -> Option<usize> {
 }
 
 /// Inserts a section into a list at a number, which is at most the number of sections.
-pub(super) fn inserted(
+pub(super) fn insert_section(
     layout: &Layout<'_>,
     list: &[Step],
     at: usize,
     value: &Json,
-) -> Result<Vec<Splice>, Refusal> {
+) -> Result<Vec<Splice>, EditError> {
     let Json::Object(members) = value else {
-        return Err(refusal("a section of a list is a table", "give a table"));
+        return Err(edit_error("a section of a list is a table", "give a table"));
     };
     let block = section_text(layout, list, members, true)?;
     let element = |number| [list, &[Step::Index(number)]].concat();
-    if let Some(run) = layout.runs(&element(at)).first() {
-        return Ok(vec![set_before(layout, layout.lines(run).start, &block)]);
+    if let Some(run) = layout.statement_runs(&element(at)).first() {
+        return Ok(vec![insert_section_before(layout, layout.lines(run).start, &block)]);
     }
-    let last = layout.runs(list);
+    let last = layout.statement_runs(list);
     let end = last.last().map_or(layout.text.len(), |run| layout.lines(run).end);
     Ok(vec![insert(end, format!("{}{block}", layout.new_line()))])
 }
 
 /// Inserts a section before the lines of another: with an empty line between them if there is one before.
-pub(super) fn set_before(layout: &Layout<'_>, start: usize, block: &str) -> Splice {
+pub(super) fn insert_section_before(layout: &Layout<'_>, start: usize, block: &str) -> Splice {
     let is_spaced = start == 0 || blank_before(layout.text, start).is_some();
     insert(start, format!("{block}{}", if is_spaced { layout.new_line() } else { "" }))
 }
 
 /// Moves the sections of a list into another order.
-pub(super) fn moved(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
-    let runs_of = |number| layout.runs(&[list, &[Step::Index(number)]].concat());
+pub(super) fn reorder_sections(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
+    let runs_of = |number| layout.statement_runs(&[list, &[Step::Index(number)]].concat());
     let text_of = |number: usize| {
         let runs = runs_of(number);
         let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();

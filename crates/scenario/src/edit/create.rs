@@ -1,13 +1,13 @@
 //! New keys and sections.
 
-use super::blocks::set_before;
+use super::blocks::insert_section_before;
 use super::layout::{Layout, Statement, Step, line_start};
-use super::members::{enclosing, with_member};
-use super::path::written;
+use super::members::{enclosing_table, insert_member};
+use super::path::quoted_name;
 use super::section::{are_sections, dotted, header, is_large, names_of, section_text};
 use super::splice::{Splice, insert};
-use super::value::New;
-use super::{Refusal, refusal};
+use super::value::NewValue;
+use super::{EditError, edit_error};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Table, Value};
 
@@ -17,29 +17,32 @@ pub(super) fn create(
     path: &[Step],
     item: &Item,
     names: &[String],
-    new: New<'_>,
-) -> Result<Vec<Splice>, Refusal> {
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
     match item {
         Item::Value(Value::InlineTable(_)) => {
-            let Some((table, depth)) = enclosing(layout, path) else { return Ok(Vec::new()) };
+            let Some((table, depth)) = enclosing_table(layout, path) else { return Ok(Vec::new()) };
             let all = [&names_of(&path[depth..])[..], names].concat();
-            let member = format!("{} = {}", dotted(&all), new.written(None)?);
-            Ok(with_member(layout.text, table, &member))
+            let member = format!("{} = {}", dotted(&all), new.to_toml(None)?);
+            Ok(insert_member(layout.text, table, &member))
         }
-        Item::Table(table) if table.is_dotted() => in_dotted(layout, path, names, new),
-        Item::Table(table) => in_table(layout, path, table, names, new),
-        _ => Err(refusal(format!("`{}` does not stand in a table", dotted(names)), "name a table")),
+        Item::Table(table) if table.is_dotted() => add_dotted(layout, path, names, new),
+        Item::Table(table) => add_to_table(layout, path, table, names, new),
+        _ => Err(edit_error(
+            format!("`{}` does not stand in a table", dotted(names)),
+            "name a table",
+        )),
     }
 }
 
 /// Makes a line after those of a table of dotted keys.
-fn in_dotted(
+fn add_dotted(
     layout: &Layout<'_>,
     path: &[Step],
     names: &[String],
-    new: New<'_>,
-) -> Result<Vec<Splice>, Refusal> {
-    let runs = layout.runs(path);
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
+    let runs = layout.statement_runs(path);
     let below = |s: &Statement| names_of(&s.path[path.len()..]).len();
     let mut own = runs.iter().flat_map(|run| &layout.statements[run.clone()]);
     // Keys below a header of their own are no pattern for the new line.
@@ -52,39 +55,40 @@ fn in_dotted(
         return Ok(Vec::new());
     };
     let head = &layout.text[line_start(layout.text, first.start)..end.end];
-    let line = format!("{head}.{} = {}{}", dotted(names), new.written(None)?, layout.new_line());
+    let line = format!("{head}.{} = {}{}", dotted(names), new.to_toml(None)?, layout.new_line());
     Ok(vec![insert(last.lines.end, line)])
 }
 
-fn in_table(
+fn add_to_table(
     layout: &Layout<'_>,
     path: &[Step],
     table: &Table,
     names: &[String],
-    new: New<'_>,
-) -> Result<Vec<Splice>, Refusal> {
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
     let Some((last, on_the_way)) = names.split_last() else { return Ok(Vec::new()) };
     let step = |name: &String| Step::Name(name.clone());
     let way = |names: &[String]| [path, &names.iter().map(step).collect::<Vec<_>>()].concat();
     match new {
-        New::Json(Json::Object(members)) if is_section(path, table, on_the_way, members) => {
+        NewValue::Json(Json::Object(members)) if is_section(path, table, on_the_way, members) => {
             let block = section_text(layout, &way(names), members, false)?;
-            Ok(vec![behind(layout, path, &block)])
+            Ok(vec![insert_block_after(layout, path, &block)])
         }
-        New::Json(Json::Array(items)) if are_sections(items) => {
+        NewValue::Json(Json::Array(items)) if are_sections(items) => {
             let list = way(names);
             let blocks = items.iter().filter_map(Json::as_object);
-            let blocks: Result<Vec<String>, Refusal> =
+            let blocks: Result<Vec<String>, EditError> =
                 blocks.map(|members| section_text(layout, &list, members, true)).collect();
-            Ok(vec![behind(layout, path, &blocks?.join(layout.new_line()))])
+            Ok(vec![insert_block_after(layout, path, &blocks?.join(layout.new_line()))])
         }
         _ => {
-            let line = format!("{} = {}{}", written(last), new.written(None)?, layout.new_line());
+            let line =
+                format!("{} = {}{}", quoted_name(last), new.to_toml(None)?, layout.new_line());
             Ok(vec![match on_the_way.is_empty() {
-                true => line_in(layout, path, &line),
+                true => insert_line(layout, path, &line),
                 false => {
                     let head = header(layout, &way(on_the_way), false);
-                    behind(layout, path, &format!("{head}{line}"))
+                    insert_block_after(layout, path, &format!("{head}{line}"))
                 }
             }])
         }
@@ -104,9 +108,9 @@ fn is_section(
 }
 
 /// Inserts a section after everything at a path.
-fn behind(layout: &Layout<'_>, path: &[Step], block: &str) -> Splice {
+fn insert_block_after(layout: &Layout<'_>, path: &[Step], block: &str) -> Splice {
     let new_line = layout.new_line();
-    match layout.runs(path).last().filter(|_| !path.is_empty()) {
+    match layout.statement_runs(path).last().filter(|_| !path.is_empty()) {
         Some(run) => insert(layout.lines(run).end, format!("{new_line}{block}")),
         None if layout.text.is_empty() => insert(0, block),
         None => insert(layout.text.len(), format!("{new_line}{block}")),
@@ -114,34 +118,34 @@ fn behind(layout: &Layout<'_>, path: &[Step], block: &str) -> Splice {
 }
 
 /// Inserts a line into a section, after the section's own lines.
-fn line_in(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
+fn insert_line(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let is_own = |s: &&Statement| s.is_header && s.path == path;
     let header = layout.statements.iter().position(|s| is_own(&s));
     let first = match header {
         Some(header) => header + 1,
         None if path.is_empty() => 0,
         // The only headers are those of sections in it.
-        None => return before(layout, path, line),
+        None => return insert_header_before(layout, path, line),
     };
     let lines = layout.statements[first..].iter().take_while(|s| !s.is_header);
     match (lines.last(), header) {
         (Some(last), _) => insert(last.lines.end, line),
         (None, Some(header)) => insert(layout.statements[header].lines.end, line),
-        (None, None) => insert(behind_head(layout), line),
+        (None, None) => insert(end_of_head_comment(layout), line),
     }
 }
 
 /// Inserts a header, and a line, before the sections in it.
-pub(super) fn before(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
+pub(super) fn insert_header_before(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let block = format!("{}{line}", header(layout, path, false));
-    match layout.runs(path).first() {
-        Some(run) => set_before(layout, layout.lines(run).start, &block),
-        None => behind(layout, &[], &block),
+    match layout.statement_runs(path).first() {
+        Some(run) => insert_section_before(layout, layout.lines(run).start, &block),
+        None => insert_block_after(layout, &[], &block),
     }
 }
 
 /// Returns the place after a comment that heads the text, and the empty lines after it.
-fn behind_head(layout: &Layout<'_>) -> usize {
+fn end_of_head_comment(layout: &Layout<'_>) -> usize {
     let mut at = 0;
     let lines = layout.text.split_inclusive('\n');
     let comments = lines.clone().take_while(|line| line.trim_start().starts_with('#'));

@@ -1,8 +1,8 @@
 //! Places of all keys and sections in a text.
 
-use super::path::{Part, keys_at};
-use super::{Refusal, refusal};
-pub(super) use crate::locate::Part as Step;
+use super::path::{KeyPart, keys_at};
+use super::{EditError, edit_error};
+pub(super) use crate::locate::PathStep as Step;
 use std::ops::Range;
 use toml_edit::{Document, Item, Table, TomlError};
 
@@ -28,7 +28,7 @@ pub(super) struct Layout<'t> {
 }
 
 /// The end of a key's path in a text.
-pub(super) struct Reach<'l> {
+pub(super) struct KeyLookup<'l> {
     /// The path to the last existing item, with every number.
     pub(super) path: Vec<Step>,
     /// The last existing item.
@@ -39,33 +39,34 @@ pub(super) struct Reach<'l> {
 
 impl<'t> Layout<'t> {
     /// Reads a text.
-    pub(super) fn of(text: &'t str) -> Result<Self, TomlError> {
+    pub(super) fn parse(text: &'t str) -> Result<Self, TomlError> {
         let document = Document::parse(text)?;
         let mut statements = Vec::new();
-        collect(text, document.as_table(), &mut Vec::new(), &mut statements);
+        collect_statements(text, document.as_table(), &mut Vec::new(), &mut statements);
         statements.sort_by_key(|statement| statement.lines.start);
         Ok(Self { text, document, statements })
     }
 
     /// Follows a key as far as it leads.
-    pub(super) fn reach(&self, key: &[Part]) -> Result<Reach<'_>, Refusal> {
-        let mut reach = Reach { path: Vec::new(), item: self.document.as_item(), rest: Vec::new() };
+    pub(super) fn look_up(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
+        let mut reach =
+            KeyLookup { path: Vec::new(), item: self.document.as_item(), rest: Vec::new() };
         for part in key {
-            step(&mut reach, part)?;
+            follow_part(&mut reach, part)?;
         }
         Ok(reach)
     }
 
     /// Follows a key to its end.
-    pub(super) fn find(&self, key: &[Part]) -> Result<Reach<'_>, Refusal> {
-        let reach = self.reach(key)?;
+    pub(super) fn find(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
+        let reach = self.look_up(key)?;
         match reach.rest.first() {
             None => Ok(reach),
             Some(name) => {
                 let known = names_of(reach.item);
                 let known: Vec<&str> = known.iter().map(String::as_str).collect();
-                let remedy = crate::nearest(name, &known);
-                Err(refusal(format!("there is no key `{name}`"), remedy))
+                let remedy = crate::suggestion(name, &known);
+                Err(edit_error(format!("there is no key `{name}`"), remedy))
             }
         }
     }
@@ -82,7 +83,7 @@ impl<'t> Layout<'t> {
     }
 
     /// Returns the numbers of the statements at a path or below, in runs without others between them.
-    pub(super) fn runs(&self, path: &[Step]) -> Vec<Range<usize>> {
+    pub(super) fn statement_runs(&self, path: &[Step]) -> Vec<Range<usize>> {
         let mut runs: Vec<Range<usize>> = Vec::new();
         let below = |s: &Statement| s.path.starts_with(path);
         for (at, _) in self.statements.iter().enumerate().filter(|(_, s)| below(s)) {
@@ -116,9 +117,9 @@ fn names_of(item: &Item) -> Vec<String> {
 }
 
 /// Takes one part of a key.
-fn step(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
+fn follow_part(reach: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
     if !reach.rest.is_empty() {
-        return missing(reach, part);
+        return push_missing(reach, part);
     }
     if let Some(count) = count(reach.item) {
         let number = match part.number() {
@@ -128,7 +129,7 @@ fn step(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
         };
         let element = reach.item.get(number).ok_or_else(|| {
             let cause = format!("there is no element {number}, as there are {count}");
-            refusal(cause, "count from 0")
+            edit_error(cause, "count from 0")
         })?;
         reach.path.push(Step::Index(number));
         reach.item = element;
@@ -144,18 +145,18 @@ fn step(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
         }
         // A section that stands alone.
         None if part.number() == Some(0) => {}
-        None => missing(reach, part)?,
+        None => push_missing(reach, part)?,
     }
     Ok(())
 }
 
-fn missing(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
+fn push_missing(reach: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
     match part.number() {
         None => reach.rest.push(part.name.clone()),
         // The new section will stand alone.
         Some(0) if !reach.rest.is_empty() => {}
         Some(number) => {
-            return Err(refusal(format!("there is no element {number}"), "count from 0"));
+            return Err(edit_error(format!("there is no element {number}"), "count from 0"));
         }
     }
     Ok(())
@@ -167,15 +168,15 @@ pub(super) fn count(item: &Item) -> Option<usize> {
     sections.or_else(|| item.as_array().map(toml_edit::Array::len))
 }
 
-fn not_a_table(name: &str) -> Refusal {
-    refusal(
+fn not_a_table(name: &str) -> EditError {
+    edit_error(
         format!("`{name}` does not stand in a table"),
         "name the element of an array by its number, e.g. robots.0.count",
     )
 }
 
 /// Collects the statements of a table and of the tables in it.
-fn collect(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
+fn collect_statements(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
     for (name, item) in table.iter() {
         path.push(Step::Name(name.to_string()));
         match item {
@@ -186,11 +187,11 @@ fn collect(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Stat
                     found.push(pair(text, path, key.start, value.end));
                 }
             }
-            Item::Table(inner) => section(text, inner, path, found),
+            Item::Table(inner) => push_section(text, inner, path, found),
             Item::ArrayOfTables(many) => {
                 for (number, inner) in many.iter().enumerate() {
                     path.push(Step::Index(number));
-                    section(text, inner, path, found);
+                    push_section(text, inner, path, found);
                     path.pop();
                 }
             }
@@ -199,7 +200,7 @@ fn collect(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Stat
     }
 }
 
-fn section(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
+fn push_section(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
     if let (Some(_), Some(span)) = (table.position(), table.span()) {
         let brackets = text[span.start..].bytes().take_while(|b| *b == b'[').count();
         found.push(Statement {
@@ -209,7 +210,7 @@ fn section(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Stat
             lines: line_start(text, span.start)..line_end(text, span.end),
         });
     }
-    collect(text, table, path, found);
+    collect_statements(text, table, path, found);
 }
 
 fn pair(text: &str, path: &[Step], key: usize, end: usize) -> Statement {

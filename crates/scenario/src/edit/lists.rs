@@ -14,13 +14,13 @@ struct OwnLines {
 }
 
 /// Returns the places of the elements.
-fn places(array: &Array) -> Vec<Range<usize>> {
+fn element_spans(array: &Array) -> Vec<Range<usize>> {
     array.iter().filter_map(toml_edit::Value::span).collect()
 }
 
 /// Inserts an element at a number, which is at most the number of elements.
-pub(super) fn with(text: &str, array: &Array, at: usize, value: &str) -> Vec<Splice> {
-    let places = places(array);
+pub(super) fn insert_element(text: &str, array: &Array, at: usize, value: &str) -> Vec<Splice> {
+    let places = element_spans(array);
     let Some(last) = places.last() else {
         let open = array.span().map_or(0, |span| span.start + 1);
         return vec![insert(open, value)];
@@ -47,8 +47,8 @@ pub(super) fn with(text: &str, array: &Array, at: usize, value: &str) -> Vec<Spl
 }
 
 /// Removes an element.
-pub(super) fn without(text: &str, array: &Array, number: usize) -> Vec<Splice> {
-    let places = places(array);
+pub(super) fn remove_element(text: &str, array: &Array, number: usize) -> Vec<Splice> {
+    let places = element_spans(array);
     let Some(place) = places.get(number) else { return Vec::new() };
     let (before, next) = (number.checked_sub(1).map(|n| &places[n]), places.get(number + 1));
     if let Some(OwnLines { lines, comma }) = own_lines(text, place) {
@@ -67,8 +67,8 @@ pub(super) fn without(text: &str, array: &Array, number: usize) -> Vec<Splice> {
 }
 
 /// Puts the elements into another order; comments on their lines go with them.
-pub(super) fn ordered(text: &str, array: &Array, order: &[usize]) -> Vec<Splice> {
-    let places = places(array);
+pub(super) fn reorder_elements(text: &str, array: &Array, order: &[usize]) -> Vec<Splice> {
+    let places = element_spans(array);
     let own: Option<Vec<OwnLines>> = places.iter().map(|place| own_lines(text, place)).collect();
     let behind = |number: usize| {
         let OwnLines { lines, comma } = &own.as_ref()?[number];
@@ -106,12 +106,12 @@ fn end_of_line<'t>(text: &'t str, lines: &Range<usize>) -> &'t str {
 
 /// Returns the place of the comma after a value, if there is one.
 pub(super) fn comma_after(text: &str, at: usize) -> Option<usize> {
-    let at = behind_space(text, at);
+    let at = skip_space(text, at);
     text[at..].starts_with(',').then_some(at)
 }
 
 /// Returns the place after blanks, ends of lines and comments.
-pub(super) fn behind_space(text: &str, mut at: usize) -> usize {
+pub(super) fn skip_space(text: &str, mut at: usize) -> usize {
     loop {
         at = text.len() - text[at..].trim_start().len();
         match text[at..].starts_with('#') {

@@ -1,7 +1,7 @@
 //! Keys of tables in braces.
 
 use super::layout::{Layout, Step};
-use super::lists::{behind_space, comma_after};
+use super::lists::{comma_after, skip_space};
 use super::path::keys_at;
 use super::splice::{Splice, delete, insert, replace};
 use std::ops::Range;
@@ -30,7 +30,7 @@ impl Member {
 }
 
 /// Returns the table in braces that a path leads into, and the number of steps to it.
-pub(super) fn enclosing<'l>(
+pub(super) fn enclosing_table<'l>(
     layout: &'l Layout<'_>,
     path: &[Step],
 ) -> Option<(&'l InlineTable, usize)> {
@@ -55,14 +55,14 @@ pub(super) fn members(text: &str, table: &InlineTable) -> Vec<Member> {
     found.sort_by_key(|member| member.end);
     let mut at = table.span().map_or(0, |span| span.start + 1);
     for member in &mut found {
-        member.keys = keys_at(text, behind_space(text, at));
+        member.keys = keys_at(text, skip_space(text, at));
         at = comma_after(text, member.end).map_or(member.end, |comma| comma + 1);
     }
     found
 }
 
 /// Inserts a member after the others.
-pub(super) fn with_member(text: &str, table: &InlineTable, member: &str) -> Vec<Splice> {
+pub(super) fn insert_member(text: &str, table: &InlineTable, member: &str) -> Vec<Splice> {
     let open = table.span().map_or(0, |span| span.start + 1);
     vec![match members(text, table).last() {
         Some(last) => insert(last.end, format!(", {member}")),
@@ -72,7 +72,7 @@ pub(super) fn with_member(text: &str, table: &InlineTable, member: &str) -> Vec<
 }
 
 /// Removes the members at a path or below.
-pub(super) fn without_members(text: &str, table: &InlineTable, path: &[Step]) -> Vec<Splice> {
+pub(super) fn remove_members(text: &str, table: &InlineTable, path: &[Step]) -> Vec<Splice> {
     let all = members(text, table);
     let open = table.span().map_or(0, |span| span.start + 1);
     let mut splices = Vec::new();
@@ -89,7 +89,7 @@ pub(super) fn without_members(text: &str, table: &InlineTable, path: &[Step]) ->
 }
 
 /// Puts one member in place of those at a path or below.
-pub(super) fn with_value(
+pub(super) fn replace_members(
     text: &str,
     table: &InlineTable,
     path: &[Step],

@@ -18,9 +18,9 @@ mod insert;
 mod layout;
 mod lists;
 mod members;
-mod names;
 mod paint;
 mod path;
+mod rename;
 mod section;
 mod set;
 mod splice;
@@ -29,19 +29,19 @@ mod value;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use path::{Part, parts};
+pub(crate) use path::{KeyPart, parse_key};
 
 use crate::Source;
 use layout::Layout;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 use splice::Splice;
-use value::New;
+use value::NewValue;
 
 /// The largest number of edits at a time.
-const MOST_EDITS: usize = 1000;
+const MAX_EDITS: usize = 1000;
 /// The largest number of bytes that all edits together may read.
-const MOST_WORK: usize = 1 << 30;
+const MAX_WORK_BYTES: usize = 1 << 30;
 
 /// A change of a scenario. Keys are those of overrides: `robots.1.at.0`, with elements counted from 0, and a section
 /// that stands alone named by 0 or without a number; parts with dots stand in quotes.
@@ -87,13 +87,13 @@ pub enum Edit {
         /// The key of the drawing, a string.
         key: String,
         /// The new characters.
-        cells: Vec<Cell>,
+        cells: Vec<CharEdit>,
     },
 }
 
 /// A character of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cell {
+pub struct CharEdit {
     /// Its row, from 0 at the top; a first row that is empty does not count.
     pub row: usize,
     /// Its column, from 0 at the left.
@@ -104,14 +104,14 @@ pub struct Cell {
 
 /// The reason why an edit cannot be done.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Refusal {
+pub(crate) struct EditError {
     pub(crate) cause: String,
     pub(crate) remedy: String,
 }
 
 /// Returns a refusal.
-fn refusal(cause: impl Into<String>, remedy: impl Into<String>) -> Refusal {
-    Refusal { cause: cause.into(), remedy: remedy.into() }
+fn edit_error(cause: impl Into<String>, remedy: impl Into<String>) -> EditError {
+    EditError { cause: cause.into(), remedy: remedy.into() }
 }
 
 impl Edit {
@@ -128,14 +128,14 @@ impl Edit {
     }
 
     /// Returns the pieces that it replaces in a text.
-    fn splices(&self, layout: &Layout<'_>) -> Result<Vec<Splice>, Refusal> {
-        let key = parts(self.key())?;
+    fn to_splices(&self, layout: &Layout<'_>) -> Result<Vec<Splice>, EditError> {
+        let key = parse_key(self.key())?;
         match self {
-            Self::Set { value, .. } => set::set(layout, &key, New::Json(value)),
+            Self::Set { value, .. } => set::set(layout, &key, NewValue::Json(value)),
             Self::Insert { at, value, .. } => insert::insert(layout, &key, *at, value),
             Self::Remove { .. } => set::remove(layout, &key),
             Self::Move { to, .. } => insert::relocate(layout, &key, *to),
-            Self::Rename { to, .. } => names::rename(layout, &key, to),
+            Self::Rename { to, .. } => rename::rename(layout, &key, to),
             Self::Paint { cells, .. } => paint::paint(layout, &key, cells),
         }
     }
@@ -148,20 +148,20 @@ impl Source {
     /// # Errors
     /// When the text is not TOML, or an edit does not fit it.
     pub fn edited(&self, edits: &[Edit]) -> Result<Self, InputError> {
-        if edits.len() > MOST_EDITS || edits.len().saturating_mul(self.text.len()) > MOST_WORK {
+        if edits.len() > MAX_EDITS || edits.len().saturating_mul(self.text.len()) > MAX_WORK_BYTES {
             let cause = format!("{} changes of this text are too many at a time", edits.len());
             return Err(InputError::new(&self.place, cause, "ask for fewer"));
         }
         let mut source = self.clone();
         for edit in edits {
-            let told = |r: Refusal| {
+            let told = |r: EditError| {
                 let place = format!("{} ({})", self.place, edit.key());
                 InputError::new(place, r.cause, r.remedy).with_key(edit.key())
             };
             if let Edit::Set { key, value } = edit {
-                source.change(|layout| set::headed(layout, &parts(key)?, value), told)?;
+                source.change(|layout| set::add_header(layout, &parse_key(key)?, value), told)?;
             }
-            source.change(|layout| edit.splices(layout), told)?;
+            source.change(|layout| edit.to_splices(layout), told)?;
         }
         Ok(source)
     }
@@ -171,10 +171,11 @@ impl Source {
         &mut self,
         key: &str,
         value: &toml_edit::Value,
-        told: impl Fn(Refusal) -> InputError,
+        told: impl Fn(EditError) -> InputError,
     ) -> Result<(), InputError> {
         let text = value.to_string();
-        let set = |layout: &Layout<'_>| set::set(layout, &parts(key)?, New::Toml(text.trim()));
+        let set =
+            |layout: &Layout<'_>| set::set(layout, &parse_key(key)?, NewValue::Toml(text.trim()));
         self.change(set, told)
     }
 
@@ -182,9 +183,9 @@ impl Source {
     /// numbers of the remaining keys. Sets none if one key equals another, or is a part of another.
     pub(crate) fn replace_values(&mut self, given: &[(&str, String)]) -> Vec<usize> {
         let all = || (0..given.len()).collect();
-        let Ok(layout) = Layout::of(&self.text) else { return all() };
+        let Ok(layout) = Layout::parse(&self.text) else { return all() };
         let found =
-            |(key, text): &(&str, String)| set::replacement(&layout, &parts(key).ok()?, text);
+            |(key, text): &(&str, String)| set::replacement(&layout, &parse_key(key).ok()?, text);
         let Some(found) = given.iter().map(found).collect::<Option<Vec<_>>>() else { return all() };
         let mut ways: Vec<_> = found.iter().map(|(way, _)| way).collect();
         // A path comes directly before its own continuations.
@@ -194,35 +195,35 @@ impl Source {
         }
         let rest = (0..given.len()).filter(|k| found[*k].1.is_none()).collect();
         let splices = found.into_iter().filter_map(|(_, splice)| splice).collect();
-        self.text = splice::spliced(&self.text, splices);
+        self.text = splice::apply_splices(&self.text, splices);
         rest
     }
 
     /// Makes one change.
     fn change(
         &mut self,
-        splices: impl FnOnce(&Layout<'_>) -> Result<Vec<Splice>, Refusal>,
-        told: impl Fn(Refusal) -> InputError,
+        splices: impl FnOnce(&Layout<'_>) -> Result<Vec<Splice>, EditError>,
+        told: impl Fn(EditError) -> InputError,
     ) -> Result<(), InputError> {
         let is_open = !self.text.is_empty() && !self.text.ends_with('\n');
         if is_open {
             self.text.push('\n');
         }
-        let layout = Layout::of(&self.text).map_err(|e| self.not_toml(&e))?;
+        let layout = Layout::parse(&self.text).map_err(|e| self.not_toml(&e))?;
         let splices = splices(&layout).map_err(&told)?;
         if splices.is_empty() {
             self.text.truncate(self.text.len() - usize::from(is_open));
             return Ok(());
         }
-        let text = splice::spliced(&self.text, splices);
+        let text = splice::apply_splices(&self.text, splices);
         let mut changed = Self { text, ..self.clone() };
         // A last line without a line break stays so.
         if is_open && changed.text.ends_with('\n') {
             changed.text.pop();
         }
-        Layout::of(&changed.text).map_err(|error| {
+        Layout::parse(&changed.text).map_err(|error| {
             let cause = format!("it would not be TOML any more: {}", error.message());
-            told(refusal(cause, "change the text itself"))
+            told(edit_error(cause, "change the text itself"))
         })?;
         *self = changed;
         Ok(())

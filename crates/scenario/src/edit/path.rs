@@ -1,20 +1,20 @@
 //! Keys as overrides name them: `robots.1.at`, `kinds."a.b".observation`.
 
-use super::{Refusal, refusal};
+use super::{EditError, edit_error};
 use toml_edit::Key;
 
 /// The largest number of parts of a key.
-const MOST_PARTS: usize = 64;
+const MAX_PARTS: usize = 64;
 
 /// A part of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Part {
+pub(crate) struct KeyPart {
     /// The name, without quotes.
     pub(crate) name: String,
     is_quoted: bool,
 }
 
-impl Part {
+impl KeyPart {
     /// Returns the number of an element, if it is one.
     pub(crate) fn number(&self) -> Option<usize> {
         let is_number = !self.is_quoted && self.name.bytes().all(|b| b.is_ascii_digit());
@@ -23,35 +23,40 @@ impl Part {
 }
 
 /// Splits a key into its parts; never returns none.
-pub(crate) fn parts(key: &str) -> Result<Vec<Part>, Refusal> {
+pub(crate) fn parse_key(key: &str) -> Result<Vec<KeyPart>, EditError> {
     let mut found = Vec::new();
     let mut rest = key.trim();
     loop {
         let end = end_of_part(rest);
-        found.push(part(&rest[..end])?);
+        found.push(parse_part(&rest[..end])?);
         match rest[end..].strip_prefix('.') {
             Some(behind) => rest = behind,
             None if end == rest.len() => return Ok(found),
-            None => return Err(refusal("a dot is missing behind a quote", "write a.\"b.c\".d")),
+            None => return Err(edit_error("a dot is missing behind a quote", "write a.\"b.c\".d")),
         }
-        if found.len() > MOST_PARTS {
-            return Err(refusal("the key has too many parts", "name what is in the text"));
+        if found.len() > MAX_PARTS {
+            return Err(edit_error("the key has too many parts", "name what is in the text"));
         }
     }
 }
 
-fn part(text: &str) -> Result<Part, Refusal> {
+fn parse_part(text: &str) -> Result<KeyPart, EditError> {
     let is_quoted = text.starts_with(['"', '\'']);
     let name = match is_quoted {
         false => text.to_string(),
         true => match Key::parse(text).as_deref() {
             Ok([key]) => key.get().to_string(),
-            _ => return Err(refusal("a quoted part of the key is not TOML", "write a.\"b.c\".d")),
+            _ => {
+                return Err(edit_error(
+                    "a quoted part of the key is not TOML",
+                    "write a.\"b.c\".d",
+                ));
+            }
         },
     };
     match name.is_empty() && !is_quoted {
-        true => Err(refusal("a part of the key is empty", "write a.b.c")),
-        false => Ok(Part { name, is_quoted }),
+        true => Err(edit_error("a part of the key is empty", "write a.b.c")),
+        false => Ok(KeyPart { name, is_quoted }),
     }
 }
 
@@ -79,13 +84,13 @@ fn end_of_quoted(text: &str, quote: u8) -> usize {
 /// Returns the places of the parts of the key at a place of a text, which must be TOML.
 pub(super) fn keys_at(text: &str, at: usize) -> Vec<std::ops::Range<usize>> {
     let mut found = Vec::new();
-    let mut at = behind_blanks(text, at);
+    let mut at = skip_blanks(text, at);
     loop {
         let end = at + end_of_key(&text[at..]);
         found.push(at..end);
-        let dot = behind_blanks(text, end);
+        let dot = skip_blanks(text, end);
         match text[dot..].starts_with('.') {
-            true => at = behind_blanks(text, dot + 1),
+            true => at = skip_blanks(text, dot + 1),
             false => return found,
         }
     }
@@ -98,12 +103,12 @@ fn end_of_key(text: &str) -> usize {
     }
 }
 
-fn behind_blanks(text: &str, at: usize) -> usize {
+fn skip_blanks(text: &str, at: usize) -> usize {
     at + text[at..].bytes().take_while(|b| b" \t".contains(b)).count()
 }
 
 /// Returns a name as TOML writes it.
-pub(super) fn written(name: &str) -> String {
+pub(super) fn quoted_name(name: &str) -> String {
     Key::new(name)
         .default_repr()
         .as_raw()
@@ -117,7 +122,8 @@ mod tests {
 
     #[test]
     fn keys_are_split_at_dots_outside_of_quotes() {
-        let names = |key| parts(key).map(|all| all.into_iter().map(|p| p.name).collect::<Vec<_>>());
+        let names =
+            |key| parse_key(key).map(|all| all.into_iter().map(|p| p.name).collect::<Vec<_>>());
         assert_eq!(names("robots.1.at"), Ok(vec!["robots".into(), "1".into(), "at".into()]));
         assert_eq!(names(r#"kinds."a.b".c"#), Ok(vec!["kinds".into(), "a.b".into(), "c".into()]));
         assert_eq!(names(r#""a\"b".'c.d'"#), Ok(vec!["a\"b".into(), "c.d".into()]));
@@ -128,7 +134,7 @@ mod tests {
 
     #[test]
     fn numbers_in_quotes_are_names() {
-        let number = |key| parts(key).expect("a key")[0].number();
+        let number = |key| parse_key(key).expect("a key")[0].number();
         assert_eq!((number("12"), number("\"12\""), number("+1")), (Some(12), None, None));
         assert_eq!(number("99999999999999999999999"), None);
     }
@@ -138,6 +144,6 @@ mod tests {
         let text = "[ a . \"b.]\".c ]";
         let found: Vec<&str> = keys_at(text, 1).into_iter().map(|range| &text[range]).collect();
         assert_eq!(found, ["a", "\"b.]\"", "c"]);
-        assert_eq!((written("a-b"), written("a b")), ("a-b".into(), "\"a b\"".into()));
+        assert_eq!((quoted_name("a-b"), quoted_name("a b")), ("a-b".into(), "\"a b\"".into()));
     }
 }

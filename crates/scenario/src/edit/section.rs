@@ -1,18 +1,18 @@
 //! The text of new sections.
 
-use super::Refusal;
+use super::EditError;
 use super::layout::{Layout, Step};
-use super::path::written;
+use super::path::quoted_name;
 use super::value::text_of;
 use serde_json::{Map, Value as Json};
 
 /// The length of the longest table in braces; a longer one becomes a section.
-const MOST_IN_BRACES: usize = 80;
+const MAX_INLINE_CHARS: usize = 80;
 
 /// Returns whether a table should be a section rather than in braces.
 pub(super) fn is_large(members: &Map<String, Json>) -> bool {
     let text = text_of(&Json::Object(members.clone()), false);
-    text.is_ok_and(|text| text.len() > MOST_IN_BRACES)
+    text.is_ok_and(|text| text.len() > MAX_INLINE_CHARS)
 }
 
 /// Returns whether an array becomes a list of sections.
@@ -31,7 +31,7 @@ pub(super) fn names_of(path: &[Step]) -> Vec<String> {
 
 /// Returns names as a key of several parts.
 pub(super) fn dotted(names: &[String]) -> String {
-    names.iter().map(|name| written(name)).collect::<Vec<_>>().join(".")
+    names.iter().map(|name| quoted_name(name)).collect::<Vec<_>>().join(".")
 }
 
 /// Returns the header of a section, or of one of a list.
@@ -46,7 +46,7 @@ pub(super) fn section_text(
     path: &[Step],
     members: &Map<String, Json>,
     is_element: bool,
-) -> Result<String, Refusal> {
+) -> Result<String, EditError> {
     let new_line = layout.new_line();
     let mut text = header(layout, path, is_element);
     let mut sections = String::new();
@@ -64,7 +64,7 @@ pub(super) fn section_text(
                 sections += &section_text(layout, &way, inner, false)?;
             }
             _ => {
-                let line = format!("{} = {}{new_line}", written(name), text_of(value, false)?);
+                let line = format!("{} = {}{new_line}", quoted_name(name), text_of(value, false)?);
                 text += &line;
             }
         }

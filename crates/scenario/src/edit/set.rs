@@ -1,23 +1,27 @@
 //! Replaced values, and removed keys.
 
-use super::blocks::taken;
-use super::create::{before, create};
-use super::layout::{Layout, Reach, Step};
-use super::lists::without;
-use super::members::{enclosing, with_value, without_members};
-use super::path::Part;
+use super::blocks::remove_lines;
+use super::create::{create, insert_header_before};
+use super::layout::{KeyLookup, Layout, Step};
+use super::lists::remove_element;
+use super::members::{enclosing_table, remove_members, replace_members};
+use super::path::KeyPart;
 use super::splice::{Splice, replace};
-use super::value::{New, is_same};
-use super::{Refusal, refusal};
+use super::value::{NewValue, is_same};
+use super::{EditError, edit_error};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Value};
 
 /// The size of the largest table that is set key by key.
-const MOST_KEYS: usize = 1000;
+const MAX_KEYS: usize = 1000;
 
 /// Sets a value.
-pub(super) fn set(layout: &Layout<'_>, key: &[Part], new: New<'_>) -> Result<Vec<Splice>, Refusal> {
-    let Reach { path, item, rest } = layout.reach(key)?;
+pub(super) fn set(
+    layout: &Layout<'_>,
+    key: &[KeyPart],
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
+    let KeyLookup { path, item, rest } = layout.look_up(key)?;
     match rest.is_empty() {
         true => set_item(layout, &path, item, new),
         false => create(layout, &path, item, &rest, new),
@@ -28,10 +32,10 @@ pub(super) fn set(layout: &Layout<'_>, key: &[Part], new: New<'_>) -> Result<Vec
 /// Replacing a value leaves the text valid TOML, and everything else in its place.
 pub(super) fn replacement(
     layout: &Layout<'_>,
-    key: &[Part],
+    key: &[KeyPart],
     text: &str,
 ) -> Option<(Vec<Step>, Option<Splice>)> {
-    let Reach { mut path, item, rest } = layout.reach(key).ok()?;
+    let KeyLookup { mut path, item, rest } = layout.look_up(key).ok()?;
     let span = match item {
         Item::Value(old) if rest.is_empty() && !is_dotted(old) => old.span(),
         _ => None,
@@ -41,43 +45,43 @@ pub(super) fn replacement(
 }
 
 /// Returns the pieces that give a header to a table that has none and gets keys of its own.
-pub(super) fn headed(
+pub(super) fn add_header(
     layout: &Layout<'_>,
-    key: &[Part],
+    key: &[KeyPart],
     value: &Json,
-) -> Result<Vec<Splice>, Refusal> {
-    let Reach { path, item, rest } = layout.reach(key)?;
+) -> Result<Vec<Splice>, EditError> {
+    let KeyLookup { path, item, rest } = layout.look_up(key)?;
     let table = item.as_table().filter(|t| t.position().is_none() && !t.is_dotted());
     let (Some(table), Json::Object(members), true) = (table, value, rest.is_empty()) else {
         return Ok(Vec::new());
     };
     match path.is_empty() || members.keys().all(|name| table.contains_key(name)) {
         true => Ok(Vec::new()),
-        false => Ok(vec![before(layout, &path, "")]),
+        false => Ok(vec![insert_header_before(layout, &path, "")]),
     }
 }
 
 /// Removes a key, an element or a section.
-pub(super) fn remove(layout: &Layout<'_>, key: &[Part]) -> Result<Vec<Splice>, Refusal> {
+pub(super) fn remove(layout: &Layout<'_>, key: &[KeyPart]) -> Result<Vec<Splice>, EditError> {
     let path = layout.find(key)?.path;
     match path.is_empty() {
-        true => Err(refusal("this is the whole text", "name a key of it")),
-        false => Ok(removed(layout, &path)),
+        true => Err(edit_error("this is the whole text", "name a key of it")),
+        false => Ok(removal_splices(layout, &path)),
     }
 }
 
 /// Returns the pieces that remove the item at a path.
-pub(super) fn removed(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
+pub(super) fn removal_splices(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
     let Some((last, parent)) = path.split_last() else { return Vec::new() };
     match (layout.item(parent), last) {
         (Item::Value(Value::Array(array)), Step::Index(number)) => {
-            without(layout.text, array, *number)
+            remove_element(layout.text, array, *number)
         }
-        (Item::Value(Value::InlineTable(_)), _) => match enclosing(layout, parent) {
-            Some((table, depth)) => without_members(layout.text, table, &path[depth..]),
+        (Item::Value(Value::InlineTable(_)), _) => match enclosing_table(layout, parent) {
+            Some((table, depth)) => remove_members(layout.text, table, &path[depth..]),
             None => Vec::new(),
         },
-        _ => taken(layout, path),
+        _ => remove_lines(layout, path),
     }
 }
 
@@ -85,20 +89,20 @@ fn set_item(
     layout: &Layout<'_>,
     path: &[Step],
     item: &Item,
-    new: New<'_>,
-) -> Result<Vec<Splice>, Refusal> {
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
     match (item, new) {
         (Item::Value(old), _) if is_dotted(old) => set_dotted(layout, path, old, new),
         (Item::Value(old), _) => set_value(old, new),
-        (_, New::Json(Json::Object(members))) if item.is_table_like() => {
+        (_, NewValue::Json(Json::Object(members))) if item.is_table_like() => {
             set_members(layout, path, item, members)
         }
-        (Item::ArrayOfTables(_), New::Json(Json::Array(elements)))
+        (Item::ArrayOfTables(_), NewValue::Json(Json::Array(elements)))
             if elements.iter().all(Json::is_object) && !elements.is_empty() =>
         {
             set_sections(layout, path, item, elements)
         }
-        _ => set_anew(layout, path, new),
+        _ => replace_sections(layout, path, new),
     }
 }
 
@@ -111,41 +115,43 @@ fn set_dotted(
     layout: &Layout<'_>,
     path: &[Step],
     old: &Value,
-    new: New<'_>,
-) -> Result<Vec<Splice>, Refusal> {
-    match (enclosing(layout, path), new) {
-        (_, New::Json(json)) if is_same(old, json) => Ok(Vec::new()),
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
+    match (enclosing_table(layout, path), new) {
+        (_, NewValue::Json(json)) if is_same(old, json) => Ok(Vec::new()),
         (Some((table, depth)), _) => {
-            let value = new.written(None)?;
-            Ok(with_value(layout.text, table, &path[depth..], &value))
+            let value = new.to_toml(None)?;
+            Ok(replace_members(layout.text, table, &path[depth..], &value))
         }
         (None, _) => Ok(Vec::new()),
     }
 }
 
 /// Replaces a value that is written as a value; parts that stay the same keep their text.
-fn set_value(old: &Value, new: New<'_>) -> Result<Vec<Splice>, Refusal> {
+fn set_value(old: &Value, new: NewValue<'_>) -> Result<Vec<Splice>, EditError> {
     match (old, new) {
-        (_, New::Json(json)) if is_same(old, json) => Ok(Vec::new()),
-        (Value::Array(old), New::Json(Json::Array(new))) if old.len() == new.len() => {
-            each(old.iter().zip(new))
+        (_, NewValue::Json(json)) if is_same(old, json) => Ok(Vec::new()),
+        (Value::Array(old), NewValue::Json(Json::Array(new))) if old.len() == new.len() => {
+            set_each(old.iter().zip(new))
         }
-        (Value::InlineTable(table), New::Json(Json::Object(new)))
+        (Value::InlineTable(table), NewValue::Json(Json::Object(new)))
             if table.len() == new.len() && new.keys().all(|key| table.contains_key(key)) =>
         {
-            each(table.iter().filter_map(|(key, old)| Some((old, new.get(key)?))))
+            set_each(table.iter().filter_map(|(key, old)| Some((old, new.get(key)?))))
         }
         _ => {
-            let text = new.written(Some(old))?;
+            let text = new.to_toml(Some(old))?;
             Ok(old.span().map(|span| replace(span, text)).into_iter().collect())
         }
     }
 }
 
-fn each<'v>(pairs: impl Iterator<Item = (&'v Value, &'v Json)>) -> Result<Vec<Splice>, Refusal> {
+fn set_each<'v>(
+    pairs: impl Iterator<Item = (&'v Value, &'v Json)>,
+) -> Result<Vec<Splice>, EditError> {
     let mut splices = Vec::new();
     for (old, new) in pairs {
-        splices.extend(set_value(old, New::Json(new))?);
+        splices.extend(set_value(old, NewValue::Json(new))?);
     }
     Ok(splices)
 }
@@ -156,19 +162,19 @@ fn set_members(
     path: &[Step],
     item: &Item,
     members: &Map<String, Json>,
-) -> Result<Vec<Splice>, Refusal> {
+) -> Result<Vec<Splice>, EditError> {
     let table = item.as_table_like();
     let old: Vec<&str> = table.iter().flat_map(|table| table.iter()).map(|(key, _)| key).collect();
-    if members.len() + old.len() > MOST_KEYS {
-        return Err(refusal("the table has too many keys", "set them one by one"));
+    if members.len() + old.len() > MAX_KEYS {
+        return Err(edit_error("the table has too many keys", "set them one by one"));
     }
     let at = |name: &str| [path, &[Step::Name(name.into())]].concat();
     let gone = old.iter().filter(|key| !members.contains_key(**key));
-    let mut splices: Vec<Splice> = gone.flat_map(|key| removed(layout, &at(key))).collect();
+    let mut splices: Vec<Splice> = gone.flat_map(|key| removal_splices(layout, &at(key))).collect();
     // Lines stand before sections.
     let (sections, lines): (Vec<_>, Vec<_>) = members.iter().partition(|(_, v)| may_be_section(v));
     for (name, value) in lines.into_iter().chain(sections) {
-        let new = New::Json(value);
+        let new = NewValue::Json(value);
         splices.extend(match table.and_then(|table| table.get(name)) {
             Some(member) => set_item(layout, &at(name), member, new)?,
             None => create(layout, path, item, std::slice::from_ref(name), new)?,
@@ -191,28 +197,32 @@ fn set_sections(
     path: &[Step],
     item: &Item,
     elements: &[Json],
-) -> Result<Vec<Splice>, Refusal> {
+) -> Result<Vec<Splice>, EditError> {
     let count = super::layout::count(item).unwrap_or(0);
-    if elements.len() + count > MOST_KEYS {
-        return Err(refusal("the list has too many sections", "set them one by one"));
+    if elements.len() + count > MAX_KEYS {
+        return Err(edit_error("the list has too many sections", "set them one by one"));
     }
     let at = |number| [path, &[Step::Index(number)]].concat();
     let mut splices = Vec::new();
     for (number, element) in elements.iter().enumerate() {
         splices.extend(match item.get(number) {
-            Some(old) => set_item(layout, &at(number), old, New::Json(element))?,
-            None => super::blocks::inserted(layout, path, count, element)?,
+            Some(old) => set_item(layout, &at(number), old, NewValue::Json(element))?,
+            None => super::blocks::insert_section(layout, path, count, element)?,
         });
     }
-    splices.extend((elements.len()..count).flat_map(|number| removed(layout, &at(number))));
+    splices.extend((elements.len()..count).flat_map(|number| removal_splices(layout, &at(number))));
     Ok(splices)
 }
 
 /// Sets a value in place of sections.
-fn set_anew(layout: &Layout<'_>, path: &[Step], new: New<'_>) -> Result<Vec<Splice>, Refusal> {
+fn replace_sections(
+    layout: &Layout<'_>,
+    path: &[Step],
+    new: NewValue<'_>,
+) -> Result<Vec<Splice>, EditError> {
     let Some((Step::Name(name), parent)) = path.split_last() else {
-        return Err(refusal("a section of a list is a table", "give a table"));
+        return Err(edit_error("a section of a list is a table", "give a table"));
     };
     let made = create(layout, parent, layout.item(parent), std::slice::from_ref(name), new)?;
-    Ok([removed(layout, path), made].concat())
+    Ok([removal_splices(layout, path), made].concat())
 }

@@ -27,7 +27,7 @@ pub(super) fn delete(range: Range<usize>) -> Splice {
 }
 
 /// Returns a text with pieces replaced; where two overlap, the second gets the remainder of the first.
-pub(super) fn spliced(text: &str, mut splices: Vec<Splice>) -> String {
+pub(super) fn apply_splices(text: &str, mut splices: Vec<Splice>) -> String {
     splices.sort_by_key(|splice| splice.range.start);
     let mut new = String::with_capacity(text.len());
     let mut done = 0;
@@ -47,7 +47,7 @@ mod tests {
     fn pieces_are_replaced_in_any_order() {
         let splices =
             vec![replace(4..5, "E"), insert(0, ">"), delete(1..3), delete(2..4), insert(6, "<")];
-        assert_eq!(spliced("abcdef", splices), ">aEf<");
-        assert_eq!(spliced("ab", vec![insert(1, "1"), insert(1, "2")]), "a12b");
+        assert_eq!(apply_splices("abcdef", splices), ">aEf<");
+        assert_eq!(apply_splices("ab", vec![insert(1, "1"), insert(1, "2")]), "a12b");
     }
 }

@@ -1,6 +1,6 @@
 //! Edits of small texts, with the resulting text.
 
-use super::{Cell, Edit};
+use super::{CharEdit, Edit};
 use crate::Source;
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ pub(super) fn rename(key: &str, to: &str) -> Edit {
 }
 
 fn paint(key: &str, cells: &[(usize, usize, char)]) -> Edit {
-    let cell = |&(row, column, mark): &_| Cell { row, column, mark };
+    let cell = |&(row, column, mark): &_| CharEdit { row, column, mark };
     Edit::Paint { key: key.into(), cells: cells.iter().map(cell).collect() }
 }
 

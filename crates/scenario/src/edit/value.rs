@@ -1,30 +1,30 @@
 //! Values in the notation of TOML.
 
-use super::path::written;
-use super::{Refusal, refusal};
+use super::path::quoted_name;
+use super::{EditError, edit_error};
 use serde_json::{Map, Number, Value as Json};
 use std::fmt::Write;
 use toml_edit::{Datetime, Value};
 
 /// The number up to which whole numbers are exact as floats.
-const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
 /// A value that is set.
 #[derive(Clone, Copy)]
-pub(super) enum New<'v> {
+pub(super) enum NewValue<'v> {
     /// A value by its meaning.
     Json(&'v Json),
     /// A piece of TOML, to be written as it is.
     Toml(&'v str),
 }
 
-impl New<'_> {
+impl NewValue<'_> {
     /// Returns its text; `old` is the value that it replaces.
-    pub(super) fn written(self, old: Option<&Value>) -> Result<String, Refusal> {
+    pub(super) fn to_toml(self, old: Option<&Value>) -> Result<String, EditError> {
         match self {
-            New::Toml(text) => Ok(text.to_string()),
-            New::Json(Json::String(text)) if is_date(old, text) => Ok(text.clone()),
-            New::Json(value) => text_of(value, old.is_some_and(has_floats)),
+            NewValue::Toml(text) => Ok(text.to_string()),
+            NewValue::Json(Json::String(text)) if is_date(old, text) => Ok(text.clone()),
+            NewValue::Json(value) => text_of(value, old.is_some_and(has_floats)),
         }
     }
 }
@@ -44,17 +44,17 @@ pub(super) fn has_floats(value: &Value) -> bool {
 }
 
 /// Returns the text of a value on one line, except for strings of several lines.
-pub(super) fn text_of(value: &Json, floats: bool) -> Result<String, Refusal> {
+pub(super) fn text_of(value: &Json, floats: bool) -> Result<String, EditError> {
     let mut text = String::new();
     write_value(&mut text, value, floats)?;
     Ok(text)
 }
 
-fn write_value(text: &mut String, value: &Json, floats: bool) -> Result<(), Refusal> {
+fn write_value(text: &mut String, value: &Json, floats: bool) -> Result<(), EditError> {
     match value {
         Json::Null => {
             let remedy = "leave the key out; what is NaN or infinite becomes null in JSON";
-            return Err(refusal("null is no value of TOML", remedy));
+            return Err(edit_error("null is no value of TOML", remedy));
         }
         Json::Bool(is_so) => text.push_str(if *is_so { "true" } else { "false" }),
         Json::Number(number) => text.push_str(&number_text(number, floats)?),
@@ -72,14 +72,14 @@ fn write_value(text: &mut String, value: &Json, floats: bool) -> Result<(), Refu
     Ok(())
 }
 
-fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), Refusal> {
+fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), EditError> {
     if members.is_empty() {
         text.push_str("{}");
         return Ok(());
     }
     for (at, (name, member)) in members.iter().enumerate() {
         text.push_str(if at == 0 { "{ " } else { ", " });
-        text.push_str(&written(name));
+        text.push_str(&quoted_name(name));
         text.push_str(" = ");
         write_value(text, member, false)?;
     }
@@ -87,18 +87,18 @@ fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), R
     Ok(())
 }
 
-fn number_text(number: &Number, floats: bool) -> Result<String, Refusal> {
+fn number_text(number: &Number, floats: bool) -> Result<String, EditError> {
     let float = number.as_f64().filter(|x| x.is_finite());
     match (number.as_i64(), float) {
         (Some(whole), _) if !floats => Ok(whole.to_string()),
-        (None, Some(x)) if !floats && x.trunc() == x && x.abs() <= MOST_EXACT => {
+        (None, Some(x)) if !floats && x.trunc() == x && x.abs() <= MAX_EXACT_INTEGER => {
             Ok(format!("{x:.0}"))
         }
         (None, Some(x)) if floats || number.is_f64() => Ok(format!("{x:?}")),
         (Some(_), Some(x)) => Ok(format!("{x:?}")),
         _ => {
             let cause = format!("{number} is larger than any whole number of TOML");
-            Err(refusal(cause, format!("give at most {}", i64::MAX)))
+            Err(edit_error(cause, format!("give at most {}", i64::MAX)))
         }
     }
 }
@@ -131,7 +131,9 @@ pub(super) fn is_same(old: &Value, new: &Json) -> bool {
         (Value::Boolean(a), Json::Bool(b)) => a.value() == b,
         (Value::Integer(a), Json::Number(b)) => match b.as_i64() {
             Some(b) => *a.value() == b,
-            None => b.as_f64().is_some_and(|b| b.abs() <= MOST_EXACT && *a.value() as f64 == b),
+            None => {
+                b.as_f64().is_some_and(|b| b.abs() <= MAX_EXACT_INTEGER && *a.value() as f64 == b)
+            }
         },
         (Value::Float(a), Json::Number(b)) => b.as_f64() == Some(*a.value()),
         (Value::Array(a), Json::Array(b)) => {
@@ -175,7 +177,7 @@ mod tests {
     #[test]
     fn whole_numbers_are_integers_unless_a_float_was_there() {
         let written = |old: Option<&str>, new: Json| {
-            New::Json(&new).written(old.map(read).as_ref()).map_err(|r| r.cause)
+            NewValue::Json(&new).to_toml(old.map(read).as_ref()).map_err(|r| r.cause)
         };
         assert_eq!(written(None, json!(2.0)), Ok("2".into()));
         assert_eq!(written(Some("1"), json!(2.0)), Ok("2".into()));

@@ -1,7 +1,7 @@
 //! Comments and values of a world's commented scenario, put into its schema.
 
-use super::places::places;
-use super::shown::{Shown, shown};
+use super::documented::{DocumentedKey, documented_keys};
+use super::pointers::pointers;
 use serde_json::{Map, Value};
 use sidestep_kernel::ports::table::split_unit;
 
@@ -9,8 +9,8 @@ use sidestep_kernel::ports::table::split_unit;
 /// its name: a title and a unit.
 pub(crate) fn describe(schema: &mut Value, scenario: &str) {
     let mut told: Vec<String> = Vec::new();
-    for one in shown(scenario) {
-        for place in places(schema, &one.way) {
+    for one in documented_keys(scenario) {
+        for place in pointers(schema, &one.way) {
             let is_new = !told.contains(&place);
             let Some(Value::Object(part)) = schema.pointer_mut(&place) else { continue };
             add(part, &one, is_new);
@@ -28,7 +28,7 @@ pub(crate) fn describe(schema: &mut Value, scenario: &str) {
 }
 
 /// Adds the statements about a key. Of several alternatives the first has the words, and all are examples.
-fn add(part: &mut Map<String, Value>, one: &Shown, is_new: bool) {
+fn add(part: &mut Map<String, Value>, one: &DocumentedKey, is_new: bool) {
     if !one.words.is_empty() && (is_new || !part.contains_key("description")) {
         part.insert("description".into(), one.words.clone().into());
     }
@@ -44,7 +44,7 @@ fn add(part: &mut Map<String, Value>, one: &Shown, is_new: bool) {
 
 /// Returns the default of a key: `[value]` at the end of its words, `default value` in them, or the
 /// value of a key that is left out, if it can have no other meaning.
-fn default_of(one: &Shown, part: &Map<String, Value>) -> Option<Value> {
+fn default_of(one: &DocumentedKey, part: &Map<String, Value>) -> Option<Value> {
     let bracket = one.words.strip_suffix(']').and_then(|words| words.rsplit_once('['));
     if let Some((_, told)) = bracket {
         return value_of(told);

@@ -10,16 +10,16 @@
 //! of the table with the keys that can be named there) and `x-infinite` (whether `inf` is allowed, which JSON lacks).
 
 mod describe;
+mod documented;
 mod numbers;
-mod places;
-mod shown;
+mod pointers;
 mod widen;
 
 #[doc(hidden)]
 pub use schemars;
 pub use widen::widened;
 
-use crate::{FORMAT, Head, Kind, Worlds};
+use crate::{FORMAT, Head, WorldType, Worlds};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
@@ -29,7 +29,7 @@ use std::collections::BTreeSet;
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a type that is read from TOML, which has no null.
-pub fn of<T: JsonSchema>() -> Value {
+pub fn for_type<T: JsonSchema>() -> Value {
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.meta_schema = None);
     let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
     without_null(&mut schema);
@@ -75,9 +75,9 @@ fn only_alternative(members: &mut Map<String, Value>) {
 }
 
 /// Returns the schema of a world's scenarios.
-pub fn of_world(kind: &dyn Kind) -> Value {
+pub fn for_world(kind: &dyn WorldType) -> Value {
     let mut sections = kind.sections();
-    let mut schema = of::<Head>();
+    let mut schema = for_type::<Head>();
     schema["properties"]["format"]["const"] = FORMAT.into();
     schema["properties"]["world"]["const"] = kind.name().into();
     if let Some(own) = sections.as_object_mut() {
@@ -97,7 +97,7 @@ pub fn of_world(kind: &dyn Kind) -> Value {
 
 /// Returns the schema of a file with the keys in `own`, a title, and the words of a commented scenario for the keys
 /// that both have.
-pub fn of_file(title: &str, mut own: Value, scenario: &str) -> Value {
+pub fn for_file(title: &str, mut own: Value, scenario: &str) -> Value {
     describe::describe(&mut own, scenario);
     let mut all = Map::new();
     all.insert("$schema".into(), DRAFT.into());
@@ -125,15 +125,15 @@ impl Worlds {
     /// Returns the schema of scenarios of one world, or of any; `None` if there is no such world.
     pub fn schema(self, world: Option<&str>) -> Option<Value> {
         match world {
-            Some(name) => self.named(name).map(of_world),
-            None => Some(self.schema_of_any()),
+            Some(name) => self.find(name).map(for_world),
+            None => Some(self.for_any_world()),
         }
     }
 
-    fn schema_of_any(self) -> Value {
+    fn for_any_world(self) -> Value {
         let mut definitions = Map::new();
         for kind in self.0 {
-            let mut schema = of_world(*kind);
+            let mut schema = for_world(*kind);
             rename(&mut schema, kind.name());
             if let Some(members) = schema.as_object_mut() {
                 members.remove("$schema");
@@ -170,7 +170,7 @@ fn rename(schema: &mut Value, world: &str) {
 
 /// Returns limits that include infinity, which JSON lacks.
 #[must_use]
-pub fn or_infinite(mut limits: Value) -> Value {
+pub fn with_infinity(mut limits: Value) -> Value {
     limits["x-infinite"] = true.into();
     limits
 }
@@ -180,9 +180,9 @@ pub fn or_infinite(mut limits: Value) -> Value {
 ///
 /// # Panics
 /// When the schema has no such key.
-pub fn names(schema: &mut Value, key: &str, table: &str, built_in: &[&str]) {
+pub fn mark_as_names(schema: &mut Value, key: &str, table: &str, built_in: &[&str]) {
     let way: Vec<String> = key.split('.').map(String::from).collect();
-    let found = places::places(schema, &way);
+    let found = pointers::pointers(schema, &way);
     assert!(!found.is_empty(), "the sections have no key `{key}`");
     for place in found {
         let part = schema.pointer_mut(&place).expect("found just now");
@@ -196,23 +196,23 @@ pub fn names(schema: &mut Value, key: &str, table: &str, built_in: &[&str]) {
 
 /// Returns the keys that the commented scenario of a world shows, also commented out, and that its
 /// schema does not know. There should be none.
-pub fn unknown(kind: &dyn Kind) -> Vec<String> {
-    let schema = of_world(kind);
-    let shown = shown::shown(kind.default_scenario()).into_iter();
-    let unknown = shown.filter(|one| places::places(&schema, &one.way).is_empty());
+pub fn unknown_keys(kind: &dyn WorldType) -> Vec<String> {
+    let schema = for_world(kind);
+    let shown = documented::documented_keys(kind.default_scenario()).into_iter();
+    let unknown = shown.filter(|one| pointers::pointers(&schema, &one.way).is_empty());
     unknown.map(|one| one.way.join(".")).collect()
 }
 
 /// Returns the keys of a world's schema, as JSON pointers, that its commented scenario shows nowhere, neither as a
 /// key nor in the words beside one.
-pub fn unshown(kind: &dyn Kind) -> Vec<String> {
-    let schema = of_world(kind);
-    let shown = shown::shown(kind.default_scenario());
+pub fn undocumented_keys(kind: &dyn WorldType) -> Vec<String> {
+    let schema = for_world(kind);
+    let shown = documented::documented_keys(kind.default_scenario());
     let ways = shown.iter().flat_map(|one| (1..=one.way.len()).map(|n| &one.way[..n]));
-    let told: BTreeSet<String> = ways.flat_map(|way| places::places(&schema, way)).collect();
+    let told: BTreeSet<String> = ways.flat_map(|way| pointers::pointers(&schema, way)).collect();
     let is_named = |key: &str| shown.iter().any(|one| has_word(&one.words, key));
     let mut all = Vec::new();
-    places::properties(&schema, "", &mut all);
+    pointers::collect_properties(&schema, "", &mut all);
     all.retain(|(place, key)| !told.contains(place) && !is_named(key));
     all.into_iter().map(|(place, _)| place).collect()
 }
@@ -224,7 +224,7 @@ fn has_word(text: &str, key: &str) -> bool {
 
 /// Returns examples of a key's values, from the commented scenario of its world.
 pub fn examples(schema: &Value, way: &[String]) -> Vec<Value> {
-    let places = places::places(schema, way);
+    let places = pointers::pointers(schema, way);
     let known = places.iter().filter_map(|place| schema.pointer(place)?.get("examples"));
     known.filter_map(Value::as_array).flatten().cloned().collect()
 }

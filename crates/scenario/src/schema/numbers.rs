@@ -1,6 +1,6 @@
 //! Numbers that check themselves, in terms of JSON Schema.
 
-use crate::{Limits, Number, Point, Rule, Whole};
+use crate::{Integer, Number, NumberRange, Point, Rule};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -39,18 +39,18 @@ impl<R: Rule> JsonSchema for Number<R> {
     }
 }
 
-impl<const LEAST: u64, const MOST: u64> JsonSchema for Whole<LEAST, MOST> {
+impl<const MIN: u64, const MAX: u64> JsonSchema for Integer<MIN, MAX> {
     inline!("Whole");
 
     fn schema_id() -> Cow<'static, str> {
-        format!("Whole_{LEAST}_{MOST}").into()
+        format!("Whole_{MIN}_{MAX}").into()
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let mut schema = json_schema!({ "type": "integer", "minimum": LEAST });
+        let mut schema = json_schema!({ "type": "integer", "minimum": MIN });
         // TOML has no larger integers.
-        if MOST < i64::MAX as u64 {
-            schema.insert("maximum".into(), MOST.into());
+        if MAX < i64::MAX as u64 {
+            schema.insert("maximum".into(), MAX.into());
         }
         schema
     }
@@ -69,7 +69,7 @@ impl<const D: usize, R: Rule> JsonSchema for Point<D, R> {
     }
 }
 
-impl JsonSchema for Limits {
+impl JsonSchema for NumberRange {
     inline!("Limits");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {

@@ -1,13 +1,13 @@
 //! Frames as bytes, and the messages beside them. The layout is in [`protocol`](crate::protocol).
 
-mod cast;
-mod plain;
+mod body_set;
+mod convert;
 
-pub(crate) use plain::{body, event, problem, scan, scene, who};
+pub(crate) use convert::{body, body_id, event, problem, scan, scene};
 
-use crate::protocol::{Cast, FrameText, SessionId, VERSION};
-use cast::Troupe;
-use sidestep::kernel::view::{Body, Condition, Frame, Kind, Pose, Scenery, Shape};
+use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
+use body_set::BodySet;
+use sidestep::kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
 use std::collections::BTreeMap;
 
 /// First bytes of a frame.
@@ -19,8 +19,8 @@ const HEADER_BYTES: usize = 56;
 pub struct Encoder {
     session: SessionId,
     dimensions: u8,
-    names: BTreeMap<(Kind, u32), String>,
-    troupe: Option<Troupe>,
+    names: BTreeMap<(BodyKind, u32), String>,
+    troupe: Option<BodySet>,
     casts: u32,
 }
 
@@ -35,7 +35,8 @@ impl Encoder {
 
     /// Switches to another run; the numbering of casts goes on.
     pub fn restart(&mut self, scenery: &Scenery) {
-        let named = |(kind, number, name): &(Kind, u32, String)| ((*kind, *number), name.clone());
+        let named =
+            |(kind, number, name): &(BodyKind, u32, String)| ((*kind, *number), name.clone());
         self.names = scenery.names.iter().map(named).collect();
         self.dimensions = scenery.dimensions;
         self.troupe = None;
@@ -47,17 +48,16 @@ impl Encoder {
         frame: &Frame,
         text: &FrameText,
         left_out: u32,
-    ) -> (Option<Cast>, Vec<u8>) {
-        let is_new = !self.troupe.as_ref().is_some_and(|troupe| troupe.is_of(&frame.bodies));
+    ) -> (Option<BodyTable>, Vec<u8>) {
+        let is_new = !self.troupe.as_ref().is_some_and(|troupe| troupe.matches(&frame.bodies));
         if is_new {
             self.casts += 1;
-            self.troupe = Some(Troupe::of(&frame.bodies, self.dimensions));
+            self.troupe = Some(BodySet::from_bodies(&frame.bodies, self.dimensions));
         }
-        let cast = self
-            .troupe
-            .as_ref()
-            .filter(|_| is_new)
-            .map(|troupe| troupe.cast(self.session, self.casts, &frame.bodies, &self.names));
+        let cast =
+            self.troupe.as_ref().filter(|_| is_new).map(|troupe| {
+                troupe.to_table(self.session, self.casts, &frame.bodies, &self.names)
+            });
         // Text made of numbers and strings only: serializing cannot fail.
         let text = serde_json::to_vec(text).unwrap_or_default();
         (cast, self.bytes(frame, &text, left_out))
@@ -74,17 +74,17 @@ impl Encoder {
         let mut out = Vec::with_capacity(size);
         let counts = [bodies.len(), lines.len(), count, text.len()];
         self.header(&mut out, frame, counts.map(|n| n as u32), left_out);
-        put(&mut out, bodies.iter().flat_map(|body| body.pose.at_m.into_iter().take(d)));
+        put_column(&mut out, bodies.iter().flat_map(|body| body.pose.at_m.into_iter().take(d)));
         match d {
-            2 => put(&mut out, bodies.iter().map(|body| heading_rad(&body.pose))),
-            _ => put(&mut out, bodies.iter().flat_map(|body| body.pose.turn)),
+            2 => put_column(&mut out, bodies.iter().map(|body| heading_rad(&body.pose))),
+            _ => put_column(&mut out, bodies.iter().flat_map(|body| body.pose.turn)),
         }
         put_starts(&mut out, &lines);
-        put(
+        put_column(
             &mut out,
             lines.iter().copied().flatten().flat_map(|at_m| at_m.iter().copied().take(d)),
         );
-        out.extend(bodies.iter().map(|body| code(body.state)));
+        out.extend(bodies.iter().map(|body| condition_code(body.state)));
         out.resize(out.len() + flags - bodies.len(), 0);
         out.extend_from_slice(text);
         debug_assert_eq!(out.len(), size);
@@ -112,7 +112,7 @@ fn points(body: &Body) -> Option<&[[f64; 3]]> {
 }
 
 /// Writes a column of numbers.
-fn put(out: &mut Vec<u8>, numbers: impl Iterator<Item = f64>) {
+fn put_column(out: &mut Vec<u8>, numbers: impl Iterator<Item = f64>) {
     numbers.for_each(|number| out.extend_from_slice(&(number as f32).to_le_bytes()));
 }
 
@@ -132,7 +132,7 @@ fn heading_rad(pose: &Pose) -> f64 {
     f64::from(2.0 * (z as f32).atan2(w as f32))
 }
 
-fn code(condition: Condition) -> u8 {
+fn condition_code(condition: Condition) -> u8 {
     match condition {
         Condition::Plain => 0,
         Condition::Leading => 1,

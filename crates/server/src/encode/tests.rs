@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::protocol::Scan;
-use sidestep::kernel::view::{COLORS, Pose};
+use sidestep::kernel::view::{BODY_COLORS, Pose};
 
 fn scenery(dimensions: u8) -> Scenery {
     Scenery {
@@ -11,18 +11,18 @@ fn scenery(dimensions: u8) -> Scenery {
         cycle_s: 0.5,
         floor: None,
         bodies: Vec::new(),
-        names: vec![(Kind::Robot, 1, "Anna".into())],
+        names: vec![(BodyKind::Robot, 1, "Anna".into())],
     }
 }
 
 fn robot(number: u32, at_m: [f64; 3], heading_rad: f64) -> Body {
     let shape = Shape::Cylinder { radius_m: 0.25, height_m: 1.0 };
-    Body::new(Kind::Robot, number, Pose::heading(at_m, heading_rad), shape)
+    Body::new(BodyKind::Robot, number, Pose::from_heading(at_m, heading_rad), shape)
 }
 
 fn line(points_m: Vec<[f64; 3]>) -> Body {
     let shape = Shape::Line { points_m, thickness_m: 0.1 };
-    Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), shape)
+    Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), shape)
 }
 
 fn frame(bodies: Vec<Body>) -> Frame {
@@ -56,7 +56,7 @@ impl Reader<'_> {
 
 #[test]
 fn a_frame_of_a_plane_has_the_documented_layout() {
-    let touching = robot(1, [3.0, 4.0, 0.5], 1.0).when(true, Condition::Touching);
+    let touching = robot(1, [3.0, 4.0, 0.5], 1.0).with_state_if(true, Condition::Touching);
     let bodies = vec![robot(0, [1.0, 2.0, 0.5], -2.0), touching];
     let mut encoder = Encoder::new(9, &scenery(2));
     let (cast, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
@@ -78,7 +78,7 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
     assert_eq!((cast.session, cast.cast), (9, 1));
     assert_eq!((cast.kinds, cast.kind), (vec!["robot".to_string()], vec![0, 0]));
     assert_eq!((cast.number, cast.part, cast.shape), (vec![0, 1], vec![-1, -1], vec![0, 0]));
-    assert_eq!(cast.looks[usize::from(cast.look[1])][0].color, COLORS[1]);
+    assert_eq!(cast.looks[usize::from(cast.look[1])][0].color, BODY_COLORS[1]);
     assert_eq!((cast.names, cast.is_agent), (vec![(1, "Anna".to_string())], vec![true, true]));
 }
 
@@ -122,7 +122,7 @@ fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
     assert_eq!(begins(two()), Some(3));
     let wider = Shape::Cylinder { radius_m: 0.5, height_m: 1.0 };
     assert_eq!(begins(vec![Body { shape: wider, ..robot(0, [0.0; 3], 0.0) }]), Some(4));
-    let pushed = robot(0, [0.0; 3], 0.0).moving([1.0, 0.0, 0.0]);
+    let pushed = robot(0, [0.0; 3], 0.0).with_velocity([1.0, 0.0, 0.0]);
     assert_eq!(begins(vec![pushed]), Some(5));
 }
 
@@ -130,7 +130,7 @@ fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
 fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
     let door = |height_m: f64| {
         let shape = Shape::Cuboid { size_m: [1.0, 0.2, height_m] };
-        frame(vec![Body::new(Kind::Door, 0, Pose::at([0.0; 3]), shape)])
+        frame(vec![Body::new(BodyKind::Door, 0, Pose::from_position([0.0; 3]), shape)])
     };
     for (dimensions, begins) in [(2, false), (3, true)] {
         let mut encoder = Encoder::new(1, &scenery(dimensions));
@@ -142,9 +142,9 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
 #[test]
 fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
     let seen = sidestep::kernel::view::Scan {
-        of: sidestep::kernel::view::Who::new(Kind::Robot, 1, None),
+        of: sidestep::kernel::view::BodyId::new(BodyKind::Robot, 1, None),
         sensor: "eye".into(),
-        pose: Pose::at([0.0; 3]),
+        pose: Pose::from_position([0.0; 3]),
         bearings_rad: vec![0.0, 1.0],
         ranges_m: vec![2.0, f64::INFINITY],
         true_m: vec![f64::INFINITY, 3.0],

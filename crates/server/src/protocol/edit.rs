@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use serde_json::Value;
-use sidestep::scenario::{self, Cell};
+use sidestep::scenario::{self, CharEdit};
 
 /// A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
 /// alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
@@ -68,7 +68,7 @@ impl From<Edit> for scenario::Edit {
             Edit::Move { key, to } => Self::Move { key, to: to as usize },
             Edit::Rename { key, to } => Self::Rename { key, to },
             Edit::Paint { key, cells } => {
-                let cell = |(row, column, mark): (u32, u32, char)| Cell {
+                let cell = |(row, column, mark): (u32, u32, char)| CharEdit {
                     row: row as usize,
                     column: column as usize,
                     mark,

@@ -1,6 +1,6 @@
 //! Fleets: agents that are flown by processes elsewhere, as a page sees them.
 
-use super::Who;
+use super::BodyId;
 use serde::Serialize;
 
 /// A fleet at one moment.
@@ -28,7 +28,7 @@ pub struct Node {
     /// The agent's number on the network.
     pub agent: u32,
     /// The body by which the agent is seen.
-    pub who: Who,
+    pub who: BodyId,
     /// A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
     pub state: String,
     /// Epoch of the coordinator that it follows.

@@ -21,27 +21,29 @@
 //!    u8[n]       condition: 0 plain 1 leading 2 open 3 touching 4 failed; padded to 4
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
-//! A page grants credit for frames ([`Call::Credit`]), and gets none without it. At most
+//! A page grants credit for frames ([`Method::Credit`]), and gets none without it. At most
 //! [`FRAMES_PER_S`](crate::FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 
 mod edit;
 mod fleet;
-mod inspected;
+mod inspection;
+mod reply;
 mod request;
-mod shown;
-mod told;
+mod scene;
 #[cfg(test)]
 mod typescript;
 
 pub use edit::Edit;
 pub use fleet::{Fleet, Node};
-pub use inspected::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
-pub use request::{Call, Request, Speed, Subject, Who};
-pub use shown::{Cast, Event, Floor, FrameText, Look, Scan, Scene, Shape, StillBody};
-pub use told::{
-    Answer, FileEntry, FileKind, MetricName, Named, Notice, Outcome, Problem, Reply, State, Status,
-    SweepRun,
+pub use inspection::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
+pub use reply::{
+    FileEntry, FileKind, MetricName, Notification, Problem, Reply, ReplyBody, ReplyResult,
+    SessionState, SessionStatus, SweepRun, TargetRef,
+};
+pub use request::{BodyId, Method, OpenTarget, Request, Speed};
+pub use scene::{
+    Appearance, BodyTable, Event, FrameText, OccupancyGrid, Scan, Scene, Shape, StaticBody,
 };
 
 /// Version of requests, replies, notices and frames together.

@@ -11,14 +11,14 @@ pub struct Request {
     /// Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
     pub id: u32,
     /// The question.
-    pub call: Call,
+    pub call: Method,
 }
 
 /// A question or an order of a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Call {
+pub enum Method {
     /// Lists a folder below those named at start (all of those if none is given).
     Files {
         /// Its path, as a listing gave it.
@@ -27,7 +27,7 @@ pub enum Call {
     /// Opens a scenario or a recording: a new session, which is paused at its start and belongs to the socket.
     Open {
         /// The thing to open.
-        what: Subject,
+        what: OpenTarget,
         /// Another seed than the scenario's.
         seed: Option<u64>,
     },
@@ -79,7 +79,7 @@ pub enum Call {
         /// The session.
         session: SessionId,
         /// The bodies.
-        scans_of: Vec<Who>,
+        scans_of: Vec<BodyId>,
     },
     /// Grants the server further frames; it sends none without credit.
     Credit {
@@ -93,7 +93,7 @@ pub enum Call {
         /// The session.
         session: SessionId,
         /// The body.
-        who: Who,
+        who: BodyId,
     },
     /// Asks for samples of all metrics, from the sample with this number on.
     Metrics {
@@ -180,7 +180,7 @@ pub enum Call {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Subject {
+pub enum OpenTarget {
     /// A scenario file, or a foreign file that stands for one.
     Scenario {
         /// Its path, as a listing gave it.
@@ -218,7 +218,7 @@ pub enum Speed {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
-pub struct Who {
+pub struct BodyId {
     /// Its kind, e.g. `robot`.
     pub kind: String,
     /// Its number among those of its kind.

@@ -7,15 +7,15 @@ use std::path::Path;
 use ts_rs::{Config, TS};
 
 /// The file that the page imports.
-const TYPES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../studio/src/protocol/types.ts");
+const TYPES_PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../studio/src/protocol/types.ts");
 
-const HEAD: &str = "\
+const HEADER: &str = "\
 // Written from crates/server/src/protocol by
 // `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
 ";
 
 /// Returns the declaration of a type, with its documentation.
-fn declared<T: TS>(config: &Config) -> String {
+fn declaration<T: TS>(config: &Config) -> String {
     let docs = T::docs().map(|docs| docs.trim_end().to_string() + "\n").unwrap_or_default();
     format!("{docs}export {}\n", T::decl(config))
 }
@@ -23,24 +23,57 @@ fn declared<T: TS>(config: &Config) -> String {
 fn types() -> String {
     let config = Config::new().with_large_int("number");
     macro_rules! all {
-        ($($name:ty),+ $(,)?) => { [$(declared::<$name>(&config)),+] };
+        ($($name:ty),+ $(,)?) => { [$(declaration::<$name>(&config)),+] };
     }
     let types = all![
-        Request, Call, Edit, Subject, Speed, Who, Reply, Outcome, Answer, Problem, FileEntry,
-        FileKind, MetricName, Notice, Named, Status, State, Fleet, Node, Scene, Floor, StillBody,
-        Shape, Look, Cast, SweepRun, FrameText, Scan, Event, Inspection, Section, Fact, Value,
-        Table, Mark, Role, MarkShape,
+        Request,
+        Method,
+        Edit,
+        OpenTarget,
+        Speed,
+        BodyId,
+        Reply,
+        ReplyResult,
+        ReplyBody,
+        Problem,
+        FileEntry,
+        FileKind,
+        MetricName,
+        Notification,
+        TargetRef,
+        SessionStatus,
+        SessionState,
+        Fleet,
+        Node,
+        Scene,
+        OccupancyGrid,
+        StaticBody,
+        Shape,
+        Appearance,
+        BodyTable,
+        SweepRun,
+        FrameText,
+        Scan,
+        Event,
+        Inspection,
+        Section,
+        Fact,
+        Value,
+        Table,
+        Mark,
+        Role,
+        MarkShape,
     ];
     let version = format!(
         "/** Version of requests, replies, notices and frames together. */\nexport const VERSION = {VERSION};\n"
     );
-    let lines = format!("{HEAD}\n{version}\n{}", types.join("\n"));
+    let lines = format!("{HEADER}\n{version}\n{}", types.join("\n"));
     lines.lines().map(|line| line.trim_end().to_string() + "\n").collect()
 }
 
 #[test]
 fn the_page_has_the_types_of_the_protocol() {
-    let (path, expected) = (Path::new(TYPES), types());
+    let (path, expected) = (Path::new(TYPES_PATH), types());
     if std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "protocol") {
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
         std::fs::write(path, &expected).expect("written");

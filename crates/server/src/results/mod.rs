@@ -10,36 +10,36 @@
 //! is made at a time, in a thread of its own; none is finished for a browser that is gone.
 
 mod export;
-mod fields;
+mod job_queue;
+mod query;
 mod report;
 mod runs;
-mod work;
 
 pub(crate) use export::answer as export;
+pub(crate) use job_queue::JobQueue;
 pub(crate) use report::answer as report;
 pub(crate) use runs::runs;
-pub(crate) use work::Workshop;
 
 use crate::protocol::Problem;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
 /// The reason why there is no result.
-pub(super) struct Failed(StatusCode, Problem);
+pub(super) struct ResultError(StatusCode, Problem);
 
-impl Failed {
+impl ResultError {
     fn new(status: StatusCode, problem: Problem) -> Self {
         Self(status, problem)
     }
 }
 
-impl From<Problem> for Failed {
+impl From<Problem> for ResultError {
     fn from(problem: Problem) -> Self {
         Self(StatusCode::UNPROCESSABLE_ENTITY, problem)
     }
 }
 
-impl IntoResponse for Failed {
+impl IntoResponse for ResultError {
     fn into_response(self) -> Response {
         let Self(status, Problem { place, cause, remedy, .. }) = self;
         (status, format!("{place}: {cause}\nhelp: {remedy}\n")).into_response()

@@ -1,11 +1,11 @@
 //! Reports: the page of `sidestep report` in a frame, and its parts as files.
 
-use super::Failed;
-use super::fields::Fields;
-use super::work::{Client, failed};
-use crate::house::House;
+use super::ResultError;
+use super::job_queue::{CancelToken, result_error};
+use super::query::QueryFields;
+use crate::compress;
 use crate::protocol::Problem;
-use crate::zip;
+use crate::state::AppState;
 use axum::extract::State;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
@@ -14,53 +14,68 @@ use axum::http::header::{
 use axum::http::{HeaderMap, Uri};
 use axum::response::{IntoResponse, Response};
 use sidestep::scenario::Worlds;
-use sidestep_report::{Rendered, SvgFile, render};
+use sidestep_report::{RenderedReport, SvgFile, render};
 use sidestep_session::report::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The rights of the page of a report, unlike those of all others: it runs its inline scripts, in our frame, and
 /// nothing else. It has no origin, so it could send no requests even if a name in it were taken for a script.
-const POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
+const REPORT_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
     style-src 'unsafe-inline'; img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'self'";
 
 /// Returns the report of a folder, or a part of it.
 pub(crate) async fn answer(
-    State(house): State<Arc<House>>,
+    State(house): State<Arc<AppState>>,
     headers: HeaderMap,
     uri: Uri,
 ) -> Response {
-    if let Err(refusal) = house.guard.trust_fetch(&headers) {
+    if let Err(refusal) = house.guard.authorize_fetch(&headers) {
         return refusal.into_response();
     }
-    let made = made(&house, &Fields::of(uri.query()), zip::is_taken(&headers)).await;
-    made.unwrap_or_else(Failed::into_response)
+    let made = report_response(
+        &house,
+        &QueryFields::from_query(uri.query()),
+        compress::accepts_gzip(&headers),
+    )
+    .await;
+    made.unwrap_or_else(ResultError::into_response)
 }
 
-async fn made(house: &House, fields: &Fields, is_zipped: bool) -> Result<Response, Failed> {
-    let path = house.means.files.find(fields.need("path")?)?;
+async fn report_response(
+    house: &AppState,
+    fields: &QueryFields,
+    is_zipped: bool,
+) -> Result<Response, ResultError> {
+    let path = house.means.files.resolve(fields.require("path")?)?;
     let part = fields.get("as").map(String::from);
     let worlds = house.means.worlds;
-    let kept = house.workshop.kept(&path).filter(|_| part.is_some());
+    let kept = house.workshop.cached_report(&path).filter(|_| part.is_some());
     let folder = path.clone();
-    let work = move |client: &Client| match kept {
+    let work = move |client: &CancelToken| match kept {
         Some(kept) => Ok(kept),
-        None => rendered(worlds, &folder, client).map(Arc::new),
+        None => render_cached(worlds, &folder, client).map(Arc::new),
     };
-    let rendered = house.workshop.work(work).await?;
-    house.workshop.keep(path.clone(), rendered.clone());
-    let work = move |_: &Client| Part::of(&rendered, &path, part.as_deref(), is_zipped);
-    Ok(house.workshop.work(work).await?.into_response())
+    let rendered = house.workshop.run(work).await?;
+    house.workshop.cache_report(path.clone(), rendered.clone());
+    let work = move |_: &CancelToken| {
+        ReportPart::from_report(&rendered, &path, part.as_deref(), is_zipped)
+    };
+    Ok(house.workshop.run(work).await?.into_response())
 }
 
-fn rendered(worlds: Worlds, folder: &Path, client: &Client) -> Result<Rendered, Failed> {
-    let document = document(worlds, folder, client).map_err(|e| failed(&e))?;
-    render(&document, "figures").map_err(|e| failed(&e.into()))
+fn render_cached(
+    worlds: Worlds,
+    folder: &Path,
+    client: &CancelToken,
+) -> Result<RenderedReport, ResultError> {
+    let document = document(worlds, folder, client).map_err(|e| result_error(&e))?;
+    render(&document, "figures").map_err(|e| result_error(&e.into()))
 }
 
 /// A part of a report that is sent.
-struct Part {
+struct ReportPart {
     media: &'static str,
     /// The name of the file, unless it is shown.
     file: Option<String>,
@@ -68,14 +83,14 @@ struct Part {
     is_zipped: bool,
 }
 
-impl Part {
-    fn of(
-        report: &Rendered,
+impl ReportPart {
+    fn from_report(
+        report: &RenderedReport,
         path: &Path,
         part: Option<&str>,
         is_zipped: bool,
-    ) -> Result<Self, Failed> {
-        let name = name(path);
+    ) -> Result<Self, ResultError> {
+        let name = folder_name(path);
         let (media, file, text) = match part {
             None => ("text/html; charset=utf-8", None, report.html.clone()),
             Some("html") => {
@@ -85,36 +100,36 @@ impl Part {
                 let file = Some(format!("{name}.md"));
                 ("text/markdown; charset=utf-8", file, report.markdown.clone())
             }
-            Some("figures") => ("application/json", None, figures(report)),
+            Some("figures") => ("application/json", None, figures_json(report)),
             Some(stem) => {
                 let found = report.pictures.iter().find(|picture| picture.stem == stem);
-                let SvgFile { stem, svg } = found.ok_or_else(|| unknown(stem))?;
+                let SvgFile { stem, svg } = found.ok_or_else(|| no_such_figure(stem))?;
                 ("image/svg+xml", Some(format!("{name}-{stem}.svg")), svg.clone())
             }
         };
-        let bytes = if is_zipped { zip::gzip(text.as_bytes()) } else { text.into_bytes() };
+        let bytes = if is_zipped { compress::gzip(text.as_bytes()) } else { text.into_bytes() };
         Ok(Self { media, file, bytes, is_zipped })
     }
 }
 
 /// Returns the names of all figures as JSON.
-fn figures(report: &Rendered) -> String {
+fn figures_json(report: &RenderedReport) -> String {
     let stems: Vec<&str> = report.pictures.iter().map(|picture| picture.stem.as_str()).collect();
     serde_json::json!(stems).to_string()
 }
 
-fn unknown(stem: &str) -> Problem {
+fn no_such_figure(stem: &str) -> Problem {
     let cause = format!("the report has no figure `{stem}`");
     Problem::new("report", cause, "give html, markdown, or one of figures")
 }
 
 /// Returns the name of a folder as part of a file name.
-fn name(path: &Path) -> String {
+fn folder_name(path: &Path) -> String {
     let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    super::export::plain(&whole.file_stem().unwrap_or_default().to_string_lossy())
+    super::export::plain_file_name(&whole.file_stem().unwrap_or_default().to_string_lossy())
 }
 
-impl IntoResponse for Part {
+impl IntoResponse for ReportPart {
     fn into_response(self) -> Response {
         let mut response = self.bytes.into_response();
         let headers = response.headers_mut();
@@ -129,7 +144,7 @@ impl IntoResponse for Part {
         if self.is_zipped {
             set(CONTENT_ENCODING, "gzip");
         }
-        set(CONTENT_SECURITY_POLICY, POLICY);
+        set(CONTENT_SECURITY_POLICY, REPORT_POLICY);
         set(X_FRAME_OPTIONS, "SAMEORIGIN");
         if let Some(file) = self.file {
             set(CONTENT_DISPOSITION, &format!("attachment; filename=\"{file}\""));

@@ -1,20 +1,20 @@
 //! The runs of a sweep, each with the thing that opens it.
 
 use crate::encode::problem;
-use crate::protocol::{Answer, Named, Problem, SweepRun};
-use sidestep_session::sweep::{Finished, Folder, finished};
+use crate::protocol::{Problem, ReplyBody, SweepRun, TargetRef};
+use sidestep_session::sweep::{FinishedRuns, Folder, read_finished};
 use std::path::Path;
 
 /// The largest number of runs listed.
-const MOST_RUNS: usize = 20_000;
+const MAX_RUNS: usize = 20_000;
 
 /// Lists the runs of the sweep in a folder.
 ///
 /// # Errors
 /// When it is no sweep, none of its runs is finished, or something in it is damaged.
-pub(crate) fn runs(path: &Path) -> Result<Answer, Problem> {
+pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
     let folder = Folder::open(path).map_err(|e| problem(&e))?;
-    let Finished { table, is_complete } = finished(&folder).map_err(|e| problem(&e))?;
+    let FinishedRuns { table, is_complete } = read_finished(&folder).map_err(|e| problem(&e))?;
     let (plan, names) = (folder.plan(), folder.plan().names());
     let number = |name: &str, row: usize| table.column(name)?.values.number(row);
     let run = |row: usize| {
@@ -30,11 +30,11 @@ pub(crate) fn runs(path: &Path) -> Result<Answer, Problem> {
             variant: names.get(cell.variant as usize)?.clone(),
             seed: cell.seed.to_string(),
             failure,
-            replay: Named { kind: kind.into(), path: replay.display().to_string() },
+            replay: TargetRef { kind: kind.into(), path: replay.display().to_string() },
         })
     };
     let all = table.runs();
-    let runs = (0..all.min(MOST_RUNS)).filter_map(run).collect();
-    let left_out = all.saturating_sub(MOST_RUNS) as u64;
-    Ok(Answer::Runs { name: plan.name.clone(), is_complete, runs, left_out })
+    let runs = (0..all.min(MAX_RUNS)).filter_map(run).collect();
+    let left_out = all.saturating_sub(MAX_RUNS) as u64;
+    Ok(ReplyBody::Runs { name: plan.name.clone(), is_complete, runs, left_out })
 }

@@ -1,8 +1,8 @@
 //! Percepts, decisions and deeds of a body, in the words of the protocol.
 
-use crate::encode::{body, who};
+use crate::encode::{body, body_id};
 use crate::protocol::{
-    Fact, Inspection, Mark, MarkShape, Problem, Role, Section, Table, Value, Who,
+    BodyId, Fact, Inspection, Mark, MarkShape, Problem, Role, Section, Table, Value,
 };
 use sidestep::kernel::Simulation;
 use sidestep::kernel::view;
@@ -11,7 +11,7 @@ use sidestep::kernel::view;
 ///
 /// # Errors
 /// When there is no such body, or there is nothing to show of it.
-pub(super) fn inspection(run: &dyn Simulation, of: &Who) -> Result<Inspection, Problem> {
+pub(super) fn inspection(run: &dyn Simulation, of: &BodyId) -> Result<Inspection, Problem> {
     let told = body(of).and_then(|body| run.inspect(body)).ok_or_else(|| {
         let part = of.part.map(|part| format!("/{part}")).unwrap_or_default();
         let place = format!("{}/{}{part}", of.kind, of.number);
@@ -19,7 +19,7 @@ pub(super) fn inspection(run: &dyn Simulation, of: &Who) -> Result<Inspection, P
         Problem::new(place, "nothing is to tell of this body", remedy)
     })?;
     Ok(Inspection {
-        who: who(&told.who),
+        who: body_id(&told.who),
         cycle: told.cycle as f64,
         title: told.title,
         sections: told.sections.into_iter().map(section).collect(),
@@ -27,7 +27,7 @@ pub(super) fn inspection(run: &dyn Simulation, of: &Who) -> Result<Inspection, P
     })
 }
 
-fn section(section: view::Section) -> Section {
+fn section(section: view::FactSection) -> Section {
     let fact = |fact: view::Fact| Fact { label: fact.label, value: value(fact.value) };
     Section {
         title: section.title,
@@ -36,20 +36,20 @@ fn section(section: view::Section) -> Section {
     }
 }
 
-fn table(table: view::Table) -> Table {
-    let row = |row: Vec<view::Value>| row.into_iter().map(value).collect();
+fn table(table: view::FactTable) -> Table {
+    let row = |row: Vec<view::FactValue>| row.into_iter().map(value).collect();
     Table { columns: table.columns, rows: table.rows.into_iter().map(row).collect() }
 }
 
-fn value(value: view::Value) -> Value {
+fn value(value: view::FactValue) -> Value {
     match value {
-        view::Value::Number { value, unit } => Value::Number { value, unit: unit.into() },
-        view::Value::Share(share) => Value::Share(share),
-        view::Value::Text(words) => Value::Text(words),
-        view::Value::Who(of) => Value::Who(who(&of)),
-        view::Value::Place(at_m) => Value::Place(at_m),
-        view::Value::Yes(is_so) => Value::Yes(is_so),
-        view::Value::None => Value::None,
+        view::FactValue::Number { value, unit } => Value::Number { value, unit: unit.into() },
+        view::FactValue::Share(share) => Value::Share(share),
+        view::FactValue::Text(words) => Value::Text(words),
+        view::FactValue::Who(of) => Value::Who(body_id(&of)),
+        view::FactValue::Place(at_m) => Value::Place(at_m),
+        view::FactValue::Yes(is_so) => Value::Yes(is_so),
+        view::FactValue::None => Value::None,
     }
 }
 
@@ -58,20 +58,20 @@ fn mark(mark: view::Mark) -> Mark {
     Mark { role: role(part), label, weight, shape: shape(form) }
 }
 
-fn role(role: view::Role) -> Role {
+fn role(role: view::MarkRole) -> Role {
     match role {
-        view::Role::True => Role::True,
-        view::Role::Reported => Role::Reported,
-        view::Role::Wish => Role::Wish,
-        view::Role::Done => Role::Done,
-        view::Role::Refused => Role::Refused,
-        view::Role::Claim => Role::Claim,
-        view::Role::Group => Role::Group,
-        view::Role::Predicted => Role::Predicted,
-        view::Role::Chosen => Role::Chosen,
-        view::Role::Known => Role::Known,
-        view::Role::Orbit => Role::Orbit,
-        view::Role::Target => Role::Target,
+        view::MarkRole::True => Role::True,
+        view::MarkRole::Reported => Role::Reported,
+        view::MarkRole::Wish => Role::Wish,
+        view::MarkRole::Done => Role::Done,
+        view::MarkRole::Refused => Role::Refused,
+        view::MarkRole::Claim => Role::Claim,
+        view::MarkRole::Group => Role::Group,
+        view::MarkRole::Predicted => Role::Predicted,
+        view::MarkRole::Chosen => Role::Chosen,
+        view::MarkRole::Known => Role::Known,
+        view::MarkRole::Orbit => Role::Orbit,
+        view::MarkRole::Target => Role::Target,
     }
 }
 

@@ -4,59 +4,59 @@
 //! the computation, and its views go to an [`Outbox`], which never makes it wait.
 
 mod edit;
+mod fleet_session;
+mod foxglove;
+mod history;
 mod inspect;
-mod memory;
+mod open_run;
 mod pace;
+mod page_view;
 mod player;
+mod prefetcher;
 mod save;
-mod scout;
-mod showing;
-mod stage;
-mod viewer;
-mod watching;
 
-pub(crate) use edit::{edited, model};
-pub(crate) use showing::Showcase;
-pub(crate) use stage::{Means, checked, stopped};
+pub(crate) use edit::{apply_edits, model};
+pub(crate) use foxglove::FoxgloveHost;
+pub(crate) use open_run::{SessionDeps, problem_of, text_problems};
 
 use crate::outbox::Outbox;
-use crate::protocol::{Call, Outcome, Problem, Reply, SessionId, Subject};
+use crate::protocol::{Method, OpenTarget, Problem, Reply, ReplyResult, SessionId};
+use fleet_session::FleetSession;
+use open_run::OpenRun;
 use player::Player;
-use save::Shown;
+use save::SharedSource;
 use sidestep::kernel::Interrupt;
 use sidestep::scenario::Source;
-use stage::Stage;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
-use watching::Watching;
 
 /// The largest number of requests that wait for a session.
-const MOST_WAITING: usize = 256;
+const MAX_QUEUED_REQUESTS: usize = 256;
 /// The longest wait for a request, after which the thread looks around again.
-const LONGEST_WAIT: Duration = Duration::from_secs(5);
+const MAX_WAIT: Duration = Duration::from_secs(5);
 
 /// The first request of a session.
-pub(crate) struct Opening {
+pub(crate) struct OpenRequest {
     /// The session's number.
     pub(crate) session: SessionId,
     /// The request.
     pub(crate) id: u32,
     /// The thing to open.
-    pub(crate) what: Subject,
+    pub(crate) what: OpenTarget,
     /// Another seed than the scenario's.
     pub(crate) seed: Option<u64>,
 }
 
 /// A session, from the side of a socket. It ends when this is dropped.
 pub(crate) struct Session {
-    orders: SyncSender<(u32, Call)>,
+    orders: SyncSender<(u32, Method)>,
     interrupt: Interrupt,
     thread: JoinHandle<()>,
-    shown: Shown,
+    shown: SharedSource,
 }
 
 impl Session {
@@ -65,20 +65,20 @@ impl Session {
     /// # Errors
     /// When the system has no threads left.
     pub(crate) fn start(
-        means: Means,
-        opening: Opening,
+        means: SessionDeps,
+        opening: OpenRequest,
         outbox: Arc<Outbox>,
         ticket: impl Send + 'static,
     ) -> std::io::Result<Self> {
-        let (orders, taken) = sync_channel(MOST_WAITING);
+        let (orders, taken) = sync_channel(MAX_QUEUED_REQUESTS);
         let interrupt = Interrupt::default();
-        let shown = Shown::default();
+        let shown = SharedSource::default();
         let (heeded, told) = (interrupt.clone(), shown.clone());
         let thread =
             Builder::new().name(format!("session-{}", opening.session)).spawn(move || {
                 let _ticket = ticket;
-                let desk = Desk { outbox, interrupt: heeded, orders: taken };
-                desk.work(means, opening, told);
+                let desk = SessionWorker { outbox, interrupt: heeded, orders: taken };
+                desk.run(means, opening, told);
             })?;
         Ok(Self { orders, interrupt, thread, shown })
     }
@@ -87,12 +87,12 @@ impl Session {
     ///
     /// # Errors
     /// When too many wait, or the session has ended.
-    pub(crate) fn order(&self, id: u32, call: Call) -> Result<(), Problem> {
+    pub(crate) fn send_request(&self, id: u32, call: Method) -> Result<(), Problem> {
         self.orders.try_send((id, call)).map_err(|error| match error {
             TrySendError::Full(_) => {
                 Problem::new("session", "too many requests wait for it", "ask less often")
             }
-            TrySendError::Disconnected(_) => ended(),
+            TrySendError::Disconnected(_) => no_such_session(),
         })
     }
 
@@ -115,98 +115,100 @@ impl Drop for Session {
 }
 
 /// Returns the problem of a request for a session that is gone.
-pub(crate) fn ended() -> Problem {
+pub(crate) fn no_such_session() -> Problem {
     Problem::new("session", "there is no such session, or it has ended", "open it again")
 }
 
 /// The place of a session's thread.
-struct Desk {
+struct SessionWorker {
     outbox: Arc<Outbox>,
     interrupt: Interrupt,
-    orders: Receiver<(u32, Call)>,
+    orders: Receiver<(u32, Method)>,
 }
 
 /// The reason why work was not done to its end.
-enum Broken {
+enum SessionExit {
     /// It was interrupted, because it is no longer wanted.
-    Unwanted,
+    Interrupted,
     /// A bug, in words.
     Bug(String),
 }
 
-impl Desk {
+impl SessionWorker {
     /// Opens the requested thing and plays it, until the socket drops it or a bug ends it.
-    fn work(self, means: Means, opening: Opening, shown: Shown) {
-        let Opening { session, id, what, seed } = opening;
-        if let Subject::Fleet { path } = &what {
-            match means.screen(path) {
-                Ok(screen) => Watching::new(session, self.outbox.clone(), screen).work(&self, id),
+    fn run(self, means: SessionDeps, opening: OpenRequest, shown: SharedSource) {
+        let OpenRequest { session, id, what, seed } = opening;
+        if let OpenTarget::Fleet { path } = &what {
+            match means.fleet_feed(path) {
+                Ok(screen) => {
+                    FleetSession::new(session, self.outbox.clone(), screen).run(&self, id)
+                }
                 Err(problem) => return self.refuse(id, problem),
             }
-            return self.close();
+            return self.refuse_queued();
         }
-        let opened = self.guarded(|| {
-            let stage = Stage::open(means, &what, seed)?.shown_by(shown);
+        let opened = self.catch_panic(|| {
+            let stage = OpenRun::open(means, &what, seed)?.with_shared_source(shown);
             let (outbox, interrupt) = (self.outbox.clone(), self.interrupt.clone());
             Player::new(session, outbox, interrupt, stage)
         });
         let mut player = match opened {
             Ok(Ok(player)) => player,
             Ok(Err(problem)) => return self.refuse(id, problem),
-            Err(Broken::Bug(words)) => return self.refuse(id, bug(&words)),
-            Err(Broken::Unwanted) => return self.refuse(id, ended()),
+            Err(SessionExit::Bug(words)) => return self.refuse(id, internal_error(&words)),
+            Err(SessionExit::Interrupted) => return self.refuse(id, no_such_session()),
         };
-        let result = Outcome::Answer(player.opened());
-        self.outbox.reply(&Reply { id, result });
-        match self.guarded(|| self.play(&mut player)) {
-            Ok(()) | Err(Broken::Unwanted) => player.give_up("the session was closed"),
-            Err(Broken::Bug(words)) => player.fail(bug(&words)),
+        let result = ReplyResult::Answer(player.opened_reply());
+        self.outbox.send_reply(&Reply { id, result });
+        match self.catch_panic(|| self.play(&mut player)) {
+            Ok(()) | Err(SessionExit::Interrupted) => player.cancel_seek("the session was closed"),
+            Err(SessionExit::Bug(words)) => player.fail(internal_error(&words)),
         }
-        self.close();
+        self.refuse_queued();
     }
 
     /// Refuses requests that came after the end.
-    fn close(&self) {
+    fn refuse_queued(&self) {
         while let Ok((id, _)) = self.orders.try_recv() {
-            self.refuse(id, ended());
+            self.refuse(id, no_such_session());
         }
     }
 
     fn play(&self, player: &mut Player) {
         loop {
-            let wait = player.turn().unwrap_or(LONGEST_WAIT);
+            let wait = player.poll().unwrap_or(MAX_WAIT);
             match self.orders.recv_timeout(wait) {
-                Ok((id, call)) => player.take(id, call),
+                Ok((id, call)) => player.on_request(id, call),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
             while let Ok((id, call)) = self.orders.try_recv() {
-                player.take(id, call);
+                player.on_request(id, call);
             }
         }
     }
 
     fn refuse(&self, id: u32, problem: Problem) {
-        self.outbox.reply(&Reply { id, result: Outcome::Problem(problem) });
+        self.outbox.send_reply(&Reply { id, result: ReplyResult::Problem(problem) });
     }
 
-    fn guarded<T>(&self, work: impl FnOnce() -> T) -> Result<T, Broken> {
+    fn catch_panic<T>(&self, work: impl FnOnce() -> T) -> Result<T, SessionExit> {
         catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
-            match self.interrupt.explains(payload.as_ref()) {
-                true => Broken::Unwanted,
-                false => Broken::Bug(words(payload.as_ref())),
+            match self.interrupt.caused(payload.as_ref()) {
+                true => SessionExit::Interrupted,
+                false => SessionExit::Bug(panic_message(payload.as_ref())),
             }
         })
     }
 }
 
 /// Returns the message of a panic.
-fn words(payload: &(dyn Any + Send)) -> String {
+fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
 }
 
-fn bug(words: &str) -> Problem {
+fn internal_error(words: &str) -> Problem {
     let remedy = "please report it with the scenario; the other sessions go on";
     Problem::new("session", format!("this is a bug in sidestep: {words}"), remedy)
 }

@@ -4,55 +4,55 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Duration of a slice, and so the longest wait of orders, unless a cycle takes longer.
-const SLICE: Duration = Duration::from_millis(12);
+const SLICE_DURATION: Duration = Duration::from_millis(12);
 /// The time over which cycles are counted.
-const COUNTED: Duration = Duration::from_secs(1);
+const RATE_WINDOW: Duration = Duration::from_secs(1);
 
 /// The number of cycles of a slice.
 #[derive(Debug)]
-pub(super) struct Pace(u64);
+pub(super) struct SliceSize(u64);
 
-impl Default for Pace {
+impl Default for SliceSize {
     fn default() -> Self {
         Self(1)
     }
 }
 
-impl Pace {
+impl SliceSize {
     pub(super) fn cycles(&self) -> u64 {
         self.0
     }
 
-    /// Adapts the number of cycles to [`SLICE`]; it grows at most fourfold at a time.
-    pub(super) fn note(&mut self, cycles: u64, took: Duration) {
+    /// Adapts the number of cycles to [`SLICE_DURATION`]; it grows at most fourfold at a time.
+    pub(super) fn adapt(&mut self, cycles: u64, took: Duration) {
         let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
-        let fitting = (SLICE.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
+        let fitting = (SLICE_DURATION.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
         self.0 = fitting.clamp(1, self.0.saturating_mul(4));
     }
 }
 
 /// Cycles per second, over the last second.
 #[derive(Debug, Default)]
-pub(super) struct Rate(VecDeque<(Instant, u64)>);
+pub(super) struct CycleRate(VecDeque<(Instant, u64)>);
 
-impl Rate {
-    pub(super) fn note(&mut self, now: Instant, cycles: u64) {
-        self.forget(now);
+impl CycleRate {
+    pub(super) fn record(&mut self, now: Instant, cycles: u64) {
+        self.drop_old(now);
         match self.0.back_mut() {
             // A resolution of a hundred stretches is enough.
-            Some((at, sum)) if now.duration_since(*at) < COUNTED / 100 => *sum += cycles,
+            Some((at, sum)) if now.duration_since(*at) < RATE_WINDOW / 100 => *sum += cycles,
             _ => self.0.push_back((now, cycles)),
         }
     }
 
     pub(super) fn per_s(&mut self, now: Instant) -> f64 {
-        self.forget(now);
+        self.drop_old(now);
         let sum: u64 = self.0.iter().map(|(_, cycles)| cycles).sum();
-        sum as f64 / COUNTED.as_secs_f64()
+        sum as f64 / RATE_WINDOW.as_secs_f64()
     }
 
-    fn forget(&mut self, now: Instant) {
-        while self.0.front().is_some_and(|(at, _)| now.duration_since(*at) > COUNTED) {
+    fn drop_old(&mut self, now: Instant) {
+        while self.0.front().is_some_and(|(at, _)| now.duration_since(*at) > RATE_WINDOW) {
             self.0.pop_front();
         }
     }
@@ -66,8 +66,8 @@ mod tests {
 
     #[test]
     fn a_rate_is_that_of_the_last_second() {
-        let (mut rate, start) = (Rate::default(), Instant::now());
-        (0..300).for_each(|k| rate.note(start + k * 5 * MS, 10));
+        let (mut rate, start) = (CycleRate::default(), Instant::now());
+        (0..300).for_each(|k| rate.record(start + k * 5 * MS, 10));
         let per_s = rate.per_s(start + 1500 * MS);
         assert!((1950.0..=2050.0).contains(&per_s), "{per_s}");
         assert_eq!(rate.per_s(start + 4000 * MS), 0.0);

@@ -1,51 +1,52 @@
 //! A run that is played: its next steps, and its answers.
 
+mod seek;
 mod viewers;
-mod way;
 
+use super::foxglove::FoxgloveLease;
+use super::history::RunHistory;
 use super::inspect::inspection;
-use super::memory::Memory;
-use super::pace::{Pace, Rate};
-use super::save::Wish;
-use super::scout::Scout;
-use super::showing::Showing;
-use super::stage::Stage;
-use super::viewer::{MOST_SCANNING, Viewer};
-use crate::SPEEDS;
+use super::open_run::OpenRun;
+use super::pace::{CycleRate, SliceSize};
+use super::page_view::{MAX_SCANNED_BODIES, PageView};
+use super::prefetcher::Prefetcher;
+use super::save::SaveOptions;
+use crate::SPEED_RANGE;
 use crate::encode::scene;
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Answer, Call, Notice, Outcome, Problem, Reply, SessionId, Speed, State, Status,
+    Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
+    SessionStatus, Speed,
 };
+use seek::Seek;
 use sidestep::kernel::view::Scenery;
 use sidestep::kernel::{Cycle, Interrupt};
-use sidestep_session::Beat;
+use sidestep_session::Pacer;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use way::Errand;
 
 /// The largest number of events in an answer; a page that wants more asks again.
-const MOST_EVENTS: u32 = 5000;
+const MAX_EVENTS: u32 = 5000;
 
 /// A run that is played.
 pub(super) struct Player {
     session: SessionId,
     outbox: Arc<Outbox>,
     interrupt: Interrupt,
-    pub(super) stage: Stage,
+    pub(super) stage: OpenRun,
     scenery: Scenery,
-    viewer: Viewer,
-    showing: Showing,
-    memory: Memory,
-    scout: Option<Scout>,
-    state: State,
+    viewer: PageView,
+    showing: FoxgloveLease,
+    memory: RunHistory,
+    scout: Option<Prefetcher>,
+    state: SessionState,
     speed: Speed,
-    beat: Option<Beat>,
-    errand: Option<Errand>,
+    beat: Option<Pacer>,
+    errand: Option<Seek>,
     /// The request now being taken.
     taken: Option<u32>,
-    pace: Pace,
-    rate: Rate,
+    pace: SliceSize,
+    rate: CycleRate,
     /// Digest of the state, and its cycle.
     digest: Option<(Cycle, String)>,
     /// The result of comparing a recording with its digest.
@@ -57,67 +58,72 @@ impl Player {
         session: SessionId,
         outbox: Arc<Outbox>,
         interrupt: Interrupt,
-        stage: Stage,
+        stage: OpenRun,
     ) -> Result<Self, Problem> {
         let scenery = stage.run.scenery();
         let mut player = Self {
             session,
-            viewer: Viewer::new(session, outbox.clone(), &scenery),
-            showing: Showing::new(stage.showcase(), session),
+            viewer: PageView::new(session, outbox.clone(), &scenery),
+            showing: FoxgloveLease::new(stage.foxglove_host(), session),
             outbox,
             interrupt,
-            memory: Memory::of(stage.run.as_ref(), stage.meanings(), stage.budget()),
+            memory: RunHistory::from_run(stage.run.as_ref(), stage.metric_infos(), stage.budget()),
             scout: None,
-            state: State::Paused,
+            state: SessionState::Paused,
             speed: Speed::Times(1.0),
             beat: None,
             errand: None,
             taken: None,
-            pace: Pace::default(),
-            rate: Rate::default(),
+            pace: SliceSize::default(),
+            rate: CycleRate::default(),
             digest: None,
             verdict: None,
             stage,
             scenery,
         };
-        player.begin();
-        player.show_anew()?;
+        player.prepare();
+        player.restart_viewers()?;
         Ok(player)
     }
 
     /// Prepares a run that is at its start.
-    fn begin(&mut self) {
-        self.stage.run.heed(self.interrupt.clone());
-        self.stage.run.watch();
-        if self.showing.is_possible() {
-            self.memory.log.keep_for_viewers();
+    fn prepare(&mut self) {
+        self.stage.run.set_interrupt(self.interrupt.clone());
+        self.stage.run.enable_events();
+        if self.showing.is_enabled() {
+            self.memory.log.enable_viewers();
         }
-        self.scout =
-            self.stage.again().map(|run| Scout::new(run, self.stage.until, self.interrupt.clone()));
-        self.stand();
+        self.scout = self
+            .stage
+            .recorded_run_again()
+            .map(|run| Prefetcher::new(run, self.stage.until, self.interrupt.clone()));
+        self.pause();
     }
 
-    fn restart(&mut self, seed: Option<u64>, text: Option<String>) -> Result<Answer, Problem> {
+    fn restart(&mut self, seed: Option<u64>, text: Option<String>) -> Result<ReplyBody, Problem> {
         let is_other = text.is_some();
         self.stage.restart(seed, text)?;
         self.scenery = self.stage.run.scenery();
         self.viewer.restart(&self.scenery);
-        self.memory =
-            Memory::of(self.stage.run.as_ref(), self.stage.meanings(), self.stage.budget());
-        (self.digest, self.pace, self.rate) = (None, Pace::default(), Rate::default());
-        self.begin();
+        self.memory = RunHistory::from_run(
+            self.stage.run.as_ref(),
+            self.stage.metric_infos(),
+            self.stage.budget(),
+        );
+        (self.digest, self.pace, self.rate) = (None, SliceSize::default(), CycleRate::default());
+        self.prepare();
         // The same scenario only goes back to its start.
         if is_other {
-            self.show_anew()?;
+            self.restart_viewers()?;
         }
-        Ok(self.opened())
+        Ok(self.opened_reply())
     }
 
     /// Returns the answer to the page that has opened the session.
-    pub(super) fn opened(&mut self) -> Answer {
+    pub(super) fn opened_reply(&mut self) -> ReplyBody {
         let (run, is_recording) = (&self.stage.run, self.stage.recorded.is_some());
         let scene = scene(run.world(), run.agent(), &self.scenery, is_recording);
-        Answer::Opened { session: self.session, scene, status: self.status(Instant::now()) }
+        ReplyBody::Opened { session: self.session, scene, status: self.status(Instant::now()) }
     }
 
     fn cycle(&self) -> Cycle {
@@ -129,7 +135,7 @@ impl Player {
     }
 
     /// Answers a request, now or on arrival.
-    pub(super) fn take(&mut self, id: u32, call: Call) {
+    pub(super) fn on_request(&mut self, id: u32, call: Method) {
         self.taken = Some(id);
         if let Some(result) = self.answer(id, call) {
             self.reply(id, result);
@@ -137,106 +143,106 @@ impl Player {
         self.taken = None;
     }
 
-    fn reply(&self, id: u32, result: Result<Answer, Problem>) {
-        let result = result.map_or_else(Outcome::Problem, Outcome::Answer);
-        self.outbox.reply(&Reply { id, result });
+    fn reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
+        let result = result.map_or_else(ReplyResult::Problem, ReplyResult::Answer);
+        self.outbox.send_reply(&Reply { id, result });
     }
 
     /// Returns the answer to a request; `None` if it is given later.
-    fn answer(&mut self, id: u32, call: Call) -> Option<Result<Answer, Problem>> {
+    fn answer(&mut self, id: u32, call: Method) -> Option<Result<ReplyBody, Problem>> {
         Some(match call {
-            Call::Play { speed, .. } => self.play(speed),
-            Call::Pause { .. } => {
-                self.give_up("the run was paused");
-                self.stand();
-                Ok(Answer::Done)
+            Method::Play { speed, .. } => self.play(speed),
+            Method::Pause { .. } => {
+                self.cancel_seek("the run was paused");
+                self.pause();
+                Ok(ReplyBody::Done)
             }
-            Call::Step { cycles, .. } => {
+            Method::Step { cycles, .. } => {
                 self.step(id, cycles);
                 return None;
             }
-            Call::Seek { cycle, .. } => {
-                self.go(Some(id), cycle, None);
+            Method::Seek { cycle, .. } => {
+                self.seek(Some(id), cycle, None);
                 return None;
             }
-            Call::Restart { seed, text, .. } => {
-                self.give_up("the run was started anew");
+            Method::Restart { seed, text, .. } => {
+                self.cancel_seek("the run was started anew");
                 let result = self.restart(seed, text);
-                if result.is_err() && self.state == State::Seeking {
-                    self.stand();
+                if result.is_err() && self.state == SessionState::Seeking {
+                    self.pause();
                 }
                 result
             }
-            other => self.told(other),
+            other => self.answer_query(other),
         })
     }
 
     /// Answers a request that does not move the run.
-    fn told(&mut self, call: Call) -> Result<Answer, Problem> {
+    fn answer_query(&mut self, call: Method) -> Result<ReplyBody, Problem> {
         let run = self.stage.run.as_mut();
         match call {
-            Call::Look { scans_of, .. } if scans_of.len() > MOST_SCANNING => {
-                let cause = format!("scans of at most {MOST_SCANNING} bodies are shown");
+            Method::Look { scans_of, .. } if scans_of.len() > MAX_SCANNED_BODIES => {
+                let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
                 Err(Problem::new("look", cause, "name fewer"))
             }
-            Call::Look { scans_of, .. } => {
-                self.viewer.look(scans_of);
-                Ok(Answer::Done)
+            Method::Look { scans_of, .. } => {
+                self.viewer.set_scanned_bodies(scans_of);
+                Ok(ReplyBody::Done)
             }
-            Call::Credit { frames, .. } => {
-                self.viewer.grant(frames);
-                Ok(Answer::Done)
+            Method::Credit { frames, .. } => {
+                self.viewer.add_credit(frames);
+                Ok(ReplyBody::Done)
             }
-            Call::Inspect { who, .. } => inspection(run, &who).map(Answer::Inspection),
-            Call::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
-            Call::Events { from, until, skip, most, .. } => {
+            Method::Inspect { who, .. } => inspection(run, &who).map(ReplyBody::Inspection),
+            Method::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
+            Method::Events { from, until, skip, most, .. } => {
                 self.viewer.drain(run, &mut self.memory.log, Instant::now());
-                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), most.min(MOST_EVENTS)))
+                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), most.min(MAX_EVENTS)))
             }
-            Call::Source { .. } => {
+            Method::Source { .. } => {
                 let source = &self.stage.source;
                 let (place, text) = (source.place.clone(), source.text.clone());
-                Ok(Answer::Source { place, text, read_only: self.stage.is_fixed() })
+                Ok(ReplyBody::Source { place, text, read_only: self.stage.is_read_only() })
             }
-            Call::Save { text, to, base, over, .. } => {
-                self.stage.save(text, to, Wish { base, over })
+            Method::Save { text, to, base, over, .. } => {
+                self.stage.save(text, to, SaveOptions { base, over })
             }
-            Call::Tables { .. } => self.stage.tables().map(|names| Answer::Tables { names }),
+            Method::Tables { .. } => self.stage.tables().map(|names| ReplyBody::Tables { names }),
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
         }
     }
 
-    fn play(&mut self, speed: Speed) -> Result<Answer, Problem> {
+    fn play(&mut self, speed: Speed) -> Result<ReplyBody, Problem> {
         if let Speed::Times(times) = speed
-            && !SPEEDS.contains(&times)
+            && !SPEED_RANGE.contains(&times)
         {
             let cause = format!("{times} times is no speed");
             return Err(Problem::new("play", cause, "give 0.1 to 100, or `fastest`"));
         }
-        self.give_up("the run was played");
+        self.cancel_seek("the run was played");
         self.speed = speed;
         self.beat = match speed {
             Speed::Fastest => None,
             Speed::Times(times) => {
-                Some(Beat::new(times / self.scenery.cycle_s, Instant::now(), self.cycle()))
+                Some(Pacer::new(times / self.scenery.cycle_s, Instant::now(), self.cycle()))
             }
         };
         match self.is_at_end() {
-            true => self.stand(),
-            false => self.state = State::Playing,
+            true => self.pause(),
+            false => self.state = SessionState::Playing,
         }
-        Ok(Answer::Done)
+        Ok(ReplyBody::Done)
     }
 
     /// Stops where the run is.
-    fn stand(&mut self) {
+    fn pause(&mut self) {
         let is_at_end = self.is_at_end();
-        self.state = if is_at_end { State::Over } else { State::Paused };
+        self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
         self.errand = None;
-        self.rate = Rate::default();
+        self.rate = CycleRate::default();
         self.viewer.refresh();
         let cycle = self.cycle();
-        self.memory.note_stand(self.stage.run.as_ref());
+        self.memory.record_pause(self.stage.run.as_ref());
         if self.digest.as_ref().is_none_or(|(of, _)| *of != cycle) {
             self.digest = Some((cycle, self.stage.run.digest().to_string()));
         }
@@ -245,56 +251,57 @@ impl Player {
 
     /// Does the work that is due, for some milliseconds at most. Returns the time until there is more, unless a
     /// request comes; `None` for forever.
-    pub(super) fn turn(&mut self) -> Option<Duration> {
+    pub(super) fn poll(&mut self) -> Option<Duration> {
         let now = Instant::now();
-        self.memory.keyframes.fit();
+        self.memory.keyframes.shrink_to_budget();
         match (self.state, self.errand) {
-            (State::Playing, _) => {
+            (SessionState::Playing, _) => {
                 let cycle = self.cycle();
                 let beat = self.beat.as_mut();
                 let target = beat.map_or(self.stage.until, |beat| beat.target(now, cycle));
-                self.slice(target.min(self.stage.until));
+                self.advance_slice(target.min(self.stage.until));
             }
-            (State::Seeking, Some(Errand { target, .. })) => self.slice(target),
+            (SessionState::Seeking, Some(Seek { target, .. })) => self.advance_slice(target),
             _ => {}
         }
-        self.arrive();
+        self.stop_at_target();
         let now = Instant::now();
-        self.viewer.attend(self.stage.run.as_mut(), &mut self.memory.log, now);
+        self.viewer.send_due_frame(self.stage.run.as_mut(), &mut self.memory.log, now);
         let status = self.status(now);
-        self.viewer.tell(status.clone(), now);
-        self.attend_viewers(now);
+        self.viewer.report_status(status.clone(), now);
+        self.update_viewers(now);
         let is_free = self.work_due(now).is_none_or(|due| due > now);
-        if is_free && self.scout() {
+        if is_free && self.prefetch() {
             return Some(Duration::ZERO);
         }
         let status_due = self.status_due(&status);
-        let due = [self.work_due(now), self.viewer.frame_due(), status_due, self.showing.due()];
+        let due =
+            [self.work_due(now), self.viewer.frame_due(), status_due, self.showing.next_update()];
         let next = due.into_iter().flatten().min()?;
         Some(next.saturating_duration_since(Instant::now()))
     }
 
     fn work_due(&self, now: Instant) -> Option<Instant> {
         match (self.state, &self.beat) {
-            (State::Playing, Some(beat)) => Some(beat.next(self.cycle())),
-            (State::Playing | State::Seeking, _) => Some(now),
+            (SessionState::Playing, Some(beat)) => Some(beat.next_due(self.cycle())),
+            (SessionState::Playing | SessionState::Seeking, _) => Some(now),
             _ => None,
         }
     }
 
-    fn status_due(&self, status: &Status) -> Option<Instant> {
-        self.viewer.has_to_tell(status).then(|| self.viewer.status_due())
+    fn status_due(&self, status: &SessionStatus) -> Option<Instant> {
+        self.viewer.needs_report(status).then(|| self.viewer.status_due())
     }
 
     /// Stops where the seek or the run ends.
-    fn arrive(&mut self) {
+    fn stop_at_target(&mut self) {
         let is_there = self.errand.is_some_and(|errand| self.cycle() >= errand.target);
-        let is_on_the_way = matches!(self.state, State::Playing | State::Seeking);
+        let is_on_the_way = matches!(self.state, SessionState::Playing | SessionState::Seeking);
         if is_on_the_way && (is_there || self.is_at_end()) {
             let errand = self.errand;
-            self.stand();
+            self.pause();
             if let Some(id) = errand.and_then(|errand| errand.id) {
-                self.reply(id, Ok(Answer::Done));
+                self.reply(id, Ok(ReplyBody::Done));
             }
             if let Some(speed) = errand.and_then(|errand| errand.then) {
                 // Speeds of viewers are in bounds.
@@ -304,7 +311,7 @@ impl Player {
     }
 
     /// Goes on for some milliseconds, but not beyond the target cycle.
-    fn slice(&mut self, target: Cycle) {
+    fn advance_slice(&mut self, target: Cycle) {
         let asked = self.pace.cycles().min(target.saturating_sub(self.cycle()));
         if asked == 0 || self.stage.run.is_over() {
             return;
@@ -312,33 +319,33 @@ impl Player {
         let started = Instant::now();
         let done = self.stage.run.advance(asked);
         let took = started.elapsed();
-        self.pace.note(done, took);
-        self.rate.note(Instant::now(), done);
-        self.viewer.moved();
+        self.pace.adapt(done, took);
+        self.rate.record(Instant::now(), done);
+        self.viewer.mark_moved();
         self.digest = None;
-        self.memory.note(self.stage.run.as_ref(), took);
+        self.memory.record(self.stage.run.as_ref(), took);
     }
 
     /// Computes ahead when there is nothing else to do; returns whether there was anything to compute ahead.
-    fn scout(&mut self) -> bool {
+    fn prefetch(&mut self) -> bool {
         let Some(scout) = &mut self.scout else { return false };
-        if let Some(run) = scout.slice(&mut self.memory) {
+        if let Some(run) = scout.advance_slice(&mut self.memory) {
             self.verdict = self.stage.verdict(run).or(self.verdict.take());
             self.scout = None;
         }
         true
     }
 
-    fn status(&mut self, now: Instant) -> Status {
+    fn status(&mut self, now: Instant) -> SessionStatus {
         let cycle = self.cycle();
-        let is_still = matches!(self.state, State::Paused | State::Over);
+        let is_still = matches!(self.state, SessionState::Paused | SessionState::Over);
         let has_digest = is_still && self.stage.is_computed();
         let digest = self.digest.as_ref().filter(|(of, _)| has_digest && *of == cycle);
         let banner = self.stage.recorded.as_ref().map(|_| {
             let later = || "Computed again; the digest is compared at the end.".into();
             self.verdict.clone().unwrap_or_else(later)
         });
-        Status {
+        SessionStatus {
             session: self.session,
             state: self.state,
             cycle: cycle as f64,
@@ -346,7 +353,7 @@ impl Player {
             time_s: cycle as f64 * self.scenery.cycle_s,
             speed: self.speed,
             cycles_per_s: if is_still { 0.0 } else { self.rate.per_s(now) },
-            seed: self.stage.run.plan().seed.to_string(),
+            seed: self.stage.run.config().seed.to_string(),
             digest: digest.map(|(_, digest)| digest.clone()),
             banner,
             fleet: None,
@@ -356,15 +363,17 @@ impl Player {
     /// Reports that the session ends here; the run is no longer touched.
     pub(super) fn fail(&mut self, problem: Problem) {
         let errand = self.errand.and_then(|errand| errand.id);
-        self.give_up("the session has ended");
+        self.cancel_seek("the session has ended");
         // The request that met the bug waits for an answer, too.
         if let Some(id) = self.taken.take().filter(|id| Some(*id) != errand) {
             self.reply(id, Err(problem.clone()));
         }
-        if let Some(told) = self.viewer.last_told() {
-            self.outbox
-                .status(self.session, &Notice::Status(Status { state: State::Failed, ..told }));
+        if let Some(told) = self.viewer.last_reported() {
+            self.outbox.send_status(
+                self.session,
+                &Notification::Status(SessionStatus { state: SessionState::Failed, ..told }),
+            );
         }
-        self.outbox.notice(&Notice::Ended { session: self.session, problem });
+        self.outbox.send_notification(&Notification::Ended { session: self.session, problem });
     }
 }

@@ -1,8 +1,8 @@
 //! Scenarios that are saved: whole or not at all, and never over a text that another program wrote meanwhile.
 
-use crate::files::Files;
-use crate::protocol::{Answer, Problem};
-use crate::write::{Target, replaced};
+use crate::files::AllowedFiles;
+use crate::protocol::{Problem, ReplyBody};
+use crate::write::{WriteTarget, replace_file};
 use serde_json::Value;
 use sidestep::scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
@@ -10,16 +10,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The file of a session, as last read or written.
 #[derive(Debug, Clone)]
-pub(super) struct OwnFile {
+pub(super) struct SessionFile {
     pub(super) path: PathBuf,
     pub(super) text: String,
 }
 
 /// The scenario of a session, for other threads than its own: its place is the file in which it was last saved.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Shown(Arc<Mutex<Option<Source>>>);
+pub(crate) struct SharedSource(Arc<Mutex<Option<Source>>>);
 
-impl Shown {
+impl SharedSource {
     /// Returns the scenario, once it is open.
     pub(crate) fn source(&self) -> Option<Source> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
@@ -31,16 +31,16 @@ impl Shown {
     }
 }
 
-impl OwnFile {
+impl SessionFile {
     /// Returns the file that a scenario was read from, unless it holds something that stands for the scenario.
-    pub(super) fn of(path: &Path, source: &Source) -> Option<Self> {
+    pub(super) fn open(path: &Path, source: &Source) -> Option<Self> {
         let read = Source::read(path, &[]).ok()?;
         (read.text == source.text).then(|| Self { path: path.into(), text: read.text })
     }
 }
 
 /// Returns a file's path, or the problem of a session that has none.
-pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Problem> {
+pub(super) fn session_path(own: Option<&SessionFile>, place: &str) -> Result<String, Problem> {
     let path = own.and_then(|own| own.path.to_str()).map(String::from);
     path.ok_or_else(|| {
         let remedy = "give a name that ends in .toml";
@@ -50,7 +50,7 @@ pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Pro
 
 /// The way in which a page wants a text saved.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Wish {
+pub(super) struct SaveOptions {
     /// The text that the page believes the file holds; without it, the text that the session has read or written.
     pub(super) base: Option<String>,
     /// Whether the file is replaced regardless of its content.
@@ -63,7 +63,11 @@ pub(super) struct Wish {
 ///
 /// # Errors
 /// With the file that it names, or the kind of text that it has to be.
-pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Result<(), Problem> {
+pub(super) fn check_writable(
+    files: &AllowedFiles,
+    worlds: &Worlds,
+    source: &Source,
+) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
     files.check_text(source)?;
     // This holds over a scenario, too: in two saves, a page could otherwise make any file out of one.
@@ -85,25 +89,25 @@ pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Resul
 ///
 /// # Errors
 /// When it cannot be written; then the file is as it was.
-pub(super) fn saved(
-    target: &Target,
-    own: Option<&OwnFile>,
+pub(super) fn write_scenario(
+    target: &WriteTarget,
+    own: Option<&SessionFile>,
     text: &str,
-    wish: &Wish,
-) -> Result<Answer, Problem> {
-    let own = own.filter(|own| is_same(&own.path, target)).map(|own| own.text.as_str());
+    wish: &SaveOptions,
+) -> Result<ReplyBody, Problem> {
+    let own = own.filter(|own| is_same_file(&own.path, target)).map(|own| own.text.as_str());
     // A reconnected page knows a different text from the one that its new session has read.
     let known = wish.base.as_deref().or(own);
     let may_replace = |found: Option<&str>| match found {
         None => true,
         Some(found) => wish.over || known == Some(found) || found == text,
     };
-    match replaced(target, text, own.is_some(), may_replace)? {
-        None => Ok(Answer::Saved { place: target.path.display().to_string() }),
-        Some(text) => Ok(Answer::Differs { text }),
+    match replace_file(target, text, own.is_some(), may_replace)? {
+        None => Ok(ReplyBody::Saved { place: target.path.display().to_string() }),
+        Some(text) => Ok(ReplyBody::Differs { text }),
     }
 }
 
-fn is_same(path: &Path, target: &Target) -> bool {
+fn is_same_file(path: &Path, target: &WriteTarget) -> bool {
     path == target.path || path.canonicalize().is_ok_and(|real| real == target.real)
 }

@@ -1,10 +1,10 @@
 //! D1 for the studio: whether a page acts or not, the result is that of a plain run.
 
 use super::*;
-use crate::files::Files;
-use crate::keyframes::Budget;
-use crate::outbox::Mail;
-use crate::protocol::{Speed, Who};
+use crate::files::AllowedFiles;
+use crate::keyframes::MemoryBudget;
+use crate::outbox::OutboxItem;
+use crate::protocol::{BodyId, Speed};
 use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
@@ -12,7 +12,7 @@ use std::time::Instant;
 mod fleets;
 mod recordings;
 mod saving;
-mod ways;
+mod seeks;
 
 const ROBOTS: &str = "format = 1\nworld = \"robots\"\nseed = 5\ncycles = 600\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
     ..............\n..............\n....##........\n....##........\n..............\n..............\n\"\"\"\n\
@@ -34,10 +34,18 @@ struct Page {
     _folder: tempfile::TempDir,
 }
 
-fn means(folder: &std::path::Path, workers: usize) -> Means {
-    let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
-    let (budget, screens) = (Arc::new(Budget::new(1 << 28, 1 << 28)), Vec::new());
-    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None, screens }
+fn means(folder: &std::path::Path, workers: usize) -> SessionDeps {
+    let files = AllowedFiles::from_roots(&[folder.to_path_buf()]).expect("a folder");
+    let (budget, screens) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
+    SessionDeps {
+        worlds: WORLDS,
+        files,
+        workers,
+        read_only: false,
+        budget,
+        showcase: None,
+        screens,
+    }
 }
 
 impl Page {
@@ -46,13 +54,17 @@ impl Page {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).expect("written");
-        let what = Subject::Scenario { path: path.display().to_string() };
-        Self::of(means(folder.path(), workers), what, folder)
+        let what = OpenTarget::Scenario { path: path.display().to_string() };
+        Self::open_target(means(folder.path(), workers), what, folder)
     }
 
-    fn of(means: Means, what: Subject, folder: tempfile::TempDir) -> (Self, Value) {
+    fn open_target(
+        means: SessionDeps,
+        what: OpenTarget,
+        folder: tempfile::TempDir,
+    ) -> (Self, Value) {
         let outbox = Arc::new(Outbox::default());
-        let opening = Opening { session: 1, id: 1, what, seed: None };
+        let opening = OpenRequest { session: 1, id: 1, what, seed: None };
         let session = Session::start(means, opening, outbox.clone(), ()).expect("a thread");
         let (frames, notices, replies) = Default::default();
         let mut page = Self { outbox, session, id: 1, frames, notices, replies, _folder: folder };
@@ -62,10 +74,10 @@ impl Page {
 
     /// Takes the messages that have come.
     fn read(&mut self) {
-        while let Some(mail) = self.outbox.next() {
+        while let Some(mail) = self.outbox.pop() {
             match mail {
-                Mail::Frame(bytes) => self.frames.push(bytes),
-                Mail::Text(text) => {
+                OutboxItem::Frame(bytes) => self.frames.push(bytes),
+                OutboxItem::Text(text) => {
                     let value: Value = serde_json::from_str(&text).expect("JSON");
                     let is_reply = value.get("id").is_some();
                     if is_reply { self.replies.push(value) } else { self.notices.push(value) }
@@ -97,7 +109,7 @@ impl Page {
     fn send(&mut self, call: Value) -> u32 {
         self.id += 1;
         let call = serde_json::from_value(call).expect("a call");
-        self.session.order(self.id, call).expect("it takes requests");
+        self.session.send_request(self.id, call).expect("it takes requests");
         self.id
     }
 
@@ -187,7 +199,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         let source = Source::new("s.toml", text, "");
         let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
         run.advance(20);
-        let who = Who { kind: kind.into(), number: 1, part };
+        let who = BodyId { kind: kind.into(), number: 1, part };
         let by_library = inspect::inspection(run.as_ref(), &who);
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(20);
@@ -318,18 +330,18 @@ fn a_text_is_checked_with_its_place_and_refused_where_the_studio_only_reads() {
     let source = Source::new("s.toml", ROBOTS, folder.path());
     let means = means(folder.path(), 1);
     let problems =
-        checked(&means, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
+        text_problems(&means, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
     assert_eq!((problems.len(), problems[0].line), (1, Some(16)));
     assert!(problems[0].remedy.contains("count") && !problems[0].is_warning);
     assert_eq!(problems[0].key.as_deref(), Some("robots.cuont"));
     let twice = ROBOTS.replace("count = 6", "cuont = 6").replace("seed = ", "seed = -");
-    let keys = checked(&means, &source, twice).expect("checked");
+    let keys = text_problems(&means, &source, twice).expect("checked");
     let keys: Vec<_> = keys.iter().filter_map(|one| one.key.as_deref()).collect();
     assert_eq!(keys, ["seed", "robots.cuont"]);
-    assert_eq!(checked(&means, &source, ROBOTS.into()), Ok(vec![]));
-    assert_eq!(checked(&means, &source, "a = = 1".into()).expect("checked").len(), 1);
-    let reads = Means { read_only: true, ..means };
-    assert!(checked(&reads, &source, ROBOTS.into()).is_err());
+    assert_eq!(text_problems(&means, &source, ROBOTS.into()), Ok(vec![]));
+    assert_eq!(text_problems(&means, &source, "a = = 1".into()).expect("checked").len(), 1);
+    let reads = SessionDeps { read_only: true, ..means };
+    assert!(text_problems(&reads, &source, ROBOTS.into()).is_err());
 }
 
 #[test]
@@ -342,7 +354,7 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
     drop(session);
     let started = Instant::now();
     while outbox.backlog() > 0 {
-        while outbox.next().is_some() {}
+        while outbox.pop().is_some() {}
         assert!(started.elapsed() < Duration::from_secs(20), "it did not end");
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -351,16 +363,16 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
 #[test]
 fn a_bug_in_a_run_ends_its_session_with_a_notice() {
     let (mut page, _) = Page::open(ROBOTS, 1);
-    let who = Who { kind: "no such kind".into(), number: 0, part: None };
-    page.session.order(99, Call::Look { session: 1, scans_of: vec![who] }).expect("taken");
+    let who = BodyId { kind: "no such kind".into(), number: 0, part: None };
+    page.session.send_request(99, Method::Look { session: 1, scans_of: vec![who] }).expect("taken");
     page.wait(99);
     let desk = |work: fn()| {
         let (_, orders) = sync_channel(1);
         let (outbox, interrupt) = (page.outbox.clone(), Interrupt::default());
-        Desk { outbox, interrupt, orders }.guarded(work)
+        SessionWorker { outbox, interrupt, orders }.catch_panic(work)
     };
     assert!(
-        matches!(desk(|| panic!("a rule is broken")), Err(Broken::Bug(words)) if words == "a rule is broken")
+        matches!(desk(|| panic!("a rule is broken")), Err(SessionExit::Bug(words)) if words == "a rule is broken")
     );
     assert!(matches!(desk(|| ()), Ok(())));
 }
@@ -397,7 +409,7 @@ fn a_pipe_is_not_opened_for_nobody_may_ever_write_into_it() {
     let path = folder.path().join("pipe.toml");
     let made = std::process::Command::new("mkfifo").arg(&path).status().expect("mkfifo runs");
     assert!(made.success());
-    let what = Subject::Scenario { path: path.display().to_string() };
-    let (_, reply) = Page::of(means(folder.path(), 1), what, folder);
+    let what = OpenTarget::Scenario { path: path.display().to_string() };
+    let (_, reply) = Page::open_target(means(folder.path(), 1), what, folder);
     assert!(reply.get("problem").is_some(), "{reply}");
 }

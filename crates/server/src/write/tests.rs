@@ -6,7 +6,7 @@ use std::cell::Cell;
 const SCENARIO: &str = "world = \"robots\"\n";
 
 /// A folder `in` that may be written, with a scenario, beside one that may not.
-fn places() -> (tempfile::TempDir, Files) {
+fn places() -> (tempfile::TempDir, AllowedFiles) {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in [
         ("in/a.toml", SCENARIO),
@@ -19,7 +19,7 @@ fn places() -> (tempfile::TempDir, Files) {
         fs::create_dir_all(path.parent().expect("a folder")).expect("made");
         fs::write(path, text).expect("written");
     }
-    let files = Files::below(&[folder.path().join("in")]).expect("a folder");
+    let files = AllowedFiles::from_roots(&[folder.path().join("in")]).expect("a folder");
     (folder, files)
 }
 
@@ -86,7 +86,7 @@ fn a_file_is_replaced_whole_with_its_permissions_and_its_mark() {
         seen.set(found == Some(SCENARIO));
         true
     };
-    assert_eq!(replaced(&target, "new", true, may), Ok(None));
+    assert_eq!(replace_file(&target, "new", true, may), Ok(None));
     assert!(seen.get());
     assert_eq!(fs::read_to_string(&path).expect("read"), format!("{BYTE_ORDER_MARK}new"));
     #[cfg(unix)]
@@ -110,7 +110,7 @@ fn what_another_program_writes_meanwhile_is_not_lost() {
         found == Some(SCENARIO)
     };
     let before = names(&folder.path().join("in"));
-    assert_eq!(replaced(&target, "new", true, may), Ok(Some("another".into())));
+    assert_eq!(replace_file(&target, "new", true, may), Ok(Some("another".into())));
     assert_eq!((asked.get(), fs::read_to_string(&path).expect("read")), (2, "another".into()));
     assert_eq!(names(&folder.path().join("in")), before, "nothing half-written stays");
 }
@@ -137,16 +137,20 @@ fn what_cannot_be_replaced_stays_as_it_is() {
     ] {
         let old = fs::read(inside.join(name)).expect("read");
         let target = files.target(&place(name)).expect("a file");
-        let problem = replaced(&target, "new", is_own, |_| true).expect_err(name);
+        let problem = replace_file(&target, "new", is_own, |_| true).expect_err(name);
         assert!(problem.cause.contains(cause), "{problem:?}");
         assert_eq!(fs::read(inside.join(name)).expect("read"), old);
     }
     let target = files.target(&place("new.toml")).expect("a file");
-    assert_eq!(replaced(&target, "new", false, |found| found.is_none()), Ok(None));
-    assert_eq!(replaced(&target, "newer", true, |_| true), Ok(None), "its own need be no scenario");
+    assert_eq!(replace_file(&target, "new", false, |found| found.is_none()), Ok(None));
+    assert_eq!(
+        replace_file(&target, "newer", true, |_| true),
+        Ok(None),
+        "its own need be no scenario"
+    );
     // The folder is gone.
     let target = files.target(&place("deep/new.toml")).expect("a file");
     fs::remove_dir_all(inside.join("deep")).expect("removed");
-    let problem = replaced(&target, "new", false, |_| true).expect_err("no folder");
+    let problem = replace_file(&target, "new", false, |_| true).expect_err("no folder");
     assert!(problem.cause.contains("cannot be written"), "{problem:?}");
 }

@@ -6,15 +6,15 @@ mod tables;
 mod target;
 
 use crate::driver::{Sinks, drive};
-use crate::film::{BagFilm, Ending, McapFilm};
-use crate::{Error, Recorded, Watcher};
+use crate::frame_sink::{BagSink, EndReason, McapSink};
+use crate::{Error, RecordedRun, Watcher};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
 use target::Target;
 
 /// The output formats, each with its own options.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Form {
+pub enum Format {
     /// Tables as text: one of this name, or all.
     Csv(Option<String>),
     /// Tables as Parquet, one file each: one of this name, or all.
@@ -31,14 +31,14 @@ pub enum Form {
         width_px: Option<u16>,
     },
     /// Animated GIF.
-    Gif(Film),
+    Gif(AnimationOptions),
     /// Animation as numbered PNG files.
-    Frames(Film),
+    Frames(AnimationOptions),
 }
 
 /// Options of an animation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Film {
+pub struct AnimationOptions {
     /// Frames per second; `None` for the default.
     pub fps: Option<u16>,
     /// The longer side in pixels; `None` for the default.
@@ -47,9 +47,9 @@ pub struct Film {
 
 /// A requested export: its format, its part of the run and its place.
 #[derive(Debug, Clone)]
-pub struct Export<'a> {
+pub struct ExportRequest<'a> {
     /// The format.
-    pub form: Form,
+    pub form: Format,
     /// The place; `None` for one beside the recorded run, with its name.
     pub out: Option<&'a Path>,
     /// Whether an earlier export is replaced.
@@ -67,7 +67,7 @@ pub struct Export<'a> {
 
 /// Files that were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Written {
+pub struct ExportResult {
     /// The files, or the folder of an animation's frames.
     pub paths: Vec<PathBuf>,
     /// Whether a run that was computed again reached the recorded digest.
@@ -76,8 +76,8 @@ pub struct Written {
     pub film: Option<(usize, u16)>,
 }
 
-impl Written {
-    fn one(path: impl Into<PathBuf>, is_confirmed: bool) -> Self {
+impl ExportResult {
+    fn single_file(path: impl Into<PathBuf>, is_confirmed: bool) -> Self {
         Self { paths: vec![path.into()], is_confirmed, film: None }
     }
 }
@@ -88,40 +88,50 @@ impl Written {
 /// When the part or the place is wrong, the result cannot be stored, or the run differs from the
 /// recorded one; [`Error::Interrupted`] when the watcher asked to stop.
 pub fn export(
-    recorded: &Recorded,
-    wanted: &Export<'_>,
+    recorded: &RecordedRun,
+    wanted: &ExportRequest<'_>,
     watcher: &dyn Watcher,
-) -> Result<Written, Error> {
-    let job = Job { recorded, wanted, span: Span::of(wanted, recorded)?, watcher };
+) -> Result<ExportResult, Error> {
+    let job = ExportContext {
+        recorded,
+        wanted,
+        span: CycleRange::from_request(wanted, recorded)?,
+        watcher,
+    };
     match &wanted.form {
-        Form::Csv(table) => tables::export(&job, tables::Form::Csv, table.as_deref()),
-        Form::Parquet(table) => tables::export(&job, tables::Form::Parquet, table.as_deref()),
-        Form::Mcap => export_mcap(&job),
-        Form::RosBag => export_bag(&job),
-        Form::Svg => pictures::export_svg(&job),
-        Form::Png { width_px } => pictures::export_png(&job, *width_px),
-        Form::Gif(film) => pictures::export_gif(&job, *film),
-        Form::Frames(film) => pictures::export_frames(&job, *film),
+        Format::Csv(table) => tables::export(&job, tables::TableFormat::Csv, table.as_deref()),
+        Format::Parquet(table) => {
+            tables::export(&job, tables::TableFormat::Parquet, table.as_deref())
+        }
+        Format::Mcap => export_mcap(&job),
+        Format::RosBag => export_bag(&job),
+        Format::Svg => pictures::export_svg(&job),
+        Format::Png { width_px } => pictures::export_png(&job, *width_px),
+        Format::Gif(film) => pictures::export_gif(&job, *film),
+        Format::Frames(film) => pictures::export_frames(&job, *film),
     }
 }
 
 /// An export that has been checked.
-struct Job<'a> {
-    recorded: &'a Recorded,
-    wanted: &'a Export<'a>,
-    span: Span,
+struct ExportContext<'a> {
+    recorded: &'a RecordedRun,
+    wanted: &'a ExportRequest<'a>,
+    span: CycleRange,
     watcher: &'a dyn Watcher,
 }
 
 /// The requested cycles, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Span {
+struct CycleRange {
     from: Cycle,
     until: Cycle,
 }
 
-impl Span {
-    fn of(wanted: &Export<'_>, recorded: &Recorded) -> Result<Self, InputError> {
+impl CycleRange {
+    fn from_request(
+        wanted: &ExportRequest<'_>,
+        recorded: &RecordedRun,
+    ) -> Result<Self, InputError> {
         let done = recorded.cycles_done;
         let (from, until) = (wanted.from.unwrap_or(0), wanted.until.unwrap_or(done));
         let wrong = |option: &str, cycle: Cycle, cause: String, remedy: String| {
@@ -139,7 +149,7 @@ impl Span {
     }
 }
 
-impl Job<'_> {
+impl ExportContext<'_> {
     /// Returns the run at the start of a cycle.
     fn run_up_to(&self, cycle: Cycle) -> Result<Box<dyn Simulation>, Error> {
         let mut run = self.recorded.start_near(cycle, self.wanted.workers)?;
@@ -157,31 +167,31 @@ impl Job<'_> {
     }
 }
 
-fn export_mcap(job: &Job<'_>) -> Result<Written, Error> {
-    let Job { recorded, wanted, span, .. } = job;
-    let target = Target::file(job, ".mcap")?;
-    let resolved = recorded.resolved()?;
+fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
+    let ExportContext { recorded, wanted, span, .. } = job;
+    let target = Target::for_file(job, ".mcap")?;
+    let resolved = recorded.resolved_scenario()?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
-    let mut film = McapFilm::begin(target.path(), every, resolved, run.as_mut())?;
-    job.drive(run.as_mut(), span.until, Sinks { film: Some(&mut film), ..Sinks::default() })?;
-    let is_confirmed = recorded.confirm(run.as_ref())?;
+    let mut film = McapSink::start(target.path(), every, resolved, run.as_mut())?;
+    job.drive(run.as_mut(), span.until, Sinks { frames: Some(&mut film), ..Sinks::default() })?;
+    let is_confirmed = recorded.verify_digest(run.as_ref())?;
     let is_whole = span.from == 0 && is_confirmed && recorded.is_complete;
-    let ending = if is_whole { Ending::Complete } else { Ending::Extract };
-    Ok(Written::one(film.finish(run.as_ref(), ending)?, is_confirmed))
+    let ending = if is_whole { EndReason::Complete } else { EndReason::Extract };
+    Ok(ExportResult::single_file(film.finish(run.as_ref(), ending)?, is_confirmed))
 }
 
-fn export_bag(job: &Job<'_>) -> Result<Written, Error> {
-    let Job { recorded, wanted, span, .. } = job;
-    let target = Target::folder(job, "-rosbag", &["mcap", "yaml", "pgm"])?;
+fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
+    let ExportContext { recorded, wanted, span, .. } = job;
+    let target = Target::for_folder(job, "-rosbag", &["mcap", "yaml", "pgm"])?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
-    let is_confirmed = target.make_folder(|folder| {
-        let mut film = BagFilm::begin(folder, every, run.as_mut())?;
-        let sinks = Sinks { film: Some(&mut film), ..Sinks::default() };
+    let is_confirmed = target.write_folder(|folder| {
+        let mut film = BagSink::start(folder, every, run.as_mut())?;
+        let sinks = Sinks { frames: Some(&mut film), ..Sinks::default() };
         job.drive(run.as_mut(), span.until, sinks)?;
         film.finish()?;
-        recorded.confirm(run.as_ref())
+        recorded.verify_digest(run.as_ref())
     })?;
-    Ok(Written::one(target.path(), is_confirmed))
+    Ok(ExportResult::single_file(target.path(), is_confirmed))
 }

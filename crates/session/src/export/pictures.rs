@@ -1,129 +1,146 @@
 //! Pictures and animations of a run that is computed again.
 
 use super::target::Target;
-use super::{Film as Options, Job, Written};
+use super::{AnimationOptions as Options, ExportContext, ExportResult};
 use crate::driver::Sinks;
-use crate::files::replace;
-use crate::film::{Pictures, write_gif};
-use crate::picture::{origin, svg};
-use crate::watcher::{Progress, Watched};
+use crate::files::write_atomically;
+use crate::frame_sink::{AnimationFrames, write_gif};
+use crate::picture::{draw_svg, footnote};
+use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use sidestep::kernel::Cycle;
-use sidestep_draw::{Film, Still, to_png};
+use sidestep_draw::{AnimationFrame, AnimationRenderer, to_png};
 use std::io::Write;
 use std::path::Path;
 
 /// Largest number of frames of an animation, unless more are requested.
-const MOST_PICTURES: Cycle = 150;
+const MAX_FRAMES: Cycle = 150;
 /// Frames per second.
-const FPS: u16 = 15;
-const GIF_PX: u16 = 640;
-const FRAME_PX: u16 = 1280;
-const PNG_PX: u16 = 1600;
+const DEFAULT_FPS: u16 = 15;
+const DEFAULT_GIF_WIDTH_PX: u16 = 640;
+const DEFAULT_FRAME_WIDTH_PX: u16 = 1280;
+const DEFAULT_PNG_WIDTH_PX: u16 = 1600;
 
 /// Exports the picture of the run at its end, or at one cycle.
-pub(super) fn export_svg(job: &Job<'_>) -> Result<Written, Error> {
+pub(super) fn export_svg(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     export_picture(job, ".svg", |svg| Ok(svg.into_bytes()))
 }
 
 /// Exports the same picture as PNG.
-pub(super) fn export_png(job: &Job<'_>, width_px: Option<u16>) -> Result<Written, Error> {
-    export_picture(job, ".png", |svg| Ok(to_png(&svg, width_px.unwrap_or(PNG_PX).into())?))
+pub(super) fn export_png(
+    job: &ExportContext<'_>,
+    width_px: Option<u16>,
+) -> Result<ExportResult, Error> {
+    export_picture(job, ".png", |svg| {
+        Ok(to_png(&svg, width_px.unwrap_or(DEFAULT_PNG_WIDTH_PX).into())?)
+    })
 }
 
 fn export_picture(
-    job: &Job<'_>,
+    job: &ExportContext<'_>,
     ending: &str,
     encode: impl FnOnce(String) -> Result<Vec<u8>, Error>,
-) -> Result<Written, Error> {
-    let target = Target::file(job, ending)?;
+) -> Result<ExportResult, Error> {
+    let target = Target::for_file(job, ending)?;
     let mut run = job.run_up_to(job.wanted.from.unwrap_or(job.span.until))?;
-    let is_confirmed = job.recorded.confirm(run.as_ref())?;
-    let origin = format!("Cycle {}. {}", run.cycle(), origin(run.as_ref()));
-    let svg = svg(run.as_mut(), job.recorded.folder.as_deref(), &origin)?;
+    let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
+    let origin = format!("Cycle {}. {}", run.cycle(), footnote(run.as_ref()));
+    let svg = draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin)?;
     let bytes = encode(svg)?;
-    replace(target.path(), |file| file.write_all(&bytes))?;
-    Ok(Written::one(target.path(), is_confirmed))
+    write_atomically(target.path(), |file| file.write_all(&bytes))?;
+    Ok(ExportResult::single_file(target.path(), is_confirmed))
 }
 
 /// Exports an animation as GIF.
-pub(super) fn export_gif(job: &Job<'_>, options: Options) -> Result<Written, Error> {
-    let target = Target::file(job, ".gif")?;
-    export_film(job, options, &target, |film| {
-        film.write_gif(options.width_px.unwrap_or(GIF_PX), target.path())
+pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<ExportResult, Error> {
+    let target = Target::for_file(job, ".gif")?;
+    export_animation(job, options, &target, |film| {
+        film.write_gif(options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX), target.path())
     })
 }
 
 /// Exports an animation as numbered pictures in a folder.
-pub(super) fn export_frames(job: &Job<'_>, options: Options) -> Result<Written, Error> {
-    let target = Target::folder(job, "-frames", &["png"])?;
-    export_film(job, options, &target, |film| {
-        let width_px = options.width_px.unwrap_or(FRAME_PX);
-        target.make_folder(|folder| film.write_frames(width_px, folder))
+pub(super) fn export_frames(
+    job: &ExportContext<'_>,
+    options: Options,
+) -> Result<ExportResult, Error> {
+    let target = Target::for_folder(job, "-frames", &["png"])?;
+    export_animation(job, options, &target, |film| {
+        let width_px = options.width_px.unwrap_or(DEFAULT_FRAME_WIDTH_PX);
+        target.write_folder(|folder| film.write_frames(width_px, folder))
     })
 }
 
-fn export_film(
-    job: &Job<'_>,
+fn export_animation(
+    job: &ExportContext<'_>,
     options: Options,
     target: &Target,
-    write: impl FnOnce(&Drawn<'_>) -> Result<(), Error>,
-) -> Result<Written, Error> {
+    write: impl FnOnce(&Animation<'_>) -> Result<(), Error>,
+) -> Result<ExportResult, Error> {
     let span = job.span;
     let mut run = job.run_up_to(span.from)?;
-    let usual = (span.until - span.from).div_ceil(MOST_PICTURES - 1).max(1);
-    let mut pictures =
-        Pictures::new(run.as_ref(), job.wanted.every.unwrap_or(usual), span.until - span.from);
-    let sinks = Sinks { film: Some(&mut pictures), ..Sinks::default() };
+    let usual = (span.until - span.from).div_ceil(MAX_FRAMES - 1).max(1);
+    let mut pictures = AnimationFrames::new(
+        run.as_ref(),
+        job.wanted.every.unwrap_or(usual),
+        span.until - span.from,
+    );
+    let sinks = Sinks { frames: Some(&mut pictures), ..Sinks::default() };
     job.drive(run.as_mut(), span.until, sinks)?;
-    let is_confirmed = job.recorded.confirm(run.as_ref())?;
-    let film = Drawn { pictures, fps: options.fps.unwrap_or(FPS), watcher: job.watcher };
+    let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
+    let film =
+        Animation { pictures, fps: options.fps.unwrap_or(DEFAULT_FPS), watcher: job.watcher };
     let written = write(&film);
-    if written.is_err() && !job.watcher.go_on() {
+    if written.is_err() && !job.watcher.should_continue() {
         return Err(Error::Interrupted);
     }
     written?;
     let shown = (film.pictures.len(), film.fps);
-    Ok(Written { film: Some(shown), ..Written::one(target.path(), is_confirmed) })
+    Ok(ExportResult { film: Some(shown), ..ExportResult::single_file(target.path(), is_confirmed) })
 }
 
 /// An animation that is being drawn.
-struct Drawn<'a> {
-    pictures: Pictures,
+struct Animation<'a> {
+    pictures: AnimationFrames,
     fps: u16,
     watcher: &'a dyn Watcher,
 }
 
-impl Drawn<'_> {
+impl Animation<'_> {
     fn write_gif(&self, width_px: u16, to: &Path) -> Result<(), Error> {
         let view = self.pictures.view(width_px.into())?;
-        let watched = Watched(self.watcher);
+        let watched = ProgressGuard(self.watcher);
         let pixels = (0..self.pictures.len()).map(|index| {
             let picture = self.draw(&view, index, &watched).map_err(std::io::Error::other)?;
             Ok(picture.rgba().to_vec())
         });
-        replace(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
+        write_atomically(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
     }
 
     /// Writes numbered pictures to `folder`.
     fn write_frames(&self, width_px: u16, folder: &Path) -> Result<(), Error> {
         let view = self.pictures.view(width_px.into())?;
-        let watched = Watched(self.watcher);
+        let watched = ProgressGuard(self.watcher);
         for index in 0..self.pictures.len() {
             let png = self.draw(&view, index, &watched)?.to_png()?;
             // Numbers start at 1, as ffmpeg expects.
             let path = folder.join(format!("frame-{:05}.png", index + 1));
-            std::fs::write(&path, png).map_err(|e| Error::write(&path, &e))?;
+            std::fs::write(&path, png).map_err(|e| Error::cannot_write(&path, &e))?;
         }
         Ok(())
     }
 
-    fn draw(&self, view: &Film, index: usize, watched: &Watched<'_>) -> Result<Still, Error> {
-        if !self.watcher.go_on() {
+    fn draw(
+        &self,
+        view: &AnimationRenderer,
+        index: usize,
+        watched: &ProgressGuard<'_>,
+    ) -> Result<AnimationFrame, Error> {
+        if !self.watcher.should_continue() {
             return Err(Error::Interrupted);
         }
         let share = index as f64 / self.pictures.len().max(1) as f64;
-        watched.at(Progress::Stage { what: "drawing", share });
+        watched.report(Progress::Stage { what: "drawing", share });
         self.pictures.draw(view, index)
     }
 }

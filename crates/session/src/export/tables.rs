@@ -1,12 +1,12 @@
 //! Recorded tables as CSV, or as one Parquet file each.
 
 use super::target::Target;
-use super::{Job, Written};
+use super::{ExportContext, ExportResult};
 use crate::Error;
 use csv::ByteRecord;
 use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_record::{Table, TableFile, for_each_block, tables};
+use sidestep_record::{Table, TableFileWriter, for_each_block, tables};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -16,34 +16,38 @@ const EVENTS: &str = "events";
 
 /// The formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum TableFormat {
     Csv,
     Parquet,
 }
 
 /// Exports the table `only`, or all.
-pub(super) fn export(job: &Job<'_>, form: Form, only: Option<&str>) -> Result<Written, Error> {
+pub(super) fn export(
+    job: &ExportContext<'_>,
+    form: TableFormat,
+    only: Option<&str>,
+) -> Result<ExportResult, Error> {
     let Some(folder) = &job.recorded.folder else {
         let remedy = "name the run folder; one is made by `sidestep run SCENARIO --out DIR`";
         let cause = "a recording for viewers has no tables";
         return Err(InputError::new(job.recorded.path.display(), cause, remedy).into());
     };
-    let source = Source { folder, job, form };
+    let source = TableExport { folder, job, form };
     let ending = match form {
-        Form::Csv => "csv",
-        Form::Parquet => "parquet",
+        TableFormat::Csv => "csv",
+        TableFormat::Parquet => "parquet",
     };
     let paths = match only {
         Some(name) => {
             source.check_table(name)?;
-            let target = Target::file(job, &format!("-{name}.{ending}"))?;
+            let target = Target::for_file(job, &format!("-{name}.{ending}"))?;
             source.write(name, target.path())?;
             vec![target.path().to_path_buf()]
         }
         None => {
             let names = tables(folder)?;
-            let target = Target::folder(job, &format!("-{ending}"), &[ending])?;
-            target.make_folder(|growing| {
+            let target = Target::for_folder(job, &format!("-{ending}"), &[ending])?;
+            target.write_folder(|growing| {
                 names.iter().try_for_each(|name| {
                     source.write(name, &growing.join(format!("{name}.{ending}")))
                 })
@@ -51,17 +55,17 @@ pub(super) fn export(job: &Job<'_>, form: Form, only: Option<&str>) -> Result<Wr
             names.iter().map(|name| target.path().join(format!("{name}.{ending}"))).collect()
         }
     };
-    Ok(Written { paths, is_confirmed: false, film: None })
+    Ok(ExportResult { paths, is_confirmed: false, film: None })
 }
 
 /// The tables that are exported.
-struct Source<'a> {
+struct TableExport<'a> {
     folder: &'a Path,
-    job: &'a Job<'a>,
-    form: Form,
+    job: &'a ExportContext<'a>,
+    form: TableFormat,
 }
 
-impl Source<'_> {
+impl TableExport<'_> {
     fn check_table(&self, name: &str) -> Result<(), InputError> {
         let names = tables(self.folder)?;
         if names.iter().any(|known| known == name) {
@@ -74,21 +78,21 @@ impl Source<'_> {
 
     fn write(&self, name: &str, to: &Path) -> Result<(), Error> {
         match self.form {
-            Form::Csv => self.write_csv(name, to),
-            Form::Parquet => self.write_parquet(name, to),
+            TableFormat::Csv => self.write_csv(name, to),
+            TableFormat::Parquet => self.write_parquet(name, to),
         }
     }
 
     /// Passes on the requested rows, block by block.
-    fn each_block(
+    fn for_each_block_of(
         &self,
         name: &str,
         mut each: impl FnMut(Table) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let Job { wanted, span, .. } = self.job;
+        let ExportContext { wanted, span, .. } = self.job;
         let every = if name == EVENTS { 1 } else { wanted.every.unwrap_or(1) };
         let thinned = |mut block: Table| {
-            thin(&mut block, every);
+            downsample(&mut block, every);
             each(block)
         };
         // Without a range all rows are read, because the table may have no cycles.
@@ -99,31 +103,31 @@ impl Source<'_> {
     }
 
     fn write_parquet(&self, name: &str, to: &Path) -> Result<(), Error> {
-        let mut file: Option<TableFile> = None;
-        self.each_block(name, |block| {
+        let mut file: Option<TableFileWriter> = None;
+        self.for_each_block_of(name, |block| {
             let file = match &mut file {
                 Some(file) => file,
-                None => file.insert(TableFile::create(to, &block.schema, &block.origin)?),
+                None => file.insert(TableFileWriter::create(to, &block.schema, &block.origin)?),
             };
             Ok(file.append(&block.columns)?)
         })?;
-        Ok(file.map_or(Ok(()), TableFile::finish)?)
+        Ok(file.map_or(Ok(()), TableFileWriter::finish)?)
     }
 
     fn write_csv(&self, name: &str, to: &Path) -> Result<(), Error> {
-        let growing = partial(to);
+        let growing = partial_path(to);
         let written = self
             .fill_csv(name, &growing)
-            .and_then(|()| std::fs::rename(&growing, to).map_err(|e| Error::write(to, &e)));
+            .and_then(|()| std::fs::rename(&growing, to).map_err(|e| Error::cannot_write(to, &e)));
         written.inspect_err(|_| drop(std::fs::remove_file(&growing)))
     }
 
     fn fill_csv(&self, name: &str, growing: &Path) -> Result<(), Error> {
-        let failed = |e: std::io::Error| Error::write(growing, &e);
+        let failed = |e: std::io::Error| Error::cannot_write(growing, &e);
         let mut csv =
             csv::Writer::from_writer(BufWriter::new(File::create(growing).map_err(failed)?));
         let mut is_begun = false;
-        self.each_block(name, |block| {
+        self.for_each_block_of(name, |block| {
             if !is_begun {
                 csv.write_record(heading(&block.schema)).map_err(|e| failed(e.into()))?;
                 is_begun = true;
@@ -136,14 +140,14 @@ impl Source<'_> {
     }
 }
 
-fn partial(path: &Path) -> PathBuf {
+fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
     name.into()
 }
 
 /// Keeps rows of cycles that are multiples of `every`.
-fn thin(block: &mut Table, every: Cycle) {
+fn downsample(block: &mut Table, every: Cycle) {
     let Some(Values::U64(cycles)) = block.column("cycle").filter(|_| every > 1) else { return };
     let keep: Vec<bool> = cycles.iter().map(|cycle| cycle.is_multiple_of(every)).collect();
     block.columns.iter_mut().for_each(|column| column.retain_rows(&keep));

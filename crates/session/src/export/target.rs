@@ -1,10 +1,10 @@
 //! The place of an export.
 
-use super::Job;
+use super::ExportContext;
 use crate::Error;
-use crate::files::whereabouts_of;
+use crate::files::resolve_path;
 use sidestep::kernel::InputError;
-use sidestep_record::followed;
+use sidestep_record::resolve_link;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -19,13 +19,13 @@ impl Target {
     ///
     /// # Errors
     /// When that is the recording itself, or a folder that contains it: it would be lost.
-    fn named(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
+    fn resolve(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
         let recorded = &job.recorded.path;
-        let path = job.wanted.out.map_or_else(|| beside(recorded, ending), Path::to_path_buf);
+        let path = job.wanted.out.map_or_else(|| default_path(recorded, ending), Path::to_path_buf);
         let target = Self { path };
-        if whereabouts_of(recorded).starts_with(whereabouts_of(&target.path)) {
+        if resolve_path(recorded).starts_with(resolve_path(&target.path)) {
             let cause = "this is the recording that is exported, or holds it";
-            return Err(target.refuse(cause, "name another place with --out"));
+            return Err(target.error(cause, "name another place with --out"));
         }
         Ok(target)
     }
@@ -34,11 +34,11 @@ impl Target {
     ///
     /// # Errors
     /// When the file exists and may not be replaced.
-    pub(super) fn file(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
-        let target = Self::named(job, ending)?;
+    pub(super) fn for_file(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
+        let target = Self::resolve(job, ending)?;
         match std::fs::metadata(&target.path) {
-            Ok(found) if found.is_dir() => Err(target.refuse("this is a folder", "name a file")),
-            Ok(_) if !job.wanted.replace => Err(target.refuse(EXISTS, REPLACE)),
+            Ok(found) if found.is_dir() => Err(target.error("this is a folder", "name a file")),
+            Ok(_) if !job.wanted.replace => Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY)),
             _ => Ok(target),
         }
     }
@@ -47,11 +47,15 @@ impl Target {
     ///
     /// # Errors
     /// When the folder exists and may not be replaced, or holds something else.
-    pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &[&str]) -> Result<Self, InputError> {
-        let target = Self::named(job, ending)?;
+    pub(super) fn for_folder(
+        job: &ExportContext<'_>,
+        ending: &str,
+        holds: &[&str],
+    ) -> Result<Self, InputError> {
+        let target = Self::resolve(job, ending)?;
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
             return match target.path.exists() {
-                true => Err(target.refuse("this is no folder", "name a new folder")),
+                true => Err(target.error("this is no folder", "name a new folder")),
                 false => Ok(target),
             };
         };
@@ -62,17 +66,17 @@ impl Target {
             })
         };
         if !job.wanted.replace {
-            return Err(target.refuse(EXISTS, REPLACE));
+            return Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY));
         }
         if !entries.all(is_ours) {
             let listed = holds.join(", .");
             let cause = format!("the folder holds something else than .{listed} files");
-            return Err(target.refuse(&cause, "name a new folder"));
+            return Err(target.error(&cause, "name a new folder"));
         }
         Ok(target)
     }
 
-    fn refuse(&self, cause: &str, remedy: &str) -> InputError {
+    fn error(&self, cause: &str, remedy: &str) -> InputError {
         InputError::new(self.path.display(), cause, remedy)
     }
 
@@ -86,12 +90,12 @@ impl Target {
     ///
     /// # Errors
     /// The error of `fill`, or an I/O error; nothing is left then.
-    pub(super) fn make_folder<T>(
+    pub(super) fn write_folder<T>(
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let failed = |e: std::io::Error| Error::write(&self.path, &e);
-        let path = followed(&self.path).map_err(failed)?;
+        let failed = |e: std::io::Error| Error::cannot_write(&self.path, &e);
+        let path = resolve_link(&self.path).map_err(failed)?;
         let mut growing = path.as_os_str().to_owned();
         growing.push(".partial");
         let growing = PathBuf::from(growing);
@@ -106,8 +110,8 @@ impl Target {
     }
 }
 
-const EXISTS: &str = "is there already";
-const REPLACE: &str = "name another place with --out, or give --replace";
+const EXISTS_CAUSE: &str = "is there already";
+const REPLACE_REMEDY: &str = "name another place with --out, or give --replace";
 
 fn remove(folder: &Path) -> std::io::Result<()> {
     match std::fs::remove_dir_all(folder) {
@@ -117,7 +121,7 @@ fn remove(folder: &Path) -> std::io::Result<()> {
 }
 
 /// Returns the place beside a recording, with its name.
-fn beside(recorded: &Path, ending: &str) -> PathBuf {
+fn default_path(recorded: &Path, ending: &str) -> PathBuf {
     // `.` and `..` have no name of their own.
     let whole = std::fs::canonicalize(recorded).unwrap_or_else(|_| recorded.to_path_buf());
     let named = if recorded.file_name().is_some() { recorded } else { &whole };

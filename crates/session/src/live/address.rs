@@ -6,36 +6,37 @@ use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::str::FromStr;
 
 /// The port if none is given: the one that viewers try first.
-const PORT: u16 = 8765;
+const DEFAULT_PORT: u16 = 8765;
 /// The number of ports that are tried.
-const PORTS: u16 = 100;
+const MAX_PORTS_TRIED: u16 = 100;
 
 /// A host, or a host and a port, at which viewers are served.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ViewersAt {
+pub struct ViewerAddress {
     host: String,
     port: u16,
 }
 
-impl FromStr for ViewersAt {
+impl FromStr for ViewerAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no HOST:PORT; give 127.0.0.1:{PORT}, for example");
+        let wrong =
+            || format!("`{text}` is no HOST:PORT; give 127.0.0.1:{DEFAULT_PORT}, for example");
         let number = |port: &str| port.parse::<u16>().map_err(|_| wrong());
         let (host, port) = match text.rsplit_once(':') {
             // Addresses of IPv6 without brackets have colons of their own.
-            _ if text.parse::<IpAddr>().is_ok() || text.ends_with(']') => (text, PORT),
+            _ if text.parse::<IpAddr>().is_ok() || text.ends_with(']') => (text, DEFAULT_PORT),
             Some((host, port)) => (host, number(port)?),
             None if text.parse::<u16>().is_ok() => ("127.0.0.1", number(text)?),
-            None => (text, PORT),
+            None => (text, DEFAULT_PORT),
         };
         let host = host.trim_start_matches('[').trim_end_matches(']').to_string();
         if host.is_empty() { Err(wrong()) } else { Ok(Self { host, port }) }
     }
 }
 
-impl ViewersAt {
+impl ViewerAddress {
     /// Returns the host in the form in which it precedes a port.
     pub fn host(&self) -> String {
         if self.host.contains(':') { format!("[{}]", self.host) } else { self.host.clone() }
@@ -47,18 +48,18 @@ impl ViewersAt {
     }
 
     /// Returns whether other machines can reach it.
-    pub fn is_open_to_others(&self) -> bool {
-        self.resolved().is_ok_and(|ip| !ip.is_loopback())
+    pub fn is_public(&self) -> bool {
+        self.resolve_ip().is_ok_and(|ip| !ip.is_loopback())
     }
 
     /// Returns the address with a port that is free now, if any port will do.
     ///
     /// # Errors
     /// When it does not belong to this machine, or the port is in use; the error then names the next free one.
-    pub fn settled(&self) -> Result<Self, InputError> {
-        let bound = self.resolved().and_then(|ip| TcpListener::bind((ip, self.port)));
+    pub fn with_free_port(&self) -> Result<Self, InputError> {
+        let bound = self.resolve_ip().and_then(|ip| TcpListener::bind((ip, self.port)));
         let port =
-            bound.and_then(|bound| bound.local_addr()).map_err(|e| self.unusable(&e))?.port();
+            bound.and_then(|bound| bound.local_addr()).map_err(|e| self.bind_error(&e))?.port();
         Ok(Self { port, ..self.clone() })
     }
 
@@ -67,21 +68,21 @@ impl ViewersAt {
         format!("ws://{}:{}", self.host(), self.port)
     }
 
-    fn resolved(&self) -> io::Result<IpAddr> {
+    fn resolve_ip(&self) -> io::Result<IpAddr> {
         let mut found = (self.host.as_str(), self.port).to_socket_addrs()?;
         let first = found.next().map(|address| address.ip());
         first.ok_or_else(|| io::ErrorKind::AddrNotAvailable.into())
     }
 
     /// Returns the error of an address that could not be taken.
-    pub(crate) fn unusable(&self, error: &io::Error) -> InputError {
+    pub(crate) fn bind_error(&self, error: &io::Error) -> InputError {
         let place = format!("--foxglove {}:{}", self.host(), self.port);
         let in_use = error.kind() == io::ErrorKind::AddrInUse;
-        let Some(ip) = self.resolved().ok().filter(|_| in_use) else {
+        let Some(ip) = self.resolve_ip().ok().filter(|_| in_use) else {
             let remedy = "give an address of this machine, such as 127.0.0.1:8765";
             return InputError::new(place, error.to_string(), remedy);
         };
-        let remedy = match next_free(ip, self.port) {
+        let remedy = match next_free_port(ip, self.port) {
             Some(free) => format!("give --foxglove {}:{free}, which is free", self.host()),
             None => format!("give --foxglove {}:0, and a free one is taken", self.host()),
         };
@@ -90,8 +91,8 @@ impl ViewersAt {
 }
 
 /// Returns the first free port of the next hundred.
-pub fn next_free(ip: IpAddr, port: u16) -> Option<u16> {
-    let after = (port..port.saturating_add(PORTS)).skip(1);
+pub fn next_free_port(ip: IpAddr, port: u16) -> Option<u16> {
+    let after = (port..port.saturating_add(MAX_PORTS_TRIED)).skip(1);
     after.into_iter().find(|port| TcpListener::bind(SocketAddr::new(ip, *port)).is_ok())
 }
 
@@ -101,14 +102,14 @@ mod tests {
 
     #[test]
     fn addresses_have_a_host_a_port_or_both() {
-        let read = |text: &str| text.parse::<ViewersAt>().map(|at| (at.host(), at.port()));
+        let read = |text: &str| text.parse::<ViewerAddress>().map(|at| (at.host(), at.port()));
         let is = |host: &str, port| Ok((host.to_string(), port));
         assert_eq!(read("127.0.0.1:9000"), is("127.0.0.1", 9000));
         assert_eq!(read("9000"), is("127.0.0.1", 9000));
-        assert_eq!(read("here.example"), is("here.example", PORT));
+        assert_eq!(read("here.example"), is("here.example", DEFAULT_PORT));
         assert_eq!(read("[::1]:9000"), is("[::1]", 9000));
-        assert_eq!(read("::1"), is("[::1]", PORT));
-        assert_eq!(read("[::1]"), is("[::1]", PORT));
+        assert_eq!(read("::1"), is("[::1]", DEFAULT_PORT));
+        assert_eq!(read("[::1]"), is("[::1]", DEFAULT_PORT));
         for wrong in ["", ":9000", "host:", "host:port", "host:70000"] {
             assert!(read(wrong).is_err_and(|e| e.contains("127.0.0.1:8765")), "{wrong}");
         }
@@ -118,21 +119,22 @@ mod tests {
     fn a_port_in_use_is_an_error_with_the_next_free_one() {
         let taken = TcpListener::bind("127.0.0.1:0").expect("any port");
         let port = taken.local_addr().expect("bound").port();
-        let at: ViewersAt = format!("127.0.0.1:{port}").parse().expect("an address");
-        let error = at.settled().expect_err("in use");
+        let at: ViewerAddress = format!("127.0.0.1:{port}").parse().expect("an address");
+        let error = at.with_free_port().expect_err("in use");
         assert_eq!(error.place(), format!("--foxglove 127.0.0.1:{port}"));
         assert!(error.remedy().contains("--foxglove 127.0.0.1:"), "{error}");
         drop(taken);
-        assert_eq!(at.settled(), Ok(at));
-        let any: ViewersAt = "127.0.0.1:0".parse().expect("an address");
+        assert_eq!(at.with_free_port(), Ok(at));
+        let any: ViewerAddress = "127.0.0.1:0".parse().expect("an address");
         assert!(
-            any.settled().is_ok_and(|at| at.port() > 0 && at.url().starts_with("ws://127.0.0.1:"))
+            any.with_free_port()
+                .is_ok_and(|at| at.port() > 0 && at.url().starts_with("ws://127.0.0.1:"))
         );
     }
 
     #[test]
     fn an_address_that_is_not_this_machines_is_an_error() {
-        let at: ViewersAt = "192.0.2.1:9000".parse().expect("an address");
-        assert!(at.settled().is_err() && at.is_open_to_others());
+        let at: ViewerAddress = "192.0.2.1:9000".parse().expect("an address");
+        assert!(at.with_free_port().is_err() && at.is_public());
     }
 }

@@ -4,16 +4,18 @@
 //! that no viewer could take in time are not made, and the run goes on meanwhile.
 
 mod address;
-mod steered;
+mod control;
 
-pub use address::{ViewersAt, next_free};
-pub use steered::Steered;
+pub use address::{ViewerAddress, next_free_port};
+pub use control::LiveControl;
 
 use crate::Error;
-use crate::film::LOOK;
+use crate::frame_sink::FRAME_OPTIONS;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Frame, Look, Scenery};
-use sidestep_record::{LiveFrames, LiveServer, Playback, Playing, Steering, live};
+use sidestep::kernel::view::{Frame, FrameOptions, Scenery};
+use sidestep_record::{
+    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, start_live_server,
+};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -22,18 +24,18 @@ use std::thread::{self, Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// The time between two frames.
-const FRAME: Duration = Duration::from_millis(33);
+const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 /// The time between two states of a run that goes on.
-const TOLD: Duration = Duration::from_millis(100);
-const TRIES: u32 = 50;
-const BETWEEN_TRIES: Duration = Duration::from_millis(10);
+const PLAYBACK_INTERVAL: Duration = Duration::from_millis(100);
+const MAX_BIND_ATTEMPTS: u32 = 50;
+const BIND_RETRY_DELAY: Duration = Duration::from_millis(10);
 /// The speeds that viewers can ask for.
-const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
+const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 /// The viewers of one run. They are disconnected when this is dropped.
-pub struct Viewers {
+pub struct ViewerServer {
     server: LiveServer,
-    wishes: Arc<Wishes>,
+    wishes: Arc<PlaybackRequests>,
     /// `None` after the last frame.
     frames: Option<SyncSender<Frame>>,
     is_encoding: Arc<AtomicBool>,
@@ -45,22 +47,22 @@ pub struct Viewers {
 }
 
 /// The wishes of viewers, and the answers to them.
-struct Wishes {
+struct PlaybackRequests {
     can_seek: bool,
     told: Mutex<Playback>,
-    wish: Mutex<Option<Steering>>,
+    wish: Mutex<Option<PlaybackRequest>>,
 }
 
-impl Viewers {
+impl ViewerServer {
     /// The options of frames for viewers.
-    pub const LOOK: Look = LOOK;
+    pub const FRAME_OPTIONS: FrameOptions = FRAME_OPTIONS;
 
     /// Starts to serve viewers of a run, up to `end_s` of simulated time. With `can_seek`, they may ask for times.
     ///
     /// # Errors
     /// When the address cannot be taken.
     pub fn start(
-        at: &ViewersAt,
+        at: &ViewerAddress,
         run: &mut dyn Simulation,
         scenery: &Scenery,
         end_s: f64,
@@ -68,19 +70,20 @@ impl Viewers {
         now: Playback,
     ) -> Result<Self, Error> {
         let told = Mutex::new(now);
-        let wishes = Arc::new(Wishes { can_seek, told, wish: Mutex::default() });
+        let wishes = Arc::new(PlaybackRequests { can_seek, told, wish: Mutex::default() });
         let heard = wishes.clone();
-        let first = run.frame(LOOK);
+        let first = run.frame(FRAME_OPTIONS);
         let (host, port) = (at.host(), at.port());
-        let steer = move |wish| heard.take(wish);
-        let served = retried(|| live(&host, port, scenery, &first, end_s, steer.clone()));
-        let (server, encoder) = served.map_err(|e| at.unusable(&e))?;
+        let steer = move |wish| heard.accept(wish);
+        let served =
+            retry_bind(|| start_live_server(&host, port, scenery, &first, end_s, steer.clone()));
+        let (server, encoder) = served.map_err(|e| at.bind_error(&e))?;
         let (frames, taken) = sync_channel(1);
         let is_encoding = Arc::new(AtomicBool::new(false));
         let busy = is_encoding.clone();
         let thread = Builder::new().name("viewers".into());
-        let thread = thread.spawn(move || encode(encoder, &taken, &busy)).map_err(|e| {
-            Error::stopped(format!("no thread for viewers: {e}"), "end other programs")
+        let thread = thread.spawn(move || encode_frames(encoder, &taken, &busy)).map_err(|e| {
+            Error::other(format!("no thread for viewers: {e}"), "end other programs")
         })?;
         Ok(Self {
             server,
@@ -95,26 +98,26 @@ impl Viewers {
     }
 
     /// Returns whether there are viewers.
-    pub fn are_there(&self) -> bool {
-        self.server.is_watched()
+    pub fn has_viewers(&self) -> bool {
+        self.server.has_viewers()
     }
 
     /// Returns the wish of viewers since the last call.
-    pub fn wish(&self) -> Option<Steering> {
+    pub fn take_request(&self) -> Option<PlaybackRequest> {
         lock(&self.wishes.wish).take()
     }
 
     /// Returns whether a frame of this time is due for them now.
-    pub fn frame_due(&self, time_s: f64, now: Instant) -> bool {
-        self.are_there()
+    pub fn is_frame_due(&self, time_s: f64, now: Instant) -> bool {
+        self.has_viewers()
             && time_s != self.shown_s
             && now >= self.frame_due
             && !self.is_encoding.load(Ordering::Acquire)
     }
 
     /// Shows a frame that was due.
-    pub fn show(&mut self, frame: Frame, now: Instant) {
-        (self.shown_s, self.frame_due) = (frame.time_s, (self.frame_due + FRAME).max(now));
+    pub fn send_frame(&mut self, frame: Frame, now: Instant) {
+        (self.shown_s, self.frame_due) = (frame.time_s, (self.frame_due + FRAME_INTERVAL).max(now));
         self.is_encoding.store(true, Ordering::Release);
         if let Some(frames) = &self.frames {
             // It is taken, because the one before is encoded.
@@ -124,7 +127,7 @@ impl Viewers {
 
     /// Tells them the state of the run: at once if its activity changes or its time has jumped, otherwise now and
     /// then.
-    pub fn tell(&mut self, playback: Playback, now: Instant) {
+    pub fn send_playback(&mut self, playback: Playback, now: Instant) {
         let mut told = lock(&self.wishes.told);
         let did_seek = playback.did_seek || playback.time_s < told.time_s;
         let is_other = told.playing != playback.playing || told.speed != playback.speed || did_seek;
@@ -132,13 +135,13 @@ impl Viewers {
         if is_other || is_later {
             *told = Playback { did_seek: false, ..playback };
             drop(told);
-            self.told_due = now + TOLD;
-            self.server.tell(Playback { did_seek, ..playback });
+            self.told_due = now + PLAYBACK_INTERVAL;
+            self.server.broadcast(Playback { did_seek, ..playback });
         }
     }
 }
 
-impl Drop for Viewers {
+impl Drop for ViewerServer {
     fn drop(&mut self) {
         self.frames = None;
         if let Some(thread) = self.thread.take() {
@@ -147,13 +150,13 @@ impl Drop for Viewers {
     }
 }
 
-impl Wishes {
+impl PlaybackRequests {
     /// Takes a wish, and returns the resulting playback.
-    fn take(&self, wish: Steering) -> Playback {
+    fn accept(&self, wish: PlaybackRequest) -> Playback {
         let told = *lock(&self.told);
         let speed = match wish.speed {
             speed if speed.is_finite() && speed > 0.0 => {
-                speed.clamp(*SPEEDS.start(), *SPEEDS.end())
+                speed.clamp(*SPEED_RANGE.start(), *SPEED_RANGE.end())
             }
             _ => told.speed,
         };
@@ -161,8 +164,8 @@ impl Wishes {
         let mut waiting = lock(&self.wish);
         // A viewer that asks for a time, and then to play, means both.
         let before_s = waiting.as_ref().and_then(|before| before.seek_s);
-        *waiting = Some(Steering { speed, seek_s: seek_s.or(before_s), ..wish });
-        let playing = if wish.play { Playing::Playing } else { Playing::Paused };
+        *waiting = Some(PlaybackRequest { speed, seek_s: seek_s.or(before_s), ..wish });
+        let playing = if wish.play { PlaybackPhase::Playing } else { PlaybackPhase::Paused };
         let time_s = seek_s.unwrap_or(told.time_s);
         Playback { playing, time_s, speed, did_seek: seek_s.is_some() }
     }
@@ -173,10 +176,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Tries to get a port for a moment: the server that had it before may be about to end.
-fn retried<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
-    for _ in 0..TRIES {
+fn retry_bind<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
+    for _ in 0..MAX_BIND_ATTEMPTS {
         match start() {
-            Err(error) if error.kind() == io::ErrorKind::AddrInUse => thread::sleep(BETWEEN_TRIES),
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
+                thread::sleep(BIND_RETRY_DELAY)
+            }
             other => return other,
         }
     }
@@ -184,10 +189,10 @@ fn retried<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
 }
 
 /// Encodes frames until the last one.
-fn encode(mut encoder: LiveFrames, frames: &Receiver<Frame>, is_encoding: &AtomicBool) {
+fn encode_frames(mut encoder: LiveFrameWriter, frames: &Receiver<Frame>, is_encoding: &AtomicBool) {
     for frame in frames {
         // A frame that cannot be encoded is not shown; the next one may be.
-        let _ = encoder.frame(&frame);
+        let _ = encoder.write_frame(&frame);
         is_encoding.store(false, Ordering::Release);
     }
 }
@@ -197,29 +202,29 @@ mod tests {
     use super::*;
 
     const TOLD: Playback =
-        Playback { playing: Playing::Playing, time_s: 5.0, speed: 2.0, did_seek: false };
+        Playback { playing: PlaybackPhase::Playing, time_s: 5.0, speed: 2.0, did_seek: false };
 
-    fn wishes(can_seek: bool) -> Wishes {
-        Wishes { can_seek, told: Mutex::new(TOLD), wish: Mutex::default() }
+    fn wishes(can_seek: bool) -> PlaybackRequests {
+        PlaybackRequests { can_seek, told: Mutex::new(TOLD), wish: Mutex::default() }
     }
 
-    fn wish(play: bool, speed: f64, seek_s: Option<f64>) -> Steering {
-        Steering { play, speed, seek_s }
+    fn wish(play: bool, speed: f64, seek_s: Option<f64>) -> PlaybackRequest {
+        PlaybackRequest { play, speed, seek_s }
     }
 
     #[test]
     fn a_wish_for_a_time_is_not_lost_when_another_wish_follows() {
         let wishes = wishes(true);
-        let came = wishes.take(wish(false, 1.0, Some(7.0)));
-        assert_eq!((came.playing, came.time_s, came.did_seek), (Playing::Paused, 7.0, true));
-        wishes.take(wish(true, 4.0, None));
+        let came = wishes.accept(wish(false, 1.0, Some(7.0)));
+        assert_eq!((came.playing, came.time_s, came.did_seek), (PlaybackPhase::Paused, 7.0, true));
+        wishes.accept(wish(true, 4.0, None));
         assert_eq!(lock(&wishes.wish).take(), Some(wish(true, 4.0, Some(7.0))));
     }
 
     #[test]
     fn times_are_refused_where_a_run_cannot_go_back() {
         let wishes = wishes(false);
-        let came = wishes.take(wish(true, 1.0, Some(7.0)));
+        let came = wishes.accept(wish(true, 1.0, Some(7.0)));
         assert_eq!((came.time_s, came.did_seek), (5.0, false));
         assert_eq!(lock(&wishes.wish).take().and_then(|wish| wish.seek_s), None);
     }
@@ -228,7 +233,7 @@ mod tests {
     fn speeds_that_are_none_leave_the_speed_and_others_are_kept_in_bounds() {
         let wishes = wishes(false);
         let speeds = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e9, 1e-9, 3.0];
-        let came = speeds.map(|speed| wishes.take(wish(true, speed, None)).speed);
+        let came = speeds.map(|speed| wishes.accept(wish(true, speed, None)).speed);
         assert_eq!(came, [2.0, 2.0, 2.0, 2.0, 100.0, 0.1, 3.0]);
     }
 }

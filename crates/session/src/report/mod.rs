@@ -8,10 +8,10 @@
 
 mod events;
 mod metrics;
-mod recorded;
 mod run;
 mod sweep;
-mod words;
+mod tables;
+mod text;
 
 use crate::sweep::Folder;
 use crate::{Error, Watcher};
@@ -19,7 +19,7 @@ use sidestep::scenario::Worlds;
 use sidestep_document::Document;
 use std::path::Path;
 
-pub use words::duration;
+pub use text::format_duration;
 
 /// Returns the report of a run folder or of the folder of a sweep. Only this function distinguishes
 /// the two.

@@ -1,15 +1,15 @@
 //! A run folder as a document. Nothing here knows worlds: metrics come from `summary.json`, and
 //! everything else follows from the schemas of the recorded tables.
 
-use super::words::{count, duration};
-use super::{events, metrics, recorded};
-use crate::stored_summary;
+use super::text::{format_count, format_duration};
+use super::{events, metrics, tables};
+use crate::read_summary;
 use serde_json::Value;
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Meaning, Worlds};
+use sidestep::scenario::{MetricInfo, Worlds};
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Code, Picture, Text};
-use sidestep_record::{Manifest, RunView, Status};
+use sidestep_record::{Manifest, RunReader, Status};
 use std::path::Path;
 
 /// The remark beside all numbers of a single run.
@@ -21,8 +21,8 @@ const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and s
 /// # Errors
 /// When it is no run folder, or something in it is damaged.
 pub(super) fn document(worlds: Worlds, folder: &Path) -> Result<Document, InputError> {
-    let view = RunView::open(folder)?;
-    let summary = stored_summary(folder)?;
+    let view = RunReader::open(folder)?;
+    let summary = read_summary(folder)?;
     let name = name(&view, summary.as_ref());
     let mut document = Document::new(format!("{name}, seed {}", view.manifest.seed), lead(&view));
     if let Some(warning) = unfinished(&view) {
@@ -32,44 +32,45 @@ pub(super) fn document(worlds: Worlds, folder: &Path) -> Result<Document, InputE
         document.section("Where everybody went").pictures([picture]);
     }
     if let Some(summary) = &summary {
-        let meanings = worlds.named(&view.manifest.world).map_or(&[][..], |kind| kind.meanings());
-        tell_metrics(&mut document, &view.manifest, summary, meanings);
+        let meanings =
+            worlds.find(&view.manifest.world).map_or(&[][..], |kind| kind.metric_infos());
+        append_metrics(&mut document, &view.manifest, summary, meanings);
     }
-    for table in recorded::names(folder)? {
-        events::tell(&mut document, folder, &table)?;
+    for table in tables::table_names(folder)? {
+        events::append(&mut document, folder, &table)?;
     }
     document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));
-    document.commands("How to run it again", again(&view));
+    document.commands("How to run it again", reproduction_commands(&view));
     document.push(Block::Code(Code {
         title: "The scenario, complete in itself (scenario.toml)".into(),
         language: "toml",
         text: view.scenario.clone(),
     }));
-    recorded::tell(&mut document, folder)?;
+    tables::append(&mut document, folder)?;
     Ok(document)
 }
 
 /// Returns the scenario's name, or the world's if it has none.
-fn name(view: &RunView, summary: Option<&Value>) -> String {
+fn name(view: &RunReader, summary: Option<&Value>) -> String {
     let named = summary.and_then(|s| s.get("name")).and_then(Value::as_str);
     named.filter(|name| !name.is_empty()).unwrap_or(&view.manifest.world).into()
 }
 
-fn lead(view: &RunView) -> Text {
+fn lead(view: &RunReader) -> Text {
     let Manifest { world, status, cycles_done, cycles_planned, program_version, .. } =
         &view.manifest;
-    let (done, planned) = (count(*cycles_done), count(*cycles_planned));
+    let (done, planned) = (format_count(*cycles_done), format_count(*cycles_planned));
     let cycles = match (cycles_done == cycles_planned, status) {
         (true, _) => format!("{done} cycles"),
         (false, Status::Complete) => format!("over after {done} of at most {planned} cycles"),
         (false, _) => format!("{done} of {planned} cycles"),
     };
     let text = format!("A run of the world `{world}` by sidestep {program_version}, {cycles}.");
-    Text::marked(&text)
+    Text::from_markup(&text)
 }
 
 /// Returns a remark about a run that is not complete.
-fn unfinished(view: &RunView) -> Option<Text> {
+fn unfinished(view: &RunReader) -> Option<Text> {
     let Manifest { status, cycles_done, .. } = &view.manifest;
     let how = match status {
         Status::Complete => return None,
@@ -78,14 +79,14 @@ fn unfinished(view: &RunView) -> Option<Text> {
     };
     let text = format!(
         "**This run is not complete.** {how}; what is below is of its first {} cycles at most. ",
-        count(*cycles_done)
+        format_count(*cycles_done)
     );
     let resume =
-        Text::code(format!("sidestep resume {}", quoted(&view.path.display().to_string())));
-    Some(Text::marked(&text).and(resume).and(" goes on with it."))
+        Text::code(format!("sidestep resume {}", shell_quote(&view.path.display().to_string())));
+    Some(Text::from_markup(&text).append(resume).append(" goes on with it."))
 }
 
-fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
+fn facts(view: &RunReader, summary: Option<&Value>) -> Vec<(String, Text)> {
     let manifest = &view.manifest;
     let status = match manifest.status {
         Status::Complete => "complete",
@@ -96,16 +97,16 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
         ("World".into(), Text::code(&*manifest.world)),
         ("Status".into(), status.into()),
         ("Seed".into(), manifest.seed.to_string().into()),
-        ("Cycles".into(), count(manifest.cycles_done).into()),
-        ("Cycles planned".into(), count(manifest.cycles_planned).into()),
+        ("Cycles".into(), format_count(manifest.cycles_done).into()),
+        ("Cycles planned".into(), format_count(manifest.cycles_planned).into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
     ];
     let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
     let mut fact = |name: &str, value: Option<String>| {
         facts.extend(value.map(|value| (name.to_string(), Text::from(value))));
     };
-    fact("Agents", number("agents").or(number("robots")).map(|n| count(n as u64)));
-    fact("Took", number("wall_s").map(duration));
+    fact("Agents", number("agents").or(number("robots")).map(|n| format_count(n as u64)));
+    fact("Took", number("wall_s").map(format_duration));
     fact("Workers", number("workers").map(|n| n.to_string()));
     let digest = manifest.digest.clone();
     facts.extend(digest.map(|digest| ("Digest of the last state".into(), Text::code(digest))));
@@ -113,9 +114,9 @@ fn facts(view: &RunView, summary: Option<&Value>) -> Vec<(String, Text)> {
 }
 
 /// Returns the commands that reproduce the run.
-fn again(view: &RunView) -> String {
-    let folder = quoted(&view.path.display().to_string());
-    let scenario = quoted(&view.path.join("scenario.toml").display().to_string());
+fn reproduction_commands(view: &RunReader) -> String {
+    let folder = shell_quote(&view.path.display().to_string());
+    let scenario = shell_quote(&view.path.join("scenario.toml").display().to_string());
     format!(
         "# the same run, with the same rows and the same digest\n\
          sidestep run {scenario} --out NEW_DIR\n\
@@ -125,7 +126,7 @@ fn again(view: &RunView) -> String {
 }
 
 /// Returns a path quoted for a shell.
-pub(super) fn quoted(path: &str) -> String {
+pub(super) fn shell_quote(path: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
     if !path.is_empty() && path.chars().all(is_plain) {
         return path.into();
@@ -133,19 +134,19 @@ pub(super) fn quoted(path: &str) -> String {
     format!("'{}'", path.replace('\'', "'\\''"))
 }
 
-fn tell_metrics(
+fn append_metrics(
     document: &mut Document,
     manifest: &Manifest,
     summary: &Value,
-    meanings: &[Meaning],
+    meanings: &[MetricInfo],
 ) {
     let cycles = summary.get("cycles").and_then(Value::as_u64).unwrap_or(manifest.cycles_done);
-    let of = format!(" After {} cycles.", count(cycles));
-    document.section("Results").paragraph(Text::marked(&format!("{ONE_RUN}{of}")));
+    let of = format!(" After {} cycles.", format_count(cycles));
+    document.section("Results").paragraph(Text::from_markup(&format!("{ONE_RUN}{of}")));
     let get = |key| summary.get(key).unwrap_or(&Value::Null);
-    document.tables(metrics::flat("Metrics", get("metrics"), meanings));
-    document.tables(metrics::listed("Metrics of every agent", get("per_agent"), meanings));
-    document.tables(metrics::listed("Metrics of pairs of agents", get("per_pair"), meanings));
+    document.tables(metrics::tree_tables("Metrics", get("metrics"), meanings));
+    document.tables(metrics::list_table("Metrics of every agent", get("per_agent"), meanings));
+    document.tables(metrics::list_table("Metrics of pairs of agents", get("per_pair"), meanings));
 }
 
 /// Returns the picture in the run folder.
@@ -167,8 +168,8 @@ mod tests {
 
     #[test]
     fn a_path_reaches_the_shell_as_it_is() {
-        assert_eq!(quoted("runs/a-1"), "runs/a-1");
-        assert_eq!(quoted("my runs/it's"), "'my runs/it'\\''s'");
-        assert_eq!(quoted("$(rm)"), "'$(rm)'");
+        assert_eq!(shell_quote("runs/a-1"), "runs/a-1");
+        assert_eq!(shell_quote("my runs/it's"), "'my runs/it'\\''s'");
+        assert_eq!(shell_quote("$(rm)"), "'$(rm)'");
     }
 }

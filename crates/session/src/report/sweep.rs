@@ -1,10 +1,10 @@
 //! The folder of a sweep as a document: its runs, their results, and the precision of these.
 
-use super::run::quoted;
-use super::words::{count, duration};
-use crate::sweep::{Finished, Folder, finished, picture_of};
+use super::run::shell_quote;
+use super::text::{format_count, format_duration};
+use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
-use sidestep::experiment::sweep::rounds::{Stopped, stopped};
+use sidestep::experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep::experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
 use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
@@ -12,11 +12,11 @@ use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
 /// Number of variants for which a run is drawn.
-const DRAWN: usize = 4;
+const MAX_PICTURES: usize = 4;
 /// Longest time in seconds of a run that is repeated for its picture.
-const LONGEST_S: f64 = 20.0;
+const MAX_REPEATED_RUN_S: f64 = 20.0;
 /// Largest number of failed runs that are listed.
-const NAMED: usize = 20;
+const MAX_LISTED_FAILURES: usize = 20;
 
 /// Returns the report of the sweep in `folder`.
 ///
@@ -27,19 +27,19 @@ pub(super) fn document(
     folder: &Folder,
     watcher: &dyn Watcher,
 ) -> Result<Document, Error> {
-    let Finished { table, is_complete } = finished(folder)?;
+    let FinishedRuns { table, is_complete } = read_finished(folder)?;
     let plan = folder.plan();
     let summary = plan.summary(&table)?;
     let mut document = Document::new(name(plan), lead(plan, &table));
     if !is_complete {
         document.warning(unfinished(folder, &table));
     }
-    tell_results(&mut document, &summary);
-    tell_failures(&mut document, plan, &table);
+    append_results(&mut document, &summary);
+    append_failures(&mut document, plan, &table);
     let pictures = pictures(worlds, folder, &table, watcher)?;
-    tell_pictures(&mut document, pictures);
-    tell_methods(&mut document, &summary);
-    tell_plan(&mut document, folder, &table);
+    append_pictures(&mut document, pictures);
+    append_methods(&mut document, &summary);
+    append_plan(&mut document, folder, &table);
     Ok(document)
 }
 
@@ -52,11 +52,11 @@ fn name(plan: &Plan) -> String {
 
 fn lead(plan: &Plan, table: &RunTable) -> Text {
     let (runs, variants) = (table.runs() as u64, plan.variants.len() as u64);
-    Text::marked(&format!(
+    Text::from_markup(&format!(
         "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed \
          {}\u{a0}+\u{a0}k, so variants are compared seed by seed. {}",
-        count(runs),
-        count(variants),
+        format_count(runs),
+        format_count(variants),
         plan.world,
         plan.first_seed,
         // A single run has no interval, whether another seed would change it or not.
@@ -68,18 +68,18 @@ fn lead(plan: &Plan, table: &RunTable) -> Text {
 }
 
 fn unfinished(folder: &Folder, table: &RunTable) -> Text {
-    let (done, all) = (count(table.runs() as u64), count(folder.plan().runs()));
+    let (done, all) = (format_count(table.runs() as u64), format_count(folder.plan().runs()));
     let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
-    let resume = format!("sidestep resume {}", quoted(&folder.path().display().to_string()));
-    Text::marked(&text).and(Text::code(resume)).and(" goes on with it.")
+    let resume = format!("sidestep resume {}", shell_quote(&folder.path().display().to_string()));
+    Text::from_markup(&text).append(Text::code(resume)).append(" goes on with it.")
 }
 
 fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
     let (plan, manifest) = (folder.plan(), folder.manifest());
     let mut facts: Vec<(String, Text)> = vec![
         ("World".into(), Text::code(&*plan.world)),
-        ("Runs".into(), count(table.runs() as u64).into()),
-        ("Variants".into(), count(plan.variants.len() as u64).into()),
+        ("Runs".into(), format_count(table.runs() as u64).into()),
+        ("Variants".into(), format_count(plan.variants.len() as u64).into()),
         ("First seed".into(), plan.first_seed.to_string().into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
         ("Fingerprint of all scenarios".into(), Text::code(folder.fingerprint())),
@@ -97,7 +97,7 @@ fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
         facts.push(("Runs of a variant".into(), words.into()));
     }
     if let Some(simulated_s) = total(table, "run_wall_s") {
-        facts.push(("Simulation in all".into(), duration(simulated_s).into()));
+        facts.push(("Simulation in all".into(), format_duration(simulated_s).into()));
     }
     facts
 }
@@ -127,26 +127,26 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
             Some(value) => value.as_str().map_or_else(|| value.to_string(), str::to_string),
         };
         let first = [format!("{k:04}"), runs[k].to_string()];
-        rows.row(first.into_iter().chain(plan.parameters.iter().map(value)));
+        rows.push_row(first.into_iter().chain(plan.parameters.iter().map(value)));
     }
     Some(rows)
 }
 
 /// Returns the reasons why variants stopped, if a precision ends them.
-fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
-    let stopped = stopped(plan, table);
+fn stop_reasons_table(plan: &Plan, table: &RunTable) -> Option<Table> {
+    let stopped = variant_stops(plan, table);
     let names = plan.names();
     let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
-    for Stopped { variant, runs, reason } in &stopped {
+    for VariantStop { variant, runs, reason } in &stopped {
         let name = names.get(*variant as usize).cloned();
-        rows.row([name.unwrap_or_default(), runs.to_string(), reason.words().to_string()]);
+        rows.push_row([name.unwrap_or_default(), runs.to_string(), reason.describe().to_string()]);
     }
     (!stopped.is_empty()).then_some(rows)
 }
 
 /// Returns the commands that reproduce the sweep.
-fn again(folder: &Folder) -> String {
-    let at = |rest: &str| quoted(&folder.path().join(rest).display().to_string());
+fn reproduction_commands(folder: &Folder) -> String {
+    let at = |rest: &str| shell_quote(&folder.path().join(rest).display().to_string());
     format!(
         "# one run of the table: the scenario of its variant, and its seed\n\
          sidestep run {} --seed {}\n\
@@ -154,13 +154,13 @@ fn again(folder: &Folder) -> String {
          python3 -c 'import polars, sys; print(polars.read_parquet(sys.argv[1]))' {}\n",
         at("variants/0000/scenario.toml"),
         folder.plan().first_seed,
-        quoted(&folder.results_file().display().to_string()),
+        shell_quote(&folder.results_file().display().to_string()),
     )
 }
 
 /// Appends one table of everything, then every metric in a section of its own: its figures, and its tables
 /// folded.
-fn tell_results(document: &mut Document, summary: &Summary) {
+fn append_results(document: &mut Document, summary: &Summary) {
     document.section("Results").tables([summary.overview()]);
     summary.notes.iter().for_each(|note| {
         document.paragraph(note.as_str());
@@ -169,29 +169,29 @@ fn tell_results(document: &mut Document, summary: &Summary) {
         document.section(section.title);
         let name = Text::code(section.name);
         document.paragraph(match section.meaning {
-            "" => name.and("."),
-            meaning => name.and(format!(": {meaning}.")),
+            "" => name.append("."),
+            meaning => name.append(format!(": {meaning}.")),
         });
         document.figures(section.figures).tables(section.tables);
     }
 }
 
 /// Appends the notes common to all tables, and the metrics that are not shown.
-fn tell_methods(document: &mut Document, summary: &Summary) {
+fn append_methods(document: &mut Document, summary: &Summary) {
     document.section("How the numbers were made");
     summary.footnotes().into_iter().for_each(|note| {
-        document.paragraph(Text::marked(note));
+        document.paragraph(Text::from_markup(note));
     });
-    document.tables(summary.left_out().map(Table::folded));
+    document.tables(summary.omitted_metrics().map(Table::folded));
 }
 
 /// Appends the plan of the runs, and the commands to repeat them.
-fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
+fn append_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     let plan = folder.plan();
     document.section("What was run").push(Block::Facts(facts(folder, table)));
     document.tables(variants(plan, table).map(Table::folded));
-    document.tables(why_enough(plan, table).map(Table::folded));
-    document.commands("How to run it again", again(folder));
+    document.tables(stop_reasons_table(plan, table).map(Table::folded));
+    document.commands("How to run it again", reproduction_commands(folder));
     if let Ok(text) = std::fs::read_to_string(folder.scenario(0)) {
         let name = plan.names().into_iter().next().unwrap_or_default();
         let title = format!("The scenario of the first variant: {name}");
@@ -199,7 +199,7 @@ fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     }
 }
 
-fn tell_pictures(document: &mut Document, Pictures { all, remarks }: Pictures) {
+fn append_pictures(document: &mut Document, RunPictures { all, remarks }: RunPictures) {
     if all.is_empty() && remarks.is_empty() {
         return;
     }
@@ -210,7 +210,7 @@ fn tell_pictures(document: &mut Document, Pictures { all, remarks }: Pictures) {
     });
 }
 
-fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
+fn append_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     let Some(column) = table.column("failure") else { return };
     let failed = (0..table.runs()).filter(|&row| !column.values.text(row).is_empty());
     let failed: Vec<usize> = failed.collect();
@@ -218,22 +218,22 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
         return;
     }
     let text = format!("**{} runs failed** and are in no figure of this report.", failed.len());
-    document.section("Runs that failed").warning(Text::marked(&text));
-    let note = format!("The first {NAMED} at most.");
+    document.section("Runs that failed").warning(Text::from_markup(&text));
+    let note = format!("The first {MAX_LISTED_FAILURES} at most.");
     let mut rows = Table::new("Failures", note, &["variant", "seed", "why"]);
     let names = plan.names();
-    for &row in failed.iter().take(NAMED) {
+    for &row in failed.iter().take(MAX_LISTED_FAILURES) {
         let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
         let variant = number("variant").and_then(|v| names.get(v as usize).cloned());
         let seed = number("seed").map_or_else(String::new, |s| s.to_string());
-        rows.row([variant.unwrap_or_default(), seed, column.values.text(row)]);
+        rows.push_row([variant.unwrap_or_default(), seed, column.values.text(row)]);
     }
     document.tables([rows]);
 }
 
 /// Pictures of some runs, and the reasons why others have none.
 #[derive(Default)]
-struct Pictures {
+struct RunPictures {
     all: Vec<Picture>,
     remarks: Vec<String>,
 }
@@ -244,17 +244,17 @@ fn pictures(
     folder: &Folder,
     table: &RunTable,
     watcher: &dyn Watcher,
-) -> Result<Pictures, Error> {
+) -> Result<RunPictures, Error> {
     let plan = folder.plan();
-    let digests = table.of_role(Role::Digest).next();
-    let mut pictures = Pictures::default();
-    for (variant, title) in (0u32..).zip(plan.names()).take(DRAWN) {
+    let digests = table.columns_with_role(Role::Digest).next();
+    let mut pictures = RunPictures::default();
+    for (variant, title) in (0u32..).zip(plan.names()).take(MAX_PICTURES) {
         let cell = plan.cell(variant, 0);
         let Some(row) = row_of(table, cell.id).filter(|row| is_short(table, *row)) else {
             continue;
         };
         let digest = digests.map_or_else(String::new, |c| c.values.text(row));
-        match picture_of(worlds, folder, cell, &digest, watcher)? {
+        match run_picture(worlds, folder, cell, &digest, watcher)? {
             Ok(svg) => {
                 let caption = caption(folder, cell, row);
                 pictures.all.push(Picture { title, caption, svg });
@@ -287,5 +287,5 @@ fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
 fn is_short(table: &RunTable, row: usize) -> bool {
     let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
     let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());
-    !failed && number("run_wall_s").is_some_and(|took_s| took_s <= LONGEST_S)
+    !failed && number("run_wall_s").is_some_and(|took_s| took_s <= MAX_REPEATED_RUN_S)
 }

@@ -11,25 +11,27 @@
 //! status.rs    a sweep in progress elsewhere
 //! ```
 
-mod crew;
-mod effort;
-mod gather;
-mod journey;
-mod look;
-mod piles;
+mod buckets;
+mod cell_runner;
+mod executor;
+mod finished_runs;
+mod folder;
+mod journal;
+mod json;
 mod prepare;
-mod stamped;
+mod run;
 mod status;
 mod task;
-mod told;
-mod work;
+mod timing;
 
-pub use crew::{Crew, Deal, Engine, Taken};
-pub use effort::Effort;
-pub use gather::Folder;
-pub use journey::{Done, Ended, collect, go_on, in_memory, planned, planned_or_there, share};
-pub(crate) use look::picture_of;
-pub use look::{Finished, finished};
-pub use status::{Failure, ShareStatus, Status, status};
+pub use executor::{CellBatch, CellExecutor, Engine, OutcomeSink};
+pub(crate) use finished_runs::run_picture;
+pub use finished_runs::{FinishedRuns, read_finished};
+pub use folder::Folder;
+pub use json::failed_rows;
+pub use run::{
+    SweepEnd, SweepResult, collect, create, open_or_create, run_in_memory, run_remaining, run_share,
+};
+pub use status::{FailedRun, ShareStatus, SweepStatus, read_status};
 pub use task::Task;
-pub use told::failed;
+pub use timing::SweepTiming;

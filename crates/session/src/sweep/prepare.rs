@@ -1,21 +1,22 @@
 //! Every variant of a sweep, compiled once, so that errors in any of them are reported before any
 //! runs.
 
-use crate::scenario::{read, source_of};
-use crate::watcher::{Progress, Watched};
+use crate::scenario::{read_scenario, read_source};
+use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::cell::metric_names;
-use sidestep::experiment::sweep::work::run_cells;
-use sidestep::experiment::sweep::{Base, Plan, Setting, Sweep, Variant};
+use sidestep::experiment::sweep::scheduler::run_cells;
+use sidestep::experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Seeds, Source, Worlds, nearest};
+use sidestep::scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A plan, and the thing made of each variant, by its number.
-pub(super) type Prepared<T> = (Plan, Vec<T>);
+pub(super) type PreparedPlan<T> = (Plan, Vec<T>);
 
 /// A function that makes a thing of a variant: of its number, its scenario, and the compiled scenario.
-pub(super) type Make<'a, T> = &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
+pub(super) type VariantFn<'a, T> =
+    &'a (dyn Fn(u32, &Source, &dyn CompiledScenario) -> Result<T, Error> + Sync);
 
 /// Compiles every variant on a number of workers, calls `make` for each, and returns the results with the plan. With
 /// any number of workers, the error is that of the first variant that has one.
@@ -27,29 +28,29 @@ pub(super) fn prepare<T: Send>(
     sweep: &Sweep,
     workers: usize,
     watcher: &dyn Watcher,
-    make: Make<'_, T>,
-) -> Result<Prepared<T>, Error> {
+    make: VariantFn<'_, T>,
+) -> Result<PreparedPlan<T>, Error> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
-    let base = base(worlds, sweep, &fixed)?;
+    let base = base_source(worlds, sweep, &fixed)?;
     let mut variants = sweep.design.variants(&sweep.place)?;
     Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
     let checked = |wanted: &Variant| {
-        variant(worlds, &base, wanted).map_err(|e| {
+        compile_variant(worlds, &base, wanted).map_err(|e| {
             let plain = match sweep.given {
                 Some(_) => worlds.compile(&base).err(),
-                None => read(worlds, &sweep.scenario, &fixed).err(),
+                None => read_scenario(worlds, &sweep.scenario, &fixed).err(),
             };
-            of_variant(wanted, &base, plain, e)
+            variant_error(wanted, &base, plain, e)
         })
     };
     let (source, first) = checked(&variants[0])?;
     check_metrics(sweep, &source, first.as_ref())?;
-    let one = |k: u32, wanted: &Variant| -> Result<One<T>, Error> {
+    let one = |k: u32, wanted: &Variant| -> Result<CompiledVariant<T>, Error> {
         let (source, compiled) = checked(wanted)?;
-        let (seeds, agents) = (compiled.seeds(), compiled.bodies() as u64);
-        Ok(One { seeds, agents, made: make(k, &source, compiled.as_ref())? })
+        let (seeds, agents) = (compiled.seed_effect(), compiled.body_count() as u64);
+        Ok(CompiledVariant { seeds, agents, made: make(k, &source, compiled.as_ref())? })
     };
-    let all = each(&variants, workers, watcher, &one)?;
+    let all = for_each_variant(&variants, workers, watcher, &one)?;
     let agents = all.iter().map(|one| one.agents).max().unwrap_or(0);
     let mut made = Vec::with_capacity(all.len());
     for (variant, one) in variants.iter_mut().zip(all) {
@@ -57,7 +58,7 @@ pub(super) fn prepare<T: Send>(
         made.push(one.made);
     }
     let plain = first.plan();
-    let base = Base { world: first.world(), seed: plain.seed, source: &base };
+    let base = BaseScenario { world: first.world(), seed: plain.seed, source: &base };
     let plan = Plan::new(sweep, variants, base)?;
     // A sweep without a name of its own has that of its scenario.
     let name = if plan.name.is_empty() { plain.name } else { plan.name };
@@ -65,8 +66,8 @@ pub(super) fn prepare<T: Send>(
 }
 
 /// The findings of compiling a variant, and the thing made of it.
-struct One<T> {
-    seeds: Seeds,
+struct CompiledVariant<T> {
+    seeds: SeedEffect,
     agents: u64,
     made: T,
 }
@@ -75,7 +76,7 @@ struct One<T> {
 ///
 /// # Errors
 /// That of the first variant that has one, or when the watcher asks to stop.
-fn each<T: Send>(
+fn for_each_variant<T: Send>(
     variants: &[Variant],
     workers: usize,
     watcher: &dyn Watcher,
@@ -85,7 +86,7 @@ fn each<T: Send>(
     // Variants before a wrong one are completed, because one of them may be wrong, too.
     let wrong_at = AtomicU32::new(u32::MAX);
     let run = |(k, variant): &(u32, &Variant)| {
-        let is_wanted = watcher.go_on() && *k < wrong_at.load(Ordering::Relaxed);
+        let is_wanted = watcher.should_continue() && *k < wrong_at.load(Ordering::Relaxed);
         is_wanted.then(|| {
             let result = work(*k, variant);
             if result.is_err() {
@@ -94,12 +95,12 @@ fn each<T: Send>(
             Ok::<_, Error>((*k, result))
         })
     };
-    let watched = Watched(watcher);
+    let watched = ProgressGuard(watcher);
     let mut results: Vec<(u32, Result<T, Error>)> = Vec::with_capacity(variants.len());
     run_cells(&cells, workers, run, &mut |result| {
         results.push(result);
         let share = results.len() as f64 / variants.len() as f64;
-        watched.at(Progress::Stage { what: "checking variants", share });
+        watched.report(Progress::Stage { what: "checking variants", share });
         Ok(())
     })?;
     results.sort_by_key(|(k, _)| *k);
@@ -108,10 +109,10 @@ fn each<T: Send>(
 }
 
 /// Returns the scenario with the settings that all variants share.
-fn base(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
+fn base_source(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
     match &sweep.given {
-        Some(source) => source.clone().with(fixed),
-        None => source_of(worlds, &sweep.scenario, fixed),
+        Some(source) => source.clone().with_overrides(fixed),
+        None => read_source(worlds, &sweep.scenario, fixed),
     }
 }
 
@@ -119,7 +120,7 @@ fn base(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, Input
 fn check_metrics(
     sweep: &Sweep,
     source: &Source,
-    compiled: &dyn Compiled,
+    compiled: &dyn CompiledScenario,
 ) -> Result<(), InputError> {
     let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
     let mut wanted = sweep.metrics.iter().chain(of_until).peekable();
@@ -133,24 +134,24 @@ fn check_metrics(
     let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());
-    Err(InputError::new(&sweep.place, cause, nearest(unknown, &known)))
+    Err(InputError::new(&sweep.place, cause, suggestion(unknown, &known)))
 }
 
 /// Returns a variant's scenario.
-fn variant(
+fn compile_variant(
     worlds: Worlds,
     base: &Source,
     wanted: &Variant,
-) -> Result<(Source, Box<dyn Compiled>), InputError> {
+) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
     let overrides: Vec<String> = wanted.settings.iter().map(Setting::to_override).collect();
-    let source = base.clone().with(&overrides)?;
+    let source = base.clone().with_overrides(&overrides)?;
     let compiled = worlds.compile(&source)?;
     Ok((source, compiled))
 }
 
 /// Returns the error of a variant, which names the variant unless all have it: users do not see the
 /// lines of the text that its settings have edited.
-fn of_variant(
+fn variant_error(
     wanted: &Variant,
     base: &Source,
     plain: Option<InputError>,

@@ -1,7 +1,7 @@
 //! The state of a sweep that other processes work on, read from its folder; looking changes nothing.
 
-use super::gather::{Folder, check_variants, share_of, table_of};
-use super::stamped::{Read, now_unix_s};
+use super::folder::{Folder, check_variants, to_run_table, to_share};
+use super::journal::{StoredOutcome, now_unix_s};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Plan, Shard};
 use sidestep::kernel::InputError;
@@ -9,17 +9,17 @@ use sidestep_record::sweep::Share;
 use std::collections::BTreeSet;
 
 /// The span in seconds before the last run from which runs give the rate.
-const WINDOW_S: f64 = 600.0;
+const RATE_WINDOW_S: f64 = 600.0;
 /// The idle time, in usual times between two runs, after which a sweep counts as abandoned,
-const IDLE_RUNS: f64 = 10.0;
+const IDLE_TIMEOUT_RUNS: f64 = 10.0;
 /// but not before this many seconds.
-const IDLE_S: f64 = 60.0;
+const MIN_IDLE_TIMEOUT_S: f64 = 60.0;
 /// Largest number of failed runs that are listed one by one.
-const MOST_TOLD: usize = 100;
+const MAX_LISTED_FAILURES: usize = 100;
 
 /// The state of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Status {
+pub struct SweepStatus {
     /// Whether the table of all runs exists.
     pub is_complete: bool,
     /// Number of finished runs, those that failed among them.
@@ -31,7 +31,7 @@ pub struct Status {
     /// Number of runs that failed.
     pub failed: usize,
     /// The first of them.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<FailedRun>,
     /// Whether a process works on it, by the locks of its journals; where there are no locks, by the time since the
     /// last runs came in.
     pub is_worked_on: bool,
@@ -48,7 +48,7 @@ pub struct Status {
 
 /// A run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Failure {
+pub struct FailedRun {
     /// Number of its cell.
     pub cell: u64,
     /// Name of its variant.
@@ -76,15 +76,15 @@ pub struct ShareStatus {
 
 /// The findings in the folder.
 #[derive(Default)]
-struct Found {
+struct FolderScan {
     cells: BTreeSet<u64>,
     failed: Vec<(u64, String)>,
     /// The times at which runs came in, of shares in progress.
     stamps: Vec<f64>,
 }
 
-impl Found {
-    fn note(&mut self, outcome: Outcome) {
+impl FolderScan {
+    fn add(&mut self, outcome: Outcome) {
         let is_new = self.cells.insert(outcome.cell);
         if let Some(why) = outcome.failure.filter(|_| is_new) {
             self.failed.push((outcome.cell, why));
@@ -96,15 +96,15 @@ impl Found {
 ///
 /// # Errors
 /// When something in it cannot be read.
-pub fn status(folder: &Folder) -> Result<Status, InputError> {
+pub fn read_status(folder: &Folder) -> Result<SweepStatus, InputError> {
     let (plan, now_s) = (folder.plan(), now_unix_s());
-    let (mut found, mut shares) = (Found::default(), Vec::new());
+    let (mut found, mut shares) = (FolderScan::default(), Vec::new());
     check_variants(folder)?;
     let is_complete = folder.is_complete();
     if is_complete {
-        table_of(folder.results()?).outcomes(|outcome| found.note(outcome));
+        to_run_table(folder.results()?).for_each_outcome(|outcome| found.add(outcome));
     } else {
-        folder.parts(|part| table_of(part).outcomes(|outcome| found.note(outcome)))?;
+        folder.parts(|part| to_run_table(part).for_each_outcome(|outcome| found.add(outcome)))?;
         for (share, is_done) in folder.shares()? {
             shares.push(share_status(folder, share, is_done, &mut found, now_s)?);
         }
@@ -114,11 +114,11 @@ pub fn status(folder: &Folder) -> Result<Status, InputError> {
     let newest_s = found.stamps.iter().copied().reduce(f64::max);
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
     let runs_per_s = newest_s.and_then(|newest_s| rate(&found.stamps, newest_s));
-    let left_s = left_s(of.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
-    let is_worked_on = is_worked_on(folder, &shares, runs_per_s);
+    let left_s = eta_s(of.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
+    let is_worked_on = is_active(folder, &shares, runs_per_s);
     let failures = failures(plan, &mut found.failed);
     let failed = found.failed.len();
-    Ok(Status {
+    Ok(SweepStatus {
         is_complete,
         runs,
         of,
@@ -137,20 +137,20 @@ fn share_status(
     folder: &Folder,
     share: Share,
     is_done: bool,
-    found: &mut Found,
+    found: &mut FolderScan,
     now_s: f64,
 ) -> Result<ShareStatus, InputError> {
     let shard = Shard { index: share.index, count: share.count };
-    let of = folder.plan().share(shard).count() as u64;
+    let of = folder.plan().shard_cells(shard).count() as u64;
     let done =
         || ShareStatus { share: shard.to_string(), runs: of, of, is_done: true, idle_s: None };
     if is_done {
         return Ok(done());
     }
     let (mut runs, mut newest_s) = (0, None::<f64>);
-    let read = folder.journal_of(share, |Read { outcome, ended_unix_s }| {
+    let read = folder.journal_of(share, |StoredOutcome { outcome, ended_unix_s }| {
         runs += 1;
-        found.note(outcome);
+        found.add(outcome);
         found.stamps.extend(ended_unix_s);
         newest_s =
             ended_unix_s.map(|s| newest_s.map_or(s, |newest_s| newest_s.max(s))).or(newest_s);
@@ -168,43 +168,46 @@ fn share_status(
 
 /// Returns the recent rate of runs per second.
 fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
-    let late: Vec<f64> = stamps.iter().copied().filter(|s| newest_s - s <= WINDOW_S).collect();
+    let late: Vec<f64> = stamps.iter().copied().filter(|s| newest_s - s <= RATE_WINDOW_S).collect();
     let oldest_s = late.iter().copied().fold(newest_s, f64::min);
     let (spaces, span_s) = (late.len() - 1, newest_s - oldest_s);
     (spaces > 0 && span_s > 0.0).then(|| spaces as f64 / span_s)
 }
 
-fn left_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
+fn eta_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
     let (runs_per_s, idle_s) = (runs_per_s?, idle_s?);
-    (!is_long(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
+    (!is_stalled(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
 }
 
 /// Returns whether no run has finished for longer than a sweep in progress would take.
-fn is_long(idle_s: f64, runs_per_s: Option<f64>) -> bool {
-    idle_s > runs_per_s.map_or(IDLE_S, |runs_per_s| IDLE_S.max(IDLE_RUNS / runs_per_s))
+fn is_stalled(idle_s: f64, runs_per_s: Option<f64>) -> bool {
+    idle_s
+        > runs_per_s.map_or(MIN_IDLE_TIMEOUT_S, |runs_per_s| {
+            MIN_IDLE_TIMEOUT_S.max(IDLE_TIMEOUT_RUNS / runs_per_s)
+        })
 }
 
 /// Returns whether a process works on one of the shares that are begun and not done.
-fn is_worked_on(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
+fn is_active(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
     shares.iter().filter(|share| !share.is_done).any(|share| {
         let shard: Option<Shard> = share.share.parse().ok();
-        let locked = shard.and_then(|shard| folder.is_locked(share_of(shard)));
+        let locked = shard.and_then(|shard| folder.is_locked(to_share(shard)));
         // A share without a finished run may take any time for its first one.
-        let may_be = || share.idle_s.is_none_or(|idle_s| !is_long(idle_s, runs_per_s));
+        let may_be = || share.idle_s.is_none_or(|idle_s| !is_stalled(idle_s, runs_per_s));
         locked.unwrap_or_else(may_be)
     })
 }
 
 /// Returns the first runs that failed, in order.
-fn failures(plan: &Plan, failed: &mut [(u64, String)]) -> Vec<Failure> {
+fn failures(plan: &Plan, failed: &mut [(u64, String)]) -> Vec<FailedRun> {
     failed.sort();
     let names = plan.names();
     let told = |(cell, why): &(u64, String)| {
         let its = plan.cell_of(*cell)?;
         let variant = names[its.variant as usize].clone();
-        Some(Failure { cell: *cell, variant, seed: its.seed, why: why.clone() })
+        Some(FailedRun { cell: *cell, variant, seed: its.seed, why: why.clone() })
     };
-    failed.iter().take(MOST_TOLD).filter_map(told).collect()
+    failed.iter().take(MAX_LISTED_FAILURES).filter_map(told).collect()
 }
 
 #[cfg(test)]
@@ -220,9 +223,9 @@ mod tests {
             Some(0.25),
             "the night between is none of it"
         );
-        assert_eq!(left_s(10, Some(0.5), Some(30.0)), Some(20.0));
-        assert_eq!(left_s(10, Some(0.5), Some(61.0)), None);
-        assert_eq!(left_s(10, Some(0.01), Some(900.0)), Some(1000.0), "long runs come in seldom");
-        assert_eq!(left_s(10, None, Some(1.0)), None);
+        assert_eq!(eta_s(10, Some(0.5), Some(30.0)), Some(20.0));
+        assert_eq!(eta_s(10, Some(0.5), Some(61.0)), None);
+        assert_eq!(eta_s(10, Some(0.01), Some(900.0)), Some(1000.0), "long runs come in seldom");
+        assert_eq!(eta_s(10, None, Some(1.0)), None);
     }
 }

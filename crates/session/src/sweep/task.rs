@@ -1,12 +1,12 @@
 //! Cells that another process sends: run here, without its files.
 
-use super::crew::Engine;
-use super::work::Work;
-use crate::identity::build;
+use super::cell_runner::CellRunner;
+use super::executor::Engine;
+use crate::identity::build_id;
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::{Cell, Outcome};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Resolved, Source, Worlds};
+use sidestep::scenario::{ResolvedScenario, Source, Worlds};
 use std::path::Path;
 
 /// Some cells of a sweep that another process drives.
@@ -15,7 +15,7 @@ pub struct Task {
     /// The build that drives the sweep.
     pub build: String,
     /// The scenarios of the cells, by variant.
-    pub scenarios: Vec<(u32, Resolved)>,
+    pub scenarios: Vec<(u32, ResolvedScenario)>,
     /// The cells, in the order in which they are run.
     pub cells: Vec<Cell>,
 }
@@ -26,16 +26,17 @@ impl Task {
     /// # Errors
     /// When another build drives the sweep, or files cannot be unpacked.
     pub fn run(&self, worlds: Worlds, watcher: &dyn Watcher) -> Result<Vec<Outcome>, Error> {
-        if self.build != build() {
-            let cause = format!("the sweep is of sidestep {}, this is {}", self.build, build());
+        if self.build != build_id() {
+            let cause = format!("the sweep is of sidestep {}, this is {}", self.build, build_id());
             let remedy = "install the same build of sidestep wherever tasks run";
             return Err(InputError::new("a task of a sweep", cause, remedy).into());
         }
-        let place = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
+        let place =
+            tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
         let mut sources: Vec<(u32, Source)> = Vec::new();
         for (variant, scenario) in &self.scenarios {
             let folder = place.path().join(variant.to_string());
-            unpack(&folder, &scenario.files).map_err(|e| Error::write(&folder, &e))?;
+            unpack(&folder, &scenario.files).map_err(|e| Error::cannot_write(&folder, &e))?;
             let source = Source::new("scenario.toml", scenario.text.clone(), folder);
             sources.push((*variant, source));
         }
@@ -46,7 +47,7 @@ impl Task {
             found.cloned().ok_or_else(missing)
         };
         let engine = Engine::Workers(1);
-        let work = Work { worlds, agents: 0, source: &source, record: None, engine, watcher };
+        let work = CellRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };
         let mut outcomes = Vec::with_capacity(self.cells.len());
         work.run(&self.cells, 0, self.cells.len() as u64, &mut |outcome| {
             outcomes.push(outcome);

@@ -5,8 +5,8 @@ use sidestep::kernel::EntityId;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::AirspaceRun;
-use sidestep::worlds::airspace::pilot::{Control, Fleet, Packet, Pilot, Sight};
-use sidestep_session::{Journey, Keep, Recorded, Unwatched, replay_all, replay_to};
+use sidestep::worlds::airspace::pilot::{Control, Fleet, Packet, Percept, Pilot};
+use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, replay_all, replay_to};
 use std::any::Any;
 use std::path::Path;
 
@@ -14,18 +14,18 @@ const SCENARIO: &str = "format = 1\nworld = \"airspace\"\ncycles = 30\n[airspace
     [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n\
     [record]\ncontrols = true\ncheckpoint_every = 10\n";
 
-fn airspace(journey: &mut Journey) -> &mut AirspaceRun {
+fn airspace(journey: &mut ManagedRun) -> &mut AirspaceRun {
     let run: &mut dyn Any = journey.simulation_mut();
     run.downcast_mut().expect("a run of an airspace")
 }
 
 /// Lets pilots decide a cycle: all packets arrive, one after the other.
-fn decided(pilots: &mut [Pilot], sights: Vec<Sight>) -> Vec<Control> {
+fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<Control> {
     let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
     let mut due = Vec::new();
     for sight in sights {
         let own = sight.own.id as usize;
-        pilots[own].begin(sight, 0);
+        pilots[own].start(sight, 0);
     }
     loop {
         for pilot in &mut *pilots {
@@ -40,38 +40,38 @@ fn decided(pilots: &mut [Pilot], sights: Vec<Sight>) -> Vec<Control> {
 }
 
 /// Records a run to cycle `until`; returns its digest. Some controls never reach it.
-fn recorded(folder: &Path, until: u64) -> String {
+fn record_run(folder: &Path, until: u64) -> String {
     let source = Source::new("s.toml", SCENARIO, "");
     let compiled = WORLDS.compile(&source).expect("valid");
-    let keep = Keep { folder: Some(folder), ..Keep::default() };
-    let mut journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant");
+    let keep = OutputPaths { folder: Some(folder), ..OutputPaths::default() };
+    let mut journey = ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant");
     let world = airspace(&mut journey).world().clone();
     let mut pilots: Vec<Pilot> =
         (0..3).map(|id| Pilot::new(world.clone(), id, Default::default())).collect();
     while journey.cycle() < until {
         let now = journey.cycle();
         let run = airspace(&mut journey);
-        let controls = decided(&mut pilots, run.sights());
+        let controls = decide_cycle(&mut pilots, run.percepts());
         let come =
             controls.into_iter().filter(|control| !(now + u64::from(control.id)).is_multiple_of(6));
-        run.control(come.collect()).expect("what pilots decide");
-        journey.advance_to(now + 1, &Unwatched).expect("there is room");
+        run.submit(come.collect()).expect("what pilots decide");
+        journey.advance_to(now + 1, &NoWatcher).expect("there is room");
     }
-    journey.finish(&Unwatched).expect("there is room").digest
+    journey.finish(&NoWatcher).expect("there is room").digest
 }
 
 #[test]
 fn a_run_that_was_flown_from_outside_is_replayed_from_its_controls() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    let digest = recorded(&folder, 30);
-    let again = Recorded::open(WORLDS, &folder).expect("a run");
+    let digest = record_run(&folder, 30);
+    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
     for workers in [1, 2] {
-        let replayed = replay_all(&again, workers, &Unwatched).expect("the digest is confirmed");
+        let replayed = replay_all(&again, workers, &NoWatcher).expect("the digest is confirmed");
         assert_eq!(replayed.run.digest().to_string(), digest);
     }
     for cycle in [0, 7, 13, 29] {
-        replay_to(&again, cycle, 1, &Unwatched).expect("the poses are confirmed");
+        replay_to(&again, cycle, 1, &NoWatcher).expect("the poses are confirmed");
     }
 }
 
@@ -80,10 +80,10 @@ fn a_run_that_was_flown_from_outside_is_replayed_from_its_controls() {
 fn a_run_that_lost_its_server_goes_on_by_itself_and_is_replayed() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    recorded(&folder, 17);
-    let journey = Journey::resume(WORLDS, &folder, 1, None).expect("it can go on");
-    let digest = journey.travel(&Unwatched).expect("there is room").digest;
-    let again = Recorded::open(WORLDS, &folder).expect("a run");
-    let replayed = replay_all(&again, 2, &Unwatched).expect("the digest is confirmed");
+    record_run(&folder, 17);
+    let journey = ManagedRun::resume(WORLDS, &folder, 1, None).expect("it can go on");
+    let digest = journey.run_to_end(&NoWatcher).expect("there is room").digest;
+    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    let replayed = replay_all(&again, 2, &NoWatcher).expect("the digest is confirmed");
     assert_eq!(replayed.run.digest().to_string(), digest);
 }

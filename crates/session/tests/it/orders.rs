@@ -5,7 +5,8 @@ use sidestep::kernel::ports::Values;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep_session::{
-    Journey, Keep, Recorded, RestoreError, Unwatched, Wanted, replay_all, replay_to,
+    ManagedRun, NoWatcher, OutputPaths, RecordedRun, RestoreError, RowSelection, replay_all,
+    replay_to,
 };
 use std::path::Path;
 
@@ -14,37 +15,37 @@ const SCENARIO: &str = "format = 1\nworld = \"robots\"\ncycles = 200\n\
     [record]\ncheckpoint_every = 50\n\
     [[robots]]\ncount = 4\neffector = \"nomad\"\nbehaviour.kind = \"external\"\n";
 
-fn started(keep: Keep<'_>) -> Journey {
+fn started(keep: OutputPaths<'_>) -> ManagedRun {
     let source = Source::new("s.toml", SCENARIO, "");
     let compiled = WORLDS.compile(&source).expect("valid");
-    Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant")
+    ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant")
 }
 
 /// Records a run to cycle `until` in which a caller orders turns and steps; returns its digest.
-fn recorded(folder: &Path, until: u64) -> String {
-    let mut journey = started(Keep { folder: Some(folder), ..Keep::default() });
+fn record_run(folder: &Path, until: u64) -> String {
+    let mut journey = started(OutputPaths { folder: Some(folder), ..OutputPaths::default() });
     while journey.cycle() < until {
         let now = journey.cycle();
         let values = [0, 1, 2, 3].map(|k| ((now / 3 + k * k) % 3) as f64);
         let orders = Orders { order: "action", agents: &[0, 1, 2, 3], values: &values };
         journey.simulation_mut().order(&orders).expect("right");
-        journey.advance_to(now + 1, &Unwatched).expect("there is room");
+        journey.advance_to(now + 1, &NoWatcher).expect("there is room");
     }
-    journey.finish(&Unwatched).expect("there is room").digest
+    journey.finish(&NoWatcher).expect("there is room").digest
 }
 
 #[test]
 fn a_run_that_was_decided_from_outside_is_replayed_from_its_orders() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    let digest = recorded(&folder, 200);
-    let again = Recorded::open(WORLDS, &folder).expect("a run");
+    let digest = record_run(&folder, 200);
+    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
     for workers in [1, 2] {
-        let replayed = replay_all(&again, workers, &Unwatched).expect("the digest is confirmed");
+        let replayed = replay_all(&again, workers, &NoWatcher).expect("the digest is confirmed");
         assert_eq!(replayed.run.digest().to_string(), digest);
     }
     for cycle in [0, 1, 73, 150, 199] {
-        let replayed = replay_to(&again, cycle, 1, &Unwatched).expect("the poses are confirmed");
+        let replayed = replay_to(&again, cycle, 1, &NoWatcher).expect("the poses are confirmed");
         assert_eq!(replayed.compared_poses, 4, "cycle {cycle}");
     }
 }
@@ -53,16 +54,16 @@ fn a_run_that_was_decided_from_outside_is_replayed_from_its_orders() {
 fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    recorded(&folder, 120);
-    let error = Journey::resume(WORLDS, &folder, 1, None).map(drop).expect_err("nobody decides");
+    record_run(&folder, 120);
+    let error = ManagedRun::resume(WORLDS, &folder, 1, None).map(drop).expect_err("nobody decides");
     let words = error.to_string();
     assert!(words.contains("its agents were decided from outside up to cycle 120"), "{words}");
-    let again = Recorded::open(WORLDS, &folder).expect("a run");
-    replay_to(&again, 119, 1, &Unwatched).expect("what was recorded can be looked at");
+    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    replay_to(&again, 119, 1, &NoWatcher).expect("what was recorded can be looked at");
 }
 
 /// Returns the cycles of the kept poses, each once, and takes all rows.
-fn taken(journey: &mut Journey) -> Vec<u64> {
+fn taken_cycles(journey: &mut ManagedRun) -> Vec<u64> {
     let tables = journey.take_rows().expect("rows");
     let poses = tables.iter().find(|(schema, _)| schema.name == "trajectories").expect("poses");
     let Values::U64(cycles) = &poses.1[0] else { panic!("cycles come first") };
@@ -74,9 +75,10 @@ fn taken(journey: &mut Journey) -> Vec<u64> {
 
 #[test]
 fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
-    let mut journey = started(Keep::default());
-    journey.keep_rows(&Wanted::default()).expect("kept");
-    let advance = |journey: &mut Journey, until| journey.advance_to(until, &Unwatched).expect("ok");
+    let mut journey = started(OutputPaths::default());
+    journey.keep_rows(&RowSelection::default()).expect("kept");
+    let advance =
+        |journey: &mut ManagedRun, until| journey.advance_to(until, &NoWatcher).expect("ok");
     advance(&mut journey, 20);
     let at_20 = journey.checkpoint().expect("saved");
     advance(&mut journey, 33);
@@ -87,13 +89,16 @@ fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
     advance(&mut journey, 25);
     let digest = journey.simulation().digest();
     let refused = journey.restore(&at_33).expect_err("of the way that it left");
-    assert!(matches!(refused, RestoreError::Astray { from: 0, now: 25, of: 33 }), "{refused}");
+    assert!(
+        matches!(refused, RestoreError::UnknownHistory { from: 0, now: 25, of: 33 }),
+        "{refused}"
+    );
     assert_eq!((journey.cycle(), journey.simulation().digest()), (25, digest));
-    assert_eq!(taken(&mut journey), (0..25).collect::<Vec<_>>());
+    assert_eq!(taken_cycles(&mut journey), (0..25).collect::<Vec<_>>());
     // Nothing of another past is kept any longer.
     journey.restore(&at_33).expect("of the same scenario");
     advance(&mut journey, 38);
-    assert_eq!(taken(&mut journey), (33..38).collect::<Vec<_>>());
+    assert_eq!(taken_cycles(&mut journey), (33..38).collect::<Vec<_>>());
 }
 
 #[test]
@@ -103,10 +108,12 @@ fn another_scenario_is_told_as_such_also_where_rows_are_kept() {
     let other = compiled.start(&source, 1).checkpoint();
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    for keep in [Keep::default(), Keep { folder: Some(&folder), ..Keep::default() }] {
+    for keep in
+        [OutputPaths::default(), OutputPaths { folder: Some(&folder), ..OutputPaths::default() }]
+    {
         let mut journey = started(keep);
         if keep.folder.is_none() {
-            journey.keep_rows(&Wanted::default()).expect("kept");
+            journey.keep_rows(&RowSelection::default()).expect("kept");
         }
         let told = journey.restore(&other).expect_err("another seed").to_string();
         assert!(told.contains("belongs to scenario"), "{told}");

@@ -1,17 +1,17 @@
 //! The places where a run is recorded: taken together or not at all.
 
-use crate::support::{Place, names};
-use sidestep_session::{Error, Keep, Unwatched};
+use crate::support::{TestFolder, names};
+use sidestep_session::{Error, NoWatcher, OutputPaths};
 use std::path::Path;
 
-fn start(place: &Place, folder: &Path, mcap: &Path) -> Result<(), Error> {
-    let keep = Keep { folder: Some(folder), mcap: Some((mcap, 100)), replace: false };
-    place.start(1, keep)?.travel(&Unwatched).map(drop)
+fn start(place: &TestFolder, folder: &Path, mcap: &Path) -> Result<(), Error> {
+    let keep = OutputPaths { folder: Some(folder), mcap: Some((mcap, 100)), replace: false };
+    place.start(1, keep)?.run_to_end(&NoWatcher).map(drop)
 }
 
 #[test]
 fn a_recording_that_cannot_be_made_leaves_no_run_folder() {
-    let place = Place::new();
+    let place = TestFolder::new();
     std::fs::write(place.path("file"), "no folder").expect("written");
     let before = names(&place);
     start(&place, &place.path("run"), &place.path("file/z.mcap")).expect_err("no folder");
@@ -25,7 +25,7 @@ fn a_recording_that_cannot_be_made_leaves_no_run_folder() {
 
 #[test]
 fn a_recording_in_the_place_of_the_folder_or_above_it_is_refused() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let before = names(&place);
     let same = place.path("run");
     let above = place.path("a/b");

@@ -2,8 +2,10 @@
 
 use crate::pond::Pond;
 use sidestep_kernel::{Cycle, Interrupt};
-use sidestep_scenario::{Kind, Worlds};
-use sidestep_session::{Error, Journey, Keep, Progress, Summary, Unwatched, Watcher, read};
+use sidestep_scenario::{WorldType, Worlds};
+use sidestep_session::{
+    Error, ManagedRun, NoWatcher, OutputPaths, Progress, Summary, Watcher, read_scenario,
+};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,9 +13,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) const WORLDS: Worlds = Worlds(&[&Pond]);
 
 /// A folder that is deleted when dropped.
-pub(crate) struct Place(tempfile::TempDir);
+pub(crate) struct TestFolder(tempfile::TempDir);
 
-impl Place {
+impl TestFolder {
     /// A folder with the scenario `pond.toml`.
     pub(crate) fn new() -> Self {
         let place = Self(tempfile::tempdir().expect("a folder"));
@@ -26,23 +28,23 @@ impl Place {
     }
 
     /// Returns the run of the scenario, at its start.
-    pub(crate) fn start(&self, workers: usize, keep: Keep<'_>) -> Result<Journey, Error> {
-        let (source, compiled) = read(WORLDS, &self.path("pond.toml"), &[])?;
-        Journey::start(compiled.as_ref(), &source, workers, keep, None)
+    pub(crate) fn start(&self, workers: usize, keep: OutputPaths<'_>) -> Result<ManagedRun, Error> {
+        let (source, compiled) = read_scenario(WORLDS, &self.path("pond.toml"), &[])?;
+        ManagedRun::start(compiled.as_ref(), &source, workers, keep, None)
     }
 
     /// Returns the whole run, recorded to the folder `name`.
     pub(crate) fn record(&self, name: &str) -> (PathBuf, Summary) {
         let folder = self.path(name);
-        let keep = Keep { folder: Some(&folder), ..Keep::default() };
+        let keep = OutputPaths { folder: Some(&folder), ..OutputPaths::default() };
         let journey = self.start(2, keep).expect("started");
-        let summary = journey.travel(&Unwatched).expect("recorded");
+        let summary = journey.run_to_end(&NoWatcher).expect("recorded");
         (folder, summary)
     }
 }
 
 /// Returns the names in the folder, sorted.
-pub(crate) fn names(place: &Place) -> Vec<String> {
+pub(crate) fn names(place: &TestFolder) -> Vec<String> {
     let entries = std::fs::read_dir(place.path("")).expect("a folder");
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("an entry").file_name();
     let mut names: Vec<_> = entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
@@ -63,7 +65,7 @@ impl StopAt {
 }
 
 impl Watcher for StopAt {
-    fn at(&self, progress: Progress<'_>) {
+    fn on_progress(&self, progress: Progress<'_>) {
         if let Progress::Cycles { done, .. } = progress
             && done >= self.cycle
         {
@@ -71,7 +73,7 @@ impl Watcher for StopAt {
         }
     }
 
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         !self.is_there.load(Ordering::Relaxed)
     }
 }
@@ -84,7 +86,7 @@ pub(crate) struct InterruptAt {
 }
 
 impl Watcher for InterruptAt {
-    fn at(&self, progress: Progress<'_>) {
+    fn on_progress(&self, progress: Progress<'_>) {
         if let Progress::Cycles { done, .. } = progress
             && done >= self.cycle
         {

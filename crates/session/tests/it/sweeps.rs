@@ -1,77 +1,77 @@
 //! Many runs of one scenario.
 
-use crate::support::{Place, WORLDS};
+use crate::support::{TestFolder, WORLDS};
 use sidestep::experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
-    Crew, Deal, Ended, Engine, Folder, Taken, Task, collect, go_on, in_memory, planned, share,
-    status,
+    CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task, collect, create,
+    read_status, run_in_memory, run_remaining, run_share,
 };
-use sidestep_session::{Error, Unwatched, build};
+use sidestep_session::{Error, NoWatcher, build_id};
 
 const SWEEP: &str = "format = 1\nscenario = \"pond.toml\"\nreplicates = 3\n\
                      [set]\n\"cycles\" = 700\n[vary]\n\"pond.frogs\" = [4, 20]\n";
 
 /// The sweep of two variants with three seeds each.
-pub(crate) fn sweep(place: &Place) -> Sweep {
+pub(crate) fn sweep(place: &TestFolder) -> Sweep {
     let file = place.path("sweep.toml");
     std::fs::write(&file, SWEEP).expect("written");
     Sweep::read(&file).expect("valid")
 }
 
-fn done(ended: Ended) -> RunTable {
+fn done(ended: SweepEnd) -> RunTable {
     match ended {
-        Ended::Done(done) => {
+        SweepEnd::Done(done) => {
             RunTable { columns: done.table.results().into_iter().cloned().collect() }
         }
-        Ended::Interrupted(runs) => panic!("interrupted after {runs} runs"),
+        SweepEnd::Interrupted(runs) => panic!("interrupted after {runs} runs"),
     }
 }
 
 #[test]
 fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = sweep(&place);
-    let (plan, ended) = in_memory(WORLDS, &sweep, 2, &Unwatched).expect("run");
+    let (plan, ended) = run_in_memory(WORLDS, &sweep, 2, &NoWatcher).expect("run");
     let table = done(ended);
     assert_eq!((plan.world.as_str(), plan.variants.len(), table.runs()), ("pond", 2, 6));
     assert!(table.column("hops_per_frog").is_some());
 
-    let folder = planned(WORLDS, &sweep, &place.path("one"), 2, &Unwatched).expect("planned");
-    let one = go_on(WORLDS, &folder, 3, &Unwatched).expect("run");
+    let folder = create(WORLDS, &sweep, &place.path("one"), 2, &NoWatcher).expect("planned");
+    let one = run_remaining(WORLDS, &folder, 3, &NoWatcher).expect("run");
     assert_eq!(done(one), table);
 
-    let folder = planned(WORLDS, &sweep, &place.path("shares"), 2, &Unwatched).expect("planned");
+    let folder = create(WORLDS, &sweep, &place.path("shares"), 2, &NoWatcher).expect("planned");
     for shard in ["1/2", "0/2"] {
         let shard: Shard = shard.parse().expect("a share");
-        let ended = share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
+        let ended = run_share(WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
         assert_eq!(done(ended).runs(), 3);
     }
-    assert_eq!(done(collect(&folder, &Unwatched).expect("collected")), table);
+    assert_eq!(done(collect(&folder, &NoWatcher).expect("collected")), table);
 }
 
 #[test]
 fn the_status_counts_each_run_once_and_tells_those_that_failed() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = sweep(&place);
-    let folder = planned(WORLDS, &sweep, &place.path("s"), 2, &Unwatched).expect("planned");
+    let folder = create(WORLDS, &sweep, &place.path("s"), 2, &NoWatcher).expect("planned");
     let shard: Shard = "1/2".parse().expect("a share");
-    share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
+    run_share(WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
     // A run of that share again, from another division into shares, and one that failed.
     let journal = place.path("s/shares/0-of-1.journal");
     let outcome =
-        |cell: u64| Outcome::failed(folder.plan().cell_of(cell).expect("a cell"), "no frogs");
-    let is_in_share = |cell: &u64| folder.plan().share(shard).any(|other| other.id == *cell);
+        |cell: u64| Outcome::from_failure(folder.plan().cell_of(cell).expect("a cell"), "no frogs");
+    let is_in_share = |cell: &u64| folder.plan().shard_cells(shard).any(|other| other.id == *cell);
     let (own, other) = ((0..6).find(is_in_share), (0..6).find(|cell| !is_in_share(cell)));
     let all = sidestep_record::sweep::Share { index: 0, count: 1 };
     let mut writing = folder.journal(all, |_: Outcome| ()).expect("a journal").expect("not done");
     for cell in [own, other].map(|cell| cell.expect("a cell")) {
         writing.append(&outcome(cell)).expect("written");
     }
-    let found = status(&folder).expect("read");
+    let found = read_status(&folder).expect("read");
     assert!(found.is_worked_on && found.left_s.is_none(), "before the second run, too");
     drop(writing);
-    let found = status(&folder).expect("read");
+    let found = read_status(&folder).expect("read");
     assert_eq!((found.runs, found.of, found.failed, found.is_complete), (4, 6, 1, false));
     assert!(!found.is_worked_on, "nobody has the lock of its journal");
     assert_eq!(found.failures[0].why, "no frogs");
@@ -82,19 +82,19 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
         found.shares.iter().map(|s| (s.share.as_str(), s.runs, s.is_done)).collect();
     assert_eq!(shares, [("0/1", 2, false), ("1/2", 3, true)]);
     std::fs::write(journal, "no journal\nat all\n").expect("written");
-    assert!(status(&folder).is_err(), "damage is told");
+    assert!(read_status(&folder).is_err(), "damage is told");
 }
 
 #[test]
 fn runs_of_a_sweep_are_recorded_and_reported() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
     let path = place.path("sweep");
-    let folder = planned(WORLDS, &sweep, &path, 2, &Unwatched).expect("planned");
-    go_on(WORLDS, &folder, 2, &Unwatched).expect("run");
+    let folder = create(WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
+    run_remaining(WORLDS, &folder, 2, &NoWatcher).expect("run");
     let folder = Folder::open(&path).expect("a sweep");
     assert!(folder.run_folder(5).join("trajectories.svg").is_file());
-    let document = document(WORLDS, &path, &Unwatched).expect("a document");
+    let document = document(WORLDS, &path, &NoWatcher).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
     for words in ["6 runs of 2 variants", "Hops per frog"] {
         assert!(
@@ -106,27 +106,27 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
 }
 
 /// A crew outside that gets tasks, the last cells first, and does only some of them in a call.
-struct Others {
+struct ExternalExecutor {
     in_a_call: usize,
 }
 
-impl Others {
-    fn task(deal: &Deal<'_>, cells: &[Cell]) -> Task {
+impl ExternalExecutor {
+    fn task(deal: &CellBatch<'_>, cells: &[Cell]) -> Task {
         let mut variants: Vec<u32> = cells.iter().map(|cell| cell.variant).collect();
         variants.sort_unstable();
         variants.dedup();
         let scenario = |variant: u32| (variant, deal.scenario(variant).expect("there"));
         let scenarios = variants.into_iter().map(scenario).collect();
-        Task { build: build().into(), scenarios, cells: cells.to_vec() }
+        Task { build: build_id().into(), scenarios, cells: cells.to_vec() }
     }
 
-    fn outcomes(deal: &Deal<'_>, cells: &[Cell]) -> Vec<Outcome> {
-        Self::task(deal, cells).run(WORLDS, &Unwatched).expect("run")
+    fn outcomes(deal: &CellBatch<'_>, cells: &[Cell]) -> Vec<Outcome> {
+        Self::task(deal, cells).run(WORLDS, &NoWatcher).expect("run")
     }
 }
 
-impl Crew for Others {
-    fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error> {
+impl CellExecutor for ExternalExecutor {
+    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error> {
         for cells in deal.cells().chunks(2).rev().take(self.in_a_call) {
             for outcome in Self::outcomes(deal, cells) {
                 take(outcome.clone())?;
@@ -137,24 +137,26 @@ impl Crew for Others {
         Ok(())
     }
 
-    fn at_once(&self) -> usize {
+    fn parallelism(&self) -> usize {
         2
     }
 }
 
 #[test]
 fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_of_calls() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = sweep(&place);
-    let (_, ended) = in_memory(WORLDS, &sweep, 2, &Unwatched).expect("run");
+    let (_, ended) = run_in_memory(WORLDS, &sweep, 2, &NoWatcher).expect("run");
     let table = done(ended);
     for in_a_call in [1, usize::MAX] {
-        let others = Others { in_a_call };
-        let (_, ended) = in_memory(WORLDS, &sweep, Engine::Crew(&others), &Unwatched).expect("run");
+        let others = ExternalExecutor { in_a_call };
+        let (_, ended) =
+            run_in_memory(WORLDS, &sweep, Engine::Executor(&others), &NoWatcher).expect("run");
         assert_eq!(done(ended), table);
         let path = place.path(&format!("others {in_a_call}"));
-        let folder = planned(WORLDS, &sweep, &path, 2, &Unwatched).expect("planned");
-        let ended = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched).expect("run");
+        let folder = create(WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
+        let ended =
+            run_remaining(WORLDS, &folder, Engine::Executor(&others), &NoWatcher).expect("run");
         assert_eq!(done(ended), table);
     }
 }
@@ -162,14 +164,14 @@ fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_o
 #[test]
 fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
     let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), cells: Vec::new() };
-    let told = task.run(WORLDS, &Unwatched).expect_err("another build").to_string();
-    assert!(told.contains("0.0.1+0") && told.contains(build()), "{told}");
+    let told = task.run(WORLDS, &NoWatcher).expect_err("another build").to_string();
+    assert!(told.contains("0.0.1+0") && told.contains(build_id()), "{told}");
 
-    let place = Place::new();
+    let place = TestFolder::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
-    let folder = planned(WORLDS, &sweep, &place.path("sweep"), 2, &Unwatched).expect("planned");
-    let others = Others { in_a_call: 1 };
-    let told = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched);
+    let folder = create(WORLDS, &sweep, &place.path("sweep"), 2, &NoWatcher).expect("planned");
+    let others = ExternalExecutor { in_a_call: 1 };
+    let told = run_remaining(WORLDS, &folder, Engine::Executor(&others), &NoWatcher);
     let told = told.err().expect("recorded by others").to_string();
     assert!(told.contains("which others cannot write to"), "{told}");
 }

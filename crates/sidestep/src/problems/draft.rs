@@ -7,16 +7,16 @@ use toml::de::DeTable;
 
 /// Bytes that were replaced by others.
 #[derive(Debug, Clone)]
-struct Change {
+struct TextEdit {
     at: usize,
     removed: usize,
     inserted: usize,
 }
 
-impl Change {
+impl TextEdit {
     /// Returns the place before the change of a place after it; within an insertion, the start of the
     /// removed bytes, or their end.
-    fn back(&self, offset: usize, is_end: bool) -> usize {
+    fn map_back(&self, offset: usize, is_end: bool) -> usize {
         match offset {
             _ if offset < self.at || (is_end && offset == self.at) => offset,
             _ if offset < self.at + self.inserted && !is_end => self.at,
@@ -31,7 +31,7 @@ impl Change {
 pub(super) struct Draft {
     source: Source,
     /// The latest last.
-    changes: Vec<Change>,
+    changes: Vec<TextEdit>,
 }
 
 impl Draft {
@@ -49,26 +49,26 @@ impl Draft {
 
     /// Returns the draft with parts of its text replaced, which do not overlap; none if it would be no
     /// TOML then.
-    pub(super) fn with(&self, mut parts: Vec<(Range<usize>, String)>) -> Option<Self> {
+    pub(super) fn with_replacements(&self, mut parts: Vec<(Range<usize>, String)>) -> Option<Self> {
         let mut draft = self.clone();
         parts.sort_by_key(|(part, _)| std::cmp::Reverse(part.start));
         for (part, text) in parts {
             let (at, removed, inserted) = (part.start, part.len(), text.len());
             draft.source.text.replace_range(part, &text);
-            draft.changes.push(Change { at, removed, inserted });
+            draft.changes.push(TextEdit { at, removed, inserted });
         }
         DeTable::parse(&draft.source.text).is_ok().then_some(draft)
     }
 
     /// Returns an error in the draft as one in the text as it was given.
-    pub(super) fn in_the_given_text(&self, given: &Source, error: &InputError) -> InputError {
+    pub(super) fn map_error_back(&self, given: &Source, error: &InputError) -> InputError {
         let Some(start) = error.position().filter(|_| error.place() == given.place) else {
             return error.clone();
         };
         let start = offset(self.text(), start);
         let end = error.end().map_or(start, |end| offset(self.text(), end));
         let back = |offset: usize, is_end: bool| {
-            self.changes.iter().rev().fold(offset, |offset, change| change.back(offset, is_end))
+            self.changes.iter().rev().fold(offset, |offset, change| change.map_back(offset, is_end))
         };
         let start = back(start, false);
         let end = if end > start { back(end, true).max(start) } else { start };
@@ -91,27 +91,28 @@ mod tests {
     fn places_lead_back_through_all_changes() {
         let given = Source::new("s.toml", "a = 1\nbad = 22\nc = \"é\" # d\ne = 5\n", "");
         let draft = Draft::new(given.clone());
-        let draft = draft.with(vec![(6..14, String::new())]).expect("TOML");
-        let draft =
-            draft.with(vec![(0..0, "new = 7\n".into()), (4..5, "1000".into())]).expect("TOML");
+        let draft = draft.with_replacements(vec![(6..14, String::new())]).expect("TOML");
+        let draft = draft
+            .with_replacements(vec![(0..0, "new = 7\n".into()), (4..5, "1000".into())])
+            .expect("TOML");
         assert_eq!(draft.text(), "new = 7\na = 1000\n\nc = \"é\" # d\ne = 5\n");
         let place = |part: &str| {
             let start = draft.text().find(part).expect(part);
             let error = draft.source().error(start..start + part.len(), "c", "r");
-            let told = draft.in_the_given_text(&given, &error);
+            let told = draft.map_error_back(&given, &error);
             (told.key().map(String::from), told.position(), told.end())
         };
         assert_eq!(place("5"), (Some("e".into()), Some((4, 5)), Some((4, 6))));
         assert_eq!(place("é"), (Some("c".into()), Some((3, 6)), Some((3, 7))));
         assert_eq!(place("1000"), (Some("a".into()), Some((1, 5)), Some((1, 6))));
-        assert!(draft.with(vec![(0..3, "= =".into())]).is_none());
+        assert!(draft.with_replacements(vec![(0..3, "= =".into())]).is_none());
     }
 
     #[test]
     fn errors_elsewhere_stay_as_they_are() {
         let given = Source::new("s.toml", "a = 1\n", "");
         let draft = Draft::new(given.clone());
-        let error = InputError::new("other.yaml", "c", "r").at(900, 7);
-        assert_eq!(draft.in_the_given_text(&given, &error), error);
+        let error = InputError::new("other.yaml", "c", "r").with_position(900, 7);
+        assert_eq!(draft.map_error_back(&given, &error), error);
     }
 }

@@ -22,55 +22,55 @@ use serde_json::Value;
 use sidestep_kernel::InputError;
 
 /// Most errors that are reported.
-pub const MOST: usize = 20;
+pub const MAX_PROBLEMS: usize = 20;
 /// Most compilations of drafts, because some take long.
-const MOST_DRAFTS: usize = 150;
+const MAX_DRAFTS: usize = 150;
 
-/// Returns the errors of a scenario, in the order of its text and at most [`MOST`]; none if it
+/// Returns the errors of a scenario, in the order of its text and at most [`MAX_PROBLEMS`]; none if it
 /// compiles. Errors of syntax are reported alone, because nothing else is known before they are
 /// repaired.
 pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
     let Err(first) = worlds.compile(source) else { return Vec::new() };
     let mut told = source.syntax_errors();
     if told.is_empty() {
-        let mut search = Search::new(worlds, source);
+        let mut search = ErrorRecovery::new(worlds, source);
         search.run(first);
-        told = search.told;
+        told = search.reported;
     }
     told.sort_by_key(|error| error.position());
-    told.truncate(MOST);
+    told.truncate(MAX_PROBLEMS);
     told
 }
 
 /// The search for further errors.
-struct Search<'a> {
+struct ErrorRecovery<'a> {
     worlds: Worlds,
     source: &'a Source,
-    told: Vec<InputError>,
+    reported: Vec<InputError>,
     /// Keys to which drafts give values, or none, that their author did not mean.
     guessed: Vec<Guess>,
     drafts: usize,
 }
 
 /// A draft, and its error.
-struct Step {
+struct DraftStep {
     draft: Draft,
     error: Option<InputError>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> ErrorRecovery<'a> {
     fn new(worlds: Worlds, source: &'a Source) -> Self {
-        Self { worlds, source, told: Vec::new(), guessed: Vec::new(), drafts: 0 }
+        Self { worlds, source, reported: Vec::new(), guessed: Vec::new(), drafts: 0 }
     }
 
     fn run(&mut self, first: InputError) {
         let draft = Draft::new(self.source.clone());
-        let mut step = Step { draft, error: Some(first) };
+        let mut step = DraftStep { draft, error: Some(first) };
         while let Some(error) = step.error.take()
-            && self.told.len() < MOST
+            && self.reported.len() < MAX_PROBLEMS
         {
-            self.tell(&step.draft, &error);
-            match self.mended(&step.draft, &error) {
+            self.report(&step.draft, &error);
+            match self.repair(&step.draft, &error) {
                 Some(next) => step = next,
                 None => return,
             }
@@ -78,32 +78,32 @@ impl<'a> Search<'a> {
     }
 
     /// Reports an error, unless it was reported before or may follow from a guess in a draft.
-    fn tell(&mut self, draft: &Draft, error: &InputError) {
-        let told = draft.in_the_given_text(self.source, error);
+    fn report(&mut self, draft: &Draft, error: &InputError) {
+        let told = draft.map_error_back(self.source, error);
         let follows = self.guessed.iter().any(|guess| guess.may_lead_to(error));
         let place = |one: &InputError| (one.place().to_string(), one.position(), one.end());
         let is_known = |one: &InputError| {
             one == &told || (told.position().is_some() && place(one) == place(&told))
         };
-        if !follows && !self.told.iter().any(is_known) {
-            self.told.push(told);
+        if !follows && !self.reported.iter().any(is_known) {
+            self.reported.push(told);
         }
     }
 
     /// Returns a draft in which an error is repaired; none if there is no such draft. Of all repairs
     /// the first is taken from which nothing seems to follow.
-    fn mended(&mut self, draft: &Draft, error: &InputError) -> Option<Step> {
-        let mut forced: Option<(Repair, Step)> = None;
+    fn repair(&mut self, draft: &Draft, error: &InputError) -> Option<DraftStep> {
+        let mut forced: Option<(Repair, DraftStep)> = None;
         for repair in repairs(draft, error, &self.schema(draft)) {
             let Some(draft) = repair.applied_to(draft) else { continue };
-            if self.drafts == MOST_DRAFTS {
+            if self.drafts == MAX_DRAFTS {
                 return None;
             }
             self.drafts += 1;
             let next = self.worlds.compile(draft.source()).err();
             let may_follow = next.as_ref().is_some_and(|next| repair.may_lead_to(next));
-            let is_same = next.as_ref().is_some_and(|next| is_same(next, error));
-            let step = Step { draft, error: next };
+            let is_same = next.as_ref().is_some_and(|next| is_same_error(next, error));
+            let step = DraftStep { draft, error: next };
             if !may_follow && !is_same {
                 self.guessed.extend(repair.guess());
                 return Some(step);
@@ -126,6 +126,6 @@ impl<'a> Search<'a> {
 }
 
 /// Returns whether two drafts have the same error, wherever it stands.
-fn is_same(one: &InputError, other: &InputError) -> bool {
+fn is_same_error(one: &InputError, other: &InputError) -> bool {
     (one.key(), one.cause()) == (other.key(), other.cause())
 }

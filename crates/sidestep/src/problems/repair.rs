@@ -1,26 +1,26 @@
 //! Repairs of an error: the change that its author may have meant, or nothing at all.
 
 use super::draft::Draft;
-use super::tree::{find, way};
+use super::tree::{find, key_path};
 use crate::scenario::schema;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 
 /// Most examples that are tried for a key.
-const MOST_EXAMPLES: usize = 3;
+const MAX_EXAMPLES: usize = 3;
 
 /// A change to a draft.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Repair {
     /// The key that is changed.
     target: Vec<String>,
-    what: What,
+    what: RepairKind,
     /// Whether its author is likely to have meant it.
     is_meant: bool,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum What {
+enum RepairKind {
     /// The key has another name.
     Rename(String),
     /// The key has another value.
@@ -33,57 +33,62 @@ enum What {
 
 /// Returns repairs of an error, the likeliest first.
 pub(super) fn repairs(draft: &Draft, error: &InputError, schema: &Value) -> Vec<Repair> {
-    let own = error.key().map(way).unwrap_or_default();
-    let mut all = meant(draft, error, &own);
-    all.extend(missing(draft, error, &own, schema));
+    let own = error.key().map(key_path).unwrap_or_default();
+    let mut all = suggested_repair(draft, error, &own);
+    all.extend(missing_key_repairs(draft, error, &own, schema));
     if !own.is_empty() {
         // A section with all its keys gives fewer errors that only follow.
-        all.extend(others(draft, &own, schema));
-        all.push(Repair::guessed(&own, What::Remove));
+        all.extend(other_value_repairs(draft, &own, schema));
+        all.push(Repair::from_guess(&own, RepairKind::Remove));
     }
     for count in (1..own.len()).rev() {
-        all.push(Repair::guessed(&own[..count], What::Remove));
+        all.push(Repair::from_guess(&own[..count], RepairKind::Remove));
     }
     all
 }
 
 /// Returns the change that the error's remedy takes for the meaning of the author.
-fn meant(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Repair> {
-    let meant = between(error.remedy(), "did you mean `", "`");
-    let (Some(meant), Some(wrong)) = (meant, between(error.cause(), "`", "`")) else {
+fn suggested_repair(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Repair> {
+    let meant = text_between(error.remedy(), "did you mean `", "`");
+    let (Some(meant), Some(wrong)) = (meant, text_between(error.cause(), "`", "`")) else {
         return Vec::new();
     };
     let what = if own.last().is_some_and(|name| name == wrong) {
         let is_there = find(draft.text(), &[&own[..own.len() - 1], &[meant.to_string()]].concat());
         match is_there {
             Some(_) => return Vec::new(),
-            None => What::Rename(toml_edit::Key::new(meant).display_repr().into_owned()),
+            None => RepairKind::Rename(toml_edit::Key::new(meant).display_repr().into_owned()),
         }
     } else {
-        What::Replace(toml::Value::from(meant).to_string())
+        RepairKind::Replace(toml::Value::from(meant).to_string())
     };
     vec![Repair { target: own.to_vec(), what, is_meant: true }]
 }
 
 /// Returns insertions of a key that is missing.
-fn missing(draft: &Draft, error: &InputError, own: &[String], schema: &Value) -> Vec<Repair> {
-    let named = between(error.cause(), "the key `", "` is missing");
-    let named = named.or_else(|| between(error.cause(), "the row `", "` is missing"));
-    let Some(name) = named.or_else(|| between(error.remedy(), "add ", " = ")) else {
+fn missing_key_repairs(
+    draft: &Draft,
+    error: &InputError,
+    own: &[String],
+    schema: &Value,
+) -> Vec<Repair> {
+    let named = text_between(error.cause(), "the key `", "` is missing");
+    let named = named.or_else(|| text_between(error.cause(), "the row `", "` is missing"));
+    let Some(name) = named.or_else(|| text_between(error.remedy(), "add ", " = ")) else {
         return Vec::new();
     };
     let name = name.trim_matches('`');
     let target = [own, &[name.to_string()]].concat();
     let lists = find(draft.text(), own).map(|found| found.lists).unwrap_or_default();
     let values = examples(schema, &target).chain(lists.into_iter().take(1));
-    values.map(|value| Repair::guessed(&target, What::Insert(value))).collect()
+    values.map(|value| Repair::from_guess(&target, RepairKind::Insert(value))).collect()
 }
 
 /// Returns other values for a key: those that its world shows, and that of a list beside it.
-fn others(draft: &Draft, own: &[String], schema: &Value) -> Vec<Repair> {
+fn other_value_repairs(draft: &Draft, own: &[String], schema: &Value) -> Vec<Repair> {
     let Some(found) = find(draft.text(), own) else { return Vec::new() };
     let values = examples(schema, own).chain(found.lists.into_iter().take(1));
-    values.map(|value| Repair::guessed(own, What::Replace(value))).collect()
+    values.map(|value| Repair::from_guess(own, RepairKind::Replace(value))).collect()
 }
 
 fn examples(schema: &Value, key: &[String]) -> impl Iterator<Item = String> {
@@ -92,15 +97,15 @@ fn examples(schema: &Value, key: &[String]) -> impl Iterator<Item = String> {
     let is_element = key.last().is_some_and(|part| part.parse::<usize>().is_ok());
     let known = if is_element { Vec::new() } else { schema::examples(schema, &names) };
     let texts = known.into_iter().filter_map(|value| toml::Value::try_from(value).ok());
-    texts.map(|value| value.to_string()).take(MOST_EXAMPLES)
+    texts.map(|value| value.to_string()).take(MAX_EXAMPLES)
 }
 
-fn between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str> {
+fn text_between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str> {
     text.split_once(before)?.1.split_once(after).map(|(inside, _)| inside)
 }
 
 impl Repair {
-    fn guessed(target: &[String], what: What) -> Self {
+    fn from_guess(target: &[String], what: RepairKind) -> Self {
         Self { target: target.to_vec(), what, is_meant: false }
     }
 
@@ -112,13 +117,17 @@ impl Repair {
     /// Returns the draft with this change; none if it does not fit.
     pub(super) fn applied_to(&self, draft: &Draft) -> Option<Draft> {
         let parts = match &self.what {
-            What::Rename(name) => vec![(find(draft.text(), &self.target)?.name?, name.clone())],
-            What::Replace(value) => vec![(find(draft.text(), &self.target)?.value?, value.clone())],
-            What::Remove => {
+            RepairKind::Rename(name) => {
+                vec![(find(draft.text(), &self.target)?.name?, name.clone())]
+            }
+            RepairKind::Replace(value) => {
+                vec![(find(draft.text(), &self.target)?.value?, value.clone())]
+            }
+            RepairKind::Remove => {
                 let parts = find(draft.text(), &self.target)?.parts;
                 parts.into_iter().map(|part| (part, String::new())).collect()
             }
-            What::Insert(value) => {
+            RepairKind::Insert(value) => {
                 let (name, table) = self.target.split_last()?;
                 let at = find(draft.text(), table)?.inside?;
                 let line = format!("{} = {value}", toml_edit::Key::new(name).display_repr());
@@ -130,14 +139,14 @@ impl Repair {
                 vec![(at.end..at.end, format!("{before}{line}{after}"))]
             }
         };
-        draft.with(parts)
+        draft.with_replacements(parts)
     }
 
     /// Returns whether an error of the draft with this change may only be there because of it.
     pub(super) fn may_lead_to(&self, next: &InputError) -> bool {
         let guess = Guess::from(self.clone());
-        let key = next.key().map(way).unwrap_or_default();
-        if self.is_meant { guess.holds(&key) } else { guess.may_lead_to(next) }
+        let key = next.key().map(key_path).unwrap_or_default();
+        if self.is_meant { guess.contains(&key) } else { guess.may_lead_to(next) }
     }
 }
 
@@ -150,29 +159,29 @@ pub(super) struct Guess {
 
 impl From<Repair> for Guess {
     fn from(repair: Repair) -> Self {
-        Self { key: repair.target, is_removed: repair.what == What::Remove }
+        Self { key: repair.target, is_removed: repair.what == RepairKind::Remove }
     }
 }
 
 impl Guess {
     /// Returns whether a key is in the value that it gives. Where an element was removed, the next one has its
     /// number.
-    fn holds(&self, key: &[String]) -> bool {
+    fn contains(&self, key: &[String]) -> bool {
         !self.is_removed && key.starts_with(&self.key)
     }
 
     /// Returns whether an error may only be there because of this: one in the value, one of a table around it,
     /// unless that misses another key, or one elsewhere that names it.
     pub(super) fn may_lead_to(&self, error: &InputError) -> bool {
-        let Some(key) = error.key().map(way) else { return true };
-        if self.holds(&key) {
+        let Some(key) = error.key().map(key_path) else { return true };
+        if self.contains(&key) {
             return true;
         }
         if error.cause().starts_with("unknown key") {
             return false;
         }
         if let Some(name) = self.key.strip_prefix(&key[..]).and_then(|rest| rest.first()) {
-            let missing = between(error.cause(), "the key `", "` is missing");
+            let missing = text_between(error.cause(), "the key `", "` is missing");
             return missing.is_none_or(|missing| missing == name);
         }
         // Keys beside it may have nothing to do.
@@ -228,14 +237,14 @@ mod tests {
 
     #[test]
     fn what_may_follow_from_a_repair_is_known_by_its_key_and_by_its_words() {
-        let repair = |key: &str, what: What| Repair::guessed(&way(key), what);
+        let repair = |key: &str, what: RepairKind| Repair::from_guess(&key_path(key), what);
         let error = |key: &str, cause: &str| InputError::new("s", cause, "r").with_key(key);
-        let gone = repair("sensors.eye", What::Remove);
+        let gone = repair("sensors.eye", RepairKind::Remove);
         assert!(gone.may_lead_to(&error("robots.0.sensors.0", "unknown sensor `eye`")));
         assert!(gone.may_lead_to(&InputError::new("s", "no robots", "add some")));
         assert!(!gone.may_lead_to(&error("robots.0.effector", "unknown effector `ear`")));
         assert!(!gone.may_lead_to(&error("robots.0.eye", "unknown key `eye`")));
-        let other = repair("robots.0.size", What::Replace("2".into()));
+        let other = repair("robots.0.size", RepairKind::Replace("2".into()));
         assert!(other.may_lead_to(&error("robots.0.size", "size = 2")));
         assert!(other.may_lead_to(&error("robots.0", "no place is free")));
         assert!(!other.may_lead_to(&error("robots.0", "the key `kind` is missing")));

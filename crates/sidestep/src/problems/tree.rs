@@ -6,7 +6,7 @@ use toml::de::{DeTable, DeValue};
 
 /// A key of a text, or an element of an array.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct KeyNode {
     /// Place of its name; none of an element.
     pub(super) name: Option<Range<usize>>,
     /// Place of its value; none of tables that have headers.
@@ -20,43 +20,43 @@ pub(super) struct Found {
 }
 
 /// Returns the parts of a key as overrides name it.
-pub(super) fn way(key: &str) -> Vec<String> {
+pub(super) fn key_path(key: &str) -> Vec<String> {
     let parts = toml_edit::Key::parse(key).unwrap_or_default();
     parts.iter().map(|part| part.get().to_string()).collect()
 }
 
 /// Returns the parts of the text at a key; none if it is not there. The empty way is the whole text.
-pub(super) fn find(text: &str, way: &[String]) -> Option<Found> {
+pub(super) fn find(text: &str, way: &[String]) -> Option<KeyNode> {
     let root = DeTable::parse(text).ok()?;
     let root = Spanned::new(0..0, DeValue::Table(root.into_inner()));
     let tree = Tree { text, headers: headers(text, &root) };
-    let mut place = Place { name: None, value: &root, parent: None };
+    let mut place = PathStep { name: None, value: &root, parent: None };
     for part in way {
-        place = below(place, part)?;
+        place = child(place, part)?;
     }
-    Some(tree.found(&place))
+    Some(tree.node(&place))
 }
 
 /// A value on the way.
 #[derive(Clone, Copy)]
-struct Place<'t, 'i> {
+struct PathStep<'t, 'i> {
     name: Option<&'t Spanned<std::borrow::Cow<'i, str>>>,
     value: &'t Spanned<DeValue<'i>>,
     parent: Option<&'t Spanned<DeValue<'i>>>,
 }
 
-fn below<'t, 'i>(place: Place<'t, 'i>, part: &str) -> Option<Place<'t, 'i>> {
+fn child<'t, 'i>(place: PathStep<'t, 'i>, part: &str) -> Option<PathStep<'t, 'i>> {
     let parent = Some(place.value);
     match (place.value.get_ref(), part.parse::<usize>()) {
         (DeValue::Array(many), Ok(index)) => {
-            many.get(index).map(|value| Place { name: None, value, parent })
+            many.get(index).map(|value| PathStep { name: None, value, parent })
         }
         (DeValue::Array(many), Err(_)) if many.len() == 1 => {
-            below(Place { name: None, value: many.first()?, parent }, part)
+            child(PathStep { name: None, value: many.first()?, parent }, part)
         }
         (DeValue::Table(table), number) => {
             match table.iter().find(|(key, _)| key.get_ref() == part) {
-                Some((name, value)) => Some(Place { name: Some(name), value, parent }),
+                Some((name, value)) => Some(PathStep { name: Some(name), value, parent }),
                 // A section that stands alone is its own element 0.
                 None => (number == Ok(0)).then_some(place),
             }
@@ -67,7 +67,7 @@ fn below<'t, 'i>(place: Place<'t, 'i>, part: &str) -> Option<Place<'t, 'i>> {
 
 /// The look of a value in the text.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Look {
+enum ValueStyle {
     /// A value in a line, also a table in braces.
     Inline,
     /// A table with a header, or several with the same.
@@ -76,18 +76,18 @@ enum Look {
     Implied,
 }
 
-fn look(text: &str, value: &Spanned<DeValue<'_>>) -> Look {
+fn value_style(text: &str, value: &Spanned<DeValue<'_>>) -> ValueStyle {
     match value.get_ref() {
         DeValue::Table(_) => match text.as_bytes().get(value.span().start) {
-            Some(b'{') => Look::Inline,
-            Some(b'[') => Look::Header,
-            _ => Look::Implied,
+            Some(b'{') => ValueStyle::Inline,
+            Some(b'[') => ValueStyle::Header,
+            _ => ValueStyle::Implied,
         },
         DeValue::Array(many) => match many.first() {
-            Some(first) if matches!(first.get_ref(), DeValue::Table(_)) => look(text, first),
-            _ => Look::Inline,
+            Some(first) if matches!(first.get_ref(), DeValue::Table(_)) => value_style(text, first),
+            _ => ValueStyle::Inline,
         },
-        _ => Look::Inline,
+        _ => ValueStyle::Inline,
     }
 }
 
@@ -98,7 +98,7 @@ fn headers(text: &str, value: &Spanned<DeValue<'_>>) -> Vec<usize> {
     while let Some(value) = open.pop() {
         match value.get_ref() {
             DeValue::Table(table) => {
-                if look(text, value) == Look::Header {
+                if value_style(text, value) == ValueStyle::Header {
                     found.push(value.span().start);
                 }
                 open.extend(table.iter().map(|(_, value)| value));
@@ -117,29 +117,30 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    fn found(&self, place: &Place<'_, '_>) -> Found {
-        let Place { name, value, parent } = *place;
-        let is_listed = parent.is_some_and(|parent| look(self.text, parent) == Look::Inline);
+    fn node(&self, place: &PathStep<'_, '_>) -> KeyNode {
+        let PathStep { name, value, parent } = *place;
+        let is_listed =
+            parent.is_some_and(|parent| value_style(self.text, parent) == ValueStyle::Inline);
         let mut parts = Vec::new();
-        self.gather(name.map(Spanned::span), value, is_listed, &mut parts);
+        self.collect_parts(name.map(Spanned::span), value, is_listed, &mut parts);
         let span = value.span();
-        let inside = match (value.get_ref(), look(self.text, value), parent) {
+        let inside = match (value.get_ref(), value_style(self.text, value), parent) {
             (DeValue::Table(_), _, None) => Some(0..0),
-            (DeValue::Table(_), Look::Header, _) => Some(span.clone()),
-            (DeValue::Table(_), Look::Inline, _) => Some(span.start..span.start + 1),
+            (DeValue::Table(_), ValueStyle::Header, _) => Some(span.clone()),
+            (DeValue::Table(_), ValueStyle::Inline, _) => Some(span.start..span.start + 1),
             _ => None,
         };
-        Found {
+        KeyNode {
             name: name.map(Spanned::span),
-            value: (look(self.text, value) == Look::Inline).then_some(span),
+            value: (value_style(self.text, value) == ValueStyle::Inline).then_some(span),
             inside,
-            parts: merged(parts),
+            parts: merge_ranges(parts),
             lists: self.lists(value, parent),
         }
     }
 
     /// Gathers the parts of the text that a value takes, with its name.
-    fn gather(
+    fn collect_parts(
         &self,
         name: Option<Range<usize>>,
         value: &Spanned<DeValue<'_>>,
@@ -147,26 +148,28 @@ impl Tree<'_> {
         parts: &mut Vec<Range<usize>>,
     ) {
         let span = value.span();
-        match look(self.text, value) {
-            Look::Inline => {
+        match value_style(self.text, value) {
+            ValueStyle::Inline => {
                 let start = name.map_or(span.start, |name| self.start_of_line(name.start));
-                let end = if is_listed { self.behind_comma(span.end) } else { span.end };
+                let end = if is_listed { self.after_comma(span.end) } else { span.end };
                 parts.push(start..end);
                 return;
             }
-            Look::Header if matches!(value.get_ref(), DeValue::Table(_)) => {
+            ValueStyle::Header if matches!(value.get_ref(), DeValue::Table(_)) => {
                 let next = self.headers.iter().copied().find(|start| *start > span.start);
                 parts.push(span.start..next.unwrap_or(self.text.len()));
             }
-            Look::Header | Look::Implied => {}
+            ValueStyle::Header | ValueStyle::Implied => {}
         }
         match value.get_ref() {
             DeValue::Table(table) => {
                 for (key, value) in table.iter() {
-                    self.gather(Some(key.span()), value, false, parts);
+                    self.collect_parts(Some(key.span()), value, false, parts);
                 }
             }
-            DeValue::Array(many) => many.iter().for_each(|v| self.gather(None, v, false, parts)),
+            DeValue::Array(many) => {
+                many.iter().for_each(|v| self.collect_parts(None, v, false, parts))
+            }
             _ => {}
         }
     }
@@ -182,7 +185,7 @@ impl Tree<'_> {
         }
     }
 
-    fn behind_comma(&self, end: usize) -> usize {
+    fn after_comma(&self, end: usize) -> usize {
         let rest = &self.text[end..];
         let gap = rest.len() - rest.trim_start().len();
         if rest[gap..].starts_with(',') { end + gap + 1 } else { end }
@@ -200,14 +203,16 @@ impl Tree<'_> {
         };
         let lists = table.iter().map(|(_, one)| one).filter(|one| {
             let is_list = matches!(one.get_ref(), DeValue::Array(_));
-            is_list && look(self.text, one) == Look::Inline && one.span() != value.span()
+            is_list
+                && value_style(self.text, one) == ValueStyle::Inline
+                && one.span() != value.span()
         });
         lists.map(|one| self.text[one.span()].to_string()).collect()
     }
 }
 
 /// Joins parts that overlap.
-fn merged(mut parts: Vec<Range<usize>>) -> Vec<Range<usize>> {
+fn merge_ranges(mut parts: Vec<Range<usize>>) -> Vec<Range<usize>> {
     parts.sort_by_key(|part| part.start);
     let mut joined: Vec<Range<usize>> = Vec::new();
     for part in parts {
@@ -228,11 +233,14 @@ mod tests {
                         p = [1]\nq = [2]\n";
 
     fn without(key: &str) -> String {
-        let found = find(TEXT, &way(key)).expect(key);
+        let found = find(TEXT, &key_path(key)).expect(key);
         let mut text = TEXT.to_string();
         found.parts.iter().rev().for_each(|part| text.replace_range(part.clone(), ""));
         assert!(DeTable::parse(&text).is_ok(), "{key}: {text}");
-        assert!(find(&text, &way(key)).is_none() || key == "m.0" || key.ends_with("d.0"), "{text}");
+        assert!(
+            find(&text, &key_path(key)).is_none() || key == "m.0" || key.ends_with("d.0"),
+            "{text}"
+        );
         text
     }
 
@@ -252,13 +260,13 @@ mod tests {
 
     #[test]
     fn lists_beside_a_list_and_places_for_keys_are_known() {
-        let of = |key: &str| find(TEXT, &way(key)).expect(key);
+        let of = |key: &str| find(TEXT, &key_path(key)).expect(key);
         assert_eq!(of("s.one.rows.p").lists, ["[2]"]);
         assert_eq!(of("s.one.rows").lists, ["[1]", "[2]"]);
         assert_eq!(of("").inside, Some(0..0));
         assert_eq!(of("other").inside.map(|at| &TEXT[at]), Some("[other]"));
         assert_eq!(of("s.one.b").inside.map(|at| &TEXT[at]), Some("{"));
         assert_eq!(of("other.0.o").value.map(|at| &TEXT[at]), Some("1"));
-        assert_eq!((find(TEXT, &way("m.7")), find(TEXT, &way("a.b"))), (None, None));
+        assert_eq!((find(TEXT, &key_path("m.7")), find(TEXT, &key_path("a.b"))), (None, None));
     }
 }

@@ -9,7 +9,7 @@ use sidestep::kernel::Simulation;
 use sidestep::kernel::control::Space;
 use sidestep::kernel::ports::table::split_unit;
 use sidestep::kernel::ports::{ColumnSpec, TableSchema};
-use sidestep::scenario::{Source, told};
+use sidestep::scenario::{Source, metric_label};
 use sidestep::worlds::WORLDS;
 use std::fmt::Write;
 use std::sync::{Mutex, PoisonError};
@@ -63,7 +63,7 @@ fn started(world: &str, scenario: &str) -> Box<dyn Simulation> {
     let source = Source::new(world, &text, root());
     let compiled = WORLDS.compile(&source).unwrap_or_else(|error| panic!("{error}"));
     let mut run = compiled.start(&source, 1);
-    run.begin_recording();
+    run.start_recording();
     // Some metrics are there from the first cycle on only.
     run.advance(1);
     run
@@ -100,7 +100,7 @@ fn rendered_spaces(spaces: &[Space]) -> String {
     text += "| --- | --- | --- | --- | --- | --- |\n";
     for (k, space) in spaces.iter().enumerate() {
         let shape: Vec<_> = space.shape.iter().map(ToString::to_string).collect();
-        let (name, unit, words) = (&space.name, space.unit().unwrap_or(""), space.words());
+        let (name, unit, words) = (&space.name, space.unit().unwrap_or(""), space.describe());
         let (shape, meaning) = (shape.join(" x "), &space.meaning);
         writeln!(text, "| {k} | `{name}` | {shape} | {unit} | {words} | {meaning} |")
             .expect("text");
@@ -157,8 +157,8 @@ fn the_chapter_of_columns_has_what_agents_observe_and_take() {
     for (world, scenario) in EXTERNAL {
         let run = started(world, scenario);
         let team = &run.teams()[0];
-        compare(&format!("observed of {world}"), &rendered_spaces(&team.observed));
-        compare(&format!("ordered of {world}"), &rendered_spaces(&team.ordered));
+        compare(&format!("observed of {world}"), &rendered_spaces(&team.observation_spaces));
+        compare(&format!("ordered of {world}"), &rendered_spaces(&team.action_spaces));
     }
 }
 
@@ -179,11 +179,11 @@ fn the_chapter_of_columns_names_every_event_and_no_other() {
 #[test]
 fn every_metric_is_told_in_words_with_a_meaning() {
     for (world, scenario) in SCENARIOS {
-        let meanings = WORLDS.named(world).expect("a world").meanings();
+        let meanings = WORLDS.find(world).expect("a world").metric_infos();
         let names = metrics(&started(world, scenario).metrics(), "");
         for name in names {
             let one = if name.contains("_by_") { format!("{name}.some") } else { name };
-            assert_ne!(told(meanings, &one).meaning, "", "{world}: `{one}`");
+            assert_ne!(metric_label(meanings, &one).meaning, "", "{world}: `{one}`");
         }
     }
 }

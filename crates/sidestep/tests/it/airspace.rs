@@ -18,7 +18,7 @@ pub(crate) fn traffic(more: &str) -> Source {
 
 fn run(source: &Source, workers: usize) -> AirspaceRun {
     let mut run = airspace_run(source, workers).expect("a valid scenario");
-    run.share_always();
+    run.force_parallel();
     run
 }
 
@@ -40,7 +40,11 @@ fn any_number_of_workers_gives_the_same_bits() {
             let mut team = run(&source, workers);
             team.advance(40);
             assert_eq!(team.digest(), alone.digest(), "{workers} workers, {more}");
-            assert_eq!(team.books().ledger, alone.books().ledger, "{workers} workers, {more}");
+            assert_eq!(
+                team.collector().counters,
+                alone.collector().counters,
+                "{workers} workers, {more}"
+            );
         }
     }
 }
@@ -57,7 +61,7 @@ fn resumed_and_recorded(source: &Source) {
     let mut whole = run(source, 2);
     whole.advance(30);
     let mut first = run(source, 1);
-    first.begin_recording();
+    first.start_recording();
     first.advance(13);
     let mut recorder = MemoryRecorder::new(&first.schemas());
     first.record(&mut recorder).expect("memory has room");
@@ -65,7 +69,7 @@ fn resumed_and_recorded(source: &Source) {
     second.restore(&first.checkpoint()).expect("its own checkpoint");
     second.advance(17);
     assert_eq!(second.digest(), whole.digest());
-    assert_eq!(second.books().ledger, whole.books().ledger);
+    assert_eq!(second.collector().counters, whole.collector().counters);
 }
 
 /// Wherever this is run, the bits must be these (D3); a change needs a line in the CHANGELOG
@@ -95,7 +99,7 @@ fn with_the_shield_no_method_loses_separation_and_everybody_arrives() {
                  [airspace.generator]\nkind = \"{kind}\"\nn = {n}\n"
             );
             let mut run = run(&Source::new(kind, text, ""), 2);
-            assert!(run.books().ledger.too_close.is_empty(), "{kind}");
+            assert!(run.collector().counters.too_close.is_empty(), "{kind}");
             while run.cycle() < 1000 && !run.is_over() {
                 run.advance(50);
             }
@@ -246,9 +250,9 @@ fn no_cycle_of_many_airplanes_works_long_without_a_look_at_the_interrupt() {
         );
         let mut run = run(&Source::new("s", text, ""), 1);
         let interrupt = Interrupt::default();
-        run.heed(interrupt.clone());
+        run.set_interrupt(interrupt.clone());
         run.advance(1);
-        interrupt.looks()
+        interrupt.checks()
     };
     let team = "deployment = \"compact-team\"";
     for more in ["", "shield = \"off\"", team, "preset = \"paper\""] {
@@ -267,11 +271,11 @@ fn starting_up_takes_nearly_linear_work() {
             "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = {n}\n"
         );
         let interrupt = Interrupt::default();
-        let heeded = interrupt.heeded_here();
+        let heeded = interrupt.attach();
         let started = run(&Source::new("s", text, ""), 1);
         drop(heeded);
         assert_eq!(started.agents(), n as usize);
-        interrupt.looks() as f64
+        interrupt.checks() as f64
     };
     // Four times as many may take eight times the work; the square would be sixteen.
     let ratio = looks(1600) / looks(400);

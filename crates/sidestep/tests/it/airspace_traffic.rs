@@ -18,7 +18,7 @@ fn scenario(airspace: &str, airplanes: &str) -> Source {
 
 fn run(source: &Source, workers: usize) -> AirspaceRun {
     let mut run = airspace_run(source, workers).expect("a valid scenario");
-    run.share_always();
+    run.force_parallel();
     run
 }
 
@@ -43,11 +43,11 @@ fn two_tracks() -> String {
 #[test]
 fn recorded_airplanes_fly_exactly_where_they_were_and_their_losses_are_counted() {
     let mut run = run(&scenario("", &two_tracks()), 1);
-    assert!(run.books().ledger.too_close.is_empty());
+    assert!(run.collector().counters.too_close.is_empty());
     for cycle in 1..=40_u32 {
         run.advance(1);
         let x_m = (200.0 * 0.5 * f64::from(cycle)).mul_add(5.0, -10_000.0);
-        let found = run.saved().0.airplanes.iter().map(|a| a.pose.at).collect::<Vec<_>>();
+        let found = run.snapshot().0.airplanes.iter().map(|a| a.pose.at).collect::<Vec<_>>();
         assert!((found[0][0] - x_m).abs() < 1e-6 && (found[1][0] + x_m).abs() < 1e-6, "{found:?}");
     }
     let metrics = run.metrics();
@@ -111,7 +111,7 @@ fn orders_are_carried_out_at_their_times() {
                   { at_s = 120.0, altitude_m = 100.0, climb_m_s = 2.0 },\n\
                   { at_s = 200.0, proceeds = true },\n{ at_s = 900.0, leaves = true }]";
     let mut run = run(&scenario("", &plane([0.0, 0.0], 0.0, [1e6, 0.0], orders)), 1);
-    let now = |run: &AirspaceRun| run.saved().0.airplanes[0];
+    let now = |run: &AirspaceRun| run.snapshot().0.airplanes[0];
     run.advance(4);
     assert!((now(&run).pose.at[0] - 700.0).abs() < 1e-6);
     run.advance(16);
@@ -142,7 +142,7 @@ fn a_new_route_replaces_the_old_one() {
     let mut run = run(&scenario("", &plane([0.0, 0.0], 0.0, [1e6, 0.0], orders)), 1);
     run.advance(200);
     assert!(run.is_over());
-    let at = run.saved().0.airplanes[0].pose.at;
+    let at = run.snapshot().0.airplanes[0].pose.at;
     assert!((at[0] - 2000.0).hypot(at[1] - 3000.0) < 200.0, "{at:?}");
 }
 
@@ -155,7 +155,7 @@ fn an_order_that_would_take_the_fallback_away_waits() {
     let all = beside(1600.0) + &beside(-1600.0) + &plane([0.0, 0.0], 0.0, [40_000.0, 0.0], told);
     let delayed = |shield: &str| {
         let mut run = run(&scenario(&format!("shield = \"{shield}\""), &all), 1);
-        assert!(run.books().ledger.too_close.is_empty());
+        assert!(run.collector().counters.too_close.is_empty());
         run.advance(100);
         let metrics = run.metrics();
         assert_eq!((metrics.losses_of_separation, metrics.orders), (0, u64::from(shield == "off")));
@@ -205,8 +205,8 @@ fn appearing() -> impl Strategy<Value = String> {
 type Pairs = BTreeSet<(u32, u32)>;
 
 /// Pairs that lost separation, and pairs that were reported to be too close when they came in.
-fn lost_and_told(run: &AirspaceRun) -> (Pairs, Pairs) {
-    let ledger = &run.books().ledger;
+fn lost_and_reported_pairs(run: &AirspaceRun) -> (Pairs, Pairs) {
+    let ledger = &run.collector().counters;
     let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
     (lost.collect(), ledger.too_close.keys().copied().collect())
 }
@@ -222,7 +222,7 @@ proptest! {
     ) {
         let mut run = run(&scenario(&format!("method = \"{method}\""), &airplanes), 1);
         run.advance(120);
-        let (lost, told) = lost_and_told(&run);
+        let (lost, told) = lost_and_reported_pairs(&run);
         prop_assert!(lost.is_subset(&told), "{lost:?} but only {told:?} were told");
         for &(a, b) in &told {
             prop_assert!(a < b);
@@ -256,12 +256,12 @@ fn any_number_of_workers_gives_the_same_bits_and_so_does_a_resumed_run() {
     let source = everything();
     let mut alone = run(&source, 1);
     alone.advance(50);
-    assert!(!alone.books().ledger.too_close.is_empty(), "some come in too close");
+    assert!(!alone.collector().counters.too_close.is_empty(), "some come in too close");
     for workers in [2, 3, 8] {
         let mut team = run(&source, workers);
         team.advance(50);
         assert_eq!(team.digest(), alone.digest(), "{workers} workers");
-        assert_eq!(team.books().ledger, alone.books().ledger, "{workers} workers");
+        assert_eq!(team.collector().counters, alone.collector().counters, "{workers} workers");
     }
     // Before the hand-over, in the middle of climbs, and after all orders.
     for pause in [7, 19, 40] {
@@ -271,7 +271,7 @@ fn any_number_of_workers_gives_the_same_bits_and_so_does_a_resumed_run() {
         second.restore(&first.checkpoint()).expect("its own checkpoint");
         second.advance(50 - pause);
         assert_eq!(second.digest(), alone.digest(), "from {pause}");
-        assert_eq!(second.books().ledger, alone.books().ledger, "from {pause}");
+        assert_eq!(second.collector().counters, alone.collector().counters, "from {pause}");
     }
 }
 
@@ -280,7 +280,7 @@ fn every_deployment_knows_what_airplanes_were_told() {
     let digest = |deployment: &str| {
         let mut source = everything();
         let set = format!("airspace.deployment=\"{deployment}\"");
-        source = source.with(&[set]).expect("a known key");
+        source = source.with_overrides(&[set]).expect("a known key");
         let mut run = run(&source, 1);
         run.advance(30);
         run.digest()
@@ -378,7 +378,7 @@ fn the_recording_over_switzerland_replays_with_its_losses_and_is_flown_anew_with
     }
     let metrics = replayed.metrics();
     assert_eq!((metrics.replayed, metrics.airplanes), (names.len() as u64, names.len() as u64));
-    let lost = replayed.books().ledger.pairs.iter().filter(|(_, record)| record.losses > 0);
+    let lost = replayed.collector().counters.pairs.iter().filter(|(_, record)| record.losses > 0);
     let found: BTreeMap<String, f64> = lost
         .map(|(&(a, b), r)| {
             (format!("{}-{}", names[a as usize], names[b as usize]), r.nearest_m / 1852.0)
@@ -392,10 +392,10 @@ fn the_recording_over_switzerland_replays_with_its_losses_and_is_flown_anew_with
     }
     for until_s in [0.0, 600.0] {
         let set = [format!("airspace.replay_until_s={until_s:?}")];
-        let mut anew = run(&source.clone().with(&set).expect("a known key"), 2);
+        let mut anew = run(&source.clone().with_overrides(&set).expect("a known key"), 2);
         anew.advance(400);
         let metrics = anew.metrics();
-        let (lost, told) = lost_and_told(&anew);
+        let (lost, told) = lost_and_reported_pairs(&anew);
         println!(
             "anew from {until_s} s: {} pairs lost, {:.0} s, {} told too close, {} arrived, delay {:?} %",
             lost.len(),

@@ -3,11 +3,11 @@
 
 use crate::chain::SEVERAL;
 use crate::common::CROWD;
-use sidestep::kernel::batch::{Batch, BatchError, Start};
-use sidestep::kernel::control::{CellsMut, OrderError, Orders};
+use sidestep::kernel::batch::{Batch, BatchError, SimulationFactory};
+use sidestep::kernel::control::{BufferMut, OrderError, Orders};
 use sidestep::kernel::stream::Draws;
 use sidestep::kernel::{Digest, InputError, Simulation};
-use sidestep::scenario::{Compiled, Source};
+use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::robots;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept};
@@ -33,12 +33,12 @@ fn source(world: &str, more: &str, seed: u64) -> Source {
     Source::new("s", format!("format = 1\nworld = \"{world}\"\nseed = {seed}\n{more}"), "")
 }
 
-fn compiled(source: &Source) -> Box<dyn Compiled> {
+fn compiled(source: &Source) -> Box<dyn CompiledScenario> {
     WORLDS.compile(source).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Returns all that depends on a seed: the digest after some cycles, the teams, and the texts about the scenario.
-fn told(compiled: &dyn Compiled, source: &Source) -> (Digest, String) {
+fn seed_dependent_output(compiled: &dyn CompiledScenario, source: &Source) -> (Digest, String) {
     let mut run = compiled.start(source, 1);
     let mut told = format!("{:?}", run.teams());
     write!(told, "{:?}{:?}", compiled.contents(source), compiled.plan()).expect("text");
@@ -48,17 +48,21 @@ fn told(compiled: &dyn Compiled, source: &Source) -> (Digest, String) {
 }
 
 fn assert_fresh_starts_are_those_of_compiling(of: impl Fn(u64) -> Source) {
-    let (first, before) = (compiled(&of(1)), told(&*compiled(&of(1)), &of(1)));
+    let (first, before) = (compiled(&of(1)), seed_dependent_output(&*compiled(&of(1)), &of(1)));
     let mut last = None;
     for seed in [2, 99, u64::MAX >> 1] {
         let again = first.reseeded(seed).expect("it takes less").expect("there is room");
-        assert_eq!(told(&*again, &of(seed)), told(&*compiled(&of(seed)), &of(seed)), "{seed}");
+        assert_eq!(
+            seed_dependent_output(&*again, &of(seed)),
+            seed_dependent_output(&*compiled(&of(seed)), &of(seed)),
+            "{seed}"
+        );
         last = Some(again);
     }
     // Of a fresh start another one, and the first is as it was.
     let back = last.expect("some").reseeded(1).expect("it takes less").expect("there is room");
-    assert_eq!(told(&*back, &of(1)), before);
-    assert_eq!(told(&*first, &of(1)), before);
+    assert_eq!(seed_dependent_output(&*back, &of(1)), before);
+    assert_eq!(seed_dependent_output(&*first, &of(1)), before);
 }
 
 #[test]
@@ -100,7 +104,7 @@ fn a_fresh_start_of_robots_is_that_of_compiling() {
 }
 
 /// Returns a start of worlds of a scenario.
-fn start(source: Source) -> Arc<Start> {
+fn start(source: Source) -> Arc<SimulationFactory> {
     let compiled = compiled(&source);
     Arc::new(move |seed| {
         let fresh = compiled.reseeded(seed).expect("it takes less")?;
@@ -114,7 +118,7 @@ fn action(seed: u64, agent: usize, cycle: u64) -> f64 {
 }
 
 /// Returns the digests of a batch in which some worlds are restarted on the way, and all that was observed.
-fn stepped(workers: usize) -> (Vec<Digest>, Vec<i64>) {
+fn batch_digests(workers: usize) -> (Vec<Digest>, Vec<i64>) {
     let seeds: Vec<u64> = (10..43).collect();
     let mut batch = Batch::new(start(source("robots", ORDERED, 1)), &seeds, workers).expect("room");
     let team = batch.teams()[0].clone();
@@ -131,8 +135,8 @@ fn stepped(workers: usize) -> (Vec<Digest>, Vec<i64>) {
         }
         let room =
             |space: &sidestep::kernel::control::Space| vec![-7; seeds.len() * 6 * space.width()];
-        let mut rooms: Vec<Vec<i64>> = team.observed.iter().map(room).collect();
-        let mut cells: Vec<_> = rooms.iter_mut().map(|room| CellsMut::Whole(room)).collect();
+        let mut rooms: Vec<Vec<i64>> = team.observation_spaces.iter().map(room).collect();
+        let mut cells: Vec<_> = rooms.iter_mut().map(|room| BufferMut::Integer(room)).collect();
         batch.observe(0, &mut cells).expect("room");
         seen.extend(rooms.into_iter().flatten());
     }
@@ -141,9 +145,9 @@ fn stepped(workers: usize) -> (Vec<Digest>, Vec<i64>) {
 
 #[test]
 fn a_batch_has_the_bits_of_runs_alone_on_any_number_of_workers() {
-    let alone = stepped(1);
+    let alone = batch_digests(1);
     for workers in [2, 3, 8] {
-        assert_eq!(stepped(workers), alone, "{workers} workers");
+        assert_eq!(batch_digests(workers), alone, "{workers} workers");
     }
     for (k, digest) in alone.0.into_iter().enumerate() {
         let (seed, from) = if k % 5 == 2 { (100 + k as u64, 13) } else { (10 + k as u64, 0) };
@@ -193,7 +197,7 @@ fn a_wrong_order_is_told_with_its_world_and_nobody_is_ordered_anything() {
     );
     batch.advance(0, None).expect("whole");
     assert_eq!(batch.digests(), before);
-    let room = batch.observe(0, &mut [CellsMut::Real(&mut [0.0; 3])]).expect_err("another shape");
+    let room = batch.observe(0, &mut [BufferMut::Real(&mut [0.0; 3])]).expect_err("another shape");
     assert!(room.to_string().contains("contact of 3 x 6 whole values"), "{room}");
     let masks = batch.advance(1, Some(&[true])).expect_err("one truth value");
     assert_eq!(masks.to_string(), "a batch of 3 worlds needs 3 truth values, not 1");
@@ -226,7 +230,7 @@ fn a_world_that_breaks_off_is_named_and_the_others_are_whole() {
     let fresh = move |seed| -> Result<Box<dyn Simulation>, InputError> {
         Ok(Box::new(first.reseeded(seed)?.start(&source("robots", TEXT, seed), 1)))
     };
-    let fresh: Arc<Start> = Arc::new(fresh);
+    let fresh: Arc<SimulationFactory> = Arc::new(fresh);
     let breaks = |seed: u64| {
         let mut run = fresh(seed).expect("room");
         run.advance(4);
@@ -282,7 +286,8 @@ fn worlds_of_another_shape_are_refused() {
     let [small, large] = [2, 3].map(|count| {
         start(source("robots", &ORDERED.replace("count = 6", &format!("count = {count}")), 1))
     });
-    let either: Arc<Start> = Arc::new(move |seed| if seed < 9 { small(seed) } else { large(seed) });
+    let either: Arc<SimulationFactory> =
+        Arc::new(move |seed| if seed < 9 { small(seed) } else { large(seed) });
     let refused = Batch::new(Arc::clone(&either), &[1, 2, 9], 2).expect_err("another shape");
     assert_eq!(refused, BatchError::Shape { world: 2 });
     let mut batch = Batch::new(either, &[1, 2], 2).expect("room");
@@ -291,7 +296,7 @@ fn worlds_of_another_shape_are_refused() {
 }
 
 /// Returns a start of worlds that finds no room with one seed.
-fn start_but(wrong: u64) -> Arc<Start> {
+fn start_but(wrong: u64) -> Arc<SimulationFactory> {
     let start = start(source("robots", ORDERED, 1));
     Arc::new(move |seed| match seed == wrong {
         true => Err(InputError::new("s", "no free place is left", "give a larger map")),

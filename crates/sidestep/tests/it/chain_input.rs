@@ -48,7 +48,7 @@ fn text_of(mutant: &Value) -> String {
 }
 
 fn try_out(mut run: Box<dyn Simulation>) {
-    run.begin_recording();
+    run.start_recording();
     run.advance(3);
     run.metrics();
     run.digest();

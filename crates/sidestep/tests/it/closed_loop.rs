@@ -7,7 +7,7 @@ use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema, Values};
 use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::exact::Model;
+use sidestep::worlds::robots::exact::MarkovModel;
 use sidestep::worlds::robots::robots_run;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::path::Path;
@@ -60,7 +60,7 @@ fn halls() -> Source {
 /// Runs and writes the table `name` as CSV into `folder`.
 fn record(source: &Source, cycles: u64, name: &str, folder: &Path) -> std::path::PathBuf {
     let mut run = robots_run(source, 2).unwrap_or_else(|e| panic!("{e}"));
-    run.begin_recording();
+    run.start_recording();
     let schemas = run.schemas();
     let mut recorder = MemoryRecorder::new(&schemas);
     run.advance(cycles);
@@ -130,10 +130,10 @@ fn an_effector_comes_back_from_the_log_of_its_run() {
                     ascii = \"\"\"\n.....\n\"\"\"\n[robots]\nat = [[1, 0, 0]]\neffector = \"wheels\"\n";
     let loaded = Source::new("loaded.toml", scenario, folder.path());
     let compiled = Compiled::new(&loaded, &Behaviours::new(), StorageOrder::ById);
-    let model = Model::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap();
+    let model = MarkovModel::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap();
     let forward = learned.profile.action("forward").expect("learned");
     let slip = forward.iter().find(|t| t.path == "FF").expect("two boxes ahead").p;
-    let ahead = model.here_and_now(model.poses()[0], 0);
+    let ahead = model.outcome_distribution(model.poses()[0], 0);
     let two_ahead = ahead.iter().find(|(o, _)| o.pose.col == 3).expect("a slip").1;
     assert!((two_ahead - slip).abs() < 1e-12, "{two_ahead} for {slip}");
 }

@@ -61,7 +61,7 @@ right = [{ p = 0.7, turn = -90 }, { p = 0.1 }, { p = 0.2, turn = -90, path = "R"
 /// A scenario text with overrides applied.
 pub(crate) fn source(text: &str, overrides: &[&str]) -> Source {
     let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-    Source::new("test", text, "").with(&overrides).expect("the overrides fit")
+    Source::new("test", text, "").with_overrides(&overrides).expect("the overrides fit")
 }
 
 /// A run that always uses all its workers.
@@ -74,6 +74,6 @@ pub(crate) fn stored(source: &Source, workers: usize, order: StorageOrder) -> Ro
     let compiled = Compiled::new(source, &Behaviours::new(), order);
     let compiled = compiled.unwrap_or_else(|e| panic!("{e}"));
     let mut simulation = compiled.start(source, workers);
-    simulation.share_always();
+    simulation.force_parallel();
     simulation
 }

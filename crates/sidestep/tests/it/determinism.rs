@@ -29,7 +29,7 @@ fn digest_after(mut run: RobotsRun, cycles: u64) -> String {
 
 /// All rows of a recorded run; block borders are part of nothing.
 fn recorded(mut run: RobotsRun, cycles: u64, slice: u64) -> (String, MemoryRecorder) {
-    run.begin_recording();
+    run.start_recording();
     let mut recorder = MemoryRecorder::new(&run.schemas());
     while run.cycle() < cycles {
         run.advance(slice.min(cycles - run.cycle()));

@@ -6,7 +6,7 @@ use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::effector::ObstacleRule;
-use sidestep::worlds::robots::exact::{Outcome, Pose};
+use sidestep::worlds::robots::exact::{ActionOutcome, GridPose};
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 
@@ -101,7 +101,7 @@ type Recorded = (MemoryRecorder, RobotsRun);
 
 fn recorded(source: &Source, cycles: u64) -> Recorded {
     let mut simulation = robots_run(source, 2).unwrap_or_else(|e| panic!("{e}"));
-    simulation.begin_recording();
+    simulation.start_recording();
     let mut recorder = MemoryRecorder::new(&simulation.schemas());
     simulation.advance(cycles);
     simulation.record(&mut recorder).expect("memory takes everything");
@@ -179,7 +179,7 @@ const OPEN: [&str; 4] = [
 ];
 
 /// 3600 robots do one action.
-fn one_action(art: &str, regime: &str, action: &str) -> BTreeMap<Outcome, u64> {
+fn one_action(art: &str, regime: &str, action: &str) -> BTreeMap<ActionOutcome, u64> {
     let tiles = Tiles::new(art, 60)
         .keys(&format!("regime = \"{regime}\""))
         .robots(&format!("effector = \"nomad\"\n{}", repeating(action)));
@@ -190,11 +190,11 @@ fn one_action(art: &str, regime: &str, action: &str) -> BTreeMap<Outcome, u64> {
 
 /// The ends of the nomad's actions in a free place, for a body at `[3, 3]`: written for each
 /// heading by hand.
-fn in_the_open(heading: u8, action: &str) -> BTreeMap<Outcome, f64> {
+fn in_the_open(heading: u8, action: &str) -> BTreeMap<ActionOutcome, f64> {
     let ahead = [(1, 0), (0, 1), (-1, 0), (0, -1)][usize::from(heading)];
     let left = [(0, 1), (-1, 0), (0, -1), (1, 0)][usize::from(heading)];
-    let at = |a: i32, l: i32, turn: u8| Outcome {
-        pose: Pose {
+    let at = |a: i32, l: i32, turn: u8| ActionOutcome {
+        pose: GridPose {
             col: 3 + a * ahead.0 + l * left.0,
             row: 3 + a * ahead.1 + l * left.1,
             heading: (heading + turn) % 4,
@@ -266,7 +266,7 @@ fn meet(robots: [[i32; 3]; 2], effector: &str, seed: u64) -> Vec<[(i32, i32); 2]
     let source = pairs(robots, effector, seed);
     let mut simulation = robots_run(&source, 2).unwrap_or_else(|e| panic!("{e}"));
     simulation.advance(1);
-    let bodies = simulation.saved().bodies;
+    let bodies = simulation.snapshot().bodies;
     let in_tile = |at: (u32, u32)| ((at.0 % 8) as i32, (at.1 % 8) as i32 - 1);
     bodies.chunks(2).map(|pair| [in_tile(pair[0].at), in_tile(pair[1].at)]).collect()
 }

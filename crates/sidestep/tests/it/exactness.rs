@@ -8,7 +8,7 @@ use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::decide::Random;
 use sidestep::worlds::robots::effector::{FORWARD, ObstacleRule, Side};
 use sidestep::worlds::robots::exact::{
-    self, Chain, Comparison, Model, Pose, sampling_limit, total_variation,
+    self, Comparison, GridPose, MarkovChain, MarkovModel, sampling_limit, total_variation,
 };
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
@@ -52,12 +52,12 @@ fn compile(source: &Source) -> Compiled {
     Compiled::new(source, &Behaviours::new(), StorageOrder::ById).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn model(tiles: &Tiles) -> Model {
-    Model::new(&compile(&tiles.single().source())).unwrap_or_else(|e| panic!("{e}"))
+fn model(tiles: &Tiles) -> MarkovModel {
+    MarkovModel::new(&compile(&tiles.single().source())).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Last poses of all rooms, contacts left out.
-fn poses(tiles: &Tiles, simulation: &RobotsRun) -> BTreeMap<Pose, u64> {
+fn poses(tiles: &Tiles, simulation: &RobotsRun) -> BTreeMap<GridPose, u64> {
     let mut poses = BTreeMap::new();
     for (outcome, n) in tiles.outcomes(simulation) {
         *poses.entry(outcome.pose).or_insert(0) += n;
@@ -75,7 +75,7 @@ fn after_n_cycles_the_poses_are_distributed_as_the_chain_says() {
                 let mut simulation = tiles.simulation();
                 for cycles in [1, 2, 7, 40] {
                     simulation.advance(cycles - simulation.cycle());
-                    let exact = chain.over_poses(&chain.distribution_after(cycles));
+                    let exact = chain.pose_distribution(&chain.distribution_after(cycles));
                     let what = format!("{behaviour}, {}, size {size}, {cycles}", rule.name());
                     assert_fits(&what, &poses(&tiles, &simulation), &exact);
                 }
@@ -86,7 +86,7 @@ fn after_n_cycles_the_poses_are_distributed_as_the_chain_says() {
 
 /// Cycles after which the chain has forgotten where it was: from every state the distribution
 /// is within `distance` of the stationary one.
-fn mixing_time(chain: &Chain, stationary: &[f64], distance: f64) -> u64 {
+fn mixing_time(chain: &MarkovChain, stationary: &[f64], distance: f64) -> u64 {
     let n = chain.states().len();
     let certain = |at: usize| (0..n).map(|k| f64::from(u8::from(k == at))).collect::<Vec<f64>>();
     let mut rows: Vec<Vec<f64>> = (0..n).map(certain).collect();
@@ -111,7 +111,7 @@ fn in_the_long_run_robots_are_where_the_chain_is() {
             let stationary = chain.stationary();
             assert!(stationary.residual < 1e-12);
             let apart = mixing_time(&chain, &stationary.distribution, 1e-9);
-            let expected = chain.over_poses(&stationary.distribution);
+            let expected = chain.pose_distribution(&stationary.distribution);
             let (observed, samples) = long_run(&tiles, apart, 12);
             let share = |pose| observed.get(pose).copied().unwrap_or(0) as f64 / samples;
             let shares: Vec<f64> = expected.keys().map(share).collect();
@@ -126,7 +126,7 @@ fn in_the_long_run_robots_are_where_the_chain_is() {
 }
 
 /// Looks at all rooms `times` times, `apart` cycles apart.
-fn long_run(tiles: &Tiles, apart: u64, times: u64) -> (BTreeMap<Pose, u64>, f64) {
+fn long_run(tiles: &Tiles, apart: u64, times: u64) -> (BTreeMap<GridPose, u64>, f64) {
     let mut simulation = tiles.simulation();
     let mut counts = BTreeMap::new();
     for _ in 0..times {
@@ -160,7 +160,7 @@ fn the_chain_of_another_law_does_not_fit() {
     let tiles = rooms(ROOM, 1, BOUNCE.0, ObstacleRule::Renormalise);
     let cut = rooms(ROOM, 1, BOUNCE.0, ObstacleRule::Cut);
     let chain = model(&cut).chain(&Random::bounce()).unwrap();
-    let expected = chain.over_poses(&chain.stationary().distribution);
+    let expected = chain.pose_distribution(&chain.stationary().distribution);
     let (observed, samples) = long_run(&tiles, 100, 10);
     let share = |pose| observed.get(pose).copied().unwrap_or(0) as f64 / samples;
     let shares: Vec<f64> = expected.keys().map(share).collect();
@@ -178,7 +178,7 @@ fn slow_robots_act_as_seldom_as_their_period_says() {
     let chain = model.chain(&Random::uniform()).unwrap();
     let mut simulation = tiles.simulation();
     simulation.advance(20);
-    let exact = chain.over_poses(&chain.distribution_after(model.actions_in(20)));
+    let exact = chain.pose_distribution(&chain.distribution_after(model.actions_in(20)));
     assert_fits("period 3", &poses(&tiles, &simulation), &exact);
 }
 
@@ -190,19 +190,19 @@ fn a_robot_that_always_goes_ahead_ends_at_the_wall() {
     assert_eq!(model.poses().len(), 12);
     let chain = model.chain(&Random::always(FORWARD)).unwrap();
     assert_eq!(chain.states().len(), 3);
-    let end = Pose { col: 2, row: 0, heading: 0 };
-    let stationary = chain.over_poses(&chain.stationary().distribution);
+    let end = GridPose { col: 2, row: 0, heading: 0 };
+    let stationary = chain.pose_distribution(&chain.stationary().distribution);
     assert!((stationary[&end] - 1.0).abs() < 1e-9);
-    assert_eq!(chain.over_poses(&chain.distribution_after(2))[&end], 1.0);
+    assert_eq!(chain.pose_distribution(&chain.distribution_after(2))[&end], 1.0);
     let summary = model.summary("forward", &Random::always(FORWARD), 1).unwrap();
     assert_eq!((summary.most_visited[0].col, summary.chain_states), (2, 3));
-    let contact = model.here_and_now(end, FORWARD)[0].0.contact;
+    let contact = model.outcome_distribution(end, FORWARD)[0].0.contact;
     assert_eq!(contact, Some((1, Side::Front)));
 }
 
 fn refused(text: &str) -> InputError {
     let source = Source::new("s.toml", format!("format = 1\nworld = \"robots\"\n{text}"), "");
-    Model::new(&compile(&source)).expect_err(text)
+    MarkovModel::new(&compile(&source)).expect_err(text)
 }
 
 #[test]
@@ -227,9 +227,12 @@ fn what_is_no_chain_over_one_robot_is_refused_with_what_to_change() {
 fn a_closed_door_is_a_wall_of_its_kind() {
     let text = "format = 1\nworld = \"robots\"\n[map]\nascii = \"\"\"\n.....\n\"\"\"\n[robots]\n\
                 at = [[0, 0, 0]]\n[doors]\nat = [[2, 0]]\nperiodic = { open = 0, closed = 1 }\n";
-    let model = Model::new(&compile(&Source::new("s.toml", text, ""))).unwrap();
+    let model = MarkovModel::new(&compile(&Source::new("s.toml", text, ""))).unwrap();
     assert_eq!(model.poses().len(), 8);
-    let at_the_door = Pose { col: 1, row: 0, heading: 0 };
+    let at_the_door = GridPose { col: 1, row: 0, heading: 0 };
     let door = 2;
-    assert_eq!(model.here_and_now(at_the_door, FORWARD)[0].0.contact, Some((door, Side::Front)));
+    assert_eq!(
+        model.outcome_distribution(at_the_door, FORWARD)[0].0.contact,
+        Some((door, Side::Front))
+    );
 }

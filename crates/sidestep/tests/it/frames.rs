@@ -4,13 +4,13 @@ use crate::chain::{SEVERAL, SWARM};
 use crate::common::{CROWD, source};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::MemoryRecorder;
-use sidestep::kernel::view::{Kind, Look, Shape, Who};
+use sidestep::kernel::view::{BodyId, BodyKind, FrameOptions, Shape};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::chain::chain_run;
 use sidestep::worlds::robots::robots_run;
 
-const LOOK: Look = Look::first(usize::MAX);
+const LOOK: FrameOptions = FrameOptions::with_first_scans(usize::MAX);
 
 fn traffic() -> Source {
     let text = "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\nmethod = \"none\"\n\
@@ -39,7 +39,7 @@ pub(crate) fn worlds(workers: usize) -> Vec<Box<dyn Simulation>> {
 #[test]
 fn looking_changes_no_result_whoever_computes_it() {
     for (mut plain, mut watched) in worlds(1).into_iter().zip(worlds(2)) {
-        watched.watch();
+        watched.enable_events();
         let mut frames = Vec::new();
         for _ in 0..40 {
             frames.push(watched.frame(LOOK));
@@ -66,15 +66,15 @@ fn events_reach_the_log_and_the_table_alike() {
     let mut plain = robots_run(&source(CROWD, &[]), 1).expect("a valid scenario");
     let (mut told, mut tables) = (0, Vec::new());
     for (run, watches) in [(&mut run, true), (&mut plain, false)] {
-        run.begin_recording();
+        run.start_recording();
         if watches {
-            run.watch();
+            run.enable_events();
         }
         let mut recorder = MemoryRecorder::new(&run.schemas());
         for _ in 0..30 {
             run.advance(10);
             if watches {
-                told += run.frame(Look::BODIES).log.len();
+                told += run.frame(FrameOptions::WITHOUT_SCANS).log.len();
             }
         }
         run.record(&mut recorder).expect("kept");
@@ -101,7 +101,7 @@ fn bodies_keep_their_names_and_are_where_the_world_has_them() {
         let frame = run.frame(LOOK);
         assert_eq!((frame.cycle, frame.time_s), (5, 5.0 * scenery.cycle_s));
     }
-    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == Kind::Robot).count();
+    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == BodyKind::Robot).count();
     assert_eq!(agents, robots(1).agents());
 }
 
@@ -116,7 +116,7 @@ fn sensors_see_the_floor_around_them() {
     let [scan] = &frame.scans[..] else { panic!("one robot has one sensor") };
     assert_eq!(scan.name(), "robot/0/bumper-4");
     let heading =
-        |k: usize| scan.pose.turned([scan.bearings_rad[k].cos(), scan.bearings_rad[k].sin(), 0.0]);
+        |k: usize| scan.pose.rotate([scan.bearings_rad[k].cos(), scan.bearings_rad[k].sin(), 0.0]);
     for k in 0..4 {
         let looks_along_the_corridor = heading(k)[0].abs() > 0.9;
         assert_eq!(scan.ranges_m[k].is_infinite(), looks_along_the_corridor, "beam {k}");
@@ -126,23 +126,23 @@ fn sensors_see_the_floor_around_them() {
     let [laser] = &leader.scans[..] else { panic!("one leader has a laser") };
     assert!(laser.ranges_m.iter().any(|range_m| range_m.is_finite()));
     assert_eq!(laser.ranges_m.len(), laser.bearings_rad.len());
-    assert!(robots(1).frame(Look::BODIES).scans.is_empty());
+    assert!(robots(1).frame(FrameOptions::WITHOUT_SCANS).scans.is_empty());
 }
 
 #[test]
 fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
     let mut run = airplanes(1);
-    run.watch();
+    run.enable_events();
     let (mut marked, mut losses) = (0, 0);
     while !run.is_over() && run.cycle() < 400 {
         run.advance(1);
         let frame = run.frame(LOOK);
         let is_marked = |b: &&sidestep::kernel::view::Body| {
-            b.kind == Kind::Zone && b.state == sidestep::kernel::view::Condition::Touching
+            b.kind == BodyKind::Zone && b.state == sidestep::kernel::view::Condition::Touching
         };
         marked += frame.bodies.iter().filter(is_marked).count();
         losses += frame.log.iter().filter(|e| e.words.contains("loses separation")).count();
-        let zones = frame.bodies.iter().filter(|b| b.kind == Kind::Zone);
+        let zones = frame.bodies.iter().filter(|b| b.kind == BodyKind::Zone);
         assert!(zones.clone().all(|b| matches!(b.shape, Shape::Cylinder { .. })));
         assert_eq!(frame.bodies.len(), 2 * zones.count(), "each airplane has its zone");
     }
@@ -154,9 +154,10 @@ fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_
     let mut run = robots(1);
     run.advance(10);
     let all = run.frame(LOOK).scans;
-    let asked = [30, 3].map(|id| Who::new(Kind::Robot, id, None));
-    let unknown = [Who::new(Kind::Robot, 9_999, None), Who::new(Kind::Door, 30, None)];
-    let some = run.frame(Look::of([&asked[..], &unknown].concat())).scans;
+    let asked = [30, 3].map(|id| BodyId::new(BodyKind::Robot, id, None));
+    let unknown =
+        [BodyId::new(BodyKind::Robot, 9_999, None), BodyId::new(BodyKind::Door, 30, None)];
+    let some = run.frame(FrameOptions::with_scans_of([&asked[..], &unknown].concat())).scans;
     let of = |who| all.iter().filter(move |scan| scan.of == who).cloned();
     let expected: Vec<_> = asked.into_iter().flat_map(of).collect();
     assert!(some.len() >= 2 && some == expected);
@@ -168,9 +169,9 @@ fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_
         wrong += pairs.filter(|(said, truth)| said.is_finite() != truth.is_finite()).count();
     }
     assert!(wrong > 0 && wrong < beams / 4, "{wrong} of {beams}: sensors seldom err");
-    let leader = chains(SWARM, 1).frame(Look::first(1)).scans.swap_remove(0);
+    let leader = chains(SWARM, 1).frame(FrameOptions::with_first_scans(1)).scans.swap_remove(0);
     assert_eq!(leader.true_m.len(), leader.ranges_m.len());
-    let again = chains(SWARM, 1).frame(Look::of(vec![leader.of])).scans;
+    let again = chains(SWARM, 1).frame(FrameOptions::with_scans_of(vec![leader.of])).scans;
     assert_eq!(again, [leader]);
 }
 
@@ -178,12 +179,12 @@ fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_
 fn entries_of_the_log_say_what_happened_to_whom_with_whom_and_where() {
     let mut met = 0;
     for mut run in worlds(1) {
-        run.watch();
+        run.enable_events();
         for _ in 0..60 {
             run.advance(1);
-            let frame = run.frame(Look::BODIES);
+            let frame = run.frame(FrameOptions::WITHOUT_SCANS);
             for entry in &frame.log {
-                let here = frame.bodies.iter().find(|body| body.who() == entry.who);
+                let here = frame.bodies.iter().find(|body| body.id() == entry.who);
                 let (Some(here), Some(at_m)) = (here, entry.at_m) else {
                     panic!("{} is nowhere: {entry:?}", entry.name())
                 };

@@ -4,7 +4,7 @@
 use crate::chain::{BROKEN, CAUGHT, PLANNED, SEVERAL, SNAKE, SWARM};
 use crate::common::{CROWD, source};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Inspection, Look, Place, Value, Who};
+use sidestep::kernel::view::{BodyId, FactValue, FrameOptions, Inspection, Vec3};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use std::collections::BTreeMap;
@@ -39,14 +39,14 @@ fn start(source: &Source, workers: usize) -> Box<dyn Simulation> {
 }
 
 /// Returns where all bodies are.
-fn places(run: &mut dyn Simulation) -> BTreeMap<Who, Place> {
-    let frame = run.frame(Look::BODIES);
-    frame.bodies.iter().map(|body| (body.who(), body.pose.at_m)).collect()
+fn places(run: &mut dyn Simulation) -> BTreeMap<BodyId, Vec3> {
+    let frame = run.frame(FrameOptions::WITHOUT_SCANS);
+    frame.bodies.iter().map(|body| (body.id(), body.pose.at_m)).collect()
 }
 
 /// Asks all bodies that there are.
-fn all_told(run: &mut dyn Simulation) -> Vec<Inspection> {
-    let all: Vec<Who> = places(run).into_keys().collect();
+fn inspect_all(run: &mut dyn Simulation) -> Vec<Inspection> {
+    let all: Vec<BodyId> = places(run).into_keys().collect();
     all.into_iter().filter_map(|who| run.inspect(who)).collect()
 }
 
@@ -65,7 +65,7 @@ fn asking_changes_no_result_whoever_computes_it_and_wherever_it_was_resumed() {
             for run in [&mut fresh, &mut resumed] {
                 let mut told = 0;
                 while run.cycle() < 18 {
-                    told += all_told(&mut **run).len();
+                    told += inspect_all(&mut **run).len();
                     run.advance((18 - run.cycle()).min(4));
                 }
                 assert!(told >= 3 * run.agents(), "{}: {told} answers", run.world());
@@ -82,16 +82,16 @@ fn what_is_told_of_a_body_is_what_then_comes() {
         let mut run = start(&source, 1);
         let (mut compared, mut moved) = (0, 0);
         while run.cycle() < 60 && !run.is_over() {
-            let (before, all) = (places(&mut *run), all_told(&mut *run));
+            let (before, all) = (places(&mut *run), inspect_all(&mut *run));
             run.advance(1);
             let after = places(&mut *run);
             for told in &all {
                 let next = told.value("Outcome", "next place");
                 let Some(now) = after.get(&told.who) else {
-                    assert_eq!(next, Some(&Value::None), "{} is gone", told.title);
+                    assert_eq!(next, Some(&FactValue::None), "{} is gone", told.title);
                     continue;
                 };
-                let expected = Value::Place(*now);
+                let expected = FactValue::Place(*now);
                 assert_eq!(
                     next,
                     Some(&expected),
@@ -114,7 +114,7 @@ fn what_is_told_can_be_shown() {
     for source in scenarios(1) {
         let mut run = start(&source, 1);
         run.advance(3);
-        for told in all_told(&mut *run) {
+        for told in inspect_all(&mut *run) {
             assert!(!told.title.is_empty() && told.cycle == 3, "{:?}", told.who);
             let titles: Vec<&str> = told.sections.iter().map(|s| s.title.as_str()).collect();
             assert!(titles.contains(&"Now") && titles.contains(&"Outcome"), "{titles:?}");

@@ -49,7 +49,7 @@ forward = [{ p = 0.5, path = "F" }, { p = 0.5, path = "FF" }]
     for seed in 0..50 {
         let source = source(text, &[&format!("seed={seed}")]);
         let run = run_audited(simulation(&source, 2), 40);
-        let bodies = run.saved().bodies;
+        let bodies = run.snapshot().bodies;
         assert_eq!(bodies[0].at.0 + 1, bodies[1].at.0, "they meet and stay");
         assert!(run.metrics().total.contacts > 0);
     }
@@ -107,7 +107,7 @@ at = [[2, 0]]
 periodic = { open = 5, closed = 5, phase = 0 }
 "#;
     let run = run_audited(simulation(&source(text, &[]), 1), 40);
-    let bodies = run.saved().bodies;
+    let bodies = run.snapshot().bodies;
     assert_eq!(bodies[0].at, (2, 0), "the robot stopped in the doorway");
     assert!(bodies[1].facing.is_open(), "the door has been waiting since");
 }

@@ -17,5 +17,5 @@ mod laws;
 mod obstacle_rule;
 mod pomdp;
 mod radio;
-mod resumed;
+mod resume;
 mod tiles;

@@ -11,7 +11,7 @@ use sidestep::kernel::Simulation;
 use sidestep::worlds::robots::effector::ObstacleRule::{self, Cut, Renormalise, Stay};
 use sidestep::worlds::robots::effector::Side::{self, Front, Left, Right};
 use sidestep::worlds::robots::effector::Transition;
-use sidestep::worlds::robots::exact::{Model, Outcome, Pose, here_and_now};
+use sidestep::worlds::robots::exact::{ActionOutcome, GridPose, MarkovModel, outcome_distribution};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
 
@@ -55,10 +55,10 @@ fn check(tiles: &Tiles, rows: &[Row]) {
     let start = tiles.start();
     let outcome = |&(east, north, turn, contact, p): &Row| {
         let heading = (start.heading + turn) % 4;
-        let pose = Pose { col: start.col + east, row: start.row + north, heading };
-        (Outcome { pose, contact }, p)
+        let pose = GridPose { col: start.col + east, row: start.row + north, heading };
+        (ActionOutcome { pose, contact }, p)
     };
-    let by_hand: BTreeMap<Outcome, f64> = rows.iter().map(outcome).collect();
+    let by_hand: BTreeMap<ActionOutcome, f64> = rows.iter().map(outcome).collect();
     assert!((by_hand.values().sum::<f64>() - 1.0).abs() < 1e-12, "the table sums to 1");
     check_exact(tiles, &by_hand);
     let mut simulation = tiles.simulation();
@@ -66,11 +66,13 @@ fn check(tiles: &Tiles, rows: &[Row]) {
     assert_fits(&format!("{tiles:?}"), &tiles.outcomes(&simulation), &by_hand);
 }
 
-fn check_exact(tiles: &Tiles, by_hand: &BTreeMap<Outcome, f64>) {
+fn check_exact(tiles: &Tiles, by_hand: &BTreeMap<ActionOutcome, f64>) {
     let (transitions, size, rule) = action_of(tiles);
     let kind_at = |col, row| tiles.kind_at(col, row);
-    let exact: BTreeMap<Outcome, f64> =
-        here_and_now(&transitions, size, tiles.start(), rule, kind_at).into_iter().collect();
+    let exact: BTreeMap<ActionOutcome, f64> =
+        outcome_distribution(&transitions, size, tiles.start(), rule, kind_at)
+            .into_iter()
+            .collect();
     assert_eq!(
         exact.keys().collect::<Vec<_>>(),
         by_hand.keys().collect::<Vec<_>>(),
@@ -287,8 +289,8 @@ fn a_path_longer_than_the_map_is_stopped_at_its_edge() {
         let mut simulation = tiles.simulation();
         simulation.advance(1);
         let at = tiles.start();
-        let pose = Pose { col: at.col + east, row: at.row + north, ..at };
-        let outcome = Outcome { pose, contact: Some((WALL, Front)) };
+        let pose = GridPose { col: at.col + east, row: at.row + north, ..at };
+        let outcome = ActionOutcome { pose, contact: Some((WALL, Front)) };
         assert_eq!(tiles.outcomes(&simulation), BTreeMap::from([(outcome, 1)]));
     }
 }
@@ -340,10 +342,10 @@ proptest! {
         heading in 0u8..4,
         rule in prop::sample::select(ObstacleRule::ALL.to_vec()),
     ) {
-        let from = Pose { col: 3, row: 3, heading };
-        let outcomes = here_and_now(&transitions, size, from, rule, |c, r| kind_in(&walls, c, r));
+        let from = GridPose { col: 3, row: 3, heading };
+        let outcomes = outcome_distribution(&transitions, size, from, rule, |c, r| kind_in(&walls, c, r));
         prop_assert!((outcomes.iter().map(|o| o.1).sum::<f64>() - 1.0).abs() < 1e-12);
-        for (Outcome { pose, contact }, p) in &outcomes {
+        for (ActionOutcome { pose, contact }, p) in &outcomes {
             prop_assert!(*p > 0.0);
             let covered = (0..size as i32).flat_map(|y| (0..size as i32).map(move |x| (x, y)));
             for (x, y) in covered {
@@ -379,11 +381,11 @@ proptest! {
         let tiles = tiles(&lines.join("\n"), 2, "nomad", action, rule).single();
         let tiles = tiles.keys(&format!("seed = {seed}"));
         let mut simulation = tiles.simulation();
-        let model = Model::new(&compile(&tiles)).expect("one robot");
+        let model = MarkovModel::new(&compile(&tiles)).expect("one robot");
         simulation.advance(1);
         let ended = tiles.outcomes(&simulation);
         let id = ["forward", "left", "right", "stay"].iter().position(|a| *a == action);
-        let possible = model.here_and_now(tiles.start(), id.expect("standard") as u8);
+        let possible = model.outcome_distribution(tiles.start(), id.expect("standard") as u8);
         prop_assert!(ended.keys().all(|ended| possible.iter().any(|(o, _)| o == ended)));
     }
 }

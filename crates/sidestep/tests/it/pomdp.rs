@@ -4,7 +4,7 @@
 use super::tiles::{Tiles, assert_fits};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
-use sidestep::worlds::robots::exact::{Beam, Model, PomdpOptions};
+use sidestep::worlds::robots::exact::{Beam, MarkovModel, PomdpOptions};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
 
@@ -115,9 +115,9 @@ fn with_sensor(across: u32, sensor: &str) -> Tiles {
         .robots("effector = \"nomad\"\nsensors = [\"eye\"]\nbehaviour = { kind = \"random\" }")
 }
 
-fn model(tiles: &Tiles) -> Model {
+fn model(tiles: &Tiles) -> MarkovModel {
     let compiled = Compiled::new(&tiles.source(), &Behaviours::new(), StorageOrder::ById);
-    Model::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"))
+    MarkovModel::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn file(options: &PomdpOptions) -> File {
@@ -187,7 +187,7 @@ fn the_simulator_reports_what_the_file_says() {
     let file = File::read(&model(&one_beam(1)).pomdp(&options).unwrap().to_string());
     let tiles = one_beam(20);
     let mut simulation = tiles.simulation();
-    simulation.begin_recording();
+    simulation.start_recording();
     let mut recorder = MemoryRecorder::new(&simulation.schemas());
     simulation.advance(100);
     simulation.record(&mut recorder).expect("memory takes everything");

@@ -2,9 +2,9 @@
 
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
-use sidestep::statistics::chi_square_p;
+use sidestep::statistics::chi_square_p_value;
 use sidestep::worlds::robots::effector::ObstacleRule;
-use sidestep::worlds::robots::exact::{Outcome, Pose};
+use sidestep::worlds::robots::exact::{ActionOutcome, GridPose};
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 
@@ -80,10 +80,10 @@ impl Tiles {
     }
 
     /// The start of the robot of a tile.
-    pub(crate) fn start(&self) -> Pose {
+    pub(crate) fn start(&self) -> GridPose {
         let robot = |(col, row, character): (u32, u32, char)| {
             let heading = ['>', '^', '<', 'v'].iter().position(|&h| h == character)? as u8;
-            Some(Pose { col: col as i32, row: row as i32, heading })
+            Some(GridPose { col: col as i32, row: row as i32, heading })
         };
         self.drawn().find_map(robot).expect("a robot is drawn")
     }
@@ -155,15 +155,15 @@ impl Tiles {
     }
 
     /// Counts of the robots' places, seen from their tile, and the kinds they touched.
-    pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<Outcome, u64> {
+    pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<ActionOutcome, u64> {
         let (width, height) = self.pitch();
         let robots = simulation.agents();
         let mut counts = BTreeMap::new();
-        for body in &simulation.saved().bodies[..robots] {
+        for body in &simulation.snapshot().bodies[..robots] {
             let at = ((body.at.0 % width) as i32, (body.at.1 % height) as i32);
-            let pose = Pose { col: at.0, row: at.1, heading: body.facing.heading() };
+            let pose = GridPose { col: at.0, row: at.1, heading: body.facing.heading() };
             let contact = body.contact.get().map(|contact| (contact.kind, contact.side));
-            *counts.entry(Outcome { pose, contact }).or_insert(0) += 1;
+            *counts.entry(ActionOutcome { pose, contact }).or_insert(0) += 1;
         }
         counts
     }
@@ -193,7 +193,7 @@ pub(crate) fn p_value<K: Ord>(counts: &BTreeMap<K, u64>, expected: &BTreeMap<K, 
     let pooled = rare.iter().fold((0.0, 0.0), |sum, c| (sum.0 + c.0, sum.1 + c.1));
     let cells: Vec<_> = large.into_iter().chain((pooled.1 > 0.0).then_some(pooled)).collect();
     let statistic: f64 = cells.iter().map(|(o, e)| (o - e) * (o - e) / e).sum();
-    if cells.len() < 2 { 1.0 } else { chi_square_p(statistic, cells.len() - 1) }
+    if cells.len() < 2 { 1.0 } else { chi_square_p_value(statistic, cells.len() - 1) }
 }
 
 /// Fails when `counts` do not fit `expected` at the significance [`ALPHA`].

@@ -171,7 +171,7 @@ fn with(source: &Source, mistakes: &[&Mistake]) -> Source {
     Source { text, ..source.clone() }
 }
 
-fn told(source: &Source) -> Vec<String> {
+fn reported_problems(source: &Source) -> Vec<String> {
     let keys = problems(WORLDS, source).into_iter();
     let mut keys: Vec<String> =
         keys.map(|e| e.key().map_or_else(|| e.to_string(), String::from)).collect();
@@ -210,7 +210,7 @@ fn some_of(all: &[Mistake], count: usize, start: usize) -> Vec<&Mistake> {
 #[test]
 fn right_scenarios_have_no_problems() {
     for (_, source) in shipped::all() {
-        assert_eq!(told(&source), [""; 0], "{}", source.place);
+        assert_eq!(reported_problems(&source), [""; 0], "{}", source.place);
     }
 }
 
@@ -224,7 +224,7 @@ fn two_to_five_mistakes_are_all_told_at_their_keys_and_nothing_else_is() {
             let chosen = some_of(&all, k, 7 * i + k);
             let mut keys: Vec<String> = chosen.iter().map(|mistake| mistake.key()).collect();
             keys.sort();
-            let told = told(&with(&source, &chosen));
+            let told = reported_problems(&with(&source, &chosen));
             if told == keys {
                 right += 1;
             } else {
@@ -241,5 +241,5 @@ fn what_a_draft_was_given_is_never_told() {
                 at_m = [0.0, 0.0]\nrod_m = 1.0\n[chains.tasks]\nkind = \"targets\"\n\
                 targets_m = [[1.0, 0.0]]\n";
     let source = Source::new("c.toml", text, "");
-    assert_eq!(told(&source), ["chains.at_m", "chains.tasks.targets_m"]);
+    assert_eq!(reported_problems(&source), ["chains.at_m", "chains.tasks.targets_m"]);
 }

@@ -92,11 +92,11 @@ fn schemas_refuse_a_misspelled_key_in_every_table_of_every_scenario() {
 
 #[test]
 fn a_default_scenario_shows_every_key_of_its_schema_and_no_other() {
-    let unshown = WORLDS.0.iter().map(|kind| (kind.name(), schema::unshown(*kind)));
+    let unshown = WORLDS.0.iter().map(|kind| (kind.name(), schema::undocumented_keys(*kind)));
     let unshown: Vec<_> = unshown.filter(|(_, keys)| !keys.is_empty()).collect();
     assert!(unshown.is_empty(), "{unshown:#?}");
     for kind in WORLDS.0 {
-        assert_eq!(schema::unknown(*kind), [""; 0], "{}", kind.name());
+        assert_eq!(schema::unknown_keys(*kind), [""; 0], "{}", kind.name());
         let keys = toml_edit::DocumentMut::from_str(kind.default_scenario()).expect("TOML");
         assert!(keys.len() >= 5 && kind.default_scenario().contains("\n# "), "{}", kind.name());
     }
@@ -155,7 +155,8 @@ fn defaults_of_schemas_are_those_of_the_program() {
             let Some(default) = part.get("default") else { continue };
             let default = toml::Value::try_from(default).expect("TOML has it");
             let without = without(kind.default_scenario(), way);
-            let given = Source::new("s.toml", &without, "").with(&[format!("{way}={default}")]);
+            let given =
+                Source::new("s.toml", &without, "").with_overrides(&[format!("{way}={default}")]);
             let (Ok(given), Some(left_out)) = (given, digest(&without)) else { continue };
             // A key that belongs to another one may not stand alone.
             if let Some(given) = digest(&given.text) {

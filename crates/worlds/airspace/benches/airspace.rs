@@ -6,11 +6,12 @@
 use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
-    Action, After, Legs, Levels, Model, Passing, Pilot, Point, Pose, Timing, actions,
+    Action, AfterLastWaypoint, Autopilot, Legs, Levels, Model, Point, Pose2, Timing, WaypointRule,
+    actions,
 };
-use sidestep_airspace::objective::{Objective, Options, game};
+use sidestep_airspace::objective::{ActionPredictions, Objective, game};
 use sidestep_collectives::{
-    Choice, Estimator, Game, Order, Settings, Stop, Update, Utility, optimize,
+    Choice, Estimator, Game, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility, optimize,
 };
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
@@ -22,7 +23,7 @@ const TIMING: Timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
 /// Airplanes on a circle around the conflict, near enough for every pair to matter.
 struct Conflict {
     model: Model,
-    poses: Vec<Pose>,
+    poses: Vec<Pose2>,
     goals: Vec<[Point; 1]>,
     actions: Vec<Action>,
     timing: Timing,
@@ -43,7 +44,7 @@ impl Conflict {
             [radius_m * cos(angle), radius_m * sin(angle)]
         };
         let turn = std::f64::consts::PI;
-        let pose = |k| Pose { at: on(3000.0, angle(k)), heading_rad: angle(k) + turn };
+        let pose = |k| Pose2 { at: on(3000.0, angle(k)), heading_rad: angle(k) + turn };
         Self {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),
@@ -54,33 +55,33 @@ impl Conflict {
         }
     }
 
-    fn pilot(&self, i: usize) -> Pilot<'_> {
-        Pilot {
+    fn pilot(&self, i: usize) -> Autopilot<'_> {
+        Autopilot {
             model: &self.model,
             mission: &self.goals[i],
-            passing: Passing { tolerance_m: 100.0, passes: true },
-            after: After::Straight,
+            passing: WaypointRule { tolerance_m: 100.0, passes: true },
+            after: AfterLastWaypoint::Straight,
             dtau_s: TIMING.dtau_s,
         }
     }
 
-    fn options(&self) -> Vec<Options> {
+    fn action_predictions(&self) -> Vec<ActionPredictions> {
         let of = |i: usize| {
             let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &self.timing);
             let predictions = self.actions.iter().map(predict).collect();
-            Options::new(predictions, self.model.separation_m, Levels::at(0.0))
+            ActionPredictions::new(predictions, self.model.separation_m, Levels::at(0.0))
         };
         (0..self.poses.len()).map(of).collect()
     }
 }
 
 /// The same game, with every sample's ways predicted anew whenever they are looked at.
-struct Anew<'a> {
+struct UncachedGame<'a> {
     conflict: &'a Conflict,
     strategies: Vec<usize>,
 }
 
-impl Game for Anew<'_> {
+impl Game for UncachedGame<'_> {
     fn strategies(&self) -> &[usize] {
         &self.strategies
     }
@@ -105,15 +106,15 @@ impl Game for Anew<'_> {
     }
 }
 
-fn settings(estimator: Estimator, cooling: f64, max_rounds: u32) -> Settings {
+fn settings(estimator: Estimator, cooling: f64, max_rounds: u32) -> OptimizerConfig {
     let exact = estimator == Estimator::Exact;
-    Settings {
+    OptimizerConfig {
         estimator,
         update: Update::NearestNewton { step: 0.5 },
-        order: if exact { Order::Sequence } else { Order::Parallel },
+        order: if exact { UpdateOrder::Sequence } else { UpdateOrder::Parallel },
         utility: Utility::Joint,
         cooling,
-        stop: Stop { threshold: 1e-3, calm_rounds: 3, max_rounds },
+        stop: StopCriterion { threshold: 1e-3, calm_rounds: 3, max_rounds },
         choice: Choice::Argmax,
     }
 }
@@ -143,12 +144,12 @@ fn exact() {
     };
     for (name, horizon, legs, inflation, cooling) in [
         ("the paper's actions", 125, Legs::default(), 1.05, 0.8),
-        ("the default preset", 90, Legs::usual(), 1.12, 0.7),
+        ("the default preset", 90, Legs::default_preset(), 1.12, 0.7),
     ] {
         let objective = preset(inflation);
         let conflict = Conflict::new(10, horizon, &legs, objective);
-        let predict_s = best_s(20, || drop(conflict.options()));
-        let options = conflict.options();
+        let predict_s = best_s(20, || drop(conflict.action_predictions()));
+        let options = conflict.action_predictions();
         let tables_s = best_s(20, || drop(game(&objective, &options)));
         let built = game(&objective, &options);
         let settings = settings(Estimator::Exact, cooling, 200);
@@ -170,11 +171,11 @@ fn sampled() {
     let conflict = Conflict::new(10, 125, &Legs::default(), objective);
     let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {
-        let built = game(&objective, &conflict.options());
+        let built = game(&objective, &conflict.action_predictions());
         drop(optimize(&built, &settings, uniform));
     });
     let strategies = vec![conflict.actions.len(); 10];
-    let anew = Anew { conflict: &conflict, strategies };
+    let anew = UncachedGame { conflict: &conflict, strategies };
     let anew_s = best_s(2, || drop(optimize(&anew, &settings, uniform)));
     println!(
         "sampled, 10 airplanes, 50 rounds of 20: {:.2} ms, {:.0} times faster than predicting anew [20 times]",
@@ -192,7 +193,7 @@ fn many() {
             "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = {n}\n\
              radius_m = {radius_m}\n"
         );
-        let workers = sidestep_kernel::workers::available();
+        let workers = sidestep_kernel::workers::available_workers();
         let mut run = airspace_run(&Source::new("many", text, ""), workers).expect("valid");
         run.advance(4);
         let (cpu, wall, cycles) = (ProcessTime::now(), Instant::now(), 10);

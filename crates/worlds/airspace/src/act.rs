@@ -10,33 +10,33 @@
 //! ```
 
 mod approaches;
+mod controls;
 mod direct;
 mod entry;
 mod errors;
 mod flight;
-mod obey;
 mod orders;
 mod protect;
 mod step;
 
-use super::Turn;
-use super::decide::{Considered, straight_way};
+use super::PhaseContext;
+use super::decide::{ManeuverCandidates, straight_profile};
 use super::deploy::{self, Deployment};
-use super::intruder::Intruder;
-use super::join::Flown;
-use super::perceive::intruders;
-use super::pilot::{Control, Own};
-use super::shield::Way;
-use flight::{Course, Flight};
-use obey::obey;
+use super::join::ControlledGroup;
+use super::non_cooperative::NonCooperative;
+use super::perceive::non_cooperative_aircraft;
+use super::pilot::{Control, OwnshipState};
+use super::shield::TurnProfile;
+use controls::apply_controls;
+use flight::{AircraftMotion, FlownPath};
 use sidestep_kernel::Slot;
 
 /// Lets a group decide, the shield filter, and all fly, together with those on recorded ways.
-pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
-    let Turn { world, state, now, .. } = *turn;
+pub(super) fn act(turn: &mut PhaseContext<'_>, group: &[Slot]) {
+    let PhaseContext { world, state, now, .. } = *turn;
     let mut flying = std::mem::take(&mut turn.scratch.flying);
     flying.clear();
-    flying.extend(group.iter().filter(|&&slot| state.is_there(world, slot, now)));
+    flying.extend(group.iter().filter(|&&slot| state.is_active(world, slot, now)));
     flying.sort_unstable();
     if !flying.is_empty() {
         let before = turn.scratch.events.len();
@@ -51,20 +51,20 @@ pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
 }
 
 /// Flies a group for one `dt`; `group` are the airplanes in the air, by id.
-fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
-    let Turn { world, state, now, .. } = *turn;
-    let flown = begin(turn, group);
-    let intruders = intruders(turn, group);
-    let mut ways = ways(turn, &flown, &intruders).into_iter();
+fn fly(turn: &mut PhaseContext<'_>, group: &[Slot]) {
+    let PhaseContext { world, state, now, .. } = *turn;
+    let flown = prepare(turn, group);
+    let intruders = non_cooperative_aircraft(turn, group);
+    let mut ways = turn_profiles(turn, &flown, &intruders).into_iter();
     let flights = group.iter().map(|&slot| {
         let course = match &world.airplanes[slot as usize].track {
-            Some(track) if world.is_replayed(slot, now) => Course::Track(track),
-            _ if world.is_intruder(slot, now) => {
-                Course::Way(straight_way(turn, slot), state.stage(world, slot))
+            Some(track) if world.is_replayed(slot, now) => FlownPath::Track(track),
+            _ if world.is_non_cooperative(slot, now) => {
+                FlownPath::Profile(straight_profile(turn, slot), state.segment(world, slot))
             }
-            _ => Course::Way(ways.next().unwrap_or_default(), state.stage(world, slot)),
+            _ => FlownPath::Profile(ways.next().unwrap_or_default(), state.segment(world, slot)),
         };
-        Flight::new(turn, slot, course)
+        AircraftMotion::new(turn, slot, course)
     });
     let flights = flights.collect();
     step::step_all(turn, flights);
@@ -72,13 +72,13 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
 
 /// Prepares the decisions: airplanes come in, names of pairs begin and end, and orders that are due are carried out.
 /// Returns the airplanes of a group that the method flies; `group` are those in the air, by id.
-pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Flown {
+pub(super) fn prepare(turn: &mut PhaseContext<'_>, group: &[Slot]) -> ControlledGroup {
     // Nearness is that at the time when the group was formed, because orders change levels.
-    let flown = Flown::of(turn, group);
+    let flown = ControlledGroup::from_group(turn, group);
     if turn.world.shield {
-        entry::release(turn, &flown.ids);
-        entry::admit(turn, &flown.ids);
-        errors::name(turn, &flown.ids);
+        entry::release_exempt(turn, &flown.ids);
+        entry::assign_fallbacks(turn, &flown.ids);
+        errors::report_beyond_bound(turn, &flown.ids);
     }
     orders::carry_out(turn, group, &flown.ids);
     flown
@@ -86,26 +86,32 @@ pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Flown {
 
 /// Returns the ways of the airplanes that the method flies: as those aboard decide, or as given by pilots outside of
 /// the run.
-fn ways(turn: &mut Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Way> {
-    let Turn { world, state, now, .. } = *turn;
-    let own: Vec<Own> = flown.ids.iter().map(|&slot| Own::of(turn, slot)).collect();
-    let contacts = turn.scratch.notes.as_ref().map(|notes| state.contacts(notes.slot));
-    let (controls, considered): (Vec<Option<Control>>, Vec<Considered>) = if state.is_handed(now) {
-        (state.take_handed(&flown.ids), vec![Considered::default(); own.len()])
-    } else {
-        let all = match world.deployment {
-            Deployment::Direct => direct::decided(turn, &own, intruders),
-            _ => deploy::flown(turn, flown, intruders),
+fn turn_profiles(
+    turn: &mut PhaseContext<'_>,
+    flown: &ControlledGroup,
+    intruders: &[NonCooperative],
+) -> Vec<TurnProfile> {
+    let PhaseContext { world, state, now, .. } = *turn;
+    let own: Vec<OwnshipState> =
+        flown.ids.iter().map(|&slot| OwnshipState::from_state(turn, slot)).collect();
+    let contacts = turn.scratch.trace.as_ref().map(|notes| state.traffic_picture(notes.slot));
+    let (controls, considered): (Vec<Option<Control>>, Vec<ManeuverCandidates>) =
+        if state.has_controls(now) {
+            (state.take_controls(&flown.ids), vec![ManeuverCandidates::default(); own.len()])
+        } else {
+            let all = match world.deployment {
+                Deployment::Direct => direct::decide(turn, &own, intruders),
+                _ => deploy::decide_group(turn, flown, intruders),
+            };
+            all.into_iter().map(|(control, considered)| (Some(control), considered)).unzip()
         };
-        all.into_iter().map(|(control, considered)| (Some(control), considered)).unzip()
-    };
-    if let Some(notes) = &mut turn.scratch.notes {
+    if let Some(notes) = &mut turn.scratch.trace {
         notes.contacts = contacts.unwrap_or_default();
-        notes.decided(world, &own, intruders, &controls, &considered);
+        notes.record_decisions(world, &own, intruders, &controls, &considered);
     }
-    let ways = obey(turn, &own, intruders, controls);
-    if let Some(notes) = &mut turn.scratch.notes {
-        notes.flown = notes.own(&ways).cloned();
+    let ways = apply_controls(turn, &own, intruders, controls);
+    if let Some(notes) = &mut turn.scratch.trace {
+        notes.flown = notes.own_part(&ways).cloned();
     }
     ways
 }

@@ -1,27 +1,27 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
 mod external;
+mod preferences;
 mod velocity;
-mod wishes;
 
-use super::Turn;
-use super::agents::Decided;
-use super::agents::traffic::Traffic;
-use super::baseline::mvp::Resolving;
-use super::flight::{Action, Known};
-use super::intruder::Intruder;
-use super::memory::group_takes_bytes;
-use super::objective::{Options, game};
-use super::perceive::known;
-use super::pilot::Course;
+use super::PhaseContext;
+use super::agents::ActionChoice;
+use super::agents::network_traffic::NetworkTraffic;
+use super::baseline::mvp::ActiveResolutions;
+use super::external_action::ExternalAction;
+use super::flight::{Action, KnownAircraft};
+use super::memory::max_group_bytes;
+use super::non_cooperative::NonCooperative;
+use super::objective::{ActionPredictions, game};
+use super::perceive::known_aircraft;
+use super::pilot::Maneuver;
 use super::purpose;
-use super::shield::{Decision, Way};
-use super::wish::Wish;
+use super::shield::{ShieldDecision, TurnProfile};
 use super::world::{AirspaceWorld, Method};
+use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
 use sidestep_kernel::{Cycle, EntityId, Slot};
-use wishes::straight;
 
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,12 +37,12 @@ pub struct Optimization {
     /// Whether the distributions had settled.
     pub converged: bool,
     /// Messages and bytes on the network.
-    pub traffic: Traffic,
+    pub traffic: NetworkTraffic,
 }
 
 /// Sums over optimizations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Effort {
+pub struct OptimizationStats {
     /// Number of optimizations.
     pub optimizations: u64,
     /// Sum of their rounds.
@@ -50,12 +50,12 @@ pub struct Effort {
     /// Number of those that ended before they had converged.
     pub unconverged: u64,
     /// Messages on the network, including the shield's exchanges.
-    pub traffic: Traffic,
+    pub traffic: NetworkTraffic,
     /// Beacons on the network, by which airplanes have found their groups.
-    pub beacons: Traffic,
+    pub beacons: NetworkTraffic,
 }
 
-impl Effort {
+impl OptimizationStats {
     /// Adds one optimization.
     pub fn add(&mut self, one: &Optimization) {
         self.optimizations += 1;
@@ -67,126 +67,130 @@ impl Effort {
 
 /// Everything that an airplane considers in a cycle.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Considered {
+pub(super) struct ManeuverCandidates {
     /// Its actions in the order in which it wants them; none by methods that give a heading.
     pub(super) actions: Vec<Action>,
     /// The different ways of the next `dt` that it may fly, the wanted one first.
-    pub(super) ways: Vec<Way>,
+    pub(super) ways: Vec<TurnProfile>,
     /// The optimizer's decision.
-    pub(super) decided: Option<Decided>,
+    pub(super) decided: Option<ActionChoice>,
 }
 
-impl Considered {
-    fn of(world: &AirspaceWorld, known: Known, actions: Vec<Action>) -> Self {
-        Self { ways: wishes::ways(world, known, &actions), actions, decided: None }
+impl ManeuverCandidates {
+    fn from_actions(world: &AirspaceWorld, known: KnownAircraft, actions: Vec<Action>) -> Self {
+        Self { ways: preferences::turn_profiles(world, known, &actions), actions, decided: None }
     }
 
-    fn of_ways(ways: Vec<Way>) -> Self {
+    fn from_profiles(ways: Vec<TurnProfile>) -> Self {
         Self { ways, ..Self::default() }
     }
 
     /// Returns the course that follows from the shield's decision about those of its ways that were `allowed`.
-    pub(super) fn course(&self, decision: Decision, allowed: &[usize]) -> Course {
+    pub(super) fn maneuver(&self, decision: ShieldDecision, allowed: &[usize]) -> Maneuver {
         match decision.candidate.map(|k| allowed[k]) {
-            Some(wish) => Course::Way {
+            Some(wish) => Maneuver::Way {
                 wish: wish as u32,
                 way: self.ways[wish].clone(),
                 side: decision.fallback,
             },
-            None => Course::Orbit,
+            None => Maneuver::Orbit,
         }
     }
 }
 
 /// The way in which airplanes of a group find their wishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Manner {
+pub(super) enum DecisionStrategy {
     /// Each alone.
-    Alone,
+    Independent,
     /// All, by optimizing together.
-    Optimizing,
+    Joint,
     /// Each by the places and goals of all.
-    Reacting,
+    Reactive,
     /// Each alone, because the group takes too much memory to be optimized.
-    TooMany,
+    GroupTooLarge,
 }
 
-impl Manner {
+impl DecisionStrategy {
     /// Returns the manner of a group beside some others that do not decide with it.
-    pub(super) fn of(world: &AirspaceWorld, group: &[Known], others: usize) -> Self {
+    pub(super) fn for_group(world: &AirspaceWorld, group: &[KnownAircraft], others: usize) -> Self {
         let is_alone = group.is_empty() || group.len() + others < 2;
         match world.method {
-            _ if Self::reacts(world) => Self::Reacting,
-            Method::Pc if is_alone => Self::Alone,
-            Method::Pc if group_takes_bytes(world, group) > world.group_bytes => Self::TooMany,
-            Method::Pc => Self::Optimizing,
-            _ => Self::Alone,
+            _ if Self::is_reactive(world) => Self::Reactive,
+            Method::Pc if is_alone => Self::Independent,
+            Method::Pc if max_group_bytes(world, group) > world.group_bytes => Self::GroupTooLarge,
+            Method::Pc => Self::Joint,
+            _ => Self::Independent,
         }
     }
 
     /// Returns whether the method gives headings by the places and goals of all.
-    pub(super) fn reacts(world: &AirspaceWorld) -> bool {
+    pub(super) fn is_reactive(world: &AirspaceWorld) -> bool {
         matches!(world.method, Method::Mvp | Method::Orca)
     }
 }
 
 /// Returns the wishes of an airplane that decides alone: its way-point, or its order.
-pub(super) fn alone(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) -> Considered {
+pub(super) fn candidates_alone(
+    world: &AirspaceWorld,
+    known: KnownAircraft,
+    wish: Option<&ExternalAction>,
+) -> ManeuverCandidates {
     match world.method {
-        Method::External => external::as_ordered(world, known, wish),
-        _ => Considered::of(world, known, straight(world, known)),
+        Method::External => external::candidates_by_action(world, known, wish),
+        _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
 }
 
 /// Returns the wishes of an airplane by probability collectives: the chosen action first, then the others by the cost
 /// that the optimizer expects of them.
-pub(super) fn as_decided(
+pub(super) fn candidates_by_choice(
     world: &AirspaceWorld,
-    known: Known,
-    decided: Option<Decided>,
-) -> Considered {
+    known: KnownAircraft,
+    decided: Option<ActionChoice>,
+) -> ManeuverCandidates {
     let actions = match &decided {
-        Some(decided) => wishes::by_cost(world, known, decided),
+        Some(decided) => preferences::rank_by_cost(world, known, decided),
         // No decision reached it, so it flies straight on.
-        None => straight(world, known),
+        None => rank_straight_first(world, known),
     };
-    Considered { decided, ..Considered::of(world, known, actions) }
+    ManeuverCandidates { decided, ..ManeuverCandidates::from_actions(world, known, actions) }
 }
 
 /// Returns the wishes of the airplanes of a group by the world's method, if that gives them
 /// headings. `memory` are the conflicts that they resolve.
-pub(super) fn by_velocity(
+pub(super) fn candidates_by_velocity(
     world: &AirspaceWorld,
-    group: &[Known],
-    intruders: &[Intruder],
-    memory: &mut [Resolving],
-) -> Vec<Considered> {
-    let ways = velocity::by_velocity(world, group, intruders, memory);
-    ways.into_iter().map(Considered::of_ways).collect()
+    group: &[KnownAircraft],
+    intruders: &[NonCooperative],
+    memory: &mut [ActiveResolutions],
+) -> Vec<ManeuverCandidates> {
+    let ways = velocity::profiles_by_velocity(world, group, intruders, memory);
+    ways.into_iter().map(ManeuverCandidates::from_profiles).collect()
 }
 
 /// Returns all the different ways of the next `dt` that the actions of an airplane lead.
-pub(super) fn possible(world: &AirspaceWorld, known: Known) -> Vec<Way> {
-    wishes::ways(world, known, world.actions_of(known.slot))
+pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
+    preferences::turn_profiles(world, known, world.actions(known.slot))
 }
 
 /// Returns the straight way to the next way-point of an airplane that minds no other.
-pub(super) fn straight_way(turn: &Turn<'_>, slot: Slot) -> Way {
-    let Turn { world, state, now, .. } = *turn;
-    let known = known(world, state, now, slot);
-    let wishes = straight(world, known);
-    wishes::ways(world, known, &wishes[..1]).swap_remove(0)
+pub(super) fn straight_profile(turn: &PhaseContext<'_>, slot: Slot) -> TurnProfile {
+    let PhaseContext { world, state, now, .. } = *turn;
+    let known = known_aircraft(world, state, now, slot);
+    let wishes = rank_straight_first(world, known);
+    preferences::turn_profiles(world, known, &wishes[..1]).swap_remove(0)
 }
 
 /// Lets one process decide for all.
-pub(super) fn direct(
+pub(super) fn decide_centrally(
     world: &AirspaceWorld,
-    group: &[Known],
-    intruders: &[Intruder],
+    group: &[KnownAircraft],
+    intruders: &[NonCooperative],
     now: Cycle,
-) -> Vec<Option<Decided>> {
-    let options: Vec<Options> =
-        group.iter().map(|known| world.options(*known, intruders)).collect();
+) -> Vec<Option<ActionChoice>> {
+    let options: Vec<ActionPredictions> =
+        group.iter().map(|known| world.action_predictions(*known, intruders)).collect();
     let game = game(&world.objective, &options);
     let uniform =
         |player: usize, k: u64| purpose::sample(&world.streams, group[player].slot, now, k);
@@ -194,7 +198,7 @@ pub(super) fn direct(
     let (rounds, converged) = (outcome.rounds, outcome.converged);
     let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
     let decided = |((chosen, expected), chances)| {
-        Some(Decided { chosen, expected, rounds, converged, chances })
+        Some(ActionChoice { chosen, expected, rounds, converged, chances })
     };
     each.map(decided).collect()
 }

@@ -1,7 +1,7 @@
 //! The events of a run.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::view::{Happening, Place};
+use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Kinds of events.
@@ -86,19 +86,19 @@ impl EventKind {
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
-    pub(super) fn happening(self) -> Happening {
+    pub(super) fn log_event_kind(self) -> LogEventKind {
         match self {
-            Self::LossOfSeparation => Happening::LossOfSeparation,
-            Self::Arrival => Happening::Arrival,
-            Self::Override => Happening::Override,
-            Self::Orbit => Happening::Orbit,
-            Self::Unheard => Happening::Unheard,
-            Self::Deadline => Happening::Deadline,
-            Self::HeldBack => Happening::HeldBack,
-            Self::GroupTooLarge => Happening::GroupTooLarge,
-            Self::BeyondBound => Happening::BeyondBound,
-            Self::Intruder => Happening::Intruder,
-            Self::Absent => Happening::Absent,
+            Self::LossOfSeparation => LogEventKind::LossOfSeparation,
+            Self::Arrival => LogEventKind::Arrival,
+            Self::Override => LogEventKind::Override,
+            Self::Orbit => LogEventKind::Orbit,
+            Self::Unheard => LogEventKind::Unheard,
+            Self::Deadline => LogEventKind::Deadline,
+            Self::HeldBack => LogEventKind::HeldBack,
+            Self::GroupTooLarge => LogEventKind::GroupTooLarge,
+            Self::BeyondBound => LogEventKind::BeyondBound,
+            Self::Intruder => LogEventKind::Intruder,
+            Self::Absent => LogEventKind::Absent,
         }
     }
 
@@ -134,7 +134,7 @@ pub struct Event {
     /// See [`EventKind`]; 0 where a kind has none.
     pub value: f64,
     /// The airplane's place at the end of the cycle.
-    pub at_m: Option<Place>,
+    pub at_m: Option<Vec3>,
 }
 
 impl Event {
@@ -149,18 +149,18 @@ impl Event {
     }
 
     /// Returns an event of one airplane.
-    pub fn of(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
+    pub fn new(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
         Self { cycle, kind, airplane, other: airplane, value: 0.0, at_m: None }
     }
 
     /// Returns an event of two airplanes.
-    pub fn of_pair(cycle: Cycle, kind: EventKind, airplane: EntityId, other: EntityId) -> Self {
-        Self { other, ..Self::of(cycle, kind, airplane) }
+    pub fn new_pair(cycle: Cycle, kind: EventKind, airplane: EntityId, other: EntityId) -> Self {
+        Self { other, ..Self::new(cycle, kind, airplane) }
     }
 
     /// Returns the same event with a value.
     #[must_use]
-    pub fn with(self, value: f64) -> Self {
+    pub fn with_value(self, value: f64) -> Self {
         Self { value, ..self }
     }
 

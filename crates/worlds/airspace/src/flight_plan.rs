@@ -1,20 +1,20 @@
 //! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its
 //! orders.
 
-use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
-use super::scenario::{Measure, Speed, TurnRate, Turns};
+use super::flight::{FlightOrder, FlightTask, MAX_ORDERS, Track, TrackPoint};
+use super::scenario::{SeparationM, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source, Spanned};
+use sidestep_scenario::{Closed, LeftOpen, Number, Point, Source, Spanned};
 
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
 /// A position, height or angle within reasonable bounds.
-type Value = Number<FromTo<-1_000_000_000, 1_000_000_000>>;
+type Value = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.
-type Time = Number<FromTo<0, 1_000_000_000>>;
-type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
+type Time = Number<Closed<0, 1_000_000_000>>;
+type Place = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -38,7 +38,7 @@ pub(super) struct AirplaneSection {
     /// Greatest turn rate, if not that of all.
     pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
     /// Distance that others have to keep, if not that of all.
-    pub(super) separation_m: Option<Measure>,
+    pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
     pub(super) turns: Option<Turns>,
     #[serde(default)]
@@ -57,7 +57,7 @@ struct OrderSection {
     /// Level to go to.
     altitude_m: Option<Value>,
     /// Rate of the change of level.
-    climb_m_s: Option<Number<AboveTo<0, 1_000_000_000>>>,
+    climb_m_s: Option<Number<LeftOpen<0, 1_000_000_000>>>,
     /// Way-points instead of those it has.
     way_points_m: Option<Vec<Place>>,
     /// Whether it goes on to its next way-point.
@@ -69,31 +69,31 @@ struct OrderSection {
 /// Orders in their order, and when the airplane is removed: infinity for never.
 type Orders = (Vec<FlightOrder>, f64);
 
-fn places(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
+fn points_m(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
     given.into_iter().flatten().map(|place| place.get()).collect()
 }
 
 /// Largest number of characters of a call sign.
-const MOST_OF_CALLSIGN: usize = 40;
+const MAX_CALLSIGN_CHARS: usize = 40;
 
 impl AirplaneSection {
     /// Returns the call sign, if it has one.
     pub(super) fn callsign(&self, source: &Source) -> Result<Option<String>, InputError> {
         let Some(given) = &self.callsign else { return Ok(None) };
         let callsign = given.get_ref();
-        let is_right = (1..=MOST_OF_CALLSIGN).contains(&callsign.chars().count())
+        let is_right = (1..=MAX_CALLSIGN_CHARS).contains(&callsign.chars().count())
             && !callsign.chars().any(char::is_control);
         if is_right {
             return Ok(Some(callsign.clone()));
         }
         let cause = format!("the call sign {callsign:?}");
-        let remedy = format!("give 1 to {MOST_OF_CALLSIGN} letters or digits, or leave it out");
+        let remedy = format!("give 1 to {MAX_CALLSIGN_CHARS} letters or digits, or leave it out");
         Err(source.error(given.span(), cause, remedy))
     }
 
     /// Returns the way-points in their order; none if none are given.
     pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
-        places(self.way_points_m.as_ref())
+        points_m(self.way_points_m.as_ref())
     }
 
     /// Returns the recorded track, if there is one.
@@ -146,22 +146,22 @@ impl AirplaneSection {
 
 impl OrderSection {
     /// Returns the one task of the order; `None` for leaving.
-    fn task(&self) -> Result<Option<Task>, (&'static str, &'static str)> {
+    fn task(&self) -> Result<Option<FlightTask>, (&'static str, &'static str)> {
         if self.climb_m_s.is_some() && self.altitude_m.is_none() {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));
         }
         let climb_m_s = self.climb_m_s.map_or(CLIMB_M_S, f64::from);
-        let climbs = |to: Value| Task::Altitude { altitude_m: to.get(), climb_m_s };
-        let turns = |to: Value| Task::Heading(math::wrap_angle(to.get().to_radians()));
-        let route = places(self.way_points_m.as_ref());
+        let climbs = |to: Value| FlightTask::Altitude { altitude_m: to.get(), climb_m_s };
+        let turns = |to: Value| FlightTask::Heading(math::wrap_angle(to.get().to_radians()));
+        let route = points_m(self.way_points_m.as_ref());
         let tasks = [
             self.heading_deg.map(turns),
-            self.speed_m_s.map(|speed| Task::Speed(speed.get())),
+            self.speed_m_s.map(|speed| FlightTask::Speed(speed.get())),
             self.altitude_m.map(climbs),
-            (!route.is_empty()).then_some(Task::WayPoints(route)),
-            self.proceeds.filter(|yes| *yes).map(|_| Task::Proceed),
+            (!route.is_empty()).then_some(FlightTask::WayPoints(route)),
+            self.proceeds.filter(|yes| *yes).map(|_| FlightTask::Proceed),
         ];
-        let mut tasks: Vec<Task> = tasks.into_iter().flatten().collect();
+        let mut tasks: Vec<FlightTask> = tasks.into_iter().flatten().collect();
         match (tasks.len(), self.leaves == Some(true)) {
             (1, false) => Ok(tasks.pop()),
             (0, true) => Ok(None),

@@ -1,6 +1,6 @@
 //! Generated traffic: the super-conflict, random crossings, and converging streams.
 
-use super::flight::{Airplane, Model, Point, Pose, distance_m};
+use super::flight::{Airplane, Model, Point, Pose2, distance_m};
 use super::purpose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Largest number of draws, per airplane, for a place far enough from all others.
-const TRIES: usize = 2_000;
+const MAX_TRIES: usize = 2_000;
 
 /// Kinds of generated traffic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -26,7 +26,7 @@ pub(crate) enum GeneratorKind {
 
 /// Parameters of the traffic to generate.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Order<'a> {
+pub(super) struct GeneratorParams<'a> {
     pub(super) kind: GeneratorKind,
     pub(super) n: usize,
     pub(super) radius_m: f64,
@@ -37,7 +37,10 @@ pub(super) struct Order<'a> {
 }
 
 /// Returns the airplanes, or, as an error, how many found a place before there was none left.
-pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+pub(super) fn generate(
+    order: &GeneratorParams<'_>,
+    streams: &Streams,
+) -> Result<Vec<Airplane>, usize> {
     match order.kind {
         GeneratorKind::Superconflict => Ok(superconflict(order, streams)),
         GeneratorKind::Random => random(order, streams),
@@ -45,13 +48,13 @@ pub(super) fn generate(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airpl
     }
 }
 
-fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
+fn airplane(order: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
     let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
     Airplane {
         callsign: None,
         model: order.model.clone(),
-        start: Pose { at: from, heading_rad },
+        start: Pose2 { at: from, heading_rad },
         mission: to,
         altitude_m: 0.0,
         appears_s: 0.0,
@@ -66,16 +69,16 @@ fn on_circle(radius_m: f64, angle_rad: f64) -> Point {
     [radius_m * math::cos(angle_rad), radius_m * math::sin(angle_rad)]
 }
 
-fn draws(streams: &Streams, id: usize) -> Draws {
+fn airplane_draws(streams: &Streams, id: usize) -> Draws {
     streams.draws(id as u32, 0, purpose::PLACE)
 }
 
 /// Returns airplanes evenly spread on a circle, each flying to the opposite point. The seed turns
 /// the circle, and moves each airplane along it by up to the jitter.
-fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
-    let turned = TAU * draws(streams, order.n).uniform();
+fn superconflict(order: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
+    let turned = TAU * airplane_draws(streams, order.n).uniform();
     let place = |k: usize| {
-        let jitter = order.jitter_m * (2.0 * draws(streams, k).uniform() - 1.0);
+        let jitter = order.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
         turned + TAU * k as f64 / order.n as f64 + jitter / order.radius_m
     };
     (0..order.n)
@@ -89,27 +92,27 @@ fn superconflict(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
 /// Returns airplanes anywhere in a disc, each flying to a point of the disc at least half its
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
-fn random(order: &Order<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+fn random(order: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
     let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + order.errors_m + 1.0;
     // Starts by squares as wide as the gap, so that only those around a place are compared with it.
     let mut starts: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
     let square = |at: Point| at.map(|v| (v / gap_m).floor() as i64);
     let mut all = Vec::new();
     for id in 0..order.n {
-        let mut draws = draws(streams, id);
+        let mut draws = airplane_draws(streams, id);
         let free = |at: &Point| {
             let [x, y] = square(*at);
             let rows = (x - 1..=x + 1).map(|x| starts.range([x, y - 1]..=[x, y + 1]));
             let mut near = rows.flatten().flat_map(|(_, starts)| starts);
             near.all(|other| {
-                interrupt::look();
+                interrupt::check();
                 distance_m(*at, *other) >= gap_m
             })
         };
-        let from = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(free);
+        let from = (0..MAX_TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(free);
         let from = from.ok_or(id)?;
         let far = |to: &Point| distance_m(from, *to) >= 0.5 * order.radius_m;
-        let to = (0..TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(far);
+        let to = (0..MAX_TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(far);
         starts.entry(square(from)).or_default().push(from);
         all.push(airplane(order, from, vec![to.unwrap_or([-from[0], -from[1]])]));
     }
@@ -124,12 +127,12 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
 /// Returns three streams that meet at the center and continue together. Airplanes of a stream
 /// follow each other at four separations; the first of each stream reach the center at the same
 /// time, and so do the second, and so on.
-fn converging(order: &Order<'_>, streams: &Streams) -> Vec<Airplane> {
+fn converging(order: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * order.model.separation_m;
     (0..order.n)
         .map(|k| {
             let (stream, place) = (k % 3, (k / 3) as f64);
-            let jitter = order.jitter_m * (2.0 * draws(streams, k).uniform() - 1.0);
+            let jitter = order.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
             let behind_m = place * spacing_m + jitter;
             let angle = TAU / 2.0 + (stream as f64 - 1.0) * TAU / 12.0;
             let from = on_circle(order.radius_m + behind_m, angle);

@@ -22,50 +22,50 @@ mod bundle;
 mod decide;
 pub mod deploy;
 pub mod events;
+mod external;
+pub mod external_action;
 pub mod flight;
 mod flight_plan;
-mod foreign;
 mod generate;
+mod import;
 mod inspect;
-mod intruder;
 mod join;
-mod kind;
-mod meanings;
 mod memory;
+mod metric_info;
 pub mod metrics;
-mod notes;
+mod non_cooperative;
 pub mod objective;
-mod outside;
 mod perceive;
 pub mod pilot;
 mod purpose;
 mod rows;
-mod run;
 pub mod scenario;
 pub mod shield;
 pub mod state;
+mod text;
+mod trace;
 pub mod traffic;
 mod view;
-pub mod wish;
-mod words;
 pub mod world;
+mod world_impl;
+mod world_type;
 
-use agents::traffic::Traffic;
-pub use decide::{Effort, Optimization};
+use agents::network_traffic::NetworkTraffic;
+pub use decide::{Optimization, OptimizationStats};
 use events::Event;
-pub use kind::Airspace;
 use rows::FlownLeg;
-pub use run::{AirspaceRun, Books, airspace_run};
-use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::world::Decides;
+use sidestep_kernel::conflict::ConflictGroups;
+use sidestep_kernel::world::DecisionMode;
 use sidestep_kernel::{Cycle, Phases, Slot};
 use state::{AirspaceState, PairRecord};
 use std::collections::BTreeMap;
 use std::ops::Range;
 pub use world::AirspaceWorld;
+pub use world_impl::{AirspaceRun, Collector, airspace_run};
+pub use world_type::Airspace;
 
 /// A worker's turn in one phase of one cycle.
-type Turn<'a> = sidestep_kernel::Turn<'a, AirspaceWorld>;
+type PhaseContext<'a> = sidestep_kernel::PhaseContext<'a, AirspaceWorld>;
 
 /// A worker's buffers and sums, kept between tasks.
 #[derive(Debug, Default)]
@@ -74,9 +74,9 @@ pub struct Scratch {
     pairs: BTreeMap<(Slot, Slot), PairRecord>,
     optimizations: Vec<Optimization>,
     /// Beacons by which airplanes have found their groups.
-    grouped: Traffic,
+    grouped: NetworkTraffic,
     /// Messages and bytes that the shield has sent.
-    exchanged: Traffic,
+    exchanged: NetworkTraffic,
     events: Vec<Event>,
     flown: Vec<FlownLeg>,
     /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
@@ -86,11 +86,11 @@ pub struct Scratch {
     decide_ns: u64,
     flying: Vec<Slot>,
     /// Notes for an inspection of an airplane; none in a run.
-    notes: Option<Box<notes::Notes>>,
+    trace: Option<Box<trace::InspectionTrace>>,
 }
 
 impl Phases for AirspaceWorld {
-    const DECIDES: Decides = Decides::Together;
+    const DECISION_MODE: DecisionMode = DecisionMode::Joint;
 
     type State = AirspaceState;
     type Scratch = Scratch;
@@ -103,15 +103,15 @@ impl Phases for AirspaceWorld {
         self.airplanes.len()
     }
 
-    fn claim(turn: &mut Turn<'_>, bodies: Range<usize>) {
+    fn claim(turn: &mut PhaseContext<'_>, bodies: Range<usize>) {
         perceive::claim(turn, bodies);
     }
 
-    fn join(turn: &mut Turn<'_>, bodies: Range<usize>, groups: &Groups) {
+    fn join(turn: &mut PhaseContext<'_>, bodies: Range<usize>, groups: &ConflictGroups) {
         join::join(turn, bodies, groups);
     }
 
-    fn act(turn: &mut Turn<'_>, group: &mut [Slot]) {
+    fn act(turn: &mut PhaseContext<'_>, group: &mut [Slot]) {
         act::act(turn, group);
     }
 }

@@ -1,8 +1,8 @@
 //! The metrics of a run.
 
-use super::decide::Effort;
+use super::decide::OptimizationStats;
 use super::events::{Event, EventKind};
-use super::state::{AirspaceState, Cell, PairRecord};
+use super::state::{AirplaneState, AirspaceState, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -10,21 +10,21 @@ use std::collections::BTreeMap;
 
 /// Everything that a run counts beside its state, and that a checkpoint keeps.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Ledger {
+pub struct Counters {
     /// Pairs that came near each other, by ids.
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
     /// Pairs for which the shield promises nothing, by rising ids, each with the first cycle in which it was
     /// named.
     pub too_close: BTreeMap<(EntityId, EntityId), Cycle>,
     /// Sums over optimizations.
-    pub effort: Effort,
+    pub effort: OptimizationStats,
     /// Number of events of each kind.
     pub events: BTreeMap<EventKind, u64>,
     /// Airplanes with errors beyond the shield's bounds, with the first cycle of each.
     pub beyond_bound: BTreeMap<EntityId, Cycle>,
 }
 
-impl Ledger {
+impl Counters {
     pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
         self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
     }
@@ -207,9 +207,9 @@ pub fn airplane_metrics(
     id: EntityId,
 ) -> AirplaneMetrics {
     let (cell, alone_s) = (&state.airplanes[id as usize], world.alone_s[id as usize]);
-    let joined_s = world.starts_s(world.joins_in(id as usize));
+    let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let arrived_s = cell.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
-    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_the_end(world, id));
+    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_always_replayed(world, id));
     AirplaneMetrics {
         airplane: id,
         callsign: world.callsign(id),
@@ -228,14 +228,14 @@ pub fn airplane_metrics(
     }
 }
 
-fn is_replayed_to_the_end(world: &AirspaceWorld, id: EntityId) -> bool {
-    let joined_s = world.starts_s(world.joins_in(id as usize));
+fn is_always_replayed(world: &AirspaceWorld, id: EntityId) -> bool {
+    let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let track = &world.airplanes[id as usize].track;
-    track.as_ref().is_some_and(|track| track.ends_s() <= joined_s)
+    track.as_ref().is_some_and(|track| track.end_s() <= joined_s)
 }
 
 /// Returns the metrics of all pairs that came near each other, by ids.
-pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> {
+pub fn pair_metrics(world: &AirspaceWorld, ledger: &Counters) -> Vec<PairMetrics> {
     let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
     let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
         airplanes: [a, b],
@@ -248,15 +248,15 @@ pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> 
     ledger.pairs.iter().map(one).collect()
 }
 
-fn count(state: &AirspaceState, is: impl Fn(&Cell) -> bool) -> u64 {
+fn count(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
     state.airplanes.iter().filter(|cell| is(cell)).count() as u64
 }
 
 /// Returns the number of airplanes that have flown their recorded way to its end.
-fn replayed(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
+fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     let all = (0..).zip(&state.airplanes);
     let ended = all.filter(|(_, cell)| cell.arrived_step().is_some());
-    ended.filter(|(id, _)| is_replayed_to_the_end(world, *id)).count() as u64
+    ended.filter(|(id, _)| is_always_replayed(world, *id)).count() as u64
 }
 
 fn mean(sum: f64, n: usize) -> Option<f64> {
@@ -264,9 +264,9 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
 }
 
 /// Returns the number of airplanes that were not in the air before a cycle, because they come in later.
-fn not_appeared(world: &AirspaceWorld, now: Cycle) -> u64 {
+fn not_appeared_count(world: &AirspaceWorld, now: Cycle) -> u64 {
     // At the very start, the airplanes that begin with it are there.
-    let later = |&i: &usize| world.appears_in(i) >= now.max(1);
+    let later = |&i: &usize| world.first_cycle(i) >= now.max(1);
     (0..world.airplanes.len()).filter(later).count() as u64
 }
 
@@ -275,13 +275,13 @@ pub(crate) fn metrics(
     world: &AirspaceWorld,
     state: &AirspaceState,
     now: Cycle,
-    ledger: &Ledger,
+    ledger: &Counters,
     decide_s: f64,
 ) -> Metrics {
     let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-    let Effort { optimizations, rounds, unconverged, traffic, beacons } = ledger.effort;
+    let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } = ledger.effort;
     Metrics {
         min_separation_m: ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
@@ -308,9 +308,9 @@ pub(crate) fn metrics(
         contacts_lost: ledger.count(EventKind::Unheard),
         deadlines_missed: ledger.count(EventKind::Deadline),
         groups_too_large: ledger.count(EventKind::GroupTooLarge),
-        not_appeared: not_appeared(world, now),
-        left: count(state, Cell::has_left),
-        replayed: replayed(world, state),
+        not_appeared: not_appeared_count(world, now),
+        left: count(state, AirplaneState::has_left),
+        replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
         too_close: too_close(world, ledger),
@@ -324,9 +324,9 @@ fn network_s(world: &AirspaceWorld, ticks: u64) -> Option<f64> {
 }
 
 /// Returns the airplanes whose errors exceeded the shield's bounds, by ids.
-fn beyond_bound(world: &AirspaceWorld, ledger: &Ledger) -> Vec<BeyondBound> {
+fn beyond_bound(world: &AirspaceWorld, ledger: &Counters) -> Vec<BeyondBound> {
     let one = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
-        at_s: world.starts_s(cycle),
+        at_s: world.cycle_start_s(cycle),
         airplane,
         callsign: world.callsign(airplane),
     };
@@ -334,11 +334,11 @@ fn beyond_bound(world: &AirspaceWorld, ledger: &Ledger) -> Vec<BeyondBound> {
 }
 
 /// Returns the pairs for which the shield promises nothing, by the time when that began.
-fn too_close(world: &AirspaceWorld, ledger: &Ledger) -> Vec<TooClose> {
+fn too_close(world: &AirspaceWorld, ledger: &Counters) -> Vec<TooClose> {
     let mut pairs: Vec<_> = ledger.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
     pairs.sort_unstable();
     let one = |(cycle, (a, b))| TooClose {
-        at_s: world.starts_s(cycle),
+        at_s: world.cycle_start_s(cycle),
         airplanes: [a, b],
         callsigns: world.callsigns([a, b]),
     };
@@ -346,7 +346,7 @@ fn too_close(world: &AirspaceWorld, ledger: &Ledger) -> Vec<TooClose> {
 }
 
 /// Returns whether all airplanes have arrived or left by now.
-pub fn everybody_has_arrived(state: &AirspaceState) -> bool {
+pub fn have_all_ended(state: &AirspaceState) -> bool {
     state.airplanes.iter().all(|cell| !cell.is_flying())
 }
 
@@ -398,8 +398,8 @@ mod tests {
             );
         }
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
-        run.advance(run.plan().cycles);
-        let named = run.books().ledger.count(super::EventKind::Intruder);
+        run.advance(run.config().cycles);
+        let named = run.collector().counters.count(super::EventKind::Intruder);
         let told = run.metrics().too_close;
         let mut pairs: Vec<_> = told.iter().map(|one| one.airplanes).collect();
         pairs.sort_unstable();

@@ -7,7 +7,7 @@
 //! ```
 
 use super::flight::{Levels, Point, Prediction};
-use super::intruder::Intruder;
+use super::non_cooperative::NonCooperative;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 use sidestep_kernel::interrupt;
@@ -30,11 +30,17 @@ pub struct Objective {
 impl Objective {
     /// Returns the cost of a predicted way of an airplane with this separation beside an intruder, which is taken to
     /// fly straight on.
-    fn beside(&self, one: &Intruder, way: &Prediction, separation_m: f64, dtau_s: f64) -> f64 {
-        let point = |k: usize| one.ahead(k as f64 * dtau_s);
+    fn non_cooperative_cost(
+        &self,
+        one: &NonCooperative,
+        way: &Prediction,
+        separation_m: f64,
+        dtau_s: f64,
+    ) -> f64 {
+        let point = |k: usize| one.position_after(k as f64 * dtau_s);
         let points: Vec<Point> = (1..=way.points.len()).map(point).collect();
         let straight = Prediction { counted: points.len(), points };
-        self.collision(way, &straight, [one.wide_m(separation_m), 0.0])[0]
+        self.collision(way, &straight, [one.clearance_m(separation_m), 0.0])[0]
     }
 
     /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
@@ -48,7 +54,7 @@ impl Objective {
         for (of_a, of_b) in slices {
             let parts = self.slice_collision(of_a, of_b, weight, r);
             (0..2).for_each(|k| sums[k] += parts[k]);
-            weight = self.aged(weight);
+            weight = self.decay(weight);
         }
         sums
     }
@@ -74,7 +80,7 @@ impl Objective {
 
     /// Returns the weight of a slice's first point if that of the slice before has the weight
     /// `weight`.
-    fn aged(&self, weight: f64) -> f64 {
+    fn decay(&self, weight: f64) -> f64 {
         (0..SLICE).fold(weight, |weight, _| weight * self.beta)
     }
 
@@ -96,7 +102,7 @@ const SLICE: usize = 16;
 
 /// An airplane's predictions, one per action, the optimal action last.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ActionPredictions {
     /// One prediction per action.
     pub predictions: Vec<Prediction>,
     /// Separation asked for, in meters.
@@ -108,7 +114,7 @@ pub struct Options {
     slices: Vec<Slice>,
 }
 
-impl Options {
+impl ActionPredictions {
     /// Returns options with their slices.
     pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
         let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
@@ -119,16 +125,18 @@ impl Options {
 
     /// Returns the same options beside intruders, seen at each point of the predictions.
     #[must_use]
-    pub(crate) fn beside(
+    pub(crate) fn with_non_cooperative(
         mut self,
-        intruders: &[Intruder],
+        intruders: &[NonCooperative],
         objective: &Objective,
         dtau_s: f64,
     ) -> Self {
         if !intruders.is_empty() {
-            let minds = |one: &&Intruder| one.levels.meets(&self.levels, objective.vertical_m);
+            let minds =
+                |one: &&NonCooperative| one.levels.overlaps(&self.levels, objective.vertical_m);
             let cost = |way: &Prediction| {
-                let cost = |one| objective.beside(one, way, self.separation_m, dtau_s);
+                let cost =
+                    |one| objective.non_cooperative_cost(one, way, self.separation_m, dtau_s);
                 intruders.iter().filter(minds).map(cost).sum()
             };
             self.beside = self.predictions.iter().map(cost).collect();
@@ -148,7 +156,7 @@ impl Options {
 struct Slice {
     pieces: Vec<Piece>,
     /// Bounds around all of them.
-    all: Bounds,
+    all: BoundingBox,
 }
 
 /// Points of a slice that some actions share: actions with the same turn differ only later.
@@ -158,7 +166,7 @@ struct Piece {
     actions: Vec<usize>,
     /// Point of the prediction at which the counted part of the slice ends.
     counted: usize,
-    bounds: Bounds,
+    bounds: BoundingBox,
 }
 
 impl Slice {
@@ -177,26 +185,26 @@ impl Slice {
             match pieces.iter_mut().find(is_alike) {
                 Some(piece) => piece.actions.push(action),
                 None => {
-                    let bounds = Bounds::of(points);
+                    let bounds = BoundingBox::from_points(points);
                     pieces.push(Piece { actions: vec![action], counted, bounds });
                 }
             }
         }
         let corners: Vec<Point> =
             pieces.iter().flat_map(|p| [p.bounds.low, p.bounds.high]).collect();
-        Self { pieces, all: Bounds::of(&corners) }
+        Self { pieces, all: BoundingBox::from_points(&corners) }
     }
 }
 
 /// The smallest upright rectangle around some points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Bounds {
+struct BoundingBox {
     low: Point,
     high: Point,
 }
 
-impl Bounds {
-    fn of(points: &[Point]) -> Self {
+impl BoundingBox {
+    fn from_points(points: &[Point]) -> Self {
         let start = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
         points.iter().fold(start, |b, p| Self {
             low: [b.low[0].min(p[0]), b.low[1].min(p[1])],
@@ -213,19 +221,19 @@ impl Bounds {
 /// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
 ///
 /// Everything that does not change during an optimization is computed here, once.
-pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
+pub fn game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
     let own = group.iter().map(|options| own_costs(objective, options)).collect();
     let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
         for (j, b) in group.iter().enumerate().skip(i + 1) {
-            couple(&mut game, objective, [i, j], [a, b]);
+            add_pair_costs(&mut game, objective, [i, j], [a, b]);
         }
     }
     game
 }
 
 /// Returns `alpha Gdev` of every action, and its cost beside intruders.
-pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
+pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
     let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
     let mut costs: Vec<f64> = options.predictions.iter().map(deviation).collect();
@@ -234,23 +242,27 @@ pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
 }
 
 /// Adds the costs of two players' airplanes to each other to a game, if there are any.
-pub(super) fn couple(
+pub(super) fn add_pair_costs(
     game: &mut PairwiseGame,
     objective: &Objective,
     [i, j]: [usize; 2],
-    [a, b]: [&Options; 2],
+    [a, b]: [&ActionPredictions; 2],
 ) {
-    interrupt::look();
-    if a.levels.meets(&b.levels, objective.vertical_m)
+    interrupt::check();
+    if a.levels.overlaps(&b.levels, objective.vertical_m)
         && let Some(costs) = pair_costs(objective, a, b)
     {
-        game.add_pair_in_parts(i, j, costs);
+        game.add_split_pair(i, j, costs);
     }
 }
 
 /// Returns `Gcol` of both for every two actions, if any two cost anything. Most slices of ways
 /// never come near each other, and the points that several actions share are computed once.
-fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f64; 2]>> {
+fn pair_costs(
+    objective: &Objective,
+    a: &ActionPredictions,
+    b: &ActionPredictions,
+) -> Option<Vec<[f64; 2]>> {
     let r = [a.separation_m, b.separation_m];
     // Slightly more, so that no rounding of bounds leaves out points that add a cost.
     let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
@@ -272,7 +284,7 @@ fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f6
                 }
             }
         }
-        weight = objective.aged(weight);
+        weight = objective.decay(weight);
     }
     costs
 }
@@ -295,7 +307,9 @@ fn add_to_all(
 
 #[cfg(test)]
 mod tests {
-    use super::super::flight::{Action, After, Model, Passing, Pilot, Pose, Timing};
+    use super::super::flight::{
+        Action, AfterLastWaypoint, Autopilot, Model, Pose2, Timing, WaypointRule,
+    };
     use super::*;
     use serde_json::Value;
     use sidestep_collectives::Game;
@@ -337,8 +351,12 @@ mod tests {
             mask: params["mask"] == true,
             vertical_m: 1.0,
         };
-        let after = if params["after"] == "pursue" { After::Pursue } else { After::Straight };
-        let passing = Passing { tolerance_m: number("tol"), passes: false };
+        let after = if params["after"] == "pursue" {
+            AfterLastWaypoint::Pursue
+        } else {
+            AfterLastWaypoint::Straight
+        };
+        let passing = WaypointRule { tolerance_m: number("tol"), passes: false };
         let expected = &case["expected"];
         let mut predictions = Vec::new();
         let planes = case["planes"].as_array().expect("planes");
@@ -353,9 +371,14 @@ mod tests {
             };
             let mission: Vec<Point> =
                 plane["wps"].as_array().expect("way-points").iter().map(point).collect();
-            let pilot =
-                Pilot { model: &model, mission: &mission, passing, after, dtau_s: timing.dtau_s };
-            let pose = Pose { at: [number("x"), number("y")], heading_rad: number("psi") };
+            let pilot = Autopilot {
+                model: &model,
+                mission: &mission,
+                passing,
+                after,
+                dtau_s: timing.dtau_s,
+            };
+            let pose = Pose2 { at: [number("x"), number("y")], heading_rad: number("psi") };
             let chosen = match action["omega"].as_f64() {
                 None => Action::Proceed,
                 Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
@@ -385,10 +408,10 @@ mod tests {
         near(total[0], &expected["G_col"], name);
         near(total[1], &expected["G_dev"], name);
         near(total[0] + objective.alpha * total[1], &expected["G"], name);
-        let options: Vec<Options> = predictions
+        let options: Vec<ActionPredictions> = predictions
             .iter()
             .map(|(p, optimal, r)| {
-                Options::new(vec![p.clone(), optimal.clone()], *r, Levels::at(0.0))
+                ActionPredictions::new(vec![p.clone(), optimal.clone()], *r, Levels::at(0.0))
             })
             .collect();
         let game = game(&objective, &options);
@@ -401,20 +424,26 @@ mod tests {
         use super::super::flight::{Legs, actions};
         let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
         let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
-        let passing = Passing { tolerance_m: 100.0, passes: true };
-        let all = [Legs::default(), Legs::usual()].map(|legs| actions(&model, 5.0, &[], &legs));
+        let passing = WaypointRule { tolerance_m: 100.0, passes: true };
+        let all =
+            [Legs::default(), Legs::default_preset()].map(|legs| actions(&model, 5.0, &[], &legs));
         let mut meetings = 0;
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
             let options = [0.0, 1.0].map(|side| {
                 let angle = side * 0.5 * f64::from(k);
                 let pose =
-                    Pose { at: [900.0 * side, 700.0 * side], heading_rad: angle + 3.0 * side };
+                    Pose2 { at: [900.0 * side, 700.0 * side], heading_rad: angle + 3.0 * side };
                 let mission = [[2000.0 - 2500.0 * side, 300.0]];
-                let after = After::Straight;
-                let pilot = Pilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
+                let after = AfterLastWaypoint::Straight;
+                let pilot =
+                    Autopilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
                 let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
                 let ways = all[k as usize % 2].iter().map(predict).collect();
-                Options::new(ways, model.separation_m * (1.0 - 0.1 * side), Levels::at(0.0))
+                ActionPredictions::new(
+                    ways,
+                    model.separation_m * (1.0 - 0.1 * side),
+                    Levels::at(0.0),
+                )
             });
             let [a, b] = &options;
             let objective =

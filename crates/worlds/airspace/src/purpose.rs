@@ -20,7 +20,7 @@ pub(crate) const BURST: Purpose = Purpose(6);
 pub(crate) const BURST_LOSS: Purpose = Purpose(7);
 
 /// Returns the streams and purposes from which a network's faults are drawn.
-pub(crate) fn of_network(streams: Streams) -> FaultStreams {
+pub(crate) fn network_fault_streams(streams: Streams) -> FaultStreams {
     FaultStreams { streams, network: NETWORK, burst: BURST, burst_loss: BURST_LOSS }
 }
 

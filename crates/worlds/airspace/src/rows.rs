@@ -5,7 +5,7 @@ use super::events::{Event, EventKind, Measure};
 use super::flight::Leg;
 use super::scenario::RecordSection;
 use super::world::AirspaceWorld;
-use sidestep_kernel::ports::table::label_of;
+use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -56,7 +56,7 @@ fn events(callsigns: Vec<Option<String>>) -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
-        .label("event", "what happened", kinds, |e| label_of(&EventKind::ALL, &e.kind))
+        .label("event", "what happened", kinds, |e| label_index(&EventKind::ALL, &e.kind))
         .u32("airplane", "entity id", |e| e.airplane)
         .text("callsign", "its call sign", move |e: &Event| {
             callsigns.get(e.airplane as usize).cloned().flatten()
@@ -100,26 +100,26 @@ impl Rows {
     }
 
     /// Returns whether controls from outside of the run are to be kept.
-    pub(super) fn keep_controls(&self) -> bool {
+    pub(super) fn has_controls(&self) -> bool {
         self.record.controls
     }
 
     /// Starts to keep rows.
-    pub(super) fn begin(&mut self, world: &AirspaceWorld) {
-        self.flown.begin(self.record.trajectories.then(|| trajectories(&callsigns(world))));
-        self.events.begin(self.record.events.then(|| events(callsigns(world))));
-        self.optimizations.begin(self.record.optimizations.then(optimizations));
+    pub(super) fn start(&mut self, world: &AirspaceWorld) {
+        self.flown.start(self.record.trajectories.then(|| trajectories(&callsigns(world))));
+        self.events.start(self.record.events.then(|| events(callsigns(world))));
+        self.optimizations.start(self.record.optimizations.then(optimizations));
     }
 
-    pub(super) fn flown(&mut self, flown: FlownLeg) {
+    pub(super) fn push_leg(&mut self, flown: FlownLeg) {
         self.flown.push(flown);
     }
 
-    pub(super) fn event(&mut self, event: Event) {
+    pub(super) fn push_event(&mut self, event: Event) {
         self.events.push(event);
     }
 
-    pub(super) fn optimization(&mut self, optimization: Optimization) {
+    pub(super) fn push_optimization(&mut self, optimization: Optimization) {
         self.optimizations.push(optimization);
     }
 }

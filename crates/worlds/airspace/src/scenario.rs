@@ -10,7 +10,7 @@ use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
 use super::shield::Side;
-use super::state::{AirplaneRecord, Ended, Snapshot};
+use super::state::{AirplaneRecord, PackedEnd, Snapshot};
 use super::world::{AirspaceWorld, Grouping, Method};
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
@@ -19,19 +19,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use settings::{LegsSection, ReactiveSection, Switch, Times};
-use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
+use sidestep_collectives::{Choice, Estimator, Update, UpdateOrder, Utility};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{
-    FromTo, Head, Number, Point, Rule, Sections, Seeds, Source, Spanned, schema,
+    Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
 };
 use std::sync::Arc;
 use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
     Step, Tolerance, Weight,
 };
-pub(super) use values::{Measure, Speed, TurnRate, Turns};
+pub(super) use values::{SeparationM, Speed, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -85,45 +85,45 @@ struct AirspaceSection {
     orca: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
-    order: Option<Order>,
+    order: Option<UpdateOrder>,
     utility: Option<Spanned<Utility>>,
     cooling: Option<Number<Cooling>>,
     max_rounds: Option<Rounds>,
     choice: Option<Choice>,
     vertical_m: Option<Number<LevelGap>>,
-    replay_until_s: Option<Number<UntilWhen>>,
+    replay_until_s: Option<Number<ReplayEnd>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
     /// Latitude and longitude of the origin.
-    origin_deg: Option<Point<2, FromTo<-360, 360>>>,
+    origin_deg: Option<Point<2, Closed<-360, 360>>>,
     /// Time of the start, in seconds since 1970, UTC.
-    start_utc_s: Option<Number<FromTo<-1_000_000_000_000, 1_000_000_000_000>>>,
+    start_utc_s: Option<Number<Closed<-1_000_000_000_000, 1_000_000_000_000>>>,
     /// Standard deviation in meters; larger errors of known positions make no sense.
-    position_noise_m: Option<Number<FromTo<0, 1_000_000>>>,
+    position_noise_m: Option<Number<Closed<0, 1_000_000>>>,
     heading_noise_deg: Option<Number<HeadingNoise>>,
-    error_sigmas: Option<Number<FromTo<0, 100>>>,
+    error_sigmas: Option<Number<Closed<0, 100>>>,
 }
 
 /// Returns the JSON Schema of a scenario's sections.
 pub(super) fn sections() -> Value {
-    schema::of::<AirspaceFile>()
+    schema::for_type::<AirspaceFile>()
 }
 
 /// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
-struct UntilWhen;
+struct ReplayEnd;
 
-impl Rule for UntilWhen {
+impl Rule for ReplayEnd {
     fn allows(number: f64) -> bool {
         number >= 0.0
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "seconds after the start, 0 to fly all anew, or inf to replay all".into()
     }
 
     fn limits() -> Value {
-        schema::or_infinite(json!({ "minimum": 0 }))
+        schema::with_infinity(json!({ "minimum": 0 }))
     }
 }
 
@@ -157,7 +157,7 @@ impl Default for RecordSection {
 
 /// A compiled scenario.
 #[derive(Debug, Clone)]
-pub struct Compiled {
+pub struct CompiledAirspace {
     /// The immutable world.
     pub world: Arc<AirspaceWorld>,
     /// Name of the scenario; may be empty.
@@ -167,7 +167,7 @@ pub struct Compiled {
     /// Largest number of cycles; a run ends when all have arrived.
     pub cycles: u64,
     /// The effect of another seed.
-    pub seeds: Seeds,
+    pub seeds: SeedEffect,
     /// The tables to keep.
     pub record: RecordSection,
     /// Sides of the first fallbacks.
@@ -175,25 +175,25 @@ pub struct Compiled {
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
     /// The text that it was compiled from.
-    recipe: Arc<Recipe>,
+    recipe: Arc<ScenarioSource>,
 }
 
 /// The text of a scenario and its sections, so that another seed reads nothing again.
 #[derive(Debug)]
-struct Recipe {
+struct ScenarioSource {
     source: Source,
     head: Head,
     file: AirspaceFile,
 }
 
-impl Compiled {
+impl CompiledAirspace {
     /// Compiles a scenario.
     ///
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in it.
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
-        Compiler::new(&Arc::new(Recipe { source: source.clone(), head, file })).compile()
+        Compiler::new(&Arc::new(ScenarioSource { source: source.clone(), head, file })).compile()
     }
 
     /// Returns the same scenario with another seed, as if compiled with that seed. Traffic that is drawn, and
@@ -205,7 +205,7 @@ impl Compiled {
         let streams = Streams::new(Seed(seed));
         let is_drawn = self.recipe.file.airspace.generator.is_some();
         if is_drawn || self.world.disturbance.position_m > 0.0 {
-            return Compiler::again(&self.recipe, seed, &self.world).compile();
+            return Compiler::with_seed(&self.recipe, seed, &self.world).compile();
         }
         let fingerprint = fingerprint(&self.recipe.source.text, seed);
         let world = AirspaceWorld { streams, fingerprint, ..(*self.world).clone() };
@@ -217,7 +217,7 @@ impl Compiled {
     pub fn start_snapshot(&self) -> Snapshot {
         let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
             pose: airplane.start,
-            ended: Ended::NOT_YET,
+            ended: PackedEnd::NONE,
             counts: [0; 4],
             fallback,
             altitude_m: match &airplane.track {
@@ -245,9 +245,9 @@ impl Compiled {
 mod tests {
     use super::*;
 
-    fn compiled(more: &str) -> Compiled {
+    fn compiled(more: &str) -> CompiledAirspace {
         let text = format!("format = 1\nworld = \"airspace\"\n{more}");
-        Compiled::new(&Source::new("test", text, "")).expect("a scenario")
+        CompiledAirspace::new(&Source::new("test", text, "")).expect("a scenario")
     }
 
     #[test]
@@ -289,7 +289,7 @@ mod tests {
         for preset in ["default", "paper"] {
             let (one, half) = (world(1.0, preset), world(0.5, preset));
             assert_eq!(one.timing.horizon_s(), half.timing.horizon_s());
-            assert_eq!(one.look_m(0, 1), half.look_m(0, 1));
+            assert_eq!(one.interaction_range_m(0, 1), half.interaction_range_m(0, 1));
             // Two head-on airplanes, against the price of one that has left its way by 700 m.
             let price = |world: &AirspaceWorld| {
                 let way = |from_m: f64, v_m_s: f64| {

@@ -13,12 +13,12 @@
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
 //! by default, they are flown anew.
 
-mod rules;
+mod import_settings;
 
 use super::flight::{Point, Zone};
 use super::flight_plan::CLIMB_M_S;
-use rules::{Rules, rules};
-use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile, Speed};
+use import_settings::{ImportSettings, import_settings};
+use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_import::traffic::{RecordedTraffic, Track};
 use sidestep_kernel::{InputError, math};
@@ -29,28 +29,29 @@ const NAUTICAL_MILE_M: f64 = 1852.0;
 const FOOT_M: f64 = 0.3048;
 const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 /// The turn rate at 25 degrees of bank is this over the airspeed: g tan 25.
-const BANKED_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
+const BANKED_TURN_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
 /// Time in seconds for which an airplane without a destination flies ahead.
-const AHEAD_S: f64 = 1800.0;
+const UNROUTED_FLIGHT_S: f64 = 1800.0;
 /// Seconds between two decisions: a route that is given no later than this counts as known at once.
 const DT_S: f64 = 10.0;
 /// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
 const ZONE: Zone = Zone { gap_m: 5.0 * NAUTICAL_MILE_M, vertical_m: 1000.0 * FOOT_M };
 
 /// Slowest speed in meters per second at which an aircraft is in the air.
-const SLOWEST_M_S: f64 = 1.0;
+const MIN_SPEED_M_S: f64 = 1.0;
 
 /// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a place and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
-    let (traffic, rules) = (&file.traffic, &bluesky_rules(name, file));
-    let aircraft: Vec<UnderWay> = traffic.aircraft.iter().filter_map(under_way).collect();
-    let plane = LocalPlane::about_all(aircraft.iter().map(|one| one.0.position()))?;
+    let (traffic, rules) = (&file.traffic, &bluesky_settings(name, file));
+    let aircraft: Vec<MovingAircraft> =
+        traffic.aircraft.iter().filter_map(moving_aircraft).collect();
+    let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
     let zone = Zone {
         gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
         vertical_m: traffic.zone_half_height_ft * FOOT_M,
     };
-    let more = settings(rules) + &origin(&plane);
-    let mut text = heading(name, zone, rules.look_ahead_s, &more);
+    let more = settings_text(rules) + &origin(&plane);
+    let mut text = header_text(name, zone, rules.look_ahead_s, &more);
     for one in &aircraft {
         write_aircraft(&mut text, &one.0, &plane);
     }
@@ -59,9 +60,9 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
 
 /// Returns the rules of a BlueSky file, which `place` names in errors, and all aircraft that cannot
 /// fly among them.
-pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
-    let mut rules = rules(place, file, DT_S);
-    let stands = |one: &&ScnAircraft| under_way(one).is_none();
+pub(crate) fn bluesky_settings(place: &str, file: &ScnFile) -> ImportSettings {
+    let mut rules = import_settings(place, file, DT_S);
+    let stands = |one: &&ScnAircraft| moving_aircraft(one).is_none();
     for ScnAircraft { id, .. } in file.traffic.aircraft.iter().filter(stands) {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
         let error =
@@ -73,13 +74,13 @@ pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
 
 /// An aircraft from the time when it starts to move.
 #[derive(Debug, Clone, PartialEq)]
-struct UnderWay(ScnAircraft);
+struct MovingAircraft(ScnAircraft);
 
-impl UnderWay {
+impl MovingAircraft {
     /// Returns the least speed that it has or is given.
-    fn slowest_m_s(&self) -> f64 {
-        let told = changes(&self.0, false).into_iter().filter_map(|(_, told)| match told {
-            Told::Speed(v_m_s) => Some(v_m_s),
+    fn min_speed_m_s(&self) -> f64 {
+        let told = change_commands(&self.0, false).into_iter().filter_map(|(_, told)| match told {
+            FlightCommand::Speed(v_m_s) => Some(v_m_s),
             _ => None,
         });
         told.fold(self.0.speed.true_airspeed_mps(self.0.altitude_ft), f64::min)
@@ -88,20 +89,23 @@ impl UnderWay {
 
 /// Returns an aircraft as it is when it gets a speed: at its creation, or later, after which its
 /// heading and level are those told until then. `None` for one that never gets a speed.
-fn under_way(aircraft: &ScnAircraft) -> Option<UnderWay> {
+fn moving_aircraft(aircraft: &ScnAircraft) -> Option<MovingAircraft> {
     let mut one = aircraft.clone();
-    let moves = |speed: Speed, at_ft: f64| speed.true_airspeed_mps(at_ft) >= SLOWEST_M_S;
+    let moves = |speed: Airspeed, at_ft: f64| speed.true_airspeed_mps(at_ft) >= MIN_SPEED_M_S;
     if moves(one.speed, one.altitude_ft) {
-        return Some(UnderWay(one));
+        return Some(MovingAircraft(one));
     }
     for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
         match change {
-            Change::HeadingDeg(deg) => one.heading_deg = deg,
-            Change::AltitudeFt(ft) => one.altitude_ft = ft,
-            Change::Speed(speed) if moves(speed, one.altitude_ft) => {
+            AircraftCommand::HeadingDeg(deg) => one.heading_deg = deg,
+            AircraftCommand::AltitudeFt(ft) => one.altitude_ft = ft,
+            AircraftCommand::Speed(speed) if moves(speed, one.altitude_ft) => {
                 (one.speed, one.created_s) = (speed, at_s);
                 one.changes.drain(..=k);
-                return one.deleted_s.is_none_or(|end_s| end_s > at_s).then_some(UnderWay(one));
+                return one
+                    .deleted_s
+                    .is_none_or(|end_s| end_s > at_s)
+                    .then_some(MovingAircraft(one));
             }
             _ => {}
         }
@@ -125,7 +129,7 @@ fn callsign(name: &str) -> String {
 }
 
 /// Returns the settings of a scenario that follow from rules.
-fn settings(rules: &Rules) -> String {
+fn settings_text(rules: &ImportSettings) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     if let Some(method) = rules.method {
@@ -145,7 +149,7 @@ fn settings(rules: &Rules) -> String {
 }
 
 /// Returns the commands of a BlueSky file that the scenario leaves out, with counts.
-pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
+pub(crate) fn omitted_commands(file: &ScnFile) -> BTreeMap<String, u64> {
     let mut counts = BTreeMap::new();
     let mut count = |what: &str, n: usize| {
         if n > 0 {
@@ -156,11 +160,13 @@ pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
         let points = &aircraft.way_points;
         count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());
         count("ADDWPT speed", points.iter().filter(|p| p.speed.is_some()).count());
-        let told = |is: fn(&Change) -> bool| aircraft.changes.iter().filter(|(_, c)| is(c)).count();
-        count("VNAV", told(|c| matches!(c, Change::VerticalNavigation(_))));
-        count("LNAV OFF", told(|c| matches!(c, Change::LateralNavigation(false))));
-        if told(|c| matches!(c, Change::AltitudeFt(_))) == 0 {
-            count("VS", told(|c| matches!(c, Change::VerticalSpeedFpm(_))));
+        let told = |is: fn(&AircraftCommand) -> bool| {
+            aircraft.changes.iter().filter(|(_, c)| is(c)).count()
+        };
+        count("VNAV", told(|c| matches!(c, AircraftCommand::VerticalNavigation(_))));
+        count("LNAV OFF", told(|c| matches!(c, AircraftCommand::LateralNavigation(false))));
+        if told(|c| matches!(c, AircraftCommand::AltitudeFt(_))) == 0 {
+            count("VS", told(|c| matches!(c, AircraftCommand::VerticalSpeedFpm(_))));
         }
     }
     counts
@@ -168,17 +174,17 @@ pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
 
 /// A command to an airplane, in the scenario's terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Told {
+enum FlightCommand {
     /// Degrees counterclockwise from east.
     Heading(f64),
     Speed(f64),
     /// Meters, and meters per second.
     Altitude(f64, f64),
-    Proceeds,
-    Leaves,
+    Proceed,
+    Leave,
 }
 
-impl Told {
+impl FlightCommand {
     fn text(self) -> String {
         match self {
             Self::Heading(deg) => format!("heading_deg = {deg:?}"),
@@ -186,8 +192,8 @@ impl Told {
             Self::Altitude(altitude_m, climb_m_s) => {
                 format!("altitude_m = {altitude_m:?}, climb_m_s = {climb_m_s:?}")
             }
-            Self::Proceeds => "proceeds = true".into(),
-            Self::Leaves => "leaves = true".into(),
+            Self::Proceed => "proceeds = true".into(),
+            Self::Leave => "leaves = true".into(),
         }
     }
 }
@@ -198,9 +204,9 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
     let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
     let mut way_points_m: Vec<Point> =
         aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
-    let orders = orders(aircraft, !way_points_m.is_empty());
+    let orders = flight_commands(aircraft, !way_points_m.is_empty());
     if way_points_m.is_empty() {
-        let (heading_rad, ahead_m) = (heading_deg.to_radians(), AHEAD_S * v_m_s);
+        let (heading_rad, ahead_m) = (heading_deg.to_radians(), UNROUTED_FLIGHT_S * v_m_s);
         let goal = [
             at_m[0] + ahead_m * math::cos(heading_rad),
             at_m[1] + ahead_m * math::sin(heading_rad),
@@ -208,10 +214,10 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
         way_points_m.push(goal);
     }
     let told_m_s = orders.iter().filter_map(|(_, told)| match told {
-        Told::Speed(v_m_s) => Some(*v_m_s),
+        FlightCommand::Speed(v_m_s) => Some(*v_m_s),
         _ => None,
     });
-    let omega_deg_s = banked_deg_s(told_m_s.fold(v_m_s, f64::max));
+    let omega_deg_s = banked_turn_deg_s(told_m_s.fold(v_m_s, f64::max));
     let (altitude_m, appears_s) = (aircraft.altitude_ft * FOOT_M, aircraft.created_s);
     // Writing to a string cannot fail.
     let _ = write!(
@@ -232,32 +238,32 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
 }
 
 /// Returns the commands to an aircraft on its way, by rising time.
-fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
-    let mut orders: Vec<(f64, Told)> = Vec::new();
+fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
+    let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
     let mut routed_s: Vec<f64> = route_times_s(aircraft);
     if has_route && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + DT_S) {
-        orders.push((aircraft.created_s, Told::Heading(90.0 - aircraft.heading_deg)));
+        orders.push((aircraft.created_s, FlightCommand::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
     // An aircraft that gets a way-point flies there, regardless of earlier headings.
-    orders.extend(routed_s.into_iter().map(|at_s| (at_s, Told::Proceeds)));
-    orders.extend(changes(aircraft, has_route));
+    orders.extend(routed_s.into_iter().map(|at_s| (at_s, FlightCommand::Proceed)));
+    orders.extend(change_commands(aircraft, has_route));
     orders.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut keeps_heading = false;
     // Proceeding changes nothing for an airplane that is already doing so.
     orders.retain(|(_, told)| match told {
-        Told::Heading(_) => {
+        FlightCommand::Heading(_) => {
             keeps_heading = true;
             true
         }
-        Told::Proceeds => std::mem::take(&mut keeps_heading),
+        FlightCommand::Proceed => std::mem::take(&mut keeps_heading),
         _ => true,
     });
     let last_s = orders.last().map_or(aircraft.created_s, |(at_s, _)| *at_s);
-    let ends_s = aircraft.deleted_s.or(keeps_heading.then_some(last_s + AHEAD_S));
+    let ends_s = aircraft.deleted_s.or(keeps_heading.then_some(last_s + UNROUTED_FLIGHT_S));
     if let Some(ends_s) = ends_s {
         orders.retain(|(at_s, _)| *at_s < ends_s);
-        orders.push((ends_s, Told::Leaves));
+        orders.push((ends_s, FlightCommand::Leave));
     }
     orders
 }
@@ -272,30 +278,34 @@ fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     all
 }
 
-fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
+fn change_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
     let (mut altitude_ft, mut climb_m_s) = (aircraft.altitude_ft, CLIMB_M_S);
-    let mut told: Vec<(f64, Told)> = Vec::new();
+    let mut told: Vec<(f64, FlightCommand)> = Vec::new();
     for &(at_s, change) in &aircraft.changes {
         match change {
-            Change::HeadingDeg(deg) => told.push((at_s, Told::Heading(90.0 - deg))),
-            Change::Speed(speed) => {
-                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(SLOWEST_M_S);
-                told.push((at_s, Told::Speed(v_m_s)));
+            AircraftCommand::HeadingDeg(deg) => {
+                told.push((at_s, FlightCommand::Heading(90.0 - deg)))
             }
-            Change::AltitudeFt(to_ft) => {
+            AircraftCommand::Speed(speed) => {
+                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(MIN_SPEED_M_S);
+                told.push((at_s, FlightCommand::Speed(v_m_s)));
+            }
+            AircraftCommand::AltitudeFt(to_ft) => {
                 altitude_ft = to_ft;
-                told.push((at_s, Told::Altitude(to_ft * FOOT_M, climb_m_s)));
+                told.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
             }
-            Change::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
+            AircraftCommand::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
                 climb_m_s = fpm.abs() * FOOT_M / 60.0;
                 // A rate after an `ALT` of the same time belongs to that command.
-                if let Some((last_s, Told::Altitude(_, rate_m_s))) = told.last_mut()
+                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = told.last_mut()
                     && *last_s == at_s
                 {
                     *rate_m_s = climb_m_s;
                 }
             }
-            Change::LateralNavigation(true) if has_route => told.push((at_s, Told::Proceeds)),
+            AircraftCommand::LateralNavigation(true) if has_route => {
+                told.push((at_s, FlightCommand::Proceed))
+            }
             _ => {}
         }
     }
@@ -305,12 +315,12 @@ fn changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
 /// Returns the scenario of recorded tracks, which replays them. `None` without any track.
 pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
-    let plane = LocalPlane::about_all(samples().map(|s| s.position))?;
+    let plane = LocalPlane::from_positions(samples().map(|s| s.position))?;
     let begins_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
     let more = format!("{replay}start_utc_s = {begins_s:?}\n{}", origin(&plane));
-    let mut text = heading(name, ZONE, None, &more);
+    let mut text = header_text(name, ZONE, None, &more);
     let tracks = || traffic.tracks.iter().filter(|track| has_length(track));
     tracks().for_each(|track| write_track(&mut text, track, &plane, begins_s));
     tracks().next().map(|_| text)
@@ -324,7 +334,7 @@ pub fn has_length(track: &Track) -> bool {
 fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f64) {
     let speed_kt =
         track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / track.samples.len() as f64;
-    let omega_deg_s = banked_deg_s((speed_kt * KNOT_M_S).max(1.0));
+    let omega_deg_s = banked_turn_deg_s((speed_kt * KNOT_M_S).max(1.0));
     let name = if track.callsign.trim().is_empty() { &track.icao24 } else { &track.callsign };
     // Writing to a string cannot fail. A name with a line end would end the comment.
     let _ = write!(
@@ -341,11 +351,11 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
     text.push_str("]\n");
 }
 
-fn banked_deg_s(v_m_s: f64) -> f64 {
-    (BANKED_M_S2 / v_m_s).to_degrees()
+fn banked_turn_deg_s(v_m_s: f64) -> f64 {
+    (BANKED_TURN_M_S2 / v_m_s).to_degrees()
 }
 
-fn heading(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String {
+fn header_text(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String {
     let Zone { gap_m, vertical_m } = zone;
     let horizon_s = horizon_s.unwrap_or(300.0);
     // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
@@ -360,7 +370,7 @@ fn heading(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String
 #[cfg(test)]
 mod tests {
     use super::super::airspace_run;
-    use super::super::scenario::Compiled;
+    use super::super::scenario::CompiledAirspace;
     use super::*;
     use sidestep_import::bluesky::parse;
     use sidestep_kernel::Simulation;
@@ -384,11 +394,11 @@ mod tests {
         assert!(metrics.min_separation_m.is_some_and(|d| d < 20_000.0), "they have met");
     }
 
-    fn compiled(commands: &str) -> Compiled {
+    fn compiled(commands: &str) -> CompiledAirspace {
         let line = |command: &str| format!("00:00:00.00>{command}\n");
         let text: String = commands.lines().map(line).collect();
         let text = from_bluesky("told", &parse(&"told.scn", &text)).expect("it has aircraft");
-        Compiled::new(&Source::new("told", text, "")).expect("a scenario")
+        CompiledAirspace::new(&Source::new("told", text, "")).expect("a scenario")
     }
 
     #[test]
@@ -402,9 +412,9 @@ mod tests {
             ("", 300.0),
         ] {
             let compiled = compiled(&format!("{flights}{settings}"));
-            assert_eq!(compiled.world.looks_ahead().look_ahead_s, s, "{settings}");
+            assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
             assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
-            let told = crate::words::contents(&compiled).text;
+            let told = crate::text::contents(&compiled).text;
             assert!(told.contains(&format!("decides every 10 s, looks {s} s ahead")), "{told}");
         }
         // MVP that is chosen by `--set` instead of the file looks as far.
@@ -420,7 +430,7 @@ mod tests {
                     13:00:00.00>CRE B2,A320,52.0,5.0,90,FL300,270\n";
         let text = from_bluesky("day", &parse(&"day.scn", text)).expect("it has aircraft");
         let mut run = airspace_run(&Source::new("day", text, ""), 1).expect("a scenario");
-        run.advance(run.plan().cycles);
+        run.advance(run.config().cycles);
         let metrics = run.metrics();
         assert_eq!((metrics.arrived, metrics.not_appeared), (2, 0));
     }
@@ -430,7 +440,7 @@ mod tests {
         let file = parse(&"f.scn", "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n");
         for name in ["cafe\u{301}", "a \"b\" \\ 'c'", "tab\tline\nend", "\u{feff}\u{7f}\u{0}", ""] {
             let text = from_bluesky(name, &file).expect("it has aircraft");
-            let compiled = Compiled::new(&Source::new(name, text, "")).expect("a scenario");
+            let compiled = CompiledAirspace::new(&Source::new(name, text, "")).expect("a scenario");
             assert_eq!(compiled.name, name);
         }
     }
@@ -439,8 +449,8 @@ mod tests {
     fn check_tells_how_far_orca_looks_ahead() {
         let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
-        let compiled = Compiled::new(&Source::new("o", text, "")).expect("a scenario");
-        let told = crate::words::contents(&compiled).text;
+        let compiled = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario");
+        let told = crate::text::contents(&compiled).text;
         assert!(told.contains("looks 45 s ahead"), "{told}");
     }
 
@@ -453,7 +463,7 @@ mod tests {
              00:00:00.00>CRE B2,B744,1,0.4,270,FL200,250\n\
              00:00:00.00>CRE C3,B744,2,0.4,270,FL200,0\n",
         );
-        let rules = bluesky_rules("late.scn", &file);
+        let rules = bluesky_settings("late.scn", &file);
         let [stands] = &rules.refused[..] else { panic!("{:?}", rules.refused) };
         assert!(stands.cause().contains("C3 is never given a speed"), "{stands}");
         let text = from_bluesky("late", &file).expect("two fly");
@@ -464,7 +474,7 @@ mod tests {
         for id in 0..2 {
             let flown = crate::metrics::airplane_metrics(&world, run.state(), id);
             let (s, delay) = (flown.flown_s, flown.delay_percent);
-            assert!(s.is_some_and(|s| s > 0.95 * AHEAD_S), "{id}: {s:?}");
+            assert!(s.is_some_and(|s| s > 0.95 * UNROUTED_FLIGHT_S), "{id}: {s:?}");
             assert!(delay.is_some_and(|percent| percent.abs() < 1.0), "{id}: {delay:?}");
         }
     }

@@ -5,32 +5,33 @@ use super::flight::{Airplane, Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
-    Amount, Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape, Who,
+    Axis, Body, BodyId, BodyKind, Condition, LogEvent, Pose, PositionColumns, Quantity, Scenery,
+    Severity, Shape,
 };
 use sidestep_kernel::{Cycle, Slot};
 
 /// Length of a drawn airplane, as a part of its zone's radius: large enough to be seen, and small
 /// enough that airplanes with touching zones are drawn apart.
-const LENGTH_OF_RADIUS: f64 = 0.6;
+const LENGTH_FRACTION: f64 = 0.6;
 /// Width of a drawn airplane, as a part of its length.
-const WIDTH_OF_LENGTH: f64 = 0.7;
+const WIDTH_FRACTION: f64 = 0.7;
 /// Height of a zone, as a part of its radius.
-const ZONE_HEIGHT: f64 = 0.02;
+const ZONE_HEIGHT_FRACTION: f64 = 0.02;
 /// Radius of a goal, as a part of the zone's radius.
-const GOAL_OF_RADIUS: f64 = 0.15;
+const GOAL_FRACTION: f64 = 0.15;
 
 /// Returns the starts of airplanes, as wide as their zones, and their last way-points.
 pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     let start = |(id, airplane): (u32, &Airplane)| {
         let ([x_m, y_m], radius_m) = (airplane.start.at, zone_radius_m(world, id));
-        let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
-        Body::new(Kind::Start, id, Pose::at([x_m, y_m, airplane.altitude_m]), disc)
+        let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m };
+        Body::new(BodyKind::Start, id, Pose::from_position([x_m, y_m, airplane.altitude_m]), disc)
     };
     let goal = |(id, airplane): (u32, &Airplane)| {
         let at = airplane.mission.last()?;
-        let radius_m = GOAL_OF_RADIUS * zone_radius_m(world, id);
-        let pose = Pose::at([at[0], at[1], airplane.altitude_m]);
-        Some(Body::new(Kind::Goal, id, pose, Shape::Sphere { radius_m }))
+        let radius_m = GOAL_FRACTION * zone_radius_m(world, id);
+        let pose = Pose::from_position([at[0], at[1], airplane.altitude_m]);
+        Some(Body::new(BodyKind::Goal, id, pose, Shape::Sphere { radius_m }))
     };
     let starts = (0..).zip(world.airplanes.iter()).map(start);
     Scenery {
@@ -44,25 +45,26 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
 }
 
 /// Returns the call signs.
-fn names(world: &AirspaceWorld) -> Vec<(Kind, u32, String)> {
-    let named =
-        |(id, airplane): (u32, &Airplane)| Some((Kind::Airplane, id, airplane.callsign.clone()?));
+fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
+    let named = |(id, airplane): (u32, &Airplane)| {
+        Some((BodyKind::Airplane, id, airplane.callsign.clone()?))
+    };
     (0..).zip(world.airplanes.iter()).filter_map(named).collect()
 }
 
 /// Returns how recorded poses give the places of airplanes.
-pub(super) fn place_rows() -> Vec<PlaceRows> {
-    vec![PlaceRows {
+pub(super) fn position_columns() -> Vec<PositionColumns> {
+    vec![PositionColumns {
         table: "trajectories",
-        kind: Kind::Airplane,
+        kind: BodyKind::Airplane,
         number: "airplane",
         part: None,
         axes: ["x_m", "y_m", "altitude_m"].map(Axis::meters).to_vec(),
         plane: None,
         is_corner: false,
-        ahead: None,
-        every: 1,
-        worth: Cycle::MAX,
+        heading: None,
+        interval: 1,
+        history: Cycle::MAX,
     }]
 }
 
@@ -87,8 +89,8 @@ pub(super) fn visible_bodies(
     now: Cycle,
 ) -> Vec<Body> {
     let ids = 0..world.airplanes.len() as Slot;
-    let there: Vec<Slot> = ids.filter(|&id| state.is_there(world, id, now)).collect();
-    let too_near = too_near(world, state, &there);
+    let there: Vec<Slot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
+    let too_near = too_close(world, state, &there);
     there.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
 }
 
@@ -100,16 +102,17 @@ fn airplane_and_zone(
 ) -> [Body; 2] {
     let cell = &state.airplanes[id as usize];
     let ([x_m, y_m], radius_m) = (cell.pose().at, zone_radius_m(world, id));
-    let pose = Pose::heading([x_m, y_m, cell.altitude_m.get()], cell.pose().heading_rad);
-    let length_m = LENGTH_OF_RADIUS * radius_m;
-    let dart = Shape::Dart { length_m, width_m: WIDTH_OF_LENGTH * length_m };
-    let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT * radius_m };
-    let bodies = [Body::new(Kind::Airplane, id, pose, dart), Body::new(Kind::Zone, id, pose, zone)];
-    bodies.map(|body| body.when(too_near.binary_search(&id).is_ok(), Condition::Touching))
+    let pose = Pose::from_heading([x_m, y_m, cell.altitude_m.get()], cell.pose().heading_rad);
+    let length_m = LENGTH_FRACTION * radius_m;
+    let dart = Shape::Dart { length_m, width_m: WIDTH_FRACTION * length_m };
+    let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m };
+    let bodies =
+        [Body::new(BodyKind::Airplane, id, pose, dart), Body::new(BodyKind::Zone, id, pose, zone)];
+    bodies.map(|body| body.with_state_if(too_near.binary_search(&id).is_ok(), Condition::Touching))
 }
 
 /// Returns the airplanes that are nearer to another than allowed, by id.
-fn too_near(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
+fn too_close(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
     let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
     let widest_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
     // Sorted from west to east, so that only neighbors have to be compared.
@@ -120,7 +123,7 @@ fn too_near(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec
         let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < widest_m);
         for &(q, b) in candidates {
             let gap_m = 2.0 * zone_radius_m(world, a).max(zone_radius_m(world, b));
-            if distance_m(p, q) < gap_m && are_level(world, state, a, b) {
+            if distance_m(p, q) < gap_m && are_on_one_level(world, state, a, b) {
                 near.extend([a, b]);
             }
         }
@@ -130,48 +133,50 @@ fn too_near(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec
     near
 }
 
-fn are_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> bool {
+fn are_on_one_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> bool {
     let altitude_m = |slot: Slot| state.airplanes[slot as usize].altitude_m.get();
     (altitude_m(a) - altitude_m(b)).abs() < world.vertical_m
 }
 
 /// Returns an event in words.
-pub(super) fn entry(event: &Event) -> Entry {
+pub(super) fn log_event(event: &Event) -> LogEvent {
     let (value, other) = (event.value, event.other);
     let (level, words) = match event.kind {
         EventKind::LossOfSeparation => {
-            (Level::Error, format!("loses separation from airplane/{other} at {value:.1} m"))
+            (Severity::Error, format!("loses separation from airplane/{other} at {value:.1} m"))
         }
-        EventKind::Arrival => (Level::Info, format!("arrives with a delay of {value:.1} s")),
-        EventKind::Override => {
-            (Level::Info, format!("is kept by the shield from what it wanted, flies way {value}"))
-        }
-        EventKind::Orbit => (Level::Warning, "is kept on its orbit by the shield".into()),
-        EventKind::Unheard => (Level::Warning, format!("has not heard of airplane/{other}")),
-        EventKind::Deadline => (Level::Warning, "had no time left to decide".into()),
-        EventKind::HeldBack => (Level::Warning, "stays on its orbit: not all agreed".into()),
+        EventKind::Arrival => (Severity::Info, format!("arrives with a delay of {value:.1} s")),
+        EventKind::Override => (
+            Severity::Info,
+            format!("is kept by the shield from what it wanted, flies way {value}"),
+        ),
+        EventKind::Orbit => (Severity::Warning, "is kept on its orbit by the shield".into()),
+        EventKind::Unheard => (Severity::Warning, format!("has not heard of airplane/{other}")),
+        EventKind::Deadline => (Severity::Warning, "had no time left to decide".into()),
+        EventKind::HeldBack => (Severity::Warning, "stays on its orbit: not all agreed".into()),
         EventKind::GroupTooLarge => {
-            (Level::Warning, format!("is in a group of {value}, too large to optimize"))
+            (Severity::Warning, format!("is in a group of {value}, too large to optimize"))
         }
         EventKind::BeyondBound => {
-            (Level::Warning, format!("errs {value:.1} times as much as the shield allows for"))
+            (Severity::Warning, format!("errs {value:.1} times as much as the shield allows for"))
         }
-        EventKind::Intruder => {
-            (Level::Warning, format!("can be reached by airplane/{other}, now {value:.0} m away"))
-        }
+        EventKind::Intruder => (
+            Severity::Warning,
+            format!("can be reached by airplane/{other}, now {value:.0} m away"),
+        ),
         EventKind::Absent => {
-            (Level::Warning, "stays on its orbit: no control of it came in time".into())
+            (Severity::Warning, "stays on its orbit: no control of it came in time".into())
         }
     };
-    let airplane = |id| Who::new(Kind::Airplane, id, None);
-    Entry {
+    let airplane = |id| BodyId::new(BodyKind::Airplane, id, None);
+    LogEvent {
         cycle: event.cycle,
         level,
-        kind: event.kind.happening(),
+        kind: event.kind.log_event_kind(),
         who: airplane(event.airplane),
         with: event.partner().map(airplane),
         at_m: event.at_m,
-        value: event.kind.measure().map(|measure| Amount::new(value, measure.unit())),
+        value: event.kind.measure().map(|measure| Quantity::new(value, measure.unit())),
         words,
     }
 }

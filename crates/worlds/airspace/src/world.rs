@@ -1,21 +1,21 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
-mod alone;
+mod solo_flight;
 #[cfg(test)]
 mod tests;
 
-use super::baseline::Reactive;
+use super::baseline::ReactiveSettings;
 use super::deploy::Deployment;
 use super::flight::{
-    Action, Air, Airplane, Known, Later, Legs, Levels, Passing, Point, Stage, Task, Timing, Track,
-    actions, later,
+    Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
+    SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
-use super::intruder::Intruder;
-use super::objective::{Objective, Options};
-use super::shield::{Bounds, Side, common_rates};
+use super::non_cooperative::NonCooperative;
+use super::objective::{ActionPredictions, Objective};
+use super::shield::{ErrorBounds, Side, common_rates};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, Order, Settings};
+use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
@@ -72,11 +72,11 @@ pub struct AirspaceWorld {
     /// The steps of time.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
-    pub passing: Passing,
+    pub passing: WaypointRule,
     /// The objective that is minimized.
     pub objective: Objective,
     /// Settings of the optimizer.
-    pub settings: Settings,
+    pub settings: OptimizerConfig,
     /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
     /// Legs to the sides, which take the place of held turns.
@@ -84,9 +84,9 @@ pub struct AirspaceWorld {
     /// The method by which airplanes choose their actions.
     pub method: Method,
     /// Settings of MVP.
-    pub mvp: Reactive,
+    pub mvp: ReactiveSettings,
     /// Settings of ORCA.
-    pub orca: Reactive,
+    pub orca: ReactiveSettings,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// The way in which its agents learn their groups.
@@ -113,14 +113,14 @@ pub struct AirspaceWorld {
     /// Random errors that no airplane knows.
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
-    pub bounds: Bounds,
+    pub bounds: ErrorBounds,
     /// Digest of the scenario's text and seed, by which agents recognize those of the same scenario.
     pub fingerprint: u64,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
     pub(crate) actions: Arc<Vec<Vec<Action>>>,
     /// The stage of each airplane's flight after each of its orders.
-    pub(crate) later: Arc<Vec<Vec<Later>>>,
+    pub(crate) later: Arc<Vec<Vec<SegmentAfterOrder>>>,
     /// The turn rate of each airplane's orbits, in radians per second.
     pub(crate) orbit_rad_s: Arc<Vec<f64>>,
     /// The greatest speed of each airplane, in meters per second.
@@ -156,15 +156,15 @@ impl AirspaceWorld {
     }
 
     /// Returns the name that people use for an airplane: its call sign, or else its id.
-    pub(crate) fn called(&self, id: EntityId) -> String {
+    pub(crate) fn display_name(&self, id: EntityId) -> String {
         self.callsign(id).unwrap_or_else(|| id.to_string())
     }
 
     /// Fills in the fields that follow from the others. Those that follow from models and orders alone, which
     /// no seed draws, are shared with the same world of another seed.
     #[must_use]
-    pub(crate) fn prepared(mut self, known: Option<&Self>) -> Self {
-        self.later = Arc::new(self.airplanes.iter().map(later).collect());
+    pub(crate) fn with_derived_fields(mut self, known: Option<&Self>) -> Self {
+        self.later = Arc::new(self.airplanes.iter().map(segments_after_orders).collect());
         if let Some(known) = known {
             self.actions = Arc::clone(&known.actions);
             self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
@@ -174,26 +174,26 @@ impl AirspaceWorld {
             let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
             self.actions = Arc::new(self.airplanes.iter().map(of).collect());
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
-            self.top_m_s = Arc::new(self.each(Self::top_m_s));
+            self.top_m_s = Arc::new(self.per_airplane(Self::max_speed_m_s));
             self.teams = Arc::new(self.find_teams());
         }
-        self.alone_s = Arc::new(self.each(Self::alone_s));
+        self.alone_s = Arc::new(self.per_airplane(Self::solo_s));
         self
     }
 
     /// Returns a number of each airplane.
-    fn each(&self, of: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
+    fn per_airplane(&self, of: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
         (0..self.airplanes.len()).map(|i| of(self, i)).collect()
     }
 
     /// Returns the turn rates at which airplanes orbit under the shield.
     fn orbits_rad_s(&self) -> Vec<f64> {
         let largest = |airplane: &Airplane| {
-            let held = self.bounds.holds_rad_s(&airplane.model, self.timing.dt_s);
+            let held = self.bounds.max_orbit_rate_rad_s(&airplane.model, self.timing.dt_s);
             held.filter(|_| self.shield).unwrap_or(airplane.model.omega_max_rad_s)
         };
         let mut rates: Vec<f64> = self.airplanes.iter().map(largest).collect();
-        let orbits = |&i: &usize| self.shield && self.decides(i);
+        let orbits = |&i: &usize| self.shield && self.is_controlled(i);
         let orbiting: Vec<usize> = (0..rates.len()).filter(orbits).collect();
         let largest: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
         orbiting.iter().zip(common_rates(&largest)).for_each(|(&i, rate)| rates[i] = rate);
@@ -205,11 +205,11 @@ impl AirspaceWorld {
         self.bounds.error_m(self.top_m_s[i], self.timing.dt_s)
     }
 
-    fn top_m_s(&self, i: usize) -> f64 {
+    fn max_speed_m_s(&self, i: usize) -> f64 {
         let airplane = &self.airplanes[i];
-        let recorded = airplane.track.as_ref().map_or(0.0, Track::top_speed_m_s);
+        let recorded = airplane.track.as_ref().map_or(0.0, Track::max_speed_m_s);
         let told = airplane.orders.iter().filter_map(|order| match order.task {
-            Task::Speed(v_m_s) => Some(v_m_s),
+            FlightTask::Speed(v_m_s) => Some(v_m_s),
             _ => None,
         });
         told.fold(airplane.model.v_m_s.max(recorded), f64::max)
@@ -222,32 +222,34 @@ impl AirspaceWorld {
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of
     /// the run.
-    pub(crate) fn ends_alone_s(&self, i: usize) -> f64 {
-        let joins_s = self.starts_s(self.joins_in(i));
+    pub(crate) fn solo_end_s(&self, i: usize) -> f64 {
+        let joins_s = self.cycle_start_s(self.first_controlled_cycle(i));
         match &self.airplanes[i].track {
-            Some(track) if track.ends_s() <= joins_s => track.ends_s(),
+            Some(track) if track.end_s() <= joins_s => track.end_s(),
             _ => joins_s + self.alone_s[i],
         }
     }
 
     /// Returns whether an airplane's radio is dead in a cycle.
     pub(crate) fn is_silent(&self, id: EntityId, cycle: Cycle) -> bool {
-        self.network.as_ref().is_some_and(|network| network.is_silent(id, self.starts_s(cycle)))
+        self.network
+            .as_ref()
+            .is_some_and(|network| network.is_radio_off(id, self.cycle_start_s(cycle)))
     }
 
     /// Returns whether airplanes remember the conflicts that they resolve.
-    pub(crate) fn is_resolving(&self) -> bool {
+    pub(crate) fn has_resolutions(&self) -> bool {
         self.method == Method::Mvp
     }
 
     /// Returns when a cycle starts, in seconds after the start of the run.
-    pub fn starts_s(&self, now: Cycle) -> f64 {
+    pub fn cycle_start_s(&self, now: Cycle) -> f64 {
         now as f64 * self.timing.dt_s
     }
 
     /// Returns the cycle in which an airplane appears: at its start, or within it on a recorded
     /// way.
-    pub fn appears_in(&self, i: usize) -> Cycle {
+    pub fn first_cycle(&self, i: usize) -> Cycle {
         let airplane = &self.airplanes[i];
         let cycles = airplane.appears_s / self.timing.dt_s;
         let is_on_track = airplane.track.is_some()
@@ -256,36 +258,37 @@ impl AirspaceWorld {
     }
 
     /// Returns the cycle from which the method flies an airplane.
-    pub fn joins_in(&self, i: usize) -> Cycle {
+    pub fn first_controlled_cycle(&self, i: usize) -> Cycle {
         let recorded = match &self.airplanes[i] {
             Airplane { track: None, .. } => 0,
             Airplane { is_intruder: true, .. } => Cycle::MAX,
             _ => self.replay_cycles,
         };
-        self.appears_in(i).max(recorded)
+        self.first_cycle(i).max(recorded)
     }
 
     /// Returns whether an airplane minds no other in a cycle: it was recorded, or the scenario says
     /// so. All that the method flies mind it.
-    pub fn is_intruder(&self, slot: Slot, now: Cycle) -> bool {
+    pub fn is_non_cooperative(&self, slot: Slot, now: Cycle) -> bool {
         self.airplanes[slot as usize].is_intruder || self.is_replayed(slot, now)
     }
 
     /// Returns whether the method ever flies an airplane, unless its recorded way ends before.
-    pub(crate) fn decides(&self, i: usize) -> bool {
+    pub(crate) fn is_controlled(&self, i: usize) -> bool {
         // An airplane that never minds any other never decides, and never orbits.
-        !self.is_intruder(i as Slot, Cycle::MAX - 1)
+        !self.is_non_cooperative(i as Slot, Cycle::MAX - 1)
     }
 
     /// Returns whether an airplane follows its recorded way in a cycle.
     pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
-        self.airplanes[slot as usize].track.is_some() && now < self.joins_in(slot as usize)
+        self.airplanes[slot as usize].track.is_some()
+            && now < self.first_controlled_cycle(slot as usize)
     }
 
     /// Returns the distance in meters up to which two airplanes have to mind each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
-    pub fn look_m(&self, a: usize, b: usize) -> f64 {
-        let Reactive { look_ahead_s, margin } = self.looks_ahead();
+    pub fn interaction_range_m(&self, a: usize, b: usize) -> f64 {
+        let ReactiveSettings { look_ahead_s, margin } = self.reactive_settings();
         let reach = |i: usize| {
             let v_m_s = self.top_m_s[i];
             let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
@@ -298,11 +301,11 @@ impl AirspaceWorld {
     }
 
     /// Returns how far the method looks ahead, and how much separation it asks for.
-    pub(crate) fn looks_ahead(&self) -> Reactive {
+    pub(crate) fn reactive_settings(&self) -> ReactiveSettings {
         match self.method {
             Method::Mvp => self.mvp,
             Method::Orca => self.orca,
-            Method::Pc | Method::None | Method::External => Reactive {
+            Method::Pc | Method::None | Method::External => ReactiveSettings {
                 look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
                 margin: self.objective.inflation,
             },
@@ -310,12 +313,12 @@ impl AirspaceWorld {
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.
-    pub(crate) fn stage(&self, slot: Slot, orders: u32) -> Stage<'_> {
+    pub(crate) fn segment(&self, slot: Slot, orders: u32) -> FlightSegment<'_> {
         match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
-            Some(later) => later.stage(),
+            Some(later) => later.segment(),
             None => {
                 let Airplane { model, mission, altitude_m, .. } = &self.airplanes[slot as usize];
-                Stage { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
+                FlightSegment { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
             }
         }
     }
@@ -330,7 +333,7 @@ impl AirspaceWorld {
         now_s: f64,
     ) -> (u32, usize) {
         let (mut orders, mut next) = (orders, next);
-        while self.airplanes[slot].due(orders as usize, now_s).is_some() {
+        while self.airplanes[slot].due_order(orders as usize, now_s).is_some() {
             next = self.later[slot][orders as usize].next.map_or(next, |next| next as usize);
             orders += 1;
         }
@@ -338,35 +341,36 @@ impl AirspaceWorld {
     }
 
     /// Returns the actions of an airplane, for others that know its model.
-    pub(crate) fn actions_of(&self, slot: Slot) -> &[Action] {
+    pub(crate) fn actions(&self, slot: Slot) -> &[Action] {
         &self.actions[slot as usize]
     }
 
     /// Returns the levels that an airplane is on and changes to.
-    pub(crate) fn levels(&self, known: Known) -> Levels {
-        Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
+    pub(crate) fn levels(&self, known: KnownAircraft) -> Levels {
+        Levels::between(known.altitude_m, self.segment(known.slot, known.orders).altitude_m)
     }
 
     /// Returns where each action would lead an airplane, and the cost of that beside intruders.
-    pub(crate) fn options(&self, known: Known, intruders: &[Intruder]) -> Options {
-        let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
-        let actions = self.actions_of(known.slot);
+    pub(crate) fn action_predictions(
+        &self,
+        known: KnownAircraft,
+        intruders: &[NonCooperative],
+    ) -> ActionPredictions {
+        let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
+        let actions = self.actions(known.slot);
         let predictions = self.air().predictions(model, actions, mission, known.pose, known.next);
-        Options::new(predictions, model.separation_m, self.levels(known)).beside(
-            intruders,
-            &self.objective,
-            self.timing.dtau_s,
-        )
+        ActionPredictions::new(predictions, model.separation_m, self.levels(known))
+            .with_non_cooperative(intruders, &self.objective, self.timing.dtau_s)
     }
 
     /// Returns the largest number of samples that one optimization may draw from an airplane's
     /// stream; none if that number overflows.
-    pub(crate) fn most_samples(&self) -> Option<u64> {
+    pub(crate) fn max_samples(&self) -> Option<u64> {
         let Estimator::Sampled { block, .. } = self.settings.estimator else { return Some(1) };
         let blocks_per_round = match self.settings.order {
-            Order::Parallel => 1,
+            UpdateOrder::Parallel => 1,
             // One at the start of a round, and one after each player of the largest group.
-            Order::Sequence => self.airplanes.len() as u64 + 1,
+            UpdateOrder::Sequence => self.airplanes.len() as u64 + 1,
         };
         let per_round = (block as u64).checked_mul(blocks_per_round)?;
         // Plus one for the final draw.

@@ -1,9 +1,9 @@
 //! Pilots are programs of their own: each in a thread, with packets through channels and at a pace of its own, they
 //! decide as one process does for all.
 
-use sidestep_airspace::agents::contact::Contacts;
+use sidestep_airspace::agents::traffic_state::TrafficPicture;
 use sidestep_airspace::airspace_run;
-use sidestep_airspace::pilot::{Control, Fleet, Packet, Pilot, Sight};
+use sidestep_airspace::pilot::{Control, Fleet, Packet, Percept, Pilot};
 use sidestep_airspace::world::AirspaceWorld;
 use sidestep_kernel::{Digest, EntityId, Simulation};
 use sidestep_scenario::Source;
@@ -11,9 +11,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// A message to a pilot in a thread.
-enum Told {
+enum PilotMessage {
     /// The sight of a cycle.
-    Begin(Box<Sight>),
+    Begin(Box<Percept>),
     /// A packet, with its sender.
     Packet(EntityId, Vec<u8>),
     /// The end of the run.
@@ -21,25 +21,30 @@ enum Told {
 }
 
 /// A pilot's thread.
-fn fly(mut pilot: Pilot, told: Receiver<Told>, others: Vec<Sender<Told>>, done: Sender<Control>) {
+fn fly(
+    mut pilot: Pilot,
+    told: Receiver<PilotMessage>,
+    others: Vec<Sender<PilotMessage>>,
+    done: Sender<Control>,
+) {
     let mut is_told = true;
     for message in told {
         match message {
-            Told::Begin(sight) => {
-                pilot.begin(*sight, 0);
+            PilotMessage::Begin(sight) => {
+                pilot.start(*sight, 0);
                 is_told = false;
             }
-            Told::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
-            Told::End => return,
+            PilotMessage::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
+            PilotMessage::End => return,
         }
         for Packet { to, payload, .. } in pilot.take_packets() {
             to.iter().for_each(|&id| {
                 // A pilot that has come to an end hears no more.
-                let _ = others[id as usize].send(Told::Packet(pilot.id(), payload.clone()));
+                let _ = others[id as usize].send(PilotMessage::Packet(pilot.id(), payload.clone()));
             });
         }
         if let Some(control) = pilot.control().filter(|_| !is_told) {
-            assert_eq!(pilot.refused().total(), 0);
+            assert_eq!(pilot.drop_counts().total(), 0);
             (is_told, _) = (true, done.send(control));
         }
     }
@@ -61,21 +66,21 @@ fn flown_in_threads(deployment: &str, cycles: u64) -> Digest {
     let (done, controls) = channel();
     std::thread::scope(|scope| {
         for (id, told) in (0..).zip(told) {
-            let pilot = Pilot::new(world.clone(), id, Contacts::new());
+            let pilot = Pilot::new(world.clone(), id, TrafficPicture::new());
             let (others, done) = (senders.clone(), done.clone());
             scope.spawn(move || fly(pilot, told, others, done));
         }
         for _ in 0..cycles {
-            let sights = run.sights();
+            let sights = run.percepts();
             let flying = sights.len();
             for sight in sights {
                 let own = sight.own.id as usize;
-                senders[own].send(Told::Begin(Box::new(sight))).expect("a thread");
+                senders[own].send(PilotMessage::Begin(Box::new(sight))).expect("a thread");
             }
-            run.control(controls.iter().take(flying).collect()).expect("what pilots decide");
+            run.submit(controls.iter().take(flying).collect()).expect("what pilots decide");
             run.advance(1);
         }
-        senders.iter().for_each(|sender| sender.send(Told::End).expect("a thread"));
+        senders.iter().for_each(|sender| sender.send(PilotMessage::End).expect("a thread"));
     });
     run.digest()
 }

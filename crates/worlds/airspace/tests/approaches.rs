@@ -63,7 +63,7 @@ fn the_first_instant_counts() {
 #[test]
 fn the_last_row_of_an_airplane_is_the_place_where_it_has_arrived() {
     let mut run = run(500.0, &[([0.0, 0.0], 0.0, [1000.0, 0.0])]);
-    run.begin_recording();
+    run.start_recording();
     run.advance(20);
     let mut recorder = MemoryRecorder::new(&run.schemas());
     run.record(&mut recorder).expect("memory has room");

@@ -22,7 +22,7 @@ const ERRORS: f64 = 4.0;
 
 /// Results of one run.
 #[derive(Debug, Clone, Copy, Deserialize)]
-struct Flown {
+struct RunResult {
     losses: f64,
     nearest_m: f64,
     arrived: u64,
@@ -32,7 +32,7 @@ struct Flown {
 #[derive(Deserialize)]
 struct Fixture {
     limits: Value,
-    flown: BTreeMap<usize, Vec<Flown>>,
+    flown: BTreeMap<usize, Vec<RunResult>>,
 }
 
 fn fixture() -> Fixture {
@@ -69,13 +69,13 @@ fn scenario(airplanes: &[[f64; 5]]) -> Source {
 }
 
 /// Flies a case with our MVP.
-fn ours(airplanes: &[[f64; 5]]) -> Flown {
+fn ours(airplanes: &[[f64; 5]]) -> RunResult {
     let mut run = airspace_run(&scenario(airplanes), 1).expect("a scenario");
     run.advance(300);
     let metrics = run.metrics();
     let one = |id| airplane_metrics(run.world(), run.state(), id).flown_s.expect("it has arrived");
     let flown_s: f64 = (0..airplanes.len() as u32).map(one).sum();
-    Flown {
+    RunResult {
         losses: metrics.losses_of_separation as f64,
         nearest_m: metrics.min_separation_m.expect("they meet"),
         arrived: metrics.arrived,
@@ -85,8 +85,13 @@ fn ours(airplanes: &[[f64; 5]]) -> Flown {
 
 /// Fails unless two samples have the same mean within the spread of their runs, except for an amount that follows
 /// from the motion: in BlueSky, an airplane turns at once and then flies straight for a second.
-fn agree(what: &str, of: fn(&Flown) -> f64, (ours, theirs): (&[Flown], &[Flown]), motion: f64) {
-    let moments = |all: &[Flown]| {
+fn agree(
+    what: &str,
+    of: fn(&RunResult) -> f64,
+    (ours, theirs): (&[RunResult], &[RunResult]),
+    motion: f64,
+) {
+    let moments = |all: &[RunResult]| {
         let n = all.len() as f64;
         let mean = all.iter().map(of).sum::<f64>() / n;
         let square = all.iter().map(|one| (of(one) - mean) * (of(one) - mean)).sum::<f64>();
@@ -98,7 +103,7 @@ fn agree(what: &str, of: fn(&Flown) -> f64, (ours, theirs): (&[Flown], &[Flown])
     assert!((a - b).abs() <= allowed, "{what}: {a}, BlueSky {b}, may differ by {allowed}");
 }
 
-fn all_agree(n: usize, ours: &[Flown], theirs: &[Flown]) {
+fn all_agree(n: usize, ours: &[RunResult], theirs: &[RunResult]) {
     let both = (ours, theirs);
     agree(&format!("{n}: losses"), |one| one.losses, both, 0.0);
     agree(&format!("{n}: closest approach in m"), |one| one.nearest_m, both, 5.0);
@@ -109,7 +114,7 @@ fn all_agree(n: usize, ours: &[Flown], theirs: &[Flown]) {
 #[test]
 fn mvp_flies_as_in_bluesky() {
     for (n, theirs) in fixture().flown {
-        let ours: Vec<Flown> = (0..theirs.len()).map(|run| ours(&case(n, run))).collect();
+        let ours: Vec<RunResult> = (0..theirs.len()).map(|run| ours(&case(n, run))).collect();
         all_agree(n, &ours, &theirs);
     }
 }
@@ -151,11 +156,11 @@ fn bluesky_itself_flies_as_was_measured() {
     let output = Command::new(&python).arg(script).arg(&file).output().expect("python starts");
     std::fs::remove_file(&file).expect("it was written");
     let said = String::from_utf8_lossy(&output.stderr);
-    let found: Vec<Flown> =
+    let found: Vec<RunResult> =
         serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
     for (&n, measured) in &flown {
         let again = found.iter().zip(&asked).filter(|(_, of)| of.0 == n).map(|(one, _)| *one);
-        let again: Vec<Flown> = again.collect();
+        let again: Vec<RunResult> = again.collect();
         all_agree(n, &again, &measured[..runs]);
     }
 }

@@ -9,7 +9,7 @@ const FAULTS: &str = "network = { loss = 0.15, duplication = 0.1, max_delay_s = 
                       silent = [{ airplane = 2, from_s = 40.0 }] }";
 
 /// The digest of a run of five that meet, and its traffic on the network.
-fn told(preset: &str, deployment: &str, more: &str) -> String {
+fn digest_and_traffic(preset: &str, deployment: &str, more: &str) -> String {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nseed = 11\n[airspace]\npreset = \"{preset}\"\n\
          deployment = \"{deployment}\"\nmax_rounds = 30\n{more}\n\
@@ -32,7 +32,7 @@ fn the_golden_digests_of_agents_are_what_every_machine_gets() {
     for network in ["", FAULTS] {
         for preset in ["default", "paper"] {
             for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
-                found += &told(preset, deployment, network);
+                found += &digest_and_traffic(preset, deployment, network);
             }
         }
     }

@@ -5,7 +5,7 @@
 //! the prototype's time.
 
 use cpu_time::ProcessTime;
-use sidestep_chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
+use sidestep_chain::geometry::{Point, add, add_scaled, first_axis, norm, normalized, scaled, sub};
 use sidestep_chain::{
     Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, wavefront,
 };
@@ -51,7 +51,7 @@ fn snake(n: usize) -> Chain<3> {
     let bent = 90.0 / n as f64;
     for i in 1..n {
         let u = [-1.0, bent * sin(i as f64 * 0.1), bent * cos(i as f64 * 0.07)];
-        points.push(along(points[i - 1], unit(u).expect("not zero"), 0.1));
+        points.push(add_scaled(points[i - 1], normalized(u).expect("not zero"), 0.1));
     }
     let rod = Rod::fixed(0.1, 0.01);
     Chain::new(points, vec![Connector::free(0.02); n], vec![rod; n - 1]).expect("right")
@@ -95,7 +95,7 @@ fn pull_open(
             k += 1;
             let request = Request::exact(by, to(home, k));
             let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
-            touched += outcome.moved().map_or(0, |moved| moved.touched.len());
+            touched += outcome.motion().map_or(0, |moved| moved.touched.len());
         }
     });
     let (us, touched) = (1e6 * s / motions as f64, touched as f64 / k as f64);
@@ -135,7 +135,7 @@ fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64
             k += 1;
             let request = Request::exact(0, head(k));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
-            assert!(outcome.moved().is_some(), "nothing is in the way");
+            assert!(outcome.motion().is_some(), "nothing is in the way");
         }
     });
     1e6 * s / motions as f64
@@ -182,12 +182,12 @@ fn field() {
     let (mut vetoes, mut own_vetoes, mut moves, mut rotated, mut touched) = (0, 0, 0, 0, 0);
     let started = ProcessTime::now();
     while moves < 4000 {
-        u = unit(add(u, numbers.point(0.2))).expect("not zero");
+        u = normalized(add(u, numbers.point(0.2))).expect("not zero");
         let from = chain.points()[0];
         // Near the border it heads home.
         let inward = if from.iter().any(|x| x.abs() > half_m - 1.0) { -0.1 } else { 0.0 };
-        u = unit(along(u, from, inward)).expect("not zero");
-        let request = Request::exact(0, along(from, u, 0.0099));
+        u = normalized(add_scaled(u, from, inward)).expect("not zero");
+        let request = Request::exact(0, add_scaled(from, u, 0.0099));
         match propagator.propagate(&mut chain, &obstacles, &request).expect("right") {
             Outcome::Moved(moved) => {
                 moves += 1;
@@ -197,7 +197,7 @@ fn field() {
             Outcome::Vetoed(veto) => {
                 own_vetoes += usize::from(veto.by == 0);
                 vetoes += usize::from(veto.by != 0);
-                u = unit(numbers.point(1.0)).expect("not zero");
+                u = normalized(numbers.point(1.0)).expect("not zero");
             }
         }
     }

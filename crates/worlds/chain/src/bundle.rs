@@ -3,17 +3,17 @@
 //! Floors are stored as the program read them, because a later version of an importer must not
 //! change the replay. Scripts and arm models are stored unchanged.
 
-use super::scenario::Compiled;
+use super::scenario::ChainScenario;
 use serde_json::Value;
-use sidestep_import::stage::{self, Body, FloorPlan, Pose};
+use sidestep_import::stage::{self, BoxObstacle, FloorPlan, Pose2};
 use sidestep_import::write::{map_files, pgm};
 use sidestep_import::{PixelMap, rosmap};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{Bundle, Resolved, Source};
+use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 use std::path::Path;
 
 /// Keys whose values name files that are stored unchanged.
-const PLAIN: [&str; 3] = ["script_file", "urdf", "srdf"];
+const PLAIN_FILE_KEYS: [&str; 3] = ["script_file", "urdf", "srdf"];
 
 /// Returns the scenario together with every file that it names.
 ///
@@ -21,8 +21,8 @@ const PLAIN: [&str; 3] = ["script_file", "urdf", "srdf"];
 /// When such a file can no longer be read.
 pub(crate) fn resolve<const D: usize>(
     source: &Source,
-    compiled: &Compiled<D>,
-) -> Result<Resolved, InputError> {
+    compiled: &ChainScenario<D>,
+) -> Result<ResolvedScenario, InputError> {
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
     add_plain(&mut bundle, &file["chains"], "chains")?;
@@ -44,7 +44,7 @@ fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), In
             .try_for_each(|(k, item)| add_plain(bundle, item, &format!("{key}.{k}"))),
         Value::Object(table) => table.iter().try_for_each(|(name, item)| {
             let key = format!("{key}.{name}");
-            match item.as_str().filter(|_| PLAIN.contains(&name.as_str())) {
+            match item.as_str().filter(|_| PLAIN_FILE_KEYS.contains(&name.as_str())) {
                 Some(path) => copy(bundle, &key, path),
                 None => add_plain(bundle, item, &key),
             }
@@ -83,7 +83,7 @@ fn add_stage(bundle: &mut Bundle<'_>, world: &stage::World) {
 }
 
 /// Stage expects degrees; these digits parse back to exactly the same angle.
-fn pose(pose: &Pose) -> String {
+fn pose(pose: &Pose2) -> String {
     format!("[{:?} {:?} 0.0 {:?}]", pose.x_m, pose.y_m, pose.yaw_rad.to_degrees())
 }
 
@@ -97,7 +97,7 @@ fn floor_plan(plan: &FloorPlan, bitmap: &str) -> String {
     )
 }
 
-fn solid(body: &Body) -> String {
+fn solid(body: &BoxObstacle) -> String {
     let [x_m, y_m] = body.size_m;
     format!("model\n(\n  size [{x_m:?} {y_m:?} 1.0]\n  pose {}\n)\n", pose(&body.pose))
 }

@@ -1,31 +1,31 @@
 //! Phase *claim*: a navigator looks around and decides, and every chain claims the box that it may
 //! enter during the cycle.
 
-use super::perceive::Looking;
-use super::rods::geometry::{Bounds, in_dimensions};
+use super::perceive::Perceiver;
+use super::rods::geometry::{Bounds, with_dimensions};
 use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
-use sidestep_kernel::{Cycle, Slot, Turn};
+use sidestep_kernel::{Cycle, PhaseContext, Slot};
 
 /// Makes the claim of one chain.
-pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
+pub(crate) fn claim<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
     claim_box(turn, slot);
-    let &mut Turn { world, state, now, .. } = turn;
-    let decision = Looking { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
+    let &mut PhaseContext { world, state, now, .. } = turn;
+    let decision = Perceiver { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
     state.set_decision(slot, decision);
 }
 
 /// Claims the box that a chain may enter.
-pub(crate) fn claim_box<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
-    let &mut Turn { world, state, now, .. } = turn;
+pub(crate) fn claim_box<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+    let &mut PhaseContext { world, state, now, .. } = turn;
     // A chain alone is in no other's way, wherever it goes.
     if !world.is_open() {
-        state.set_claim(slot, reach(world, &world.chains[slot], &state.body(slot), now));
+        state.set_claim(slot, reach_box(world, &world.chains[slot], &state.body(slot), now));
     }
 }
 
 /// Returns the box that a chain may enter during one cycle; no part of the chain leaves that box.
-fn reach<const D: usize>(
+fn reach_box<const D: usize>(
     world: &ChainWorld<D>,
     spec: &ChainSpec<D>,
     body: &Body<D>,
@@ -45,19 +45,19 @@ fn reach<const D: usize>(
             2.0 * longest_m.min(slave_m) + led_m
         }
     };
-    let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
+    let thrown_m = spec.changes.iter().map(|change| change.max_throw_m(now)).fold(0.0, f64::max);
     let back_m_s = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s);
     let back_m_s =
-        spec.changes.iter().map(|change| change.gathers_m_s(now)).fold(back_m_s, f64::max);
-    let of_chain =
-        Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m_s * world.dt_s);
-    of_chain.joined(&reach_of_robots(spec, body, world.dt_s))
+        spec.changes.iter().map(|change| change.gather_speed_m_s(now)).fold(back_m_s, f64::max);
+    let of_chain = Bounds::from_points(chain.points())
+        .grown(radius_m + way_m + thrown_m + back_m_s * world.dt_s);
+    of_chain.joined(&robots_reach_box(spec, body, world.dt_s))
 }
 
 /// Returns the box that the robots of a chain may enter during one cycle. A robot that lags is far from its connector.
-fn reach_of_robots<const D: usize>(spec: &ChainSpec<D>, body: &Body<D>, dt_s: f64) -> Bounds<D> {
-    let Some(robots) = &spec.robots else { return Bounds::nothing() };
+fn robots_reach_box<const D: usize>(spec: &ChainSpec<D>, body: &Body<D>, dt_s: f64) -> Bounds<D> {
+    let Some(robots) = &spec.robots else { return Bounds::empty() };
     let way_m = robots.follower.reach_m(dt_s);
-    let places = body.robots.iter().map(|robot| in_dimensions(robot.pose.at));
-    places.fold(Bounds::nothing(), |all, at| all.joined(&Bounds::of(&[at]).grown(way_m)))
+    let places = body.robots.iter().map(|robot| with_dimensions(robot.pose.at));
+    places.fold(Bounds::empty(), |all, at| all.joined(&Bounds::from_points(&[at]).grown(way_m)))
 }

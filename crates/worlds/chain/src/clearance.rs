@@ -5,14 +5,14 @@ use super::rods::geometry::{
     Bounds, Point, between_segments, distance, nearest_on_segment, scaled, sub,
 };
 use super::rods::obstacle::Obstacles;
-use super::rods::own_body::OwnBody;
+use super::rods::rod_bvh::RodBvh;
 
 /// Distance by which searches go beyond the one that counts, meters: far more than rounding.
-const SPARE_M: f64 = 1e-9;
+const MARGIN_M: f64 = 1e-9;
 
 /// The surroundings of a connector and of the rod behind it, as far as a search looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Near<const D: usize> {
+pub(crate) struct PartClearance<const D: usize> {
     /// Gap between the connector and the nearest obstacle, meters; negative inside it.
     pub(crate) gap_m: f64,
     /// The way from the connector's middle to that obstacle's surface; zero if nothing is near.
@@ -22,22 +22,22 @@ pub(crate) struct Near<const D: usize> {
 }
 
 /// Returns the surroundings nearer than `look_m` to connector `k`, and to the rod behind it if rods count.
-pub(crate) fn near<const D: usize>(
+pub(crate) fn part_clearance<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     k: usize,
     look_m: f64,
     with_rods: bool,
-) -> Near<D> {
+) -> PartClearance<D> {
     let (points, connectors) = (chain.points(), chain.connectors());
-    let mut near = Near { gap_m: look_m, way: [0.0; D], rod_gap_m: look_m };
+    let mut near = PartClearance { gap_m: look_m, way: [0.0; D], rod_gap_m: look_m };
     // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
     let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
     let (at, radii_m) = (points[k], [k, end].map(|i| connectors[i].radius_m));
     let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
     // A part that is inside looks only for obstacles that it is deeper in.
-    let room_m = (radii_m[0].max(radii_m[1]) + look_m).max(0.0) + SPARE_M;
-    let room = Bounds::of(&[at, points[end]]).grown(room_m);
+    let room_m = (radii_m[0].max(radii_m[1]) + look_m).max(0.0) + MARGIN_M;
+    let room = Bounds::from_points(&[at, points[end]]).grown(room_m);
     obstacles.visit(&room, |o| {
         let nearest = o.core.nearest_to_point(at);
         let gap_m = nearest.distance_m - radii_m[0] - o.radius_m;
@@ -55,7 +55,7 @@ pub(crate) fn near<const D: usize>(
 
 /// Returns the least distance of any connector, and of any rod if rods count, from obstacles, up to
 /// `look_m`, and the connector at or before that part.
-pub(crate) fn least_clearance<const D: usize>(
+pub(crate) fn min_clearance<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     look_m: f64,
@@ -67,7 +67,7 @@ pub(crate) fn least_clearance<const D: usize>(
     let mut least = (look_m, 0);
     for k in 0..chain.points().len() {
         // Obstacles farther away than the nearest so far change nothing.
-        let near = near(chain, obstacles, k, least.0, with_rods);
+        let near = part_clearance(chain, obstacles, k, least.0, with_rods);
         let apart_m = near.gap_m.min(near.rod_gap_m);
         if apart_m < least.0 {
             least = (apart_m, k);
@@ -79,18 +79,18 @@ pub(crate) fn least_clearance<const D: usize>(
 /// Returns the least gap between two parts of a chain that are no neighbors, up to `within_m`; negative
 /// where they overlap. Neighbors are connectors of one rod, rods of one connector, and a connector and the
 /// two rods to each of its sides. `tree` is a buffer.
-pub(crate) fn own_gap_m<const D: usize>(
+pub(crate) fn self_gap_m<const D: usize>(
     chain: &Chain<D>,
-    tree: &mut OwnBody<D>,
+    tree: &mut RodBvh<D>,
     within_m: f64,
 ) -> f64 {
     let (points, connectors, rods) = (chain.points(), chain.connectors(), chain.rods());
     let ends = |rod: usize| [points[rod], points[rod + 1]];
     let thick_m = |rod: usize| connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
-    tree.refit((0..rods.len()).map(|rod| Bounds::of(&ends(rod)).grown(thick_m(rod))));
+    tree.refit((0..rods.len()).map(|rod| Bounds::from_points(&ends(rod)).grown(thick_m(rod))));
     let mut least_m = within_m;
     for rod in 0..rods.len() {
-        let near = Bounds::of(&ends(rod)).grown((thick_m(rod) + least_m).max(0.0));
+        let near = Bounds::from_points(&ends(rod)).grown((thick_m(rod) + least_m).max(0.0));
         tree.visit(&near, |other| {
             if other >= rod + 2 {
                 let apart_m = between_segments(ends(rod), ends(other)).distance_m;
@@ -151,7 +151,7 @@ mod tests {
         let rod = Rod { min_m: 0.5, max_m: 2.0, radius_m: 0.02 };
         let points = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, -0.5]];
         let chain = Chain::new(points, vec![Connector::free(0.05); 4], vec![rod; 3]).unwrap();
-        let gap_m = own_gap_m(&chain, &mut OwnBody::default(), 1.0);
+        let gap_m = self_gap_m(&chain, &mut RodBvh::default(), 1.0);
         assert!((gap_m + 0.04).abs() < 1e-12, "{gap_m}");
     }
 
@@ -170,11 +170,11 @@ mod tests {
             let obstacles = Obstacles::new(discs.collect(), 1.0).unwrap();
             let mut least = (look_m, 0);
             for k in 0..n {
-                let near = near(&chain, &obstacles, k, look_m, with_rods);
+                let near = part_clearance(&chain, &obstacles, k, look_m, with_rods);
                 let apart_m = near.gap_m.min(near.rod_gap_m);
                 least = if apart_m < least.0 { (apart_m, k) } else { least };
             }
-            prop_assert_eq!(least_clearance(&chain, &obstacles, look_m, with_rods), least);
+            prop_assert_eq!(min_clearance(&chain, &obstacles, look_m, with_rods), least);
         }
 
         #[test]
@@ -186,7 +186,7 @@ mod tests {
             let rod = Rod { min_m: 1e-9, max_m: 9.0, radius_m: 0.2 * radius_m };
             let chain = Chain::new(points, vec![Connector::free(radius_m); n], vec![rod; n - 1]);
             let Ok(chain) = chain else { return Ok(()) };
-            let gap_m = own_gap_m(&chain, &mut OwnBody::default(), within_m);
+            let gap_m = self_gap_m(&chain, &mut RodBvh::default(), within_m);
             prop_assert!((gap_m - every_pair_m(&chain).min(within_m)).abs() < 1e-12);
         }
     }
@@ -198,13 +198,13 @@ mod tests {
         let disc = Obstacle::ball(0, [1.0, 0.5], 0.2);
         let wall = Obstacle::capsule(1, [[-0.5, -1.0], [-0.5, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![disc, wall], 1.0).unwrap();
-        let told = |k| near(&chain, &obstacles, k, 0.6, true);
+        let told = |k| part_clearance(&chain, &obstacles, k, 0.6, true);
         assert!((told(0).gap_m - 0.4).abs() < 1e-12);
         assert_eq!(told(0).way, [-0.5, 0.0]);
         assert!((told(0).rod_gap_m - 0.25).abs() < 1e-12, "half way along it");
         assert_eq!((told(1).gap_m, told(1).way), (0.6, [0.0, 0.0]), "nothing is near");
-        let (least_m, part) = least_clearance(&chain, &obstacles, 0.6, true);
+        let (least_m, part) = min_clearance(&chain, &obstacles, 0.6, true);
         assert!((least_m - 0.25).abs() < 1e-12 && part == 0);
-        assert!((least_clearance(&chain, &obstacles, 0.6, false).0 - 0.4).abs() < 1e-12);
+        assert!((min_clearance(&chain, &obstacles, 0.6, false).0 - 0.4).abs() < 1e-12);
     }
 }

@@ -1,15 +1,15 @@
 //! Tasks of a chain's initiator, carried out one after the other: its source of motion, and its
 //! destination (slides R4, R9).
 
-pub(crate) mod errand;
 pub(crate) mod external;
+pub(crate) mod step_motion;
 
 use super::events::EventKind;
-use super::motion::replan::Memory;
+use super::motion::recovery::RecoveryMemory;
 use super::navigate::Navigator;
-use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
-use super::rods::veto::{Reason, Source};
-use super::script::{Motion, Script, Turtle};
+use super::rods::geometry::{Bounds, Point, normalized, with_dimensions};
+use super::rods::veto::{RequestSource, VetoReason};
+use super::script::{Script, ScriptMotion, Turtle};
 use super::swarm::leader::LeaderState;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
@@ -28,7 +28,7 @@ pub(crate) struct Task<const D: usize> {
     /// Speed of the connector, m/s.
     pub(crate) speed_m_s: f64,
     /// The goal of the task.
-    pub(crate) driver: Driver<D>,
+    pub(crate) driver: TaskKind<D>,
     /// Longest duration of the task, s; infinite if it may take as long as it needs.
     pub(crate) lasts_s: f64,
     /// The time for which a vetoed motion is retried before the task is given up, s.
@@ -40,7 +40,7 @@ pub(crate) struct Task<const D: usize> {
 
 /// Kinds of goals for an initiator.
 #[derive(Debug, Clone)]
-pub(crate) enum Driver<const D: usize> {
+pub(crate) enum TaskKind<const D: usize> {
     /// Nothing: it moves only to get out of the way.
     Rest,
     /// Go anywhere, autonomously.
@@ -55,7 +55,7 @@ pub(crate) enum Driver<const D: usize> {
     External,
 }
 
-impl<const D: usize> Driver<D> {
+impl<const D: usize> TaskKind<D> {
     /// Returns the name of its kind in files.
     pub(crate) fn name(&self) -> &'static str {
         match self {
@@ -89,17 +89,17 @@ pub(crate) struct Targets<const D: usize> {
 
 impl<const D: usize> Task<D> {
     /// Returns the source of the task's motions.
-    pub(crate) fn source(&self) -> Source {
+    pub(crate) fn source(&self) -> RequestSource {
         match self.driver {
-            Driver::Script(_) => Source::Operator,
-            _ => Source::Autonomous,
+            TaskKind::Script(_) => RequestSource::Operator,
+            _ => RequestSource::Autonomous,
         }
     }
 }
 
 /// Progress of an initiator through its tasks: a part of the state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Driving {
+pub struct TaskProgress {
     /// The present task.
     pub task: u32,
     /// Cycles since the task started,
@@ -121,34 +121,34 @@ pub struct Driving {
     /// Kind of the last event reported since a motion went as wished.
     pub told: Option<EventKind>,
     /// The last objection in this part of the task.
-    pub objection: Option<Objection>,
+    pub objection: Option<VetoRecord>,
     /// Its rung on the ladder after vetoes.
-    pub ladder: Memory,
+    pub ladder: RecoveryMemory,
     /// Memory of a navigator on wheels.
     pub leader: Option<LeaderState>,
     /// Lengths of way in this task, meters.
-    pub way_m: Way,
+    pub way_m: TravelStats,
 }
 
 /// An objection to a motion that an initiator wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Objection {
+pub struct VetoRecord {
     /// The connector that objected.
     pub by: u32,
     /// The reason.
-    pub reason: Reason,
+    pub reason: VetoReason,
 }
 
 /// The distance that an initiator got, as a share of its wish.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Way {
+pub struct TravelStats {
     /// Length of the way that it wanted to go, meters.
     pub wanted: f64,
     /// Length of the way that it went, meters.
     pub gone: f64,
 }
 
-impl Driving {
+impl TaskProgress {
     /// Returns the state at the start of the first task.
     pub fn new<const D: usize>(agent: usize, points: &[Point<D>]) -> Self {
         let mut driving = Self {
@@ -163,26 +163,26 @@ impl Driving {
             nearest_m: f64::INFINITY,
             told: None,
             objection: None,
-            ladder: Memory::default(),
+            ladder: RecoveryMemory::default(),
             leader: None,
-            way_m: Way::default(),
+            way_m: TravelStats::default(),
         };
-        driving.begin(agent, points);
+        driving.start_task(agent, points);
         driving
     }
 
     /// Starts a task at the place of its initiator.
-    fn begin<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
-        self.start = turtle(agent, points);
+    fn start_task<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
+        self.start = initial_turtle(agent, points);
         self.ahead = self.start.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
         (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
         (self.told, self.objection) = (None, None);
-        (self.ladder, self.way_m) = (Memory::default(), Way::default());
+        (self.ladder, self.way_m) = (RecoveryMemory::default(), TravelStats::default());
     }
 
     /// Goes on to the next motion or target.
-    pub fn next_part(&mut self) {
+    pub fn advance_part(&mut self) {
         self.next += 1;
         (self.rested, self.idle) = (0, 0);
         (self.told, self.objection) = (None, None);
@@ -190,18 +190,18 @@ impl Driving {
     }
 
     /// Goes on to the next task, which `agent` carries out.
-    pub fn next_task<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
+    pub fn start_next_task<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
         self.task += 1;
-        self.begin(agent, points);
+        self.start_task(agent, points);
     }
 
     /// Returns all motions of a script started here.
     ///
     /// # Errors
     /// When the script contains an entry that is no motion, or too many motions.
-    pub fn motions(&self, script: &Script) -> Result<Vec<Motion>, InputError> {
+    pub fn motions(&self, script: &Script) -> Result<Vec<ScriptMotion>, InputError> {
         let motions = script.motions(self.start);
-        let motions: Vec<Motion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
+        let motions: Vec<ScriptMotion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
         if motions.len() > MAX_MOTIONS {
             let cause = format!("comes to more than {MAX_MOTIONS} motions");
             return Err(InputError::new("script", cause, "repeat less often"));
@@ -211,25 +211,25 @@ impl Driving {
 }
 
 /// Returns a turtle at a connector, facing away from the chain.
-fn turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
+fn initial_turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     let at = points[agent];
     let behind = match agent {
         0 => points.get(1),
         _ => points.get(agent - 1),
     };
-    let ahead = behind.and_then(|b| unit(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
-    let ahead = ahead.map_or([1.0, 0.0, 0.0], in_dimensions);
+    let ahead = behind.and_then(|b| normalized(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
+    let ahead = ahead.map_or([1.0, 0.0, 0.0], with_dimensions);
     // Left is level: across the upward axis, or along y if the turtle faces straight up or down.
     let across = math::hypot(ahead[0], ahead[1]);
     let left = match across > 1e-9 {
         true => [-ahead[1] / across, ahead[0] / across, 0.0],
         false => [0.0, 1.0, 0.0],
     };
-    Turtle { position_m: in_dimensions(at), ahead, left }
+    Turtle { position_m: with_dimensions(at), ahead, left }
 }
 
 /// Returns the direction of a wandering initiator's next step.
-pub(crate) fn wander<const D: usize>(
+pub(crate) fn wander_direction<const D: usize>(
     rule: &Wander<D>,
     at: Point<D>,
     ahead: Point<D>,
@@ -237,22 +237,23 @@ pub(crate) fn wander<const D: usize>(
     draws: &mut Draws,
 ) -> Point<D> {
     let by_m = rule.turn_rad * step_m.sqrt();
-    let turned = std::array::from_fn(|i| ahead[i] + by_m * normal(draws) + rule.home(at)[i]);
-    unit(turned).unwrap_or(ahead)
+    let turned =
+        std::array::from_fn(|i| ahead[i] + by_m * normal(draws) + rule.home_direction(at)[i]);
+    normalized(turned).unwrap_or(ahead)
 }
 
 impl<const D: usize> Wander<D> {
     /// Returns the direction toward the inside, if `at` is outside.
-    fn home(&self, at: Point<D>) -> Point<D> {
+    fn home_direction(&self, at: Point<D>) -> Point<D> {
         let Some(within) = &self.within else { return [0.0; D] };
         let inside: Point<D> = std::array::from_fn(|i| at[i].clamp(within.lo[i], within.hi[i]));
-        let back = unit(std::array::from_fn::<f64, D, _>(|i| inside[i] - at[i]));
-        back.map_or([0.0; D], |u| u.map(|x| HOMESICK * x))
+        let back = normalized(std::array::from_fn::<f64, D, _>(|i| inside[i] - at[i]));
+        back.map_or([0.0; D], |u| u.map(|x| HOMING_TURN * x))
     }
 }
 
 /// The turn back of a wandering initiator that is outside, per step.
-const HOMESICK: f64 = 0.1;
+const HOMING_TURN: f64 = 0.1;
 
 #[cfg(test)]
 mod tests {
@@ -261,10 +262,10 @@ mod tests {
     #[test]
     fn a_turtle_looks_away_from_the_chain() {
         let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
-        assert_eq!(turtle(2, &points).ahead, [0.0, 1.0, 0.0]);
-        assert_eq!(turtle(0, &points).ahead, [-1.0, 0.0, 0.0]);
-        assert_eq!(turtle(0, &points[..1]).ahead, [1.0, 0.0, 0.0]);
-        let upward = turtle(1, &[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
+        assert_eq!(initial_turtle(2, &points).ahead, [0.0, 1.0, 0.0]);
+        assert_eq!(initial_turtle(0, &points).ahead, [-1.0, 0.0, 0.0]);
+        assert_eq!(initial_turtle(0, &points[..1]).ahead, [1.0, 0.0, 0.0]);
+        let upward = initial_turtle(1, &[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
         assert_eq!((upward.ahead, upward.left), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]));
     }
 }

@@ -1,8 +1,8 @@
 //! Events of a run, with their cycles.
 
-use super::rods::veto::Reason;
+use super::rods::veto::VetoReason;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::view::{Happening, Place};
+use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Kinds of events.
@@ -91,30 +91,30 @@ impl EventKind {
     ];
 
     /// Returns its kind for viewers, which know no world.
-    pub(crate) fn happening(self) -> Happening {
+    pub(crate) fn view_kind(self) -> LogEventKind {
         match self {
-            Self::Veto => Happening::Veto,
-            Self::Penetration => Happening::Penetration,
-            Self::Clear => Happening::Clear,
-            Self::Escape => Happening::Escape,
-            Self::Bumper => Happening::Bumper,
-            Self::Sideways => Happening::Sideways,
-            Self::PulledBack => Happening::PulledBack,
-            Self::Stuck => Happening::Stuck,
-            Self::Changed => Happening::Changed,
-            Self::Broken => Happening::Broken,
-            Self::Reforming => Happening::Reforming,
-            Self::Reformed => Happening::Reformed,
-            Self::GapTooLong => Happening::GapTooLong,
-            Self::NotReformed => Happening::NotReformed,
-            Self::Target => Happening::Target,
-            Self::Done => Happening::Done,
-            Self::GivenUp | Self::TargetGivenUp => Happening::GivenUp,
-            Self::Planned => Happening::Planned,
-            Self::NotPlanned => Happening::NotPlanned,
-            Self::Unheard => Happening::Unheard,
-            Self::Heard => Happening::Heard,
-            Self::Deadline => Happening::Deadline,
+            Self::Veto => LogEventKind::Veto,
+            Self::Penetration => LogEventKind::Penetration,
+            Self::Clear => LogEventKind::Clear,
+            Self::Escape => LogEventKind::Escape,
+            Self::Bumper => LogEventKind::Bumper,
+            Self::Sideways => LogEventKind::Sideways,
+            Self::PulledBack => LogEventKind::PulledBack,
+            Self::Stuck => LogEventKind::Stuck,
+            Self::Changed => LogEventKind::Changed,
+            Self::Broken => LogEventKind::Broken,
+            Self::Reforming => LogEventKind::Reforming,
+            Self::Reformed => LogEventKind::Reformed,
+            Self::GapTooLong => LogEventKind::GapTooLong,
+            Self::NotReformed => LogEventKind::NotReformed,
+            Self::Target => LogEventKind::Target,
+            Self::Done => LogEventKind::Done,
+            Self::GivenUp | Self::TargetGivenUp => LogEventKind::GivenUp,
+            Self::Planned => LogEventKind::Planned,
+            Self::NotPlanned => LogEventKind::NotPlanned,
+            Self::Unheard => LogEventKind::Unheard,
+            Self::Heard => LogEventKind::Heard,
+            Self::Deadline => LogEventKind::Deadline,
         }
     }
 
@@ -160,9 +160,9 @@ pub(crate) struct Event {
     /// The connector concerned.
     pub(crate) connector: u32,
     /// The place of that connector.
-    pub(crate) at_m: Place,
+    pub(crate) at_m: Vec3,
     /// The reason of a veto.
-    pub(crate) reason: Option<Reason>,
+    pub(crate) reason: Option<VetoReason>,
     /// The obstacle concerned, if any.
     pub(crate) obstacle: Option<u32>,
     /// Number of parts that are missing in a gap that is too long; 0 for other events.

@@ -1,9 +1,9 @@
 //! Robots on wheels that keep to the connectors of their chain (slides E2, K5 to K7).
 
 use super::rods::geometry::Point;
-use super::swarm::drive::Pose;
+use super::swarm::drive::Pose2;
 use super::swarm::follower::Follower;
-use super::swarm::laser::Body as Seen;
+use super::swarm::laser::RobotBody as Seen;
 use serde::{Deserialize, Serialize};
 
 /// The robots of a swarm.
@@ -20,7 +20,7 @@ pub(crate) struct Robots {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Robot {
     /// Its place and heading.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Whether its bumper is pressed.
     pub is_bumped: bool,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     /// Returns the body as lasers and bumpers see it.
-    pub(crate) fn as_seen(&self) -> Seen {
+    pub(crate) fn to_robot_body(&self) -> Seen {
         Seen::disc(self.at, self.radius_m)
     }
 }

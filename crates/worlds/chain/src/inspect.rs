@@ -5,20 +5,22 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-use super::driver::{Driver, Task};
-use super::notes::Notes;
-use super::perceive::Looking;
-use super::rods::geometry::{Point, distance, in_dimensions};
+use super::driver::{Task, TaskKind};
+use super::perceive::Perceiver;
+use super::rods::geometry::{Point, distance, with_dimensions};
 use super::rods::veto::Veto;
 use super::scratch::Scratch;
 use super::state::{Body, ChainState};
-use super::view::who_of_obstacle;
+use super::trace::InspectionTrace;
+use super::view::obstacle_body_id;
 use super::world::ChainWorld;
 use super::{act, claim, join};
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::ports::ManualClock;
-use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Section, Table, Value, Who};
-use sidestep_kernel::{Cycle, Slot, Turn};
+use sidestep_kernel::view::{
+    BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
+};
+use sidestep_kernel::{Cycle, PhaseContext, Slot};
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the inspection of a connector, or of its robot, in cycle `now`; `None` for one that does
@@ -27,35 +29,44 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         state: &ChainState<D>,
         now: Cycle,
-        who: Who,
+        who: BodyId,
     ) -> Option<Inspection> {
-        let Who { kind, number: slot, part: Some(part) } = who else { return None };
+        let BodyId { kind, number: slot, part: Some(part) } = who else { return None };
         if slot as usize >= state.len() {
             return None;
         }
         let before = state.body(slot as usize).clone();
         let parts = match kind {
-            Kind::Connector => before.chain.points().len(),
-            Kind::Robot => before.robots.len(),
+            BodyKind::Connector => before.chain.points().len(),
+            BodyKind::Robot => before.robots.len(),
             _ => 0,
         };
         if part as usize >= parts {
             return None;
         }
         let mut scratch = Scratch::new(self);
-        scratch.notes = Some(Box::new(Notes { slot, ..Notes::default() }));
+        scratch.notes = Some(Box::new(InspectionTrace { slot, ..InspectionTrace::default() }));
         let mut told = Inspection::new(who, now, self.title(who));
-        let (after, group) = self.try_cycle(&state.copied(), now, slot, &mut scratch, &mut told);
+        let (after, group) =
+            self.try_cycle(&state.trial_copy(), now, slot, &mut scratch, &mut told);
         let notes = *scratch.notes.take()?;
-        let asked =
-            Asked { world: self, slot, kind, k: part as usize, before, after, notes, scratch };
-        asked.all(&mut told, &group);
+        let asked = ConnectorInspection {
+            world: self,
+            slot,
+            kind,
+            k: part as usize,
+            before,
+            after,
+            notes,
+            scratch,
+        };
+        asked.add_all(&mut told, &group);
         Some(told)
     }
 
     /// Returns the name of a connector, or of its robot, for people.
-    fn title(&self, who: Who) -> String {
-        let Who { kind, number: slot, part } = who;
+    fn title(&self, who: BodyId) -> String {
+        let BodyId { kind, number: slot, part } = who;
         let name = &self.chains[slot as usize].name;
         let chain = if name.is_empty() { format!("chain {slot}") } else { name.clone() };
         format!("{kind} {} of {chain}", part.unwrap_or_default())
@@ -72,17 +83,17 @@ impl<const D: usize> ChainWorld<D> {
         told: &mut Inspection,
     ) -> (Body<D>, Vec<Slot>) {
         let clock = &ManualClock::default();
-        let turn = &mut Turn { world: self, state, now, clock, scratch };
-        let groups = Groups::new(state.len());
+        let turn = &mut PhaseContext { world: self, state, now, clock, scratch };
+        let groups = ConflictGroups::new(state.len());
         (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
         join::join(turn, 0..state.len(), &groups);
         let mut group = Vec::new();
         groups.members(groups.leader(slot), &mut group);
         group.sort_unstable();
         for &member in &group {
-            let mut looking = Looking { world: self, state, now, scratch: turn.scratch };
+            let mut looking = Perceiver { world: self, state, now, scratch: turn.scratch };
             if member == slot {
-                navigates(&mut looking, slot, told);
+                add_navigation(&mut looking, slot, told);
             }
             let decision = looking.decide(member);
             state.set_decision(member as usize, decision);
@@ -98,22 +109,26 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Tells the perception of a leader on wheels, and the layer that acts.
-fn navigates<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot, told: &mut Inspection) {
-    let Some(sight) = looking.sight(slot) else { return };
+fn add_navigation<const D: usize>(
+    looking: &mut Perceiver<'_, D>,
+    slot: Slot,
+    told: &mut Inspection,
+) {
+    let Some(sight) = looking.percept(slot) else { return };
     let leader = &sight.navigator.leader;
     let decision = leader.decide(sight.leader.followed, &sight.percept);
     let (walls, target) = (sight.percept.walls_m, sight.percept.target);
-    told.tell(
-        Section::new("Perceives")
-            .fact("wall on the left", Value::meters(walls.left))
-            .fact("wall on the right", Value::meters(walls.right))
-            .fact("range of the laser", Value::meters(leader.laser.range_m()))
-            .fact("target ahead", target.map(|target| Value::degrees(target.bearing_rad)))
+    told.add_section(
+        FactSection::new("Perceives")
+            .fact("wall on the left", FactValue::meters(walls.left))
+            .fact("wall on the right", FactValue::meters(walls.right))
+            .fact("range of the laser", FactValue::meters(leader.laser.range_m()))
+            .fact("target ahead", target.map(|target| FactValue::degrees(target.bearing_rad)))
             .fact("way to it is free", target.map(|target| target.way_is_free)),
     );
-    let speed = |m_s| Value::number(m_s, "m/s");
-    told.tell(
-        Section::new("Decides")
+    let speed = |m_s| FactValue::number(m_s, "m/s");
+    told.add_section(
+        FactSection::new("Decides")
             .fact("layer", format!("{}: {}", decision.layer as u8, decision.layer.name()))
             .fact("left wheel", speed(decision.wheels.left_m_s))
             .fact("right wheel", speed(decision.wheels.right_m_s))
@@ -123,27 +138,27 @@ fn navigates<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot, told: &mu
 }
 
 /// A look at one connector, or its robot, before and after a cycle.
-struct Asked<'a, const D: usize> {
+struct ConnectorInspection<'a, const D: usize> {
     world: &'a ChainWorld<D>,
     slot: Slot,
-    kind: Kind,
+    kind: BodyKind,
     k: usize,
     before: Body<D>,
     after: Body<D>,
-    notes: Notes<D>,
+    notes: InspectionTrace<D>,
     scratch: Scratch<D>,
 }
 
-impl<const D: usize> Asked<'_, D> {
-    fn all(&self, told: &mut Inspection, group: &[Slot]) {
-        self.is_now(told);
-        self.is_in_group(told, group);
-        self.wants(told);
-        self.is_vetoed(told);
-        self.climbs(told);
-        self.moves(told);
-        self.follows(told);
-        self.comes_out(told);
+impl<const D: usize> ConnectorInspection<'_, D> {
+    fn add_all(&self, told: &mut Inspection, group: &[Slot]) {
+        self.add_state(told);
+        self.add_group(told, group);
+        self.add_intention(told);
+        self.add_vetoes(told);
+        self.add_recovery(told);
+        self.add_moves(told);
+        self.add_lags(told);
+        self.add_outcome(told);
     }
 
     /// Returns its present task; none after the last.
@@ -151,109 +166,121 @@ impl<const D: usize> Asked<'_, D> {
         self.world.chains[self.slot as usize].tasks.get(self.before.driving.task as usize)
     }
 
-    fn connector(&self, k: usize) -> Who {
-        Who::new(Kind::Connector, self.slot, Some(k as u32))
+    fn connector(&self, k: usize) -> BodyId {
+        BodyId::new(BodyKind::Connector, self.slot, Some(k as u32))
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
-    fn place(&self, body: &Body<D>) -> [f64; 3] {
+    fn position(&self, body: &Body<D>) -> [f64; 3] {
         match self.kind {
-            Kind::Robot => in_dimensions(body.robots[self.k].pose.at),
-            _ => in_dimensions(body.chain.points()[self.k]),
+            BodyKind::Robot => with_dimensions(body.robots[self.k].pose.at),
+            _ => with_dimensions(body.chain.points()[self.k]),
         }
     }
 
-    fn is_now(&self, told: &mut Inspection) {
+    fn add_state(&self, told: &mut Inspection) {
         let connector = &self.before.chain.connectors()[self.k];
         let task = self.task();
         let leader =
-            task.filter(|task| !matches!(task.driver, Driver::Rest)).map(|task| task.agent);
+            task.filter(|task| !matches!(task.driver, TaskKind::Rest)).map(|task| task.agent);
         let tasks = self.world.chains[self.slot as usize].tasks.len();
         let number = (self.before.driving.task as usize + 1).min(tasks);
-        told.tell(
-            Section::new("Now")
-                .fact("place", self.place(&self.before))
+        told.add_section(
+            FactSection::new("Now")
+                .fact("place", self.position(&self.before))
                 .fact("leads", leader == Some(self.k))
                 .fact("initiator", leader.map(|k| self.connector(k)))
                 .fact("task", task.map_or("all are done", |task| task.driver.name()))
                 .fact("task number", format!("{number} of {tasks}"))
-                .fact("cycles without progress", Value::count(self.before.driving.idle))
+                .fact("cycles without progress", FactValue::count(self.before.driving.idle))
                 .fact("has failed", connector.failed)
                 .fact("is scattered", self.before.scattered.is_some()),
         );
     }
 
-    fn is_in_group(&self, told: &mut Inspection, group: &[Slot]) {
-        let mut table = Table::new(["turn", "chain"]);
+    fn add_group(&self, told: &mut Inspection, group: &[Slot]) {
+        let mut table = FactTable::new(["turn", "chain"]);
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
-            table.row([Value::count(turn + 1), Value::Who(Who::new(Kind::Rods, slot, None))]);
+            table.push_row([
+                FactValue::count(turn + 1),
+                FactValue::Who(BodyId::new(BodyKind::Rods, slot, None)),
+            ]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);
-        told.tell(
-            Section::new("Conflict group")
-                .fact("chains", Value::count(group.len()))
-                .fact("turn", Value::count(turn))
+        told.add_section(
+            FactSection::new("Conflict group")
+                .fact("chains", FactValue::count(group.len()))
+                .fact("turn", FactValue::count(turn))
                 .table(table),
         );
     }
 
     /// Tells the wish of the initiator.
-    fn wants(&self, told: &mut Inspection) {
+    fn add_intention(&self, told: &mut Inspection) {
         let (Some(task), Some(wish)) = (self.task(), self.notes.wish) else { return };
         let at = self.before.chain.points()[wish.of];
         let target = match &task.driver {
-            Driver::Targets(targets) => targets.places.get(self.before.driving.next as usize),
+            TaskKind::Targets(targets) => targets.places.get(self.before.driving.next as usize),
             _ => None,
         };
-        told.tell(
-            Section::new("Wish")
+        told.add_section(
+            FactSection::new("Wish")
                 .fact("of", self.connector(wish.of))
                 .fact("what", wish.words)
-                .fact("to", wish.to.map(in_dimensions::<D, 3>))
-                .fact("way", wish.to.map(|to| Value::meters(distance(at, to))))
-                .fact_if("target", target.map(|target| in_dimensions::<D, 3>(*target)))
-                .fact_if("way to the target", target.map(|t| Value::meters(distance(at, *t)))),
+                .fact("to", wish.to.map(with_dimensions::<D, 3>))
+                .fact("way", wish.to.map(|to| FactValue::meters(distance(at, to))))
+                .fact_if("target", target.map(|target| with_dimensions::<D, 3>(*target)))
+                .fact_if("way to the target", target.map(|t| FactValue::meters(distance(at, *t)))),
         );
         if let Some(to) = wish.to {
-            told.mark(Role::Wish, wish.words, line(&[at, to]));
+            told.add_mark(MarkRole::Wish, wish.words, line(&[at, to]));
         }
         if let Some(target) = target {
-            told.mark(Role::Target, "target", MarkShape::Point { at_m: in_dimensions(*target) });
+            told.add_mark(
+                MarkRole::Target,
+                "target",
+                MarkShape::Point { at_m: with_dimensions(*target) },
+            );
         }
     }
 
     /// Tells the objecting connector, its reason, the obstacle, and how far the initiator could have gone.
-    fn is_vetoed(&self, told: &mut Inspection) {
+    fn add_vetoes(&self, told: &mut Inspection) {
         let before = self.before.chain.points();
         let far_m = |veto: &Veto<D>| distance(veto.reached, before[veto.from]);
-        let mut table = Table::new(["by", "reason", "because of", "could go"]);
+        let mut table = FactTable::new(["by", "reason", "because of", "could go"]);
         for veto in self.vetoes() {
-            let because = veto.obstacle.map(who_of_obstacle);
+            let because = veto.obstacle.map(obstacle_body_id);
             let by = self.connector(veto.by).into();
-            table.row([by, veto.reason.name().into(), because.into(), Value::meters(far_m(veto))]);
-            let at_m = in_dimensions(before[veto.by]);
-            told.mark(Role::Refused, veto.reason.to_string(), MarkShape::Point { at_m });
+            table.push_row([
+                by,
+                veto.reason.name().into(),
+                because.into(),
+                FactValue::meters(far_m(veto)),
+            ]);
+            let at_m = with_dimensions(before[veto.by]);
+            told.add_mark(MarkRole::Refused, veto.reason.to_string(), MarkShape::Point { at_m });
             let way = line(&[before[veto.from], veto.reached]);
-            told.mark(Role::Refused, "as far as it could go", way);
+            told.add_mark(MarkRole::Refused, "as far as it could go", way);
         }
         let Some(first) = self.vetoes().next() else { return };
-        told.tell(
-            Section::new("Veto")
+        told.add_section(
+            FactSection::new("Veto")
                 .fact("by", self.connector(first.by))
                 .fact("reason", first.reason.name())
                 .fact("why", first.reason.to_string())
-                .fact("because of", first.obstacle.map(who_of_obstacle))
-                .fact("could go", Value::meters(far_m(first)))
-                .fact("as far as", in_dimensions::<D, 3>(first.reached))
+                .fact("because of", first.obstacle.map(obstacle_body_id))
+                .fact("could go", FactValue::meters(far_m(first)))
+                .fact("as far as", with_dimensions::<D, 3>(first.reached))
                 .table(table),
         );
     }
 
     /// Returns all objections, each once.
     fn vetoes(&self) -> impl Iterator<Item = &Veto<D>> {
-        use super::motion::replan::Climbed;
+        use super::motion::recovery::RecoveryOutcome;
         let others = match &self.notes.climbed {
-            Some(Climbed::Stuck { vetoes }) => &vetoes[..],
+            Some(RecoveryOutcome::Stuck { vetoes }) => &vetoes[..],
             _ => &[],
         };
         let own = &self.notes.vetoes;
@@ -263,5 +290,5 @@ impl<const D: usize> Asked<'_, D> {
 
 /// Returns some points as a line.
 fn line<const D: usize>(points: &[Point<D>]) -> MarkShape {
-    MarkShape::Line { points_m: points.iter().map(|at| in_dimensions(*at)).collect() }
+    MarkShape::Line { points_m: points.iter().map(|at| with_dimensions(*at)).collect() }
 }

@@ -1,21 +1,21 @@
 //! Phase *join*: chains whose claims meet act together.
 
 use super::world::ChainWorld;
-use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::{Slot, Turn};
+use sidestep_kernel::conflict::ConflictGroups;
+use sidestep_kernel::{PhaseContext, Slot};
 use std::ops::Range;
 
 /// Number of chains up to which comparing each with each is faster than sorting.
-const FEW: usize = 32;
+const MAX_PAIRWISE_CHAINS: usize = 32;
 
 /// Joins chains with those whose claims meet theirs.
 pub(crate) fn join<const D: usize>(
-    turn: &mut Turn<'_, ChainWorld<D>>,
+    turn: &mut PhaseContext<'_, ChainWorld<D>>,
     bodies: Range<usize>,
-    groups: &Groups,
+    groups: &ConflictGroups,
 ) {
     let state = turn.state;
-    if state.len() <= FEW {
+    if state.len() <= MAX_PAIRWISE_CHAINS {
         return bodies.for_each(|slot| join_each(turn, slot, groups));
     }
     let neighbors = state.neighbors();
@@ -25,7 +25,11 @@ pub(crate) fn join<const D: usize>(
 }
 
 /// Joins one chain with those before it whose claims meet its own.
-fn join_each<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize, groups: &Groups) {
+fn join_each<const D: usize>(
+    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    slot: usize,
+    groups: &ConflictGroups,
+) {
     let state = turn.state;
     let claim = state.claim(slot);
     for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {

@@ -24,62 +24,62 @@ mod bundle;
 mod claim;
 mod clearance;
 pub mod convoy;
+mod deferred;
 mod deploy;
 mod driver;
-mod elsewhere;
 mod events;
+mod external;
+#[cfg(test)]
+mod fixtures;
 mod formation;
 pub mod ground;
 mod inspect;
 mod join;
-mod kind;
-mod meanings;
+mod metric_info;
 pub mod metrics;
 mod motion;
 mod navigate;
 mod neighbors;
-mod notes;
-mod outside;
 mod perceive;
 mod progress;
-mod put_off;
 mod remarks;
+mod remote_agents;
 pub mod rods;
 mod rows;
-mod run;
 pub mod scenario;
-#[cfg(test)]
-mod scenes;
 mod scratch;
 mod script;
 mod state;
 pub mod swarm;
+mod text;
+mod trace;
 mod view;
-mod words;
 mod world;
+mod world_impl;
+mod world_type;
 
 pub use arms::{ik, kinematics};
 pub use deploy::Deployment;
-pub use kind::Chains;
-pub use motion::escape::{Escape, Escaped, Escaper, Method, WayOut};
-pub use motion::replan::{Climbed, Ladder, Rungs, Situation};
+pub use motion::escape::{EscapeMethod, EscapePlan, EscapeReport, EscapeRules, Escaper};
+pub use motion::recovery::{RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation};
 pub use rods::{
-    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Mode, Motion, Moved, Obstacle, Obstacles,
-    Outcome, Propagator, Reason, Request, Rod, Rotation, Rules, SKIN_M, Source, TOLERANCE_M, Veto,
-    geometry, rebuild, wavefront,
+    BEND_TOLERANCE_RAD, Chain, CompletedMotion, Connector, Mobility, Motion, Obstacle, Obstacles,
+    Outcome, Propagator, Request, RequestSource, Rod, Rotation, Rules, SKIN_M, TOLERANCE_M, Veto,
+    VetoEffect, VetoReason, geometry, rebuild, wavefront,
 };
-pub use run::{ChainRun, chain_run};
 pub use state::{Body, ChainState};
 pub use world::ChainWorld;
+pub use world_impl::{ChainRun, chain_run};
+pub use world_type::Chains;
 
 use scratch::Scratch;
-use sidestep_kernel::conflict::Groups;
-use sidestep_kernel::world::Decides;
-use sidestep_kernel::{Phases, Slot, Turn};
+use sidestep_kernel::conflict::ConflictGroups;
+use sidestep_kernel::world::DecisionMode;
+use sidestep_kernel::{PhaseContext, Phases, Slot};
 use std::ops::Range;
 
 impl<const D: usize> Phases for ChainWorld<D> {
-    const DECIDES: Decides = Decides::Together;
+    const DECISION_MODE: DecisionMode = DecisionMode::Joint;
 
     type State = ChainState<D>;
     type Scratch = Scratch<D>;
@@ -92,15 +92,15 @@ impl<const D: usize> Phases for ChainWorld<D> {
         state.len()
     }
 
-    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
         bodies.for_each(|slot| claim::claim(turn, slot));
     }
 
-    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
         join::join(turn, bodies, groups);
     }
 
-    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
         act::act(turn, group);
     }
 }

@@ -1,24 +1,24 @@
 //! Metrics of a run.
 
 use super::agents::traffic::Traffic;
-use super::motion::escape::Escaped;
-use super::motion::replan::Climbed;
-use super::rods::veto::{Moved, Reason};
-use super::swarm::follower::Followed;
+use super::motion::escape::EscapeReport;
+use super::motion::recovery::RecoveryOutcome;
+use super::rods::veto::{CompletedMotion, VetoReason};
+use super::swarm::follower::FollowResult;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::collections::BTreeMap;
 
 /// Depth in an obstacle beyond which a part counts as a penetration, meters.
-pub const PENETRATION_M: f64 = 1e-6;
+pub const PENETRATION_THRESHOLD_M: f64 = 1e-6;
 
 /// Counts for one chain that a run keeps beside its state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct ChainTally {
     /// Cycles in which the chain could act.
     pub steps: u64,
-    /// Vetoes that drivers received, by [`Reason::ALL`].
-    pub vetoes: [u64; Reason::ALL.len()],
+    /// Vetoes that drivers received, by [`VetoReason::ALL`].
+    pub vetoes: [u64; VetoReason::ALL.len()],
     /// Steps at whose end some part was in an obstacle,
     pub penetrations: u64,
     /// how many in a row ended so up to the last step,
@@ -47,7 +47,7 @@ pub struct Tally {
     /// Tasks done, targets reached.
     pub done: u64,
     /// Tasks and targets that were given up.
-    pub given_up: Vec<GivenUp>,
+    pub given_up: Vec<AbandonedPart>,
     /// Number of times that broken parts were joined again,
     pub reformed: u64,
     /// and that they could not be.
@@ -99,15 +99,15 @@ pub struct RungTally {
 
 impl RungTally {
     /// Counts a climb.
-    pub(super) fn count<const D: usize>(&mut self, climbed: &Climbed<D>) {
+    pub(super) fn record<const D: usize>(&mut self, climbed: &RecoveryOutcome<D>) {
         let rung = match climbed {
-            Climbed::Straight(_) | Climbed::Vetoed(_) => return,
-            Climbed::Shorter { .. } => &mut self.shorter,
-            Climbed::Sideways { .. } => &mut self.sideways,
-            Climbed::TurnOnTheSpot { .. } => &mut self.turned,
-            Climbed::Waiting { .. } => &mut self.waited,
-            Climbed::PulledBack { .. } => &mut self.pulled_back,
-            Climbed::Stuck { .. } => &mut self.stuck,
+            RecoveryOutcome::Straight(_) | RecoveryOutcome::Vetoed(_) => return,
+            RecoveryOutcome::Shorter { .. } => &mut self.shorter,
+            RecoveryOutcome::Sideways { .. } => &mut self.sideways,
+            RecoveryOutcome::TurnOnTheSpot { .. } => &mut self.turned,
+            RecoveryOutcome::Waiting { .. } => &mut self.waited,
+            RecoveryOutcome::PulledBack { .. } => &mut self.pulled_back,
+            RecoveryOutcome::Stuck { .. } => &mut self.stuck,
         };
         *rung += 1;
     }
@@ -139,7 +139,7 @@ pub struct EscapeTally {
 
 impl EscapeTally {
     /// Adds the result of a cycle.
-    pub(super) fn add<const D: usize>(&mut self, escaped: &Escaped<D>) {
+    pub(super) fn add<const D: usize>(&mut self, escaped: &EscapeReport<D>) {
         self.moves += escaped.moves as u64;
         self.vetoes += escaped.vetoes as u64;
         self.capped += escaped.capped as u64;
@@ -189,7 +189,7 @@ impl Default for RobotTally {
 
 impl RobotTally {
     /// Counts a step of a robot that ended `lag_m` from its connector.
-    pub(crate) fn count(&mut self, followed: &Followed, lag_m: f64) {
+    pub(crate) fn record(&mut self, followed: &FollowResult, lag_m: f64) {
         self.steps += 1;
         self.lag_sum_m += lag_m;
         self.max_lag_m = self.max_lag_m.max(lag_m);
@@ -211,9 +211,9 @@ impl RobotTally {
     }
 }
 
-impl Tally {
+impl ChainTally {
     /// Adds a motion.
-    pub(crate) fn add_moved<const D: usize>(&mut self, moved: &Moved<D>) {
+    pub(crate) fn add_motion<const D: usize>(&mut self, moved: &CompletedMotion<D>) {
         self.rotations += moved.rotated as u64;
         self.moved += moved.changed as u64;
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
@@ -227,7 +227,7 @@ impl Tally {
     }
 
     /// Counts a step that left a part in an obstacle, or none; returns whether that is news.
-    pub(crate) fn note_inside(&mut self, is_inside: bool) -> bool {
+    pub(crate) fn record_inside(&mut self, is_inside: bool) -> bool {
         let was_inside = self.inside_steps > 0;
         self.penetrations += u64::from(is_inside);
         self.inside_steps = if is_inside { self.inside_steps + 1 } else { 0 };
@@ -236,16 +236,16 @@ impl Tally {
     }
 
     /// Adds a veto.
-    pub(crate) fn add_veto(&mut self, reason: Reason) {
+    pub(crate) fn add_veto(&mut self, reason: VetoReason) {
         self.vetoes[reason.number()] += 1;
     }
 }
 
-impl Default for Tally {
+impl Default for ChainTally {
     fn default() -> Self {
         Self {
             steps: 0,
-            vetoes: [0; Reason::ALL.len()],
+            vetoes: [0; VetoReason::ALL.len()],
             penetrations: 0,
             inside_steps: 0,
             longest_inside_steps: 0,
@@ -279,7 +279,7 @@ impl Default for Tally {
 
 /// A motion or target that an initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GivenUp {
+pub struct AbandonedPart {
     /// The task.
     pub task: u32,
     /// The motion of its script, or the target.
@@ -337,7 +337,7 @@ pub struct Metrics {
     /// Number of parts that were missing in the gaps that were too long, the most of each chain.
     pub missing_parts: u64,
     /// Motions and targets that were given up, by chain.
-    pub given_up: Vec<ChainGivenUp>,
+    pub given_up: Vec<ChainAbandonedPart>,
     /// Rungs by which initiators continued after vetoes.
     pub rungs: RungTally,
     /// Counts of parts that got out of the way.
@@ -377,7 +377,7 @@ pub struct RobotMetrics {
 }
 
 impl RobotMetrics {
-    fn of(tally: &RobotTally) -> Option<Self> {
+    fn from_tally(tally: &RobotTally) -> Option<Self> {
         let part = |count: u64| count as f64 / tally.steps as f64;
         (tally.steps > 0).then(|| Self {
             bumper_events: tally.bumper_events,
@@ -392,12 +392,12 @@ impl RobotMetrics {
 
 /// A motion or target that a chain's initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChainGivenUp {
+pub struct ChainAbandonedPart {
     /// The chain.
     pub chain: EntityId,
     /// The motion or target.
     #[serde(flatten)]
-    pub what: GivenUp,
+    pub what: AbandonedPart,
 }
 
 /// Metrics of one chain.
@@ -414,25 +414,31 @@ pub struct ChainMetrics {
     pub joints: Option<BTreeMap<String, f64>>,
     /// Counts of the run.
     #[serde(flatten)]
-    pub tally: Tally,
+    pub tally: ChainTally,
 }
 
 impl Metrics {
     /// Sums the tallies of the chains; `progress` has one entry per chain.
-    pub(super) fn of(tallies: &[Tally], progress: &[f64], cpu_s: f64, timed_steps: u64) -> Self {
-        let sum = |count: fn(&Tally) -> u64| tallies.iter().map(count).sum::<u64>();
-        let most = |value: fn(&Tally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
+    pub(super) fn from_tallies(
+        tallies: &[ChainTally],
+        progress: &[f64],
+        cpu_s: f64,
+        timed_steps: u64,
+    ) -> Self {
+        let sum = |count: fn(&ChainTally) -> u64| tallies.iter().map(count).sum::<u64>();
+        let most = |value: fn(&ChainTally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
         let vetoes_of = |k: usize| tallies.iter().map(|t| t.vetoes[k]).sum::<u64>();
-        let least = |value: fn(&Tally) -> f64| {
+        let least = |value: fn(&ChainTally) -> f64| {
             let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
             Some(least).filter(|m| m.is_finite())
         };
         let steps = sum(|t| t.steps);
         let robots = tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots));
-        let by_reason = (0..Reason::ALL.len()).map(|k| (Reason::ALL[k].name(), vetoes_of(k)));
+        let by_reason =
+            (0..VetoReason::ALL.len()).map(|k| (VetoReason::ALL[k].name(), vetoes_of(k)));
         Self {
             steps,
-            vetoes: (0..Reason::ALL.len()).map(vetoes_of).sum(),
+            vetoes: (0..VetoReason::ALL.len()).map(vetoes_of).sum(),
             penetrations: sum(|t| t.penetrations),
             min_clearance_m: least(|t| t.min_clearance_m),
             max_rod_violation_m: most(|t| t.max_rod_violation_m),
@@ -449,7 +455,7 @@ impl Metrics {
             reformed: sum(|t| t.reformed),
             not_reformed: sum(|t| t.not_reformed),
             missing_parts: sum(|t| t.missing_parts),
-            given_up: given_up(tallies),
+            given_up: abandoned_parts(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
             messages: sum(|t| t.messages),
@@ -458,16 +464,16 @@ impl Metrics {
             contacts_lost: sum(|t| t.contacts_lost),
             deadlines_missed: sum(|t| t.deadlines_missed),
             stood: sum(|t| t.stood),
-            robots: RobotMetrics::of(&robots),
+            robots: RobotMetrics::from_tally(&robots),
         }
     }
 }
 
 /// Returns what the chains gave up.
-fn given_up(tallies: &[Tally]) -> Vec<ChainGivenUp> {
-    let of_one = |(chain, tally): (EntityId, &Tally)| {
+fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedPart> {
+    let of_one = |(chain, tally): (EntityId, &ChainTally)| {
         let what = tally.given_up.clone().into_iter();
-        what.map(move |what| ChainGivenUp { chain, what })
+        what.map(move |what| ChainAbandonedPart { chain, what })
     };
     (0..).zip(tallies).flat_map(of_one).collect()
 }

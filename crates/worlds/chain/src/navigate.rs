@@ -1,15 +1,15 @@
 //! An initiator on wheels that finds its way with a laser, and its goal (slides N1 to N6).
 
 use super::rods::geometry::{Point, distance};
-use super::swarm::drive::Drive;
-use super::swarm::leader::{Leader, Turning};
+use super::swarm::drive::DifferentialDrive;
+use super::swarm::leader::{Leader, TurnMode};
 use std::ops::Range;
 
 /// Distance before the end of a line at which the end counts as reached, meters.
-const BEFORE_THE_END_M: f64 = 0.5;
+const END_TOLERANCE_M: f64 = 0.5;
 
 /// Points of a line ahead among which a navigator looks for the one that it has reached.
-const AHEAD: usize = 10;
+const LOOKAHEAD_POINTS: usize = 10;
 
 /// An initiator that navigates.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,14 +17,14 @@ pub(crate) struct Navigator {
     /// Its behavior.
     pub(crate) leader: Leader,
     /// Its wheels.
-    pub(crate) drive: Drive,
+    pub(crate) drive: DifferentialDrive,
     /// Its destination; without a goal it goes on and on.
-    pub(crate) goal: Option<Goal>,
+    pub(crate) goal: Option<NavigationGoal>,
 }
 
 /// Destination of a navigator.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Goal {
+pub(crate) enum NavigationGoal {
     /// A place that it can detect.
     Target {
         /// The place.
@@ -44,11 +44,11 @@ pub(crate) enum Goal {
 impl Navigator {
     /// Returns whether it may turn without moving.
     pub(crate) fn can_turn_on_the_spot(&self) -> bool {
-        self.leader.turning == Turning::OnTheSpotWhereBlocked
+        self.leader.turning == TurnMode::OnTheSpotWhereBlocked
     }
 }
 
-impl Goal {
+impl NavigationGoal {
     /// Returns the target that the leader can detect.
     pub(crate) fn target(&self) -> Option<Point<2>> {
         match self {
@@ -59,21 +59,21 @@ impl Goal {
 
     /// Returns the point of the line at which a navigator at `at` begins: the first one beside which it is in the
     /// corridor, because a corridor may come back to where it was; the nearest one if it is outside.
-    pub(crate) fn begins(&self, at: Point<2>) -> usize {
+    pub(crate) fn start_index(&self, at: Point<2>) -> usize {
         let Self::EndOf { line, width_m } = self else { return 0 };
         match line.iter().position(|&p| distance(p, at) <= 0.5 * width_m) {
-            Some(first) => nearer_from(line, first, at),
+            Some(first) => last_nearing(line, first, at),
             None => nearest(line, 0..line.len(), at).unwrap_or(0),
         }
     }
 
     /// Returns the point of the line that a navigator at `at` has reached, if it was at `index`: it goes on while points
     /// come nearer, also beyond some that do not.
-    pub(crate) fn passed(&self, at: Point<2>, mut index: usize) -> usize {
+    pub(crate) fn reached_index(&self, at: Point<2>, mut index: usize) -> usize {
         let Self::EndOf { line, .. } = self else { return index };
         loop {
-            let here = nearer_from(line, index, at);
-            let ahead = here..(here + 1 + AHEAD).min(line.len());
+            let here = last_nearing(line, index, at);
+            let ahead = here..(here + 1 + LOOKAHEAD_POINTS).min(line.len());
             match nearest(line, ahead, at).filter(|&i| i > here) {
                 Some(further) => index = further,
                 None => return here,
@@ -88,7 +88,7 @@ impl Goal {
             // back.
             Self::EndOf { line, .. } => {
                 let end = line[line.len() - 1];
-                line[index..].iter().all(|&p| distance(p, end) <= BEFORE_THE_END_M)
+                line[index..].iter().all(|&p| distance(p, end) <= END_TOLERANCE_M)
             }
         }
     }
@@ -102,7 +102,7 @@ impl Goal {
             }
             Self::Target { .. } => 0.0,
             Self::EndOf { line, .. } => {
-                let first = self.begins(start);
+                let first = self.start_index(start);
                 let left = (line.len() - 1).saturating_sub(first);
                 index.saturating_sub(first) as f64 / left.max(1) as f64
             }
@@ -111,7 +111,7 @@ impl Goal {
 }
 
 /// Returns the last point of a line up to which all from `index` on come nearer.
-fn nearer_from(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
+fn last_nearing(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
     let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
     (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1)
 }
@@ -127,32 +127,32 @@ mod tests {
     use crate::ground::{Corridor, Leg};
 
     /// Two legs of 5 m, 4 m apart, and the way from one to the other.
-    fn hairpin() -> Goal {
+    fn hairpin() -> NavigationGoal {
         let leg = |y: f64, x: &dyn Fn(f64) -> f64| {
             (0..50).map(|k| [x(0.1 * f64::from(k)), y]).collect::<Vec<_>>()
         };
         let turn = (0..40).map(|k| [5.0, 0.1 * f64::from(k)]);
         let there = leg(0.0, &|x| x);
         let line = there.into_iter().chain(turn).chain(leg(4.0, &|x| 5.0 - x)).collect();
-        Goal::EndOf { line, width_m: 2.0 }
+        NavigationGoal::EndOf { line, width_m: 2.0 }
     }
 
     /// The middle of a corridor of 2 m.
-    fn middle(legs: &[Leg]) -> Goal {
+    fn middle(legs: &[Leg]) -> NavigationGoal {
         let corridor = Corridor::new(legs.to_vec(), 2.0).unwrap();
-        let line = corridor.line(0.1).iter().map(|pose| pose.at).collect();
-        Goal::EndOf { line, width_m: 2.0 }
+        let line = corridor.center_line(0.1).iter().map(|pose| pose.at).collect();
+        NavigationGoal::EndOf { line, width_m: 2.0 }
     }
 
     /// Passes the line from `begins` on, along its own points; returns how many of them went by before the end.
-    fn passes_all(goal: &Goal, begins: usize) -> usize {
-        let Goal::EndOf { line, .. } = goal else { panic!("a line") };
+    fn passes_all(goal: &NavigationGoal, begins: usize) -> usize {
+        let NavigationGoal::EndOf { line, .. } = goal else { panic!("a line") };
         let (mut index, mut count) = (begins, 0);
         for &at in &line[begins..] {
             if goal.is_reached(at, index) {
                 return count;
             }
-            (index, count) = (goal.passed(at, index), count + 1);
+            (index, count) = (goal.reached_index(at, index), count + 1);
         }
         panic!("the end is never reached: at {index}")
     }
@@ -163,17 +163,17 @@ mod tests {
         let straight = Leg::Straight { length_m: 10.0 };
         let round = middle(&[straight, turn(180.0), straight, turn(180.0)]);
         for at in [[-0.2, 0.0], [0.0, 0.0], [0.03, 0.4]] {
-            let begins = round.begins(at);
+            let begins = round.start_index(at);
             assert_eq!(begins, 0, "{at:?}");
             assert!(!round.is_reached(at, begins), "{at:?}");
         }
         assert!(passes_all(&round, 0) > 380);
         for turn_deg in [720.0, 3600.0, -720.0] {
             let laps = middle(&[turn(turn_deg)]);
-            let Goal::EndOf { line, .. } = &laps else { panic!("a line") };
+            let NavigationGoal::EndOf { line, .. } = &laps else { panic!("a line") };
             let lap = (line.len() - 1) as f64 * 360.0 / turn_deg.abs();
             for &at in &line[..lap as usize - 12] {
-                let begins = laps.begins(at) as f64;
+                let begins = laps.start_index(at) as f64;
                 assert!(begins < lap, "{turn_deg} deg, {at:?}: {begins} of {lap}");
             }
             assert!(passes_all(&laps, 0) > line.len() - 10, "{turn_deg} deg");
@@ -184,7 +184,7 @@ mod tests {
     fn progress_along_a_line_counts_from_where_it_began() {
         let goal = middle(&[Leg::Straight { length_m: 20.0 }]);
         let start = [10.0, 0.3];
-        let begins = goal.begins(start);
+        let begins = goal.start_index(start);
         assert_eq!(begins, 100);
         let progress = |index| goal.progress(index, start, f64::INFINITY);
         assert_eq!([begins, 150, 200].map(progress), [0.0, 0.5, 1.0]);
@@ -193,19 +193,19 @@ mod tests {
     #[test]
     fn a_navigator_begins_at_the_nearest_point_of_its_line_and_goes_on_from_there() {
         let line = hairpin();
-        let begins = line.begins([3.0, 3.8]);
+        let begins = line.start_index([3.0, 3.8]);
         assert_eq!(begins, 50 + 40 + 20);
-        let passed = line.passed([0.2, 4.0], begins);
+        let passed = line.reached_index([0.2, 4.0], begins);
         assert!(line.is_reached([0.2, 4.0], passed), "{passed}");
-        assert_eq!(line.begins([-1.0, 0.1]), 0);
+        assert_eq!(line.start_index([-1.0, 0.1]), 0);
         // From the first leg the second one is not taken for passed.
-        assert_eq!(line.passed([3.0, 1.9], 25), 30);
+        assert_eq!(line.reached_index([3.0, 1.9], 25), 30);
     }
 
     #[test]
     fn a_navigator_is_not_held_up_by_a_point_beside_its_line() {
         let line = vec![[0.0, 0.0], [0.1, 0.0], [0.15, 0.3], [0.2, 0.0], [0.9, 0.0]];
-        let bumpy = Goal::EndOf { line, width_m: 2.0 };
-        assert_eq!(bumpy.passed([0.2, 0.0], 0), 3);
+        let bumpy = NavigationGoal::EndOf { line, width_m: 2.0 };
+        assert_eq!(bumpy.reached_index([0.2, 0.0], 0), 3);
     }
 }

@@ -23,7 +23,7 @@ impl<const D: usize> Default for Neighbors<D> {
 
 impl<const D: usize> Neighbors<D> {
     /// Returns whether these are the claims after `made` claims.
-    pub(crate) fn is_of(&self, made: u64) -> bool {
+    pub(crate) fn is_current(&self, made: u64) -> bool {
         self.made == made
     }
 

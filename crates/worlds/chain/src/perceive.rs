@@ -1,8 +1,8 @@
 //! Perception and decisions of navigators at the start of a cycle, with all other bodies where they are
 //! at that moment.
 
-use super::driver::Driver;
-use super::navigate::{Goal, Navigator};
+use super::driver::TaskKind;
+use super::navigate::{NavigationGoal, Navigator};
 use super::rods::geometry::distance;
 use super::scratch::Scratch;
 use super::state::ChainState;
@@ -11,10 +11,10 @@ use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 
 /// Time for which a navigator stands for a body that moves ahead before it takes that for a wall, s.
-const STANDS_S: f64 = 10.0;
+const STAND_TIMEOUT_S: f64 = 10.0;
 
 /// A worker's read-only look at a state that does not change meanwhile.
-pub(crate) struct Looking<'a, const D: usize> {
+pub(crate) struct Perceiver<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
     pub(crate) state: &'a ChainState<D>,
     pub(crate) now: Cycle,
@@ -22,7 +22,7 @@ pub(crate) struct Looking<'a, const D: usize> {
 }
 
 /// A navigator's perception.
-pub(crate) struct Sight<'a> {
+pub(crate) struct NavigatorPercept<'a> {
     pub(crate) navigator: &'a Navigator,
     /// The connector that navigates.
     pub(crate) agent: usize,
@@ -30,34 +30,34 @@ pub(crate) struct Sight<'a> {
     pub(crate) percept: Percept,
 }
 
-impl<'a, const D: usize> Looking<'a, D> {
+impl<'a, const D: usize> Perceiver<'a, D> {
     /// Returns a navigator's decision; none for other drivers.
     pub(crate) fn decide(&mut self, slot: Slot) -> Option<Decision> {
-        let sight = self.sight(slot)?;
+        let sight = self.percept(slot)?;
         Some(sight.navigator.leader.decide(sight.leader.followed, &sight.percept))
     }
 
     /// Returns a navigator's perception; its laser's ranges are in the scratch.
-    pub(crate) fn sight(&mut self, slot: Slot) -> Option<Sight<'a>> {
+    pub(crate) fn percept(&mut self, slot: Slot) -> Option<NavigatorPercept<'a>> {
         let Self { world, state, now, .. } = *self;
-        let body = state.leading(slot as usize);
+        let body = state.deferred_body(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
-        let Driver::Navigate(navigator) = &task.driver else { return None };
-        let (leader, stood) = (body.leader(task), body.stood);
+        let TaskKind::Navigate(navigator) = &task.driver else { return None };
+        let (leader, stood) = (body.leader_state(task), body.stood);
         drop(body);
-        self.see_others(slot, task.agent, navigator, &leader);
+        self.gather_others(slot, task.agent, navigator, &leader);
         self.scratch.around.gather(world, state, now, std::iter::empty());
         let noise = &mut world.streams.draws(slot, now, purpose::LASER);
         let Scratch { around, scan, seen, .. } = &mut *self.scratch;
-        let target = navigator.goal.as_ref().and_then(Goal::target);
+        let target = navigator.goal.as_ref().and_then(NavigationGoal::target);
         let around = Surroundings { obstacles: around.all.in_plane()?, bodies: seen, target };
-        let is_patient = world.starts_s(u64::from(stood)) < STANDS_S;
+        let is_patient = world.start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
         let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
-        Some(Sight { navigator, agent: task.agent, leader, percept })
+        Some(NavigatorPercept { navigator, agent: task.agent, leader, percept })
     }
 
     /// Gathers all parts of chains that a navigator may see, its own chain included, except itself.
-    fn see_others(
+    fn gather_others(
         &mut self,
         slot: Slot,
         agent: usize,
@@ -73,7 +73,7 @@ impl<'a, const D: usize> Looking<'a, D> {
             let is_own = other == slot;
             body.solids().filter(|(k, _)| !(is_own && *k == agent)).for_each(|(_, solid)| {
                 if distance(leader.pose.at, solid.at) - solid.radius_m <= range_m {
-                    seen.push(solid.as_seen());
+                    seen.push(solid.to_robot_body());
                 }
             });
         }
@@ -84,8 +84,8 @@ impl<'a, const D: usize> Looking<'a, D> {
 mod tests {
     use super::*;
     use crate::rods::geometry::Point;
-    use crate::scenario::Compiled;
-    use crate::swarm::laser::Body as Seen;
+    use crate::scenario::ChainScenario;
+    use crate::swarm::laser::RobotBody as Seen;
     use proptest::prelude::*;
     use sidestep_scenario::Source;
 
@@ -102,7 +102,7 @@ mod tests {
         };
         let [bare, wheels] = [chains("[0.0, 0.0]", ""), chains("[9.0, 0.0]", "robots = {}")];
         let text = format!("format = 1\nworld = \"chain\"\n{bare}{wheels}");
-        let compiled = Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
+        let compiled = ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
         let state = ChainState::new(&compiled.world).expect("valid");
         ((*compiled.world).clone(), state)
     }
@@ -125,16 +125,16 @@ mod tests {
             let others = body.solids().filter(|(k, _)| (other, *k) != (slot, 0));
             let near =
                 others.filter(|(_, solid)| distance(at, solid.at) - solid.radius_m <= RANGE_M);
-            seen.extend(near.map(|(_, solid)| solid.as_seen()));
+            seen.extend(near.map(|(_, solid)| solid.to_robot_body()));
         }
         seen
     }
 
     fn assert_all_is_seen(world: &ChainWorld<2>, state: &ChainState<2>) {
         let mut scratch = Scratch::new(world);
-        let mut looking = Looking { world, state, now: 0, scratch: &mut scratch };
+        let mut looking = Perceiver { world, state, now: 0, scratch: &mut scratch };
         for slot in 0..state.len() {
-            looking.sight(slot as Slot).expect("it navigates");
+            looking.percept(slot as Slot).expect("it navigates");
             assert_eq!(looking.scratch.seen, seen_of_all(state, slot), "chain {slot}");
         }
     }
@@ -159,7 +159,7 @@ mod tests {
                 let ends = |p: &[f64; 4]| [[at(p[0], 0), at(p[1], 1)], [at(p[2], 0), at(p[3], 1)]];
                 put(&state, &places.iter().map(ends).collect::<Vec<_>>());
                 assert_all_is_seen(&world, &state);
-                assert_all_is_seen(&world, &state.copied());
+                assert_all_is_seen(&world, &state.trial_copy());
             }
         }
     }

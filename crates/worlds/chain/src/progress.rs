@@ -1,7 +1,7 @@
 //! Progress of a chain through its tasks.
 
-use super::driver::{Driver, Task};
-use super::rods::geometry::in_dimensions;
+use super::driver::{Task, TaskKind};
+use super::rods::geometry::with_dimensions;
 use super::state::{Body, ChainState};
 use super::world::ChainWorld;
 
@@ -10,7 +10,7 @@ impl<const D: usize> ChainWorld<D> {
     /// weight; parts that were given up do not count as done.
     pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
         let tasks = &self.chains[slot].tasks;
-        let part = tasks.get(body.driving.task as usize).map(|task| self.part_done(body, task));
+        let part = tasks.get(body.driving.task as usize).map(|task| self.fraction_done(body, task));
         let undone: f64 = body.tally.given_up.iter().map(|what| what.undone).sum();
         let done = f64::from(body.driving.task) + part.unwrap_or(0.0) - undone;
         (done / tasks.len() as f64).clamp(0.0, 1.0)
@@ -19,36 +19,36 @@ impl<const D: usize> ChainWorld<D> {
     /// Returns the part of its present task that an initiator has finished: for scripts by motions,
     /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
     /// its speed allows in the whole run; for resting and for orders from outside the part of the run.
-    pub(crate) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+    pub(crate) fn fraction_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
-            _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
-            Driver::Rest | Driver::External => {
+            _ if task.lasts_s.is_finite() => self.start_time_s(body.driving.cycles) / task.lasts_s,
+            TaskKind::Rest | TaskKind::External => {
                 body.driving.cycles as f64 / self.cycles.max(1) as f64
             }
-            Driver::Wander(_) => self.way_part(body, task),
-            Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
-            Driver::Targets(targets) => {
+            TaskKind::Wander(_) => self.path_fraction(body, task),
+            TaskKind::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
+            TaskKind::Targets(targets) => {
                 f64::from(body.driving.next) / targets.places.len().max(1) as f64
             }
-            Driver::Navigate(navigator) => match &navigator.goal {
+            TaskKind::Navigate(navigator) => match &navigator.goal {
                 Some(goal) => {
-                    let start = in_dimensions(body.driving.start.position_m);
+                    let start = with_dimensions(body.driving.start.position_m);
                     goal.progress(body.driving.next as usize, start, body.driving.nearest_m)
                 }
-                None => self.way_part(body, task),
+                None => self.path_fraction(body, task),
             },
         };
         part.clamp(0.0, 1.0)
     }
 
-    fn way_part(&self, body: &Body<D>, task: &Task<D>) -> f64 {
-        body.driving.way_m.gone / (task.speed_m_s * self.starts_s(self.cycles.max(1)))
+    fn path_fraction(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+        body.driving.way_m.gone / (task.speed_m_s * self.start_time_s(self.cycles.max(1)))
     }
 
     /// Returns whether all tasks of all chains are done and everything is whole.
-    pub(crate) fn all_is_done(&self, state: &ChainState<D>) -> bool {
+    pub(crate) fn is_all_done(&self, state: &ChainState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
-            let body = state.leading(slot);
+            let body = state.deferred_body(slot);
             let is_done = body.driving.task as usize >= spec.tasks.len();
             is_done && body.scattered.is_none()
         })

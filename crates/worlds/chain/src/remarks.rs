@@ -1,21 +1,21 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
-use super::arms::kinematics::{Motion, Variable};
+use super::arms::kinematics::{Dof, JointMotion};
 use super::rods::chain::{Connector, Mobility};
-use super::scenario::Compiled;
-use super::world::{ChainSpec, ChainWorld, Change, What};
+use super::scenario::ChainScenario;
+use super::world::{ChainSpec, ChainWorld, Change, ChangeKind};
 use sidestep_scenario::Remark;
 
 /// Returns the remarks, in the order of the chains.
-pub(super) fn remarks<const D: usize>(compiled: &Compiled<D>) -> Vec<Remark> {
+pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
     let chains = || compiled.world.chains.iter().enumerate();
-    let slow = chains().find_map(|(k, spec)| slow(&compiled.world, k, spec));
-    let unlimited = chains().filter_map(|(k, spec)| unlimited(k, spec));
-    unlimited.chain(slow).chain(idle(compiled)).collect()
+    let slow = chains().find_map(|(k, spec)| slow_network(&compiled.world, k, spec));
+    let unlimited = chains().filter_map(|(k, spec)| unlimited_speeds(k, spec));
+    unlimited.chain(slow).chain(unused_rules(compiled)).collect()
 }
 
 /// Returns notes on rules that are given and have no effect.
-fn idle<const D: usize>(compiled: &Compiled<D>) -> impl Iterator<Item = Remark> {
+fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<Item = Remark> {
     let world = &compiled.world;
     let moves = !world.movers.is_empty();
     let holds = world.chains.iter().any(is_held);
@@ -36,13 +36,18 @@ fn idle<const D: usize>(compiled: &Compiled<D>) -> impl Iterator<Item = Remark> 
 /// Returns whether some connector of a chain is, or comes to be, unable to go anywhere.
 fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
     let is_free = |c: &Connector<D>| c.mobility == Mobility::Free && !c.failed;
-    let holds =
-        |change: &Change<D>| matches!(change.what, What::Mobility { .. } | What::Failed { .. });
+    let holds = |change: &Change<D>| {
+        matches!(change.what, ChangeKind::Mobility { .. } | ChangeKind::Failed { .. })
+    };
     !spec.start.connectors().iter().all(is_free) || spec.changes.iter().any(holds)
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
-fn slow<const D: usize>(world: &ChainWorld<D>, k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+fn slow_network<const D: usize>(
+    world: &ChainWorld<D>,
+    k: usize,
+    spec: &ChainSpec<D>,
+) -> Option<Remark> {
     let network = world.network.as_ref()?;
     let rods = spec.start.rods().len();
     let led_m = spec.tasks.iter().map(|task| task.speed_m_s * world.dt_s).fold(0.0, f64::max);
@@ -66,11 +71,11 @@ fn slow<const D: usize>(world: &ChainWorld<D>, k: usize, spec: &ChainSpec<D>) ->
 }
 
 /// Returns a note on joints for whose speed the model gives no limit.
-fn unlimited<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+fn unlimited_speeds<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
     let speeds = arm.serial.variables.iter().zip(arm.follower.speeds());
-    let taken = |(v, speed): (&Variable, &f64)| {
-        let unit = if v.motion == Motion::Turn { "rad/s" } else { "m/s" };
+    let taken = |(v, speed): (&Dof, &f64)| {
+        let unit = if v.motion == JointMotion::Turn { "rad/s" } else { "m/s" };
         v.max_speed.is_none().then(|| format!("`{}` {speed:.4} {unit}", v.name))
     };
     let taken: Vec<String> = speeds.filter_map(taken).collect();
@@ -112,7 +117,7 @@ mod tests {
                  deployment = \"team\"\nnetwork = {{ {network} }}\n[[chains]]\nconnectors = 20\n\
                  rod_m = 0.5\n[[chains.tasks]]\nkind = \"script\"\nscript = \"forward 1\"\n"
             );
-            remarks(&Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid"))
+            remarks(&ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid"))
         };
         assert_eq!(remarks_of("loss = 0.1").len(), 0);
         let [told] = &remarks_of("latency_s = 5e-4, patience_s = 2e-3")[..] else {
@@ -127,7 +132,8 @@ mod tests {
         let chain = "[[chains]]\nconnectors = 3\nrod_m = 0.5\ntasks = [{ kind = \"rest\" }]\n";
         let keys_of = |rules: &str, more: &str| {
             let text = format!("format = 1\nworld = \"chain\"\n[chain]\n{rules}\n{chain}{more}");
-            let compiled = Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
+            let compiled =
+                ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
             remarks(&compiled).into_iter().map(|told| told.key).collect::<Vec<_>>()
         };
         let rules = "joint_speed_m_s = 1.0\nescape_by = \"literal\"\nescape_speed_m_s = 1.0\nescape_ahead_s = 0.5";
@@ -150,7 +156,7 @@ mod tests {
                     arm = { urdf = \"arm.urdf\" }\nradius_m = 0.02\n\
                     [[chains.tasks]]\nkind = \"targets\"\nconnector = 3\ntargets_m = [[0.3, 0.0, 0.8]]\nspeed_m_s = 0.2\n";
         let source = Source::new("s.toml", text, folder.path());
-        let compiled = Compiled::<3>::new(&source).expect("valid");
+        let compiled = ChainScenario::<3>::new(&source).expect("valid");
         let [told] = &remarks(&compiled)[..] else { panic!("one remark") };
         assert_eq!(told.key, "chains.0.arm");
         assert!(told.words.contains("`j0` 3.1416 rad/s"), "{}", told.words);

@@ -1,19 +1,19 @@
 //! Recorded tables of a run, and their rows until they are written.
 
 use super::events::{Event, EventKind};
-use super::rods::geometry::{Core, Point, in_dimensions};
-use super::rods::veto::Reason;
+use super::rods::geometry::{Core, Point, with_dimensions};
+use super::rods::veto::VetoReason;
 use super::scenario::RecordSection;
 use super::state::ChainState;
-use super::swarm::drive::Pose;
+use super::swarm::drive::Pose2;
 use super::world::ChainWorld;
-use sidestep_kernel::ports::table::label_of;
+use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
-struct Place {
+struct PositionRow {
     cycle: Cycle,
     /// The chain that a connector or robot belongs to.
     chain: EntityId,
@@ -24,7 +24,7 @@ struct Place {
 
 /// Value of an arm's joint at the start of a cycle.
 #[derive(Debug)]
-struct JointValue {
+struct JointRow {
     cycle: Cycle,
     chain: EntityId,
     joint: u32,
@@ -32,27 +32,27 @@ struct JointValue {
 }
 
 /// Adds one column per dimension of a position.
-fn axes(table: Table<Place>, dimensions: usize) -> Table<Place> {
+fn add_axis_columns(table: Table<PositionRow>, dimensions: usize) -> Table<PositionRow> {
     let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
     axes.fold(table, |table, (i, axis)| table.f64(axis, "position", move |p| p.at[i]))
 }
 
-fn table_of_places(name: &str) -> Table<Place> {
+fn position_table(name: &str) -> Table<PositionRow> {
     let meaning = "cycle of dt at whose start this holds";
-    Table::new(name).u64("cycle", meaning, |p: &Place| p.cycle)
+    Table::new(name).u64("cycle", meaning, |p: &PositionRow| p.cycle)
 }
 
-fn trajectories(dimensions: usize) -> Table<Place> {
-    let table = table_of_places("trajectories").u32("chain", "entity id", |p| p.chain).u32(
+fn trajectories(dimensions: usize) -> Table<PositionRow> {
+    let table = position_table("trajectories").u32("chain", "entity id", |p| p.chain).u32(
         "connector",
         "its index",
         |p| p.id,
     );
-    axes(table, dimensions)
+    add_axis_columns(table, dimensions)
 }
 
-fn robots() -> Table<Place> {
-    table_of_places("robots")
+fn robots() -> Table<PositionRow> {
+    position_table("robots")
         .u32("chain", "entity id", |p| p.chain)
         .u32("robot", "the connector that it follows", |p| p.id)
         .f64("x_m", "position of the body", |p| p.at[0])
@@ -60,27 +60,27 @@ fn robots() -> Table<Place> {
         .f64("heading_rad", "heading, counterclockwise from east", |p| p.at[2])
 }
 
-fn joints() -> Table<JointValue> {
+fn joints() -> Table<JointRow> {
     Table::new("joints")
-        .u64("cycle", "cycle of dt at whose start this holds", |j: &JointValue| j.cycle)
+        .u64("cycle", "cycle of dt at whose start this holds", |j: &JointRow| j.cycle)
         .u32("chain", "entity id", |j| j.chain)
         .u32("joint", "its number among the arm's variables, from base to tip", |j| j.joint)
         .f64("value", "rad, or m where it slides", |j| j.value)
 }
 
-fn movers(dimensions: usize) -> Table<Place> {
-    axes(table_of_places("movers").u32("obstacle", "its number", |p| p.id), dimensions)
+fn movers(dimensions: usize) -> Table<PositionRow> {
+    add_axis_columns(position_table("movers").u32("obstacle", "its number", |p| p.id), dimensions)
 }
 
 fn events() -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     // The first label stands for events without a reason.
-    let reasons = std::iter::once("none").chain(Reason::ALL.map(Reason::name));
-    let reason = |reason: &Reason| label_of(&Reason::ALL, reason) + 1;
+    let reasons = std::iter::once("none").chain(VetoReason::ALL.map(VetoReason::name));
+    let reason = |reason: &VetoReason| label_index(&VetoReason::ALL, reason) + 1;
     Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
         .u32("chain", "entity id", |e| e.chain)
-        .label("event", "what happened", kinds, |e| label_of(&EventKind::ALL, &e.kind))
+        .label("event", "what happened", kinds, |e| label_index(&EventKind::ALL, &e.kind))
         .u32("connector", "the connector that it is about", |e| e.connector)
         .label("reason", "why, of vetoes", reasons, move |e| e.reason.as_ref().map_or(0, reason))
         .u32("obstacle", "the obstacle", |e| e.obstacle)
@@ -92,10 +92,10 @@ fn events() -> Table<Event> {
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     record: RecordSection,
-    trajectories: RowBuffer<Place>,
-    joints: RowBuffer<JointValue>,
-    robots: RowBuffer<Place>,
-    movers: RowBuffer<Place>,
+    trajectories: RowBuffer<PositionRow>,
+    joints: RowBuffer<JointRow>,
+    robots: RowBuffer<PositionRow>,
+    movers: RowBuffer<PositionRow>,
     events: RowBuffer<Event>,
 }
 
@@ -106,30 +106,30 @@ impl Rows {
     }
 
     /// Returns the number of cycles from one recorded cycle to the next.
-    pub(super) fn every(&self) -> Cycle {
+    pub(super) fn interval(&self) -> Cycle {
         self.record.every
     }
 
     /// Returns whether controls from outside of the run are to be kept.
-    pub(super) fn keep_controls(&self) -> bool {
+    pub(super) fn keeps_controls(&self) -> bool {
         self.record.controls
     }
 
     /// Starts to keep rows, for those tables that will have some.
-    pub(super) fn begin<const D: usize>(&mut self, world: &ChainWorld<D>) {
+    pub(super) fn start<const D: usize>(&mut self, world: &ChainWorld<D>) {
         let record = self.record;
         let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
         let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
-        self.trajectories.begin(record.trajectories.then(|| trajectories(D)));
-        self.joints.begin((record.joints && has_arms).then(joints));
-        self.robots.begin((record.robots && has_robots).then(robots));
-        self.movers.begin((record.movers && has_movers).then(|| movers(D)));
-        self.events.begin(record.events.then(events));
+        self.trajectories.start(record.trajectories.then(|| trajectories(D)));
+        self.joints.start((record.joints && has_arms).then(joints));
+        self.robots.start((record.robots && has_robots).then(robots));
+        self.movers.start((record.movers && has_movers).then(|| movers(D)));
+        self.events.start(record.events.then(events));
     }
 
     /// Keeps the positions of everything at the start of cycle `now`.
-    pub(super) fn places<const D: usize>(
+    pub(super) fn record_positions<const D: usize>(
         &mut self,
         world: &ChainWorld<D>,
         state: &ChainState<D>,
@@ -138,16 +138,16 @@ impl Rows {
         if !now.is_multiple_of(self.record.every) {
             return;
         }
-        if self.trajectories.is_kept() {
+        if self.trajectories.is_enabled() {
             for slot in 0..state.len() {
                 self.trajectories.extend(connectors(now, slot, state.body(slot).chain.points()));
             }
         }
-        if self.joints.is_kept() {
+        if self.joints.is_enabled() {
             for slot in 0..state.len() {
                 let body = state.body(slot);
                 let values = body.joints.iter().flatten();
-                let row = |(joint, value): (u32, &f64)| JointValue {
+                let row = |(joint, value): (u32, &f64)| JointRow {
                     cycle: now,
                     chain: slot as EntityId,
                     joint,
@@ -156,24 +156,24 @@ impl Rows {
                 self.joints.extend((0..).zip(values).map(row));
             }
         }
-        if self.robots.is_kept() {
+        if self.robots.is_enabled() {
             for slot in 0..state.len() {
                 for (id, robot) in (0..).zip(&state.body(slot).robots) {
-                    let Pose { at: [x, y], heading_rad } = robot.pose;
+                    let Pose2 { at: [x, y], heading_rad } = robot.pose;
                     let at = [x, y, heading_rad];
-                    self.robots.push(Place { cycle: now, chain: slot as EntityId, id, at });
+                    self.robots.push(PositionRow { cycle: now, chain: slot as EntityId, id, at });
                 }
             }
         }
-        if self.movers.is_kept() {
-            for mover in world.movers.at(world.starts_s(now)) {
-                let at = in_dimensions(middle(&mover.core));
-                self.movers.push(Place { cycle: now, chain: 0, id: mover.id, at });
+        if self.movers.is_enabled() {
+            for mover in world.movers.at(world.start_time_s(now)) {
+                let at = with_dimensions(middle(&mover.core));
+                self.movers.push(PositionRow { cycle: now, chain: 0, id: mover.id, at });
             }
         }
     }
 
-    pub(super) fn event(&mut self, event: Event) {
+    pub(super) fn add_event(&mut self, event: Event) {
         self.events.push(event);
     }
 }
@@ -183,9 +183,14 @@ fn connectors<const D: usize>(
     cycle: Cycle,
     slot: usize,
     points: &[Point<D>],
-) -> impl Iterator<Item = Place> {
+) -> impl Iterator<Item = PositionRow> {
     let chain = slot as EntityId;
-    (0..).zip(points).map(move |(id, at)| Place { cycle, chain, id, at: in_dimensions(*at) })
+    (0..).zip(points).map(move |(id, at)| PositionRow {
+        cycle,
+        chain,
+        id,
+        at: with_dimensions(*at),
+    })
 }
 
 /// Returns a point of a core that moves with it.

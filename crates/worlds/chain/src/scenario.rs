@@ -4,28 +4,27 @@ mod arms;
 mod chains;
 mod changes;
 mod deployment;
-mod leads;
+mod leader;
 mod mobility;
 mod navigators;
 mod network;
 mod obstacles;
-mod recipe;
+mod spec;
 mod starts;
 mod tasks;
 #[cfg(test)]
 mod tests;
 
-use super::deploy::kind::Deployment;
+use super::deploy::deployment::Deployment;
 use super::ground::{Movers, Site};
-use super::motion::escape::{Escape, Method};
-use super::motion::replan::Rungs;
+use super::motion::escape::{EscapeMethod, EscapeRules};
+use super::motion::recovery::RecoveryLimits;
 use super::rods::geometry::{Bounds, norm};
 use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use network::NetworkSection;
-use obstacles::{FieldSection, Ground, GroundSection, ObstacleSection, fitted};
-pub(crate) use recipe::Recipe;
+use obstacles::{FieldSection, Ground, GroundSection, ObstacleSection, to_dimensions};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -33,25 +32,26 @@ use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{
-    AboveTo, Head, Number, Rule, Sections, Source, Spanned, Whole, refused, schema,
+    Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
 };
+pub(crate) use spec::ScenarioSpec;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Largest length, time or coordinate of a scenario.
-const MOST: f64 = 1e6;
+const MAX_VALUE: f64 = 1e6;
 /// Cycles of a run whose scenario does not set them.
-const CYCLES: u64 = 2000;
+const DEFAULT_CYCLES: u64 = 2000;
 
 /// Longest way of a slave in a sub-step, unless it is given, as a multiple of the initiator's longest. Where
 /// motion is smooth, slaves go up to 2.2 times as far.
-const SLAVE_STEPS: f64 = 4.0;
+const MAX_SLAVE_STEP_FACTOR: f64 = 4.0;
 
 /// A length, time or speed.
-type Measure = Number<AboveTo<0, 1_000_000>>;
+type Measure = Number<LeftOpen<0, 1_000_000>>;
 /// A place or a direction.
-type Place<const D: usize> = sidestep_scenario::Point<D, Coordinate>;
+type PointValue<const D: usize> = sidestep_scenario::Point<D, Coordinate>;
 
 /// Coordinates that a world accepts.
 #[derive(Debug, Clone, Copy)]
@@ -59,18 +59,18 @@ struct Coordinate;
 
 impl Rule for Coordinate {
     fn allows(number: f64) -> bool {
-        number.abs() <= MOST
+        number.abs() <= MAX_VALUE
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "-1e6 to 1e6".into()
     }
 
     fn limits() -> Value {
-        json!({ "minimum": -MOST, "maximum": MOST })
+        json!({ "minimum": -MAX_VALUE, "maximum": MAX_VALUE })
     }
 
-    fn words_of_point(dimensions: usize) -> String {
+    fn point_description(dimensions: usize) -> String {
         format!("{dimensions} finite numbers, up to 1e6; chain.dimensions is {dimensions}")
     }
 }
@@ -84,51 +84,51 @@ impl Rule for Unbounded {
         number > 0.0
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "a number above 0, or inf".into()
     }
 
     fn limits() -> Value {
-        schema::or_infinite(json!({ "exclusiveMinimum": 0 }))
+        schema::with_infinity(json!({ "exclusiveMinimum": 0 }))
     }
 }
 
 /// Numbers above 0 up to 1e6.
 #[derive(Debug, Clone, Copy)]
-struct StepMost;
+struct StepLimitRule;
 
-impl Rule for StepMost {
+impl Rule for StepLimitRule {
     fn allows(number: f64) -> bool {
-        number > 0.0 && (number <= MOST || number == f64::INFINITY)
+        number > 0.0 && (number <= MAX_VALUE || number == f64::INFINITY)
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "a number above 0 and at most 1e6, or inf".into()
     }
 
     fn limits() -> Value {
-        schema::or_infinite(json!({ "exclusiveMinimum": 0, "maximum": MOST }))
+        schema::with_infinity(json!({ "exclusiveMinimum": 0, "maximum": MAX_VALUE }))
     }
 }
 
 /// A box given by its lower and its upper corner.
 #[derive(Debug, Clone, Copy)]
-struct Room<const D: usize>(Bounds<D>);
+struct BoxSection<const D: usize>(Bounds<D>);
 
-impl<'de, const D: usize> Deserialize<'de> for Room<D> {
+impl<'de, const D: usize> Deserialize<'de> for BoxSection<D> {
     fn deserialize<S: serde::Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
-        let [lo, hi] = <[Place<D>; 2]>::deserialize(deserializer)?.map(Place::get);
+        let [lo, hi] = <[PointValue<D>; 2]>::deserialize(deserializer)?.map(PointValue::get);
         match (0..D).all(|i| lo[i] < hi[i]) {
             true => Ok(Self(Bounds { lo, hi })),
             false => {
                 let remedy = "give the lower corner first, then the upper";
-                Err(refused(format_args!("[{lo:?}, {hi:?}]"), remedy))
+                Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
             }
         }
     }
 }
 
-impl<const D: usize> JsonSchema for Room<D> {
+impl<const D: usize> JsonSchema for BoxSection<D> {
     fn inline_schema() -> bool {
         true
     }
@@ -142,14 +142,14 @@ impl<const D: usize> JsonSchema for Room<D> {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        <[Place<D>; 2]>::json_schema(generator)
+        <[PointValue<D>; 2]>::json_schema(generator)
     }
 }
 
-impl<const D: usize> Room<D> {
+impl<const D: usize> BoxSection<D> {
     /// Returns the floor of the box.
-    fn in_the_plane(&self) -> Bounds<2> {
-        Bounds { lo: fitted(self.0.lo), hi: fitted(self.0.hi) }
+    fn to_plane(&self) -> Bounds<2> {
+        Bounds { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
     }
 }
 
@@ -186,7 +186,7 @@ struct ChainFile<const D: usize> {
 
 /// Returns the JSON Schema of a scenario's sections, with places in the plane and in space.
 pub(super) fn sections() -> Value {
-    schema::widened(&schema::of::<ChainFile<2>>(), &schema::of::<ChainFile<3>>())
+    schema::widened(&schema::for_type::<ChainFile<2>>(), &schema::for_type::<ChainFile<3>>())
 }
 
 /// The behavior of a rod that hits an obstacle, by name.
@@ -208,13 +208,13 @@ struct RulesSection {
     dt_s: Option<Measure>,
     rotation: RotationWord,
     self_collision: Option<bool>,
-    slave_step_max_m: Option<Number<StepMost>>,
+    slave_step_max_m: Option<Number<StepLimitRule>>,
     joint_speed_m_s: Option<Number<Unbounded>>,
     step_m: Option<Measure>,
     backtracks: Option<usize>,
     look_m: Option<Measure>,
     escape: EscapeWord,
-    escape_by: Option<Method>,
+    escape_by: Option<EscapeMethod>,
     escape_speed_m_s: Option<Measure>,
     escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
@@ -252,8 +252,8 @@ pub struct RecordSection {
     /// Decisions of connectors whose agents are processes of their own.
     pub controls: bool,
     /// One cycle in this many is recorded; events are recorded in all.
-    #[serde(deserialize_with = "Whole::<1>::read")]
-    #[schemars(with = "Whole<1>")]
+    #[serde(deserialize_with = "Integer::<1>::read")]
+    #[schemars(with = "Integer<1>")]
     pub every: u64,
     /// Cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
@@ -276,7 +276,7 @@ impl Default for RecordSection {
 
 /// A compiled scenario.
 #[derive(Debug, Clone)]
-pub struct Compiled<const D: usize> {
+pub struct ChainScenario<const D: usize> {
     /// The immutable world.
     pub world: Arc<ChainWorld<D>>,
     /// Name of the scenario, may be empty.
@@ -288,19 +288,19 @@ pub struct Compiled<const D: usize> {
     /// The tables to keep.
     pub record: RecordSection,
     /// The sections that it was compiled from; none where no scenario was read.
-    pub(crate) recipe: Option<Arc<Recipe<D>>>,
+    pub(crate) recipe: Option<Arc<ScenarioSpec<D>>>,
 }
 
 /// A compiled scenario in two or three dimensions.
 #[derive(Debug, Clone)]
-pub enum AnyCompiled {
+pub enum AnyChainScenario {
     /// A world in the plane.
-    Plane(Compiled<2>),
+    Plane(ChainScenario<2>),
     /// A world in space.
-    Space(Compiled<3>),
+    Space(ChainScenario<3>),
 }
 
-impl AnyCompiled {
+impl AnyChainScenario {
     /// Compiles a scenario.
     ///
     /// # Errors
@@ -308,8 +308,8 @@ impl AnyCompiled {
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let dimensions = source.parse::<Shape>()?.chain.dimensions;
         match dimensions.as_ref().map_or(2, |n| *n.get_ref()) {
-            2 => compiled(source).map(Self::Plane),
-            3 => compiled(source).map(Self::Space),
+            2 => compile_scenario(source).map(Self::Plane),
+            3 => compile_scenario(source).map(Self::Space),
             n => {
                 let span = dimensions.map(|n| n.span());
                 Err(source.error(span, format!("dimensions = {n}"), "give 2 or 3"))
@@ -318,16 +318,16 @@ impl AnyCompiled {
     }
 }
 
-fn compiled<const D: usize>(source: &Source) -> Result<Compiled<D>, InputError> {
+fn compile_scenario<const D: usize>(source: &Source) -> Result<ChainScenario<D>, InputError> {
     let (head, file) = source.parse_world()?;
-    Recipe::new(source, head, file)?.compile()
+    ScenarioSpec::new(source, head, file)?.compile()
 }
 
-impl<const D: usize> Compiled<D> {
+impl<const D: usize> ChainScenario<D> {
     /// Compiles a scenario that is known to have `D` dimensions.
     ///
     /// # Errors
-    /// As [`AnyCompiled::new`]; also when the scenario has another number of dimensions.
+    /// As [`AnyChainScenario::new`]; also when the scenario has another number of dimensions.
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let shape = source.parse::<Shape>()?.chain;
         let dimensions = shape.dimensions.map_or(2, Spanned::into_inner);
@@ -335,7 +335,7 @@ impl<const D: usize> Compiled<D> {
             let cause = format!("the scenario has {dimensions} dimensions");
             return Err(source.error(None, cause, format!("set chain.dimensions to {D}")));
         }
-        compiled(source)
+        compile_scenario(source)
     }
 }
 
@@ -349,10 +349,10 @@ struct Compiler<'a, const D: usize> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    fn compile(&self) -> Result<Compiled<D>, InputError> {
-        self.escapes_by_its_keys()?;
-        let cycles = self.head.cycles.unwrap_or(CYCLES);
-        let compiled = Compiled {
+    fn compile(&self) -> Result<ChainScenario<D>, InputError> {
+        self.check_escape_keys()?;
+        let cycles = self.head.cycles.unwrap_or(DEFAULT_CYCLES);
+        let compiled = ChainScenario {
             world: Arc::new(self.world(cycles)?),
             name: self.head.name.clone(),
             seed: self.head.seed,
@@ -360,19 +360,19 @@ impl<const D: usize> Compiler<'_, D> {
             record: self.file.record,
             recipe: None,
         };
-        self.try_out(&compiled)?;
+        self.check_scripts(&compiled)?;
         Ok(compiled)
     }
 
     fn world(&self, cycles: u64) -> Result<ChainWorld<D>, InputError> {
         let section = &self.file.chain;
         let dt_s = section.dt_s.map_or(0.02, f64::from);
-        let chains = match self.known.filter(|_| !self.file.is_anywhere()) {
+        let chains = match self.known.filter(|_| !self.file.has_random_start()) {
             Some(known) => Arc::clone(&known.chains),
             None => Arc::new(self.chains(dt_s, self.site)?),
         };
         let ground = self.ground(self.site, &chains)?;
-        self.starts(&chains, &ground)?;
+        self.check_starts(&chains, &ground)?;
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
@@ -381,12 +381,12 @@ impl<const D: usize> Compiler<'_, D> {
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
         let network = self.network(dt_s, &chains)?;
-        self.is_local(&chains, &rules, escape.is_some())?;
+        self.check_local(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {
             chains,
             cycles,
             escape,
-            rungs: Rungs::default(),
+            rungs: RecoveryLimits::default(),
             obstacles: Arc::new(ground.obstacles),
             movers: Arc::new(ground.movers),
             dt_s,
@@ -406,13 +406,18 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Runs the scripts once, so that they cannot fail during a run.
-    fn try_out(&self, compiled: &Compiled<D>) -> Result<(), InputError> {
+    fn check_scripts(&self, compiled: &ChainScenario<D>) -> Result<(), InputError> {
         super::state::ChainState::new(&compiled.world).map(drop)
     }
 
     /// Returns the rule by which chains escape; none if nothing moves. By default chains escape at
     /// twice the speed at which they are led, or twice that of the fastest moving obstacle.
-    fn escape(&self, chains: &[ChainSpec<D>], movers: &Movers<D>, dt_s: f64) -> Option<Escape> {
+    fn escape(
+        &self,
+        chains: &[ChainSpec<D>],
+        movers: &Movers<D>,
+        dt_s: f64,
+    ) -> Option<EscapeRules> {
         let section = &self.file.chain;
         if section.escape == EscapeWord::Off || movers.is_empty() {
             return None;
@@ -420,15 +425,15 @@ impl<const D: usize> Compiler<'_, D> {
         let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
         let fastest = movers.at(0.0).map(|mover| norm(mover.velocity_m_s)).fold(0.0, f64::max);
         let usual_m_s = 2.0 * led.fold(fastest, f64::max);
-        let usual = Escape::new(dt_s, section.escape_speed_m_s.map_or(usual_m_s, f64::from));
+        let usual = EscapeRules::new(dt_s, section.escape_speed_m_s.map_or(usual_m_s, f64::from));
         let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
-        Some(Escape { ticks_ahead, method: section.escape_by.unwrap_or_default(), ..usual })
+        Some(EscapeRules { ticks_ahead, method: section.escape_by.unwrap_or_default(), ..usual })
     }
 
     /// Refuses keys of escapes that the kind of escape leaves without effect.
-    fn escapes_by_its_keys(&self) -> Result<(), InputError> {
+    fn check_escape_keys(&self) -> Result<(), InputError> {
         let RulesSection { escape, escape_speed_m_s, escape_ahead_s, .. } = &self.file.chain;
         let (key, because) = match escape {
             EscapeWord::Off if escape_speed_m_s.is_some() => ("escape_speed_m_s", "\"off\""),
@@ -436,7 +441,7 @@ impl<const D: usize> Compiler<'_, D> {
             EscapeWord::Touch if escape_ahead_s.is_some() => ("escape_ahead_s", "\"touch\""),
             _ => return Ok(()),
         };
-        Err(self.source.idle(&format!("chain.{key}"), &format!("with escape = {because}")))
+        Err(self.source.unused_key(&format!("chain.{key}"), &format!("with escape = {because}")))
     }
 
     /// Returns the greatest speed of the joints of chains with a fixed base, m/s; by default twice
@@ -454,7 +459,7 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         chains: &[ChainSpec<D>],
         ground: &Ground<D>,
-        escape: Option<&Escape>,
+        escape: Option<&EscapeRules>,
         dt_s: f64,
     ) -> f64 {
         let given_m = self.file.chain.slave_step_max_m.map(f64::from);
@@ -471,7 +476,7 @@ impl<const D: usize> Compiler<'_, D> {
             let led = spec.tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
             (led * dt_s).min(step_m.unwrap_or(spec.start.step_m()))
         };
-        let usual_m = || SLAVE_STEPS * chains.iter().map(longest_m).fold(0.0, f64::max);
+        let usual_m = || MAX_SLAVE_STEP_FACTOR * chains.iter().map(longest_m).fold(0.0, f64::max);
         given_m.unwrap_or_else(usual_m)
     }
 
@@ -493,7 +498,7 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Refuses a key that is given and has no effect; the arguments are the key, whether it is
     /// given, and whether it has an effect.
-    fn has_no_idle_key(
+    fn check_unused_key(
         &self,
         keys: &[(&str, bool, bool)],
         of: &str,
@@ -503,7 +508,7 @@ impl<const D: usize> Compiler<'_, D> {
             None => Ok(()),
             Some((key, ..)) => {
                 let remedy = "leave it out, or give what it belongs to";
-                let at = self.source.within(at, &[key]);
+                let at = self.source.key_span(at, &[key]);
                 Err(self.source.error(at, format!("`{key}` does nothing {of}"), remedy))
             }
         }

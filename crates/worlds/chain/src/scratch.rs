@@ -1,16 +1,16 @@
 //! A worker's buffers, kept between tasks, and the obstacles at a given moment.
 
-use super::agents::sight::Shown;
+use super::agents::percept::ChainPercepts;
 use super::events::Event;
 use super::formation::Solid;
 use super::motion::escape::Escaper;
-use super::notes::Notes;
-use super::rods::geometry::{Point, in_dimensions};
+use super::rods::geometry::{Point, with_dimensions};
 use super::rods::obstacle::{Obstacle, Obstacles};
-use super::rods::own_body::OwnBody;
 use super::rods::propagate::Propagator;
+use super::rods::rod_bvh::RodBvh;
 use super::state::{Body, ChainState};
-use super::swarm::laser::{Body as Seen, Scan};
+use super::swarm::laser::{RobotBody as Seen, Scan};
+use super::trace::InspectionTrace;
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
 
@@ -20,29 +20,29 @@ pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
     pub(crate) escaper: Option<Escaper<D>>,
     /// The obstacles around a chain.
-    pub(crate) around: Around<D>,
+    pub(crate) around: NearbyObstacles<D>,
     /// Robots around a robot.
     pub(crate) seen: Vec<Seen>,
     /// Chains near a robot.
     pub(crate) near: Vec<Slot>,
     pub(crate) scan: Scan,
     /// Boxes around a chain's rods.
-    pub(crate) own: OwnBody<D>,
+    pub(crate) own: RodBvh<D>,
     /// Places of a chain before a cycle,
-    pub(crate) before: Places<D>,
+    pub(crate) before: PositionBuffer<D>,
     /// and after parts got out of the way.
-    pub(crate) escaped: Places<D>,
+    pub(crate) escaped: PositionBuffer<D>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
     /// Notes for an inspection of a chain; none in a run.
-    pub(crate) notes: Option<Box<Notes<D>>>,
+    pub(crate) notes: Option<Box<InspectionTrace<D>>>,
     /// Perceptions of connectors, for a caller that asks; none in a run.
-    pub(crate) shown: Option<Vec<Shown<D>>>,
+    pub(crate) shown: Option<Vec<ChainPercepts<D>>>,
 }
 
 /// The obstacles around a chain at a given moment.
 #[derive(Debug, Clone)]
-pub(crate) struct Around<const D: usize> {
+pub(crate) struct NearbyObstacles<const D: usize> {
     /// The world's obstacles, the moving ones where they are at the start of `moment`, and the
     /// parts of other chains.
     pub(crate) all: Obstacles<D>,
@@ -56,7 +56,7 @@ pub(crate) struct Around<const D: usize> {
 
 /// The places of a chain's connectors at some time of its cycle.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Places<const D: usize> {
+pub(crate) struct PositionBuffer<const D: usize> {
     pub(crate) points: Vec<Point<D>>,
     /// Joint values of an arm.
     pub(crate) joints: Vec<f64>,
@@ -68,13 +68,13 @@ impl<const D: usize> Scratch<D> {
         Self {
             propagator: Propagator::new(world.rules),
             escaper: world.escape.map(Escaper::new),
-            around: Around::new(world),
+            around: NearbyObstacles::new(world),
             seen: Vec::new(),
             near: Vec::new(),
             scan: Scan::default(),
-            own: OwnBody::default(),
-            before: Places::default(),
-            escaped: Places::default(),
+            own: RodBvh::default(),
+            before: PositionBuffer::default(),
+            escaped: PositionBuffer::default(),
             events: Vec::new(),
             notes: None,
             shown: None,
@@ -82,7 +82,7 @@ impl<const D: usize> Scratch<D> {
     }
 }
 
-impl<const D: usize> Around<D> {
+impl<const D: usize> NearbyObstacles<D> {
     fn new(world: &ChainWorld<D>) -> Self {
         Self {
             all: (*world.obstacles).clone(),
@@ -109,7 +109,7 @@ impl<const D: usize> Around<D> {
             return;
         }
         self.guests.clear();
-        let movers = world.movers.at(world.starts_s(moment));
+        let movers = world.movers.at(world.start_time_s(moment));
         self.guests.extend(movers.filter(Obstacle::is_in_range));
         let movers = self.guests.len();
         let others: Vec<Slot> = others.collect();
@@ -131,9 +131,9 @@ impl<const D: usize> Around<D> {
     }
 }
 
-impl<const D: usize> Places<D> {
+impl<const D: usize> PositionBuffer<D> {
     /// Notes the places of a chain.
-    pub(crate) fn note(&mut self, body: &Body<D>) {
+    pub(crate) fn record(&mut self, body: &Body<D>) {
         self.points.clear();
         self.points.extend_from_slice(body.chain.points());
         self.joints.clear();
@@ -141,7 +141,7 @@ impl<const D: usize> Places<D> {
     }
 
     /// Puts a chain back to these places.
-    pub(crate) fn put_back(&self, body: &mut Body<D>) {
+    pub(crate) fn restore(&self, body: &mut Body<D>) {
         body.chain.points_mut().copy_from_slice(&self.points);
         if let Some(joints) = &mut body.joints {
             joints.clone_from(&self.joints);
@@ -156,7 +156,8 @@ fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: 
     if body.robots.is_empty() {
         return push_parts(parts, slot, &body.chain);
     }
-    let solid =
-        |solid: Solid| Obstacle::ball(OTHER_CHAIN + slot, in_dimensions(solid.at), solid.radius_m);
+    let solid = |solid: Solid| {
+        Obstacle::ball(OTHER_CHAIN + slot, with_dimensions(solid.at), solid.radius_m)
+    };
     parts.extend(body.solids().map(|(_, robot)| solid(robot)));
 }

@@ -1,19 +1,19 @@
 //! The changing state of a run, and its snapshot.
 
-use super::agents::handed::Handed;
+use super::agents::chain_controls::ChainControls;
+use super::deferred::DeferredMotions;
 use super::driver::external::External;
-use super::driver::{Driving, Task};
+use super::driver::{Task, TaskProgress};
 use super::formation::{Robot, Solid};
-use super::metrics::Tally;
-use super::motion::escape::WayOut;
+use super::metrics::ChainTally;
+use super::motion::escape::EscapePlan;
 use super::neighbors::Neighbors;
-use super::put_off::PutOff;
 use super::rods::chain::Chain;
-use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
+use super::rods::geometry::{Bounds, Point, normalized, with_dimensions};
 use super::rods::grid::Grid;
-use super::rods::obstacle::around;
-use super::script::Motion;
-use super::swarm::drive::Pose;
+use super::rods::obstacle::bounds_around;
+use super::script::ScriptMotion;
+use super::swarm::drive::Pose2;
 use super::swarm::leader::{Decision, LeaderState};
 use super::world::{ChainSpec, ChainWorld};
 use serde::{Deserialize, Serialize};
@@ -26,14 +26,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// Number of chains up to which a look at each takes no longer than finding those nearby.
-const FEW: usize = 16;
+const MAX_LINEAR_SCAN: usize = 16;
 /// Room for rounding between boxes and distances, meters.
 const ROUNDING_M: f64 = 1e-6;
 
 /// State of a world of chains; slots are ids.
 #[derive(Debug)]
 pub struct ChainState<const D: usize> {
-    cells: Box<[Cell<D>]>,
+    cells: Box<[ChainCell<D>]>,
     /// Number of claims ever made.
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
@@ -47,7 +47,7 @@ pub struct ChainState<const D: usize> {
 /// One chain's share of the state. None of its locks is ever waited for: in the first phase all workers only
 /// read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
-struct Cell<const D: usize> {
+struct ChainCell<const D: usize> {
     body: RwLock<Body<D>>,
     /// The box that the chain may enter during this cycle.
     claim: Mutex<Bounds<D>>,
@@ -61,39 +61,39 @@ pub struct Body<const D: usize> {
     /// Its connectors and rods.
     pub chain: Chain<D>,
     /// Progress of its initiator through its tasks.
-    pub driving: Driving,
+    pub driving: TaskProgress,
     /// Scattered connectors, and the places where they will be joined again; none while the chain
     /// is whole.
-    pub scattered: Option<Scattered>,
+    pub scattered: Option<ScatterState>,
     /// The robots that keep to its connectors; empty if nothing is on wheels.
     pub robots: Vec<Robot>,
     /// Radius of their bodies, meters.
     pub(crate) robot_radius_m: f64,
     /// Counts so far.
-    pub tally: Tally,
+    pub tally: ChainTally,
     /// Cycles that its navigator has stood because something moves ahead.
     pub(crate) stood: u32,
     /// Memory of its way out of where it was caught.
-    pub(crate) way_out: WayOut,
+    pub(crate) way_out: EscapePlan,
     /// The motions of the present script, which follow from the place where it started.
-    pub(crate) motions: Vec<Motion>,
+    pub(crate) motions: Vec<ScriptMotion>,
     /// Orders from outside, and the answer to the last ones.
     pub(crate) external: External,
     /// Joint values of an arm, in rad or m: its connectors are where forward kinematics puts them.
     pub joints: Option<Vec<f64>>,
     /// The way that it follows because local rules came no nearer.
-    pub(crate) plan: Option<Plan<D>>,
+    pub(crate) plan: Option<MotionPlan<D>>,
     /// The nearest lost connectors below and above, as each connector knows; empty while none is lost.
-    pub(crate) missing: Vec<Missing>,
+    pub(crate) missing: Vec<MissingNeighbors>,
     /// Decisions of its agents for a cycle, if they run elsewhere.
-    pub(crate) handed: Option<Handed<D>>,
+    pub(crate) handed: Option<ChainControls<D>>,
     /// Motions that the chain has yet to follow; none whenever it is looked at.
-    pub(crate) put_off: PutOff<D>,
+    pub(crate) put_off: DeferredMotions<D>,
 }
 
 /// Parts of a broken chain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Scattered {
+pub struct ScatterState {
     /// The first scattered connector,
     pub first: u32,
     /// and the last.
@@ -110,7 +110,7 @@ pub struct Scattered {
 
 /// A way to a target: the postures that are not reached yet, each straight from the one before; at least one.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Plan<const D: usize> {
+pub(crate) enum MotionPlan<const D: usize> {
     /// Places of all connectors.
     Rods(VecDeque<Vec<Point<D>>>),
     /// Values of an arm's joints.
@@ -132,9 +132,9 @@ pub struct ChainRecord {
     /// Positions of the connectors, coordinate after coordinate.
     pub points_m: Vec<f64>,
     /// See [`Body::driving`].
-    pub driving: Driving,
+    pub driving: TaskProgress,
     /// See [`Body::scattered`].
-    pub scattered: Option<Scattered>,
+    pub scattered: Option<ScatterState>,
     /// See [`Body::robots`].
     pub robots: Vec<Robot>,
 }
@@ -151,7 +151,7 @@ pub struct Snapshot {
     /// Their plans, of those that have one; by id.
     pub plans: Vec<PlanRecord>,
     /// Chains that are on a way out of where they were caught, by id.
-    pub(crate) ways_out: Vec<(u32, WayOut)>,
+    pub(crate) ways_out: Vec<(u32, EscapePlan)>,
     /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
     pub(crate) stood: Vec<(EntityId, u32)>,
     /// Cycles for which scattered parts have waited for an obstacle in their way, where they have, by id.
@@ -159,35 +159,35 @@ pub struct Snapshot {
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
     /// Lost connectors, as known to those of their chain, of chains in which one is lost; by id.
-    pub(crate) missing: Vec<(u32, Vec<Missing>)>,
+    pub(crate) missing: Vec<(u32, Vec<MissingNeighbors>)>,
     /// Decisions for the cycle that comes next, by id, if those were handed over by agents elsewhere; serialized.
     pub(crate) handed: Vec<(u32, Vec<u8>)>,
 }
 
 /// The nearest lost connectors below and above, as a connector knows.
-pub(crate) type Missing = [Option<u32>; 2];
+pub(crate) type MissingNeighbors = [Option<u32>; 2];
 
 impl<const D: usize> Body<D> {
     /// Returns a chain at its start.
     pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
-        let driving = Driving::new(spec.tasks[0].agent, chain.points());
+        let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
         let mut body = Self {
             robots: spec.robots_at(chain.points(), &driving),
             robot_radius_m: spec.robot_radius_m(),
             driving,
             chain,
             scattered: None,
-            tally: Tally::default(),
+            tally: ChainTally::default(),
             stood: 0,
-            way_out: WayOut::default(),
+            way_out: EscapePlan::default(),
             motions: Vec::new(),
             external: External::default(),
             joints: spec.arm.as_ref().map(|arm| arm.values.clone()),
             plan: None,
             missing: Vec::new(),
             handed: None,
-            put_off: PutOff::default(),
+            put_off: DeferredMotions::default(),
         };
         body.motions = spec.motions(&body.driving)?;
         Ok(body)
@@ -205,7 +205,7 @@ impl<const D: usize> Body<D> {
             Some(robot) => Solid { at: robot.pose.at, radius_m: self.robot_radius_m },
             None => {
                 let radius_m = self.chain.connectors()[k].radius_m;
-                Solid { at: in_dimensions(self.chain.points()[k]), radius_m }
+                Solid { at: with_dimensions(self.chain.points()[k]), radius_m }
             }
         };
         (0..self.chain.points().len()).map(move |k| (k, solid(k)))
@@ -213,30 +213,31 @@ impl<const D: usize> Body<D> {
 
     /// Returns the box around its solid parts in the plane.
     fn solid_bounds(&self) -> Bounds<2> {
-        let boxes = self.solids().map(|(_, solid)| Bounds::of(&[solid.at]).grown(solid.radius_m));
-        boxes.fold(Bounds::nothing(), |all, one| all.joined(&one))
+        let boxes =
+            self.solids().map(|(_, solid)| Bounds::from_points(&[solid.at]).grown(solid.radius_m));
+        boxes.fold(Bounds::empty(), |all, one| all.joined(&one))
     }
 
     /// Returns a navigator's memory; at the start of its task it stands at its connector and looks
     /// ahead.
-    pub(crate) fn leader(&self, task: &Task<D>) -> LeaderState {
+    pub(crate) fn leader_state(&self, task: &Task<D>) -> LeaderState {
         self.driving.leader.unwrap_or_else(|| {
             let [x, y, _] = self.driving.ahead;
-            let [x, y] = unit([x, y]).unwrap_or([1.0, 0.0]);
-            let at = in_dimensions(self.chain.points()[task.agent]);
-            LeaderState::at(Pose { at, heading_rad: atan2(y, x) })
+            let [x, y] = normalized([x, y]).unwrap_or([1.0, 0.0]);
+            let at = with_dimensions(self.chain.points()[task.agent]);
+            LeaderState::new(Pose2 { at, heading_rad: atan2(y, x) })
         })
     }
 
     /// Returns the decisions that were handed over for a cycle, serialized.
-    fn handed_in(&self, cycle: Cycle) -> Option<Vec<u8>> {
+    fn submitted_controls(&self, cycle: Cycle) -> Option<Vec<u8>> {
         let handed = self.handed.as_ref().filter(|handed| handed.cycle == cycle)?;
         Some(postcard::to_stdvec(handed).expect("decisions are plain data"))
     }
 
     fn record(&self) -> ChainRecord {
         ChainRecord {
-            points_m: flat(self.chain.points()),
+            points_m: flatten(self.chain.points()),
             driving: self.driving.clone(),
             scattered: self.scattered.clone(),
             robots: self.robots.clone(),
@@ -247,7 +248,7 @@ impl<const D: usize> Body<D> {
     fn restore(
         spec: &ChainSpec<D>,
         record: &ChainRecord,
-        tally: Tally,
+        tally: ChainTally,
         cycle: Cycle,
     ) -> Result<Self, CheckpointError> {
         let mut chain = spec.start.clone();
@@ -274,15 +275,15 @@ impl<const D: usize> Body<D> {
 }
 
 /// Returns the coordinates one after the other.
-pub(crate) fn flat<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
+pub(crate) fn flatten<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
     points.iter().flatten().copied().collect()
 }
 
 impl<const D: usize> ChainState<D> {
-    fn of(bodies: impl Iterator<Item = Body<D>>) -> Self {
-        let cell = |body| Cell {
+    fn from_bodies(bodies: impl Iterator<Item = Body<D>>) -> Self {
+        let cell = |body| ChainCell {
             body: RwLock::new(body),
-            claim: Mutex::new(Bounds::nothing()),
+            claim: Mutex::new(Bounds::empty()),
             decision: Mutex::new(None),
         };
         Self {
@@ -300,7 +301,7 @@ impl<const D: usize> ChainState<D> {
     /// When a script contains no motions.
     pub fn new(world: &ChainWorld<D>) -> Result<Self, InputError> {
         let bodies = world.chains.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self::of(bodies.into_iter()))
+        Ok(Self::from_bodies(bodies.into_iter()))
     }
 
     /// Returns the state that a snapshot describes.
@@ -310,7 +311,7 @@ impl<const D: usize> ChainState<D> {
     pub(crate) fn restore(
         world: &ChainWorld<D>,
         snapshot: &Snapshot,
-        tallies: Vec<Tally>,
+        tallies: Vec<ChainTally>,
     ) -> Result<Self, CheckpointError> {
         if snapshot.chains.len() != world.chains.len() || tallies.len() != world.chains.len() {
             return Err(CheckpointError::Damaged);
@@ -327,7 +328,7 @@ impl<const D: usize> ChainState<D> {
         for record in &snapshot.plans {
             let body = bodies.get_mut(record.chain as usize).ok_or(CheckpointError::Damaged)?;
             let n = body.chain.points().len();
-            body.plan = Some(Plan::restore(record, body.joints.as_deref(), n)?);
+            body.plan = Some(MotionPlan::restore(record, body.joints.as_deref(), n)?);
         }
         for (slot, way_out) in &snapshot.ways_out {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
@@ -341,12 +342,12 @@ impl<const D: usize> ChainState<D> {
             body.scattered.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
         }
         restore_agents(&mut bodies, snapshot)?;
-        Ok(Self::of(bodies.into_iter()))
+        Ok(Self::from_bodies(bodies.into_iter()))
     }
 
     /// Returns a copy on which a cycle can be tried.
-    pub(crate) fn copied(&self) -> Self {
-        Self::of((0..self.len()).map(|slot| self.body(slot).clone()))
+    pub(crate) fn trial_copy(&self) -> Self {
+        Self::from_bodies((0..self.len()).map(|slot| self.body(slot).clone()))
     }
 
     /// Returns the number of chains.
@@ -361,23 +362,23 @@ impl<const D: usize> ChainState<D> {
 
     /// Locks one chain for reading.
     pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
-        let body = self.leading(slot);
+        let body = self.deferred_body(slot);
         if body.put_off.is_empty() {
             return body;
         }
         drop(body);
         self.body_mut(slot).catch_up();
-        self.leading(slot)
+        self.deferred_body(slot)
     }
 
     /// Locks one chain for reading, of which all connectors except the initiator may have motions to follow.
-    pub(crate) fn leading(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+    pub(crate) fn deferred_body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns whether the decisions of a chain's agents for a cycle were handed over, and are not carried out yet.
-    pub fn has_handed_over(&self, slot: usize, cycle: Cycle) -> bool {
-        let body = self.leading(slot);
+    pub fn has_submitted_controls(&self, slot: usize, cycle: Cycle) -> bool {
+        let body = self.deferred_body(slot);
         body.handed.as_ref().is_some_and(|handed| handed.cycle == cycle)
     }
 
@@ -398,9 +399,9 @@ impl<const D: usize> ChainState<D> {
     /// Returns the claims by their lower ends; valid while no chain claims anything.
     pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
         let made = self.claims.load(Relaxed);
-        renewed(
+        refresh(
             &self.neighbors,
-            |neighbors| neighbors.is_of(made),
+            |neighbors| neighbors.is_current(made),
             |neighbors| neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot))),
         )
     }
@@ -409,10 +410,10 @@ impl<const D: usize> ChainState<D> {
     /// which one is; valid while no body changes.
     pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
         slots.clear();
-        if self.len() <= FEW {
+        if self.len() <= MAX_LINEAR_SCAN {
             return slots.extend(0..self.len() as Slot);
         }
-        let crowd = renewed(
+        let crowd = refresh(
             &self.crowd,
             |_| !self.has_changed.load(Relaxed),
             |crowd| {
@@ -421,7 +422,7 @@ impl<const D: usize> ChainState<D> {
                 self.has_changed.store(false, Relaxed);
             },
         );
-        crowd.visit(&around(at, range_m).grown(ROUNDING_M), |slot| slots.push(slot as Slot));
+        crowd.visit(&bounds_around(at, range_m).grown(ROUNDING_M), |slot| slots.push(slot as Slot));
         slots.sort_unstable();
     }
 
@@ -449,7 +450,8 @@ impl<const D: usize> ChainState<D> {
         let waited = |slot| Some((slot as EntityId, self.body(slot).scattered.as_ref()?.waited));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
-        let handed = slots.clone().map(|slot| (slot as EntityId, self.body(slot).handed_in(cycle)));
+        let handed =
+            slots.clone().map(|slot| (slot as EntityId, self.body(slot).submitted_controls(cycle)));
         Snapshot {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
@@ -465,13 +467,13 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Returns the counts of each chain so far.
-    pub(crate) fn tallies(&self) -> Vec<Tally> {
+    pub(crate) fn tallies(&self) -> Vec<ChainTally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
 }
 
 /// Returns the content of a lock, renewed by the first worker that comes if it is out of date.
-fn renewed<T>(
+fn refresh<T>(
     lock: &RwLock<T>,
     is_current: impl Fn(&T) -> bool,
     renew: impl FnOnce(&mut T),
@@ -512,14 +514,14 @@ fn restore_agents<const D: usize>(
     for (slot, handed) in &snapshot.handed {
         let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
         let (n, now) = (body.chain.points().len(), snapshot.cycle);
-        let read = postcard::from_bytes::<Handed<D>>(handed).ok();
+        let read = postcard::from_bytes::<ChainControls<D>>(handed).ok();
         let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
         body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
     }
     Ok(())
 }
 
-impl<const D: usize> Plan<D> {
+impl<const D: usize> MotionPlan<D> {
     /// Returns the number of postures that are not reached yet.
     pub(crate) fn len(&self) -> usize {
         match self {
@@ -530,7 +532,7 @@ impl<const D: usize> Plan<D> {
 
     fn record(&self, chain: EntityId) -> PlanRecord {
         let way = match self {
-            Self::Rods(way) => way.iter().map(|posture| flat(posture)).collect(),
+            Self::Rods(way) => way.iter().map(|posture| flatten(posture)).collect(),
             Self::Joints(way) => way.iter().cloned().collect(),
         };
         PlanRecord { chain, way }
@@ -586,7 +588,7 @@ fn add(hasher: &mut Hasher, data: &impl Serialize) {
     bytes.chunks(8).for_each(|chunk| {
         let mut word = [0; 8];
         word[..chunk.len()].copy_from_slice(chunk);
-        hasher.u64(u64::from_le_bytes(word));
+        hasher.write_u64(u64::from_le_bytes(word));
     });
-    hasher.u64(bytes.len() as u64);
+    hasher.write_u64(bytes.len() as u64);
 }

@@ -1,24 +1,24 @@
 //! The visible parts of chains: connectors and rods, robots on wheels, and obstacles.
 
-use super::driver::{Driver, Task};
+use super::driver::{Task, TaskKind};
 use super::events::{Event, EventKind};
-use super::navigate::Goal;
-use super::perceive::Looking;
+use super::navigate::NavigationGoal;
+use super::perceive::Perceiver;
 use super::rods::chain::Chain;
-use super::rods::geometry::{Core, Cuboid, cross, in_dimensions};
+use super::rods::geometry::{Core, Cuboid, cross, with_dimensions};
 use super::rods::obstacle::Obstacle;
 use super::scratch::Scratch;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::view::{
-    Amount, Axis, Body, Condition, Entry, Kind, Level, Place, PlaceRows, Pose, Scan, Scans,
-    Scenery, Shape, Who,
+    Axis, Body, BodyId, BodyKind, Condition, LogEvent, Pose, PositionColumns, Quantity, Scan,
+    ScanSelection, Scenery, Severity, Shape, Vec3,
 };
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::ops::RangeInclusive;
 
 /// Drawn radius of connectors without a body, as a part of the longest rod.
-const POINT_OF_ROD: f64 = 0.05;
+const POINT_RADIUS_FRACTION: f64 = 0.05;
 /// Drawn height of bodies that have a place in the plane only, meters.
 const HEIGHT_M: f64 = 0.1;
 /// The name of a leader's laser.
@@ -29,7 +29,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(crate) fn scenery(&self, name: &str) -> Scenery {
         // Walls of one room share their number.
         let still = (0..).zip(self.obstacles.still());
-        let still = still.map(|(part, obstacle)| seen(obstacle).part(part));
+        let still = still.map(|(part, obstacle)| obstacle_body(obstacle).with_part(part));
         let goals = (0..).zip(self.chains.iter()).flat_map(|(id, spec)| goals(id, spec));
         Scenery {
             name: name.into(),
@@ -41,24 +41,24 @@ impl<const D: usize> ChainWorld<D> {
                 .zip(self.chains.iter())
                 // Those without a name are known by their number.
                 .filter(|(_, spec)| !spec.name.is_empty())
-                .map(|(id, spec)| (Kind::Connector, id, spec.name.clone()))
+                .map(|(id, spec)| (BodyKind::Connector, id, spec.name.clone()))
                 .collect(),
         }
     }
 
-    /// Describes recorded positions as places of connectors, one row every `every` cycles.
-    pub(crate) fn place_rows(every: Cycle) -> Vec<PlaceRows> {
-        vec![PlaceRows {
+    /// Describes recorded positions as places of connectors, one row interval `interval` cycles.
+    pub(crate) fn position_columns(interval: Cycle) -> Vec<PositionColumns> {
+        vec![PositionColumns {
             table: "trajectories",
-            kind: Kind::Connector,
+            kind: BodyKind::Connector,
             number: "chain",
             part: Some("connector"),
             axes: ["x_m", "y_m", "z_m"][..D].iter().map(|axis| Axis::meters(axis)).collect(),
             plane: None,
             is_corner: false,
-            ahead: None,
-            every,
-            worth: Cycle::MAX,
+            heading: None,
+            interval,
+            history: Cycle::MAX,
         }]
     }
 
@@ -68,21 +68,21 @@ impl<const D: usize> ChainWorld<D> {
         for (id, spec) in (0..).zip(self.chains.iter()) {
             push_chain(&mut bodies, id, spec, &state.body(id as usize));
         }
-        bodies.extend(self.movers.at(self.starts_s(now)).map(|mover| seen(&mover)));
+        bodies.extend(self.movers.at(self.start_time_s(now)).map(|mover| obstacle_body(&mover)));
         bodies
     }
 
     /// Returns the laser scans that leaders on wheels are about to take.
-    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, of: &Scans) -> Vec<Scan> {
+    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, of: &ScanSelection) -> Vec<Scan> {
         let scratch = &mut Scratch::new(self);
         scratch.scan.keeps_truth = true;
-        let mut looking = Looking { world: self, state, now, scratch };
-        let mut scan = |slot| scan_of(&mut looking, slot);
+        let mut looking = Perceiver { world: self, state, now, scratch };
+        let mut scan = |slot| leader_scan(&mut looking, slot);
         let slots = 0..state.len() as Slot;
         match of {
-            Scans::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
-            Scans::Of(bodies) => {
-                let asked = |of: &Who| {
+            ScanSelection::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
+            ScanSelection::Of(bodies) => {
+                let asked = |of: &BodyId| {
                     let scan = slots.contains(&of.number).then(|| scan(of.number))??;
                     (scan.of.part == of.part).then_some(scan)
                 };
@@ -93,17 +93,17 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Returns the scan that a leader on wheels is about to take; none for other chains.
-fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<Scan> {
-    let sight = looking.sight(slot)?;
+fn leader_scan<const D: usize>(looking: &mut Perceiver<'_, D>, slot: Slot) -> Option<Scan> {
+    let sight = looking.percept(slot)?;
     let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
     let beams = laser.readings(&looking.scratch.scan);
     let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
     let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
-    let true_m = laser.truths(&looking.scratch.scan).map(beyond).collect();
+    let true_m = laser.true_ranges(&looking.scratch.scan).map(beyond).collect();
     Some(Scan {
-        of: Who::new(Kind::Connector, slot, Some(sight.agent as u32)),
+        of: BodyId::new(BodyKind::Connector, slot, Some(sight.agent as u32)),
         sensor: LASER.into(),
-        pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
+        pose: Pose::from_heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
         bearings_rad,
         ranges_m,
         true_m,
@@ -113,29 +113,33 @@ fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<S
 
 /// Returns the places that a chain shall reach.
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
-    let of_task = |task: &Task<D>| -> Vec<(Place, f64)> {
+    let of_task = |task: &Task<D>| -> Vec<(Vec3, f64)> {
         match &task.driver {
-            Driver::Targets(targets) => {
-                targets.places.iter().map(|at| (in_dimensions(*at), targets.tolerance_m)).collect()
-            }
-            Driver::Navigate(navigator) => match &navigator.goal {
-                Some(Goal::Target { at, tolerance_m }) => vec![([at[0], at[1], 0.0], *tolerance_m)],
+            TaskKind::Targets(targets) => targets
+                .places
+                .iter()
+                .map(|at| (with_dimensions(*at), targets.tolerance_m))
+                .collect(),
+            TaskKind::Navigate(navigator) => match &navigator.goal {
+                Some(NavigationGoal::Target { at, tolerance_m }) => {
+                    vec![([at[0], at[1], 0.0], *tolerance_m)]
+                }
                 _ => Vec::new(),
             },
             _ => Vec::new(),
         }
     };
     let least_m = point_radius_m(&spec.start);
-    let goal = |(part, (at_m, radius_m)): (u32, (Place, f64))| {
+    let goal = |(part, (at_m, radius_m)): (u32, (Vec3, f64))| {
         let ball = Shape::Sphere { radius_m: radius_m.max(least_m) };
-        Body::new(Kind::Goal, id, Pose::at(at_m), ball).part(part)
+        Body::new(BodyKind::Goal, id, Pose::from_position(at_m), ball).with_part(part)
     };
     (0..).zip(spec.tasks.iter().flat_map(of_task)).map(goal).collect()
 }
 
 /// Returns the drawn radius of a chain's points, meters.
 fn point_radius_m<const D: usize>(chain: &Chain<D>) -> f64 {
-    POINT_OF_ROD * chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max)
+    POINT_RADIUS_FRACTION * chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max)
 }
 
 /// Adds a chain: its rods, its connectors, and the robots that keep to them.
@@ -146,41 +150,45 @@ fn push_chain<const D: usize>(
     body: &ChainBody<D>,
 ) {
     let (chain, least_m) = (&body.chain, point_radius_m(&spec.start));
-    let points_m: Vec<Place> = chain.points().iter().map(|p| in_dimensions(*p)).collect();
+    let points_m: Vec<Vec3> = chain.points().iter().map(|p| with_dimensions(*p)).collect();
     let radius_m = chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max);
     for (part, whole) in (0..).zip(whole_parts(chain)) {
         let points_m = points_m[whole].to_vec();
         let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
-        bodies.push(Body::new(Kind::Rods, id, Pose::at([0.0; 3]), line).part(part));
+        bodies.push(
+            Body::new(BodyKind::Rods, id, Pose::from_position([0.0; 3]), line).with_part(part),
+        );
     }
     let leader = leader(spec, body);
     let connectors = (0_u32..).zip(chain.connectors()).zip(&points_m);
     bodies.extend(connectors.map(|((part, connector), at_m)| {
         let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
-        Body::new(Kind::Connector, id, Pose::at(*at_m), Shape::Sphere { radius_m })
-            .part(part)
-            .when(leader == Some(part as usize), Condition::Leading)
-            .when(connector.failed, Condition::Failed)
+        Body::new(BodyKind::Connector, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
+            .with_part(part)
+            .with_state_if(leader == Some(part as usize), Condition::Leading)
+            .with_state_if(connector.failed, Condition::Failed)
     }));
     bodies.extend((0..).zip(&body.robots).map(|(part, robot)| {
         let [x_m, y_m] = robot.pose.at;
-        let pose = Pose::heading([x_m, y_m, 0.0], robot.pose.heading_rad);
+        let pose = Pose::from_heading([x_m, y_m, 0.0], robot.pose.heading_rad);
         let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
-        Body::new(Kind::Robot, id, pose, disc).part(part).when(robot.is_bumped, Condition::Touching)
+        Body::new(BodyKind::Robot, id, pose, disc)
+            .with_part(part)
+            .with_state_if(robot.is_bumped, Condition::Touching)
     }));
 }
 
 /// Returns the connector that the present task moves, or moved if all are done; none where no connector leads.
 fn leader<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<usize> {
     let present = spec.tasks.get(body.driving.task as usize).or(spec.tasks.last())?;
-    (!matches!(present.driver, Driver::Rest)).then_some(present.agent)
+    (!matches!(present.driver, TaskKind::Rest)).then_some(present.agent)
 }
 
 /// Returns runs of connectors that are joined, because a broken chain's rods hold nothing.
 fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
     let (mut parts, mut first) = (Vec::new(), 0);
     for rod in 0..chain.rods().len() {
-        if !chain.is_rod_within(rod) {
+        if !chain.is_rod_within_limits(rod) {
             parts.push(first..=rod);
             first = rod + 1;
         }
@@ -191,21 +199,23 @@ fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
 }
 
 /// Returns an obstacle as a drawn body.
-fn seen<const D: usize>(obstacle: &Obstacle<D>) -> Body {
+fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {
-        Core::Point(at) if D == 2 => {
-            (Pose::at(in_dimensions(*at)), Shape::Cylinder { radius_m, height_m: HEIGHT_M })
-        }
-        Core::Point(at) => (Pose::at(in_dimensions(*at)), Shape::Sphere { radius_m }),
+        Core::Point(at) if D == 2 => (
+            Pose::from_position(with_dimensions(*at)),
+            Shape::Cylinder { radius_m, height_m: HEIGHT_M },
+        ),
+        Core::Point(at) => (Pose::from_position(with_dimensions(*at)), Shape::Sphere { radius_m }),
         Core::Segment(ends) => {
-            let points_m = ends.iter().map(|p| in_dimensions(*p)).collect();
+            let points_m = ends.iter().map(|p| with_dimensions(*p)).collect();
             let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
-            (Pose::at([0.0; 3]), line)
+            (Pose::from_position([0.0; 3]), line)
         }
         Core::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
-    Body::new(Kind::Obstacle, obstacle.id, pose, shape).moving(in_dimensions(obstacle.velocity_m_s))
+    Body::new(BodyKind::Obstacle, obstacle.id, pose, shape)
+        .with_velocity(with_dimensions(obstacle.velocity_m_s))
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
@@ -217,84 +227,88 @@ fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
 }
 
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
-    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| in_dimensions(*axis));
+    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| with_dimensions(*axis));
     let (x, y) = (axis(0), axis(1));
     // Two axes give the third up to its sign, and a box looks the same both ways.
-    Pose::axes(in_dimensions(cuboid.center), [x, y, cross(x, y)])
+    Pose::from_axes(with_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 
 /// Stands for the unit of events without a value.
 const NO_VALUE: &str = "none";
 
 /// Describes an event in words.
-pub(crate) fn entry(event: &Event) -> Entry {
-    let (level, unit, words) = told(event);
-    Entry {
+pub(crate) fn view_event(event: &Event) -> LogEvent {
+    let (level, unit, words) = describe(event);
+    LogEvent {
         cycle: event.cycle,
         level,
-        kind: event.kind.happening(),
-        who: Who::new(Kind::Connector, event.chain, Some(event.connector)),
-        with: event.obstacle.map(who_of_obstacle),
+        kind: event.kind.view_kind(),
+        who: BodyId::new(BodyKind::Connector, event.chain, Some(event.connector)),
+        with: event.obstacle.map(obstacle_body_id),
         at_m: Some(event.at_m),
-        value: (unit != NO_VALUE).then(|| Amount::new(event.value, unit)),
+        value: (unit != NO_VALUE).then(|| Quantity::new(event.value, unit)),
         words,
     }
 }
 
 /// Returns the severity of an event, the unit of its value, and its words.
-fn told(event: &Event) -> (Level, &'static str, String) {
+fn describe(event: &Event) -> (Severity, &'static str, String) {
     let value = event.value;
-    let what = event.obstacle.map(obstacle_in_words);
+    let what = event.obstacle.map(obstacle_text);
     let because = what.as_ref().map_or(String::new(), |what| format!(", because of {what}"));
     let reason = event.reason.map_or("", |reason| reason.name());
     match event.kind {
-        EventKind::Veto => (Level::Warning, "m", format!("objects: {reason}{because}")),
+        EventKind::Veto => (Severity::Warning, "m", format!("objects: {reason}{because}")),
         EventKind::Penetration => {
             let what = what.unwrap_or_else(|| "an obstacle".into());
-            (Level::Error, "m", format!("is {value:.4} m inside {what}"))
+            (Severity::Error, "m", format!("is {value:.4} m inside {what}"))
         }
-        EventKind::Clear => (Level::Info, NO_VALUE, "is clear of obstacles again".into()),
-        EventKind::Escape => (Level::Info, "", format!("gets out of the way{because}")),
-        EventKind::Bumper => (Level::Warning, "m", "touches something with its bumper".into()),
-        EventKind::Sideways => (Level::Info, "rad", format!("goes on {value:.2} rad to the side")),
-        EventKind::PulledBack => (Level::Info, NO_VALUE, "is pulled back by the other end".into()),
-        EventKind::Stuck => (Level::Warning, NO_VALUE, "is stuck".into()),
-        EventKind::Changed => (Level::Info, NO_VALUE, "has changed".into()),
-        EventKind::Broken => (Level::Error, "", format!("breaks, {value} parts are scattered")),
-        EventKind::Reforming => (Level::Info, "", "sets out to be joined again".into()),
-        EventKind::Reformed => (Level::Info, NO_VALUE, "is joined again".into()),
-        EventKind::GapTooLong => (Level::Warning, "m", gap_in_words(value, event.missing)),
+        EventKind::Clear => (Severity::Info, NO_VALUE, "is clear of obstacles again".into()),
+        EventKind::Escape => (Severity::Info, "", format!("gets out of the way{because}")),
+        EventKind::Bumper => (Severity::Warning, "m", "touches something with its bumper".into()),
+        EventKind::Sideways => {
+            (Severity::Info, "rad", format!("goes on {value:.2} rad to the side"))
+        }
+        EventKind::PulledBack => {
+            (Severity::Info, NO_VALUE, "is pulled back by the other end".into())
+        }
+        EventKind::Stuck => (Severity::Warning, NO_VALUE, "is stuck".into()),
+        EventKind::Changed => (Severity::Info, NO_VALUE, "has changed".into()),
+        EventKind::Broken => (Severity::Error, "", format!("breaks, {value} parts are scattered")),
+        EventKind::Reforming => (Severity::Info, "", "sets out to be joined again".into()),
+        EventKind::Reformed => (Severity::Info, NO_VALUE, "is joined again".into()),
+        EventKind::GapTooLong => (Severity::Warning, "m", gap_text(value, event.missing)),
         EventKind::NotReformed => {
-            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m{because}"))
+            (Severity::Warning, "m", format!("cannot be joined, off by {value:.3} m{because}"))
         }
-        EventKind::Target => (Level::Info, "", format!("has reached target {value}")),
-        EventKind::Done => (Level::Info, "", format!("has done task {value}")),
-        EventKind::GivenUp => (Level::Warning, "", format!("has given up task {value}")),
-        EventKind::TargetGivenUp => (Level::Warning, "", format!("has given up target {value}")),
-        EventKind::Planned => (Level::Info, "", format!("follows a plan of {value} pieces")),
-        EventKind::NotPlanned => (Level::Warning, "", format!("has no plan to target {value}")),
+        EventKind::Target => (Severity::Info, "", format!("has reached target {value}")),
+        EventKind::Done => (Severity::Info, "", format!("has done task {value}")),
+        EventKind::GivenUp => (Severity::Warning, "", format!("has given up task {value}")),
+        EventKind::TargetGivenUp => (Severity::Warning, "", format!("has given up target {value}")),
+        EventKind::Planned => (Severity::Info, "", format!("follows a plan of {value} pieces")),
+        EventKind::NotPlanned => (Severity::Warning, "", format!("has no plan to target {value}")),
         EventKind::Unheard => {
-            (Level::Warning, "", format!("is not heard by connector {value}: the chain stands"))
+            (Severity::Warning, "", format!("is not heard by connector {value}: the chain stands"))
         }
-        EventKind::Heard => (Level::Info, "", format!("is heard by connector {value} again")),
-        EventKind::Deadline => (Level::Warning, NO_VALUE, "is out of time".into()),
+        EventKind::Heard => (Severity::Info, "", format!("is heard by connector {value} again")),
+        EventKind::Deadline => (Severity::Warning, NO_VALUE, "is out of time".into()),
     }
 }
 
 /// Returns the body of an obstacle: another chain stands for all of its parts.
-pub(crate) fn who_of_obstacle(id: u32) -> Who {
+pub(crate) fn obstacle_body_id(id: u32) -> BodyId {
     match id.checked_sub(OTHER_CHAIN) {
-        Some(chain) => Who::new(Kind::Rods, chain, None),
-        None => Who::new(Kind::Obstacle, id, None),
+        Some(chain) => BodyId::new(BodyKind::Rods, chain, None),
+        None => BodyId::new(BodyKind::Obstacle, id, None),
     }
 }
 
-fn gap_in_words(wanting_m: f64, missing: u32) -> String {
+fn gap_text(wanting_m: f64, missing: u32) -> String {
     let parts = if missing == 1 { "part is" } else { "parts are" };
     format!("has a gap that is {wanting_m:.3} m too long: {missing} {parts} missing")
 }
 
-fn obstacle_in_words(id: u32) -> String {
+fn obstacle_text(id: u32) -> String {
     match id.checked_sub(OTHER_CHAIN) {
         Some(chain) => format!("chain {chain}"),
         None => format!("obstacle/{id}"),

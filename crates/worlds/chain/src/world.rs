@@ -1,19 +1,19 @@
 //! A compiled world of chains: everything that never changes during a run.
 
 use super::arms::arm::Arm;
-use super::deploy::kind::Deployment;
-use super::driver::{Driver, Driving, Task};
+use super::deploy::deployment::Deployment;
+use super::driver::{Task, TaskKind, TaskProgress};
 use super::formation::{Robot, Robots};
 use super::ground::Movers;
-use super::motion::escape::Escape;
-use super::motion::replan::Rungs;
+use super::motion::escape::EscapeRules;
+use super::motion::recovery::RecoveryLimits;
 use super::rods::chain::{Chain, Mobility};
-use super::rods::geometry::{Point, in_dimensions, norm};
+use super::rods::geometry::{Point, norm, with_dimensions};
 use super::rods::obstacle::{Obstacle, Obstacles};
-use super::rods::rebuild::MayCome;
+use super::rods::rebuild::MovableEnd;
 use super::rods::rules::Rules;
-use super::script::Motion;
-use super::swarm::drive::Pose;
+use super::script::ScriptMotion;
+use super::swarm::drive::Pose2;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::network::Network;
@@ -45,7 +45,7 @@ pub(crate) mod purpose {
 }
 
 /// Cutoff of a random throw, in standard deviations.
-pub(crate) const FARTHEST_THROW: f64 = 8.0;
+pub(crate) const MAX_THROW_SIGMAS: f64 = 8.0;
 
 /// Ids from here on stand for parts of other chains: the chain's number is added.
 pub(crate) const OTHER_CHAIN: u32 = 1 << 31;
@@ -66,9 +66,9 @@ pub struct ChainWorld<const D: usize> {
     /// Rules by which chains react.
     pub(crate) rules: Rules,
     /// Rule for getting out of the way of moving obstacles, if they do.
-    pub(crate) escape: Option<Escape>,
+    pub(crate) escape: Option<EscapeRules>,
     /// Time that initiators spend on each rung of the ladder after a veto.
-    pub(crate) rungs: Rungs,
+    pub(crate) rungs: RecoveryLimits,
     /// Distance around its parts in which a chain looks for its least clearance, meters.
     pub look_m: f64,
     pub(crate) streams: Streams,
@@ -105,12 +105,12 @@ pub(crate) struct Change<const D: usize> {
     /// The cycle.
     pub(crate) cycle: Cycle,
     /// The change.
-    pub(crate) what: What<D>,
+    pub(crate) what: ChangeKind<D>,
 }
 
 /// Kinds of changes.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum What<const D: usize> {
+pub(crate) enum ChangeKind<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
         /// Its index.
@@ -144,7 +144,7 @@ pub(crate) enum What<const D: usize> {
     /// The scattered connectors come back.
     Reform {
         /// The whole end that may come along.
-        may_come: MayCome,
+        may_come: MovableEnd,
         /// Speed limit of each part, m/s.
         speed_m_s: f64,
     },
@@ -152,19 +152,19 @@ pub(crate) enum What<const D: usize> {
 
 impl<const D: usize> Change<D> {
     /// Returns how far the change may throw parts in a cycle, meters.
-    pub(crate) fn throws_m(&self, now: Cycle) -> f64 {
+    pub(crate) fn max_throw_m(&self, now: Cycle) -> f64 {
         match &self.what {
-            What::Scatter { by_m, apart_m, .. } if self.cycle == now => {
-                FARTHEST_THROW * by_m + norm(*apart_m)
+            ChangeKind::Scatter { by_m, apart_m, .. } if self.cycle == now => {
+                MAX_THROW_SIGMAS * by_m + norm(*apart_m)
             }
             _ => 0.0,
         }
     }
 
     /// Returns the speed at which scattered parts set out in a cycle because of the change, m/s.
-    pub(crate) fn gathers_m_s(&self, now: Cycle) -> f64 {
+    pub(crate) fn gather_speed_m_s(&self, now: Cycle) -> f64 {
         match &self.what {
-            What::Reform { speed_m_s, .. } if self.cycle == now => *speed_m_s,
+            ChangeKind::Reform { speed_m_s, .. } if self.cycle == now => *speed_m_s,
             _ => 0.0,
         }
     }
@@ -172,15 +172,17 @@ impl<const D: usize> Change<D> {
     /// Applies a change of constraints.
     pub(crate) fn constrain(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
-            What::Failed { connector, failed } => {
+            ChangeKind::Failed { connector, failed } => {
                 chain.set_failed(*connector, *failed);
                 Ok(())
             }
-            What::Mobility { connector, mobility } => chain.set_mobility(*connector, *mobility),
-            What::MaxBend { connector, max_bend_rad } => {
+            ChangeKind::Mobility { connector, mobility } => {
+                chain.set_mobility(*connector, *mobility)
+            }
+            ChangeKind::MaxBend { connector, max_bend_rad } => {
                 chain.set_max_bend_rad(*connector, *max_bend_rad)
             }
-            What::Scatter { .. } | What::Reform { .. } => Ok(()),
+            ChangeKind::Scatter { .. } | ChangeKind::Reform { .. } => Ok(()),
         };
         done.expect("a change was checked when the scenario was compiled");
     }
@@ -188,11 +190,11 @@ impl<const D: usize> Change<D> {
 
 impl<const D: usize> ChainSpec<D> {
     /// Returns the robots of a swarm at their connectors, all facing ahead along their chain.
-    pub(crate) fn robots_at(&self, points: &[Point<D>], driving: &Driving) -> Vec<Robot> {
+    pub(crate) fn robots_at(&self, points: &[Point<D>], driving: &TaskProgress) -> Vec<Robot> {
         let [x, y, _] = driving.ahead;
         let heading_rad = atan2(y, x);
         let robot = |p: &Point<D>| Robot {
-            pose: Pose { at: in_dimensions(*p), heading_rad },
+            pose: Pose2 { at: with_dimensions(*p), heading_rad },
             is_bumped: false,
         };
         self.robots.iter().flat_map(|_| points.iter().map(robot)).collect()
@@ -203,9 +205,9 @@ impl<const D: usize> ChainSpec<D> {
     }
 
     /// Returns the motions of the script that a driver is carrying out; empty if there is none.
-    pub(crate) fn motions(&self, driving: &Driving) -> Result<Vec<Motion>, InputError> {
+    pub(crate) fn motions(&self, driving: &TaskProgress) -> Result<Vec<ScriptMotion>, InputError> {
         match self.tasks.get(driving.task as usize).map(|task| &task.driver) {
-            Some(Driver::Script(script)) => driving.motions(script),
+            Some(TaskKind::Script(script)) => driving.motions(script),
             _ => Ok(Vec::new()),
         }
     }
@@ -219,7 +221,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns the seconds from the start of the run to the start of a cycle.
-    pub fn starts_s(&self, now: Cycle) -> f64 {
+    pub fn start_time_s(&self, now: Cycle) -> f64 {
         now as f64 * self.dt_s
     }
 }

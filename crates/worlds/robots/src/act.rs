@@ -1,9 +1,9 @@
 //! *Act*: the bodies of a group act one after the other; the environment decides.
 
+use super::cycle_context::{CycleContext, are_free, box_index};
 use super::decide::Contact;
-use super::effector::{Action, ObstacleRule, Side, Walk};
-use super::scene::{Scene, all_free, at};
-use super::state::{BodyCell, Facing, LastContact};
+use super::effector::{Action, ObstacleRule, Side, StepPath};
+use super::state::{BodyState, Facing, LastContact};
 use super::world::Role;
 use super::{Event, EventKind, MotionSample, Scratch};
 use sidestep_kernel::Slot;
@@ -12,16 +12,16 @@ use sidestep_kernel::space::BoxWord;
 
 /// The result that a walk would have in the present state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Verdict {
+pub(super) struct WalkResult {
     /// Number of steps that are made.
     pub(super) steps: usize,
     /// The obstacle that stopped it.
-    pub(super) contact: Option<Touch>,
+    pub(super) contact: Option<Blocker>,
 }
 
 /// An obstacle that stops a walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Touch {
+pub(super) struct Blocker {
     /// Kind of the obstacle.
     pub(super) kind: u8,
     /// Side of the body that touches it.
@@ -30,10 +30,10 @@ pub(super) struct Touch {
     pub(super) by: Option<Slot>,
 }
 
-impl<T: BoxWord> Scene<'_, T> {
+impl<T: BoxWord> CycleContext<'_, T> {
     /// Lets one body act with the draw of its own stream.
     #[inline]
-    pub(super) fn act_drawn(&self, slot: Slot, scratch: &mut Scratch) {
+    pub(super) fn act_with_draw(&self, slot: Slot, scratch: &mut Scratch) {
         let [word, _] = self.act_words(self.cell(slot).id);
         self.act(slot, word, scratch);
     }
@@ -50,24 +50,24 @@ impl<T: BoxWord> Scene<'_, T> {
         let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
             return self.toggle(slot, scratch);
         };
-        let walk = &action.walks[self.drawn(action, slot, word)];
-        if all_free(self.floor, self.base(cell), &walk.whole.enter) {
-            self.make_whole(walk, slot);
+        let walk = &action.walks[self.draw_transition(action, slot, word)];
+        if are_free(self.floor, self.base(cell), &walk.whole.enter) {
+            self.execute_whole(walk, slot);
             if scratch.keep_motions {
-                let verdict = Verdict { steps: walk.steps.len(), contact: None };
-                self.sample_motion(walk, verdict, cell, scratch);
+                let verdict = WalkResult { steps: walk.steps.len(), contact: None };
+                self.record_motion(walk, verdict, cell, scratch);
             }
         } else {
-            self.blocked(walk, slot, scratch);
+            self.execute_blocked(walk, slot, scratch);
         }
     }
 
     /// Returns the number of the transition in which an action ends; `word` is the body's draw.
     #[inline(always)]
-    pub(super) fn drawn(&self, action: &Action, slot: Slot, word: u32) -> usize {
+    pub(super) fn draw_transition(&self, action: &Action, slot: Slot, word: u32) -> usize {
         match self.world.obstacle_rule {
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
-            ObstacleRule::Renormalise => match self.rescaled(action, slot) {
+            ObstacleRule::Renormalise => match self.unblocked_distribution(action, slot) {
                 Ok(distribution) => distribution.sample(word),
                 Err(blocked) => blocked,
             },
@@ -76,7 +76,7 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Makes a whole walk that meets no obstacle.
     #[inline]
-    fn make_whole(&self, walk: &Walk, slot: Slot) {
+    fn execute_whole(&self, walk: &StepPath, slot: Slot) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let base = self.base(cell);
         cell.contact.set(LastContact::NONE);
@@ -87,35 +87,35 @@ impl<T: BoxWord> Scene<'_, T> {
             return;
         }
         let whole = &walk.whole;
-        whole.leave.iter().for_each(|&offset| floor.set(at(base, offset), T::FREE));
-        whole.fill.iter().for_each(|&offset| floor.set(at(base, offset), T::standing(slot)));
-        cell.anchor.set(cell.at().offset(whole.delta.0, whole.delta.1).word());
+        whole.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
+        whole.fill.iter().for_each(|&offset| floor.set(box_index(base, offset), T::standing(slot)));
+        cell.anchor.set(cell.position().offset(whole.delta.0, whole.delta.1).word());
         cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
         if self.type_of(cell).marks {
-            let new = |&offset: &i32| self.state.visited.insert(at(base, offset));
+            let new = |&offset: &i32| self.state.visited.insert(box_index(base, offset));
             let first_visits = whole.enter.iter().filter(|offset| new(offset)).count();
             cell.first_visits.set(cell.first_visits.get() + first_visits as u32);
         }
     }
 
     /// Makes a walk that an obstacle may cut short.
-    fn blocked(&self, walk: &Walk, slot: Slot, scratch: &mut Scratch) {
+    fn execute_blocked(&self, walk: &StepPath, slot: Slot, scratch: &mut Scratch) {
         let cell = self.cell(slot);
-        let verdict = self.judge(walk, slot);
+        let verdict = self.walk_result(walk, slot);
         let is_mover = matches!(self.type_of(cell).role, Role::Mover(_));
         let made = match self.world.obstacle_rule {
             _ if verdict.contact.is_none() => verdict.steps,
             ObstacleRule::Cut if !is_mover => verdict.steps,
             _ => 0,
         };
-        self.make(walk, made, slot);
+        self.execute_steps(walk, made, slot);
         // Only robots keep contacts; people just try another time.
         if is_mover {
             return;
         }
         if scratch.keep_motions {
-            let made = Verdict { steps: made, ..verdict };
-            self.sample_motion(walk, made, cell, scratch);
+            let made = WalkResult { steps: made, ..verdict };
+            self.record_motion(walk, made, cell, scratch);
         }
         match verdict.contact {
             None => {
@@ -124,60 +124,63 @@ impl<T: BoxWord> Scene<'_, T> {
                     cell.facing.set(cell.facing.get().turned(walk.turn));
                 }
             }
-            Some(touch) => self.touch(cell, touch, scratch),
+            Some(touch) => self.record_contact(cell, touch, scratch),
         }
     }
 
     /// Notes a contact in the body's cell, in its counters and, where events are kept, as an event.
-    fn touch(&self, cell: &BodyCell, touch: Touch, scratch: &mut Scratch) {
-        let Touch { kind, side, by } = touch;
-        cell.contact.set(LastContact::of(Contact { kind, side }));
+    fn record_contact(&self, cell: &BodyState, touch: Blocker, scratch: &mut Scratch) {
+        let Blocker { kind, side, by } = touch;
+        cell.contact.set(LastContact::from_contact(Contact { kind, side }));
         let (body, kinds) = (cell.id, self.world.kinds.len());
         self.state.contacts.add(body as usize * kinds + usize::from(kind), 1);
         if scratch.keep_events {
             let with = by.map(|slot| self.cell(slot).id);
             let event = EventKind::Contact { kind, side, with };
-            scratch.events.push(self.event(cell, event));
+            scratch.events.push(self.body_event(cell, event));
         }
     }
 
     /// Returns an event of a body, which is where it happens.
-    fn event(&self, cell: &BodyCell, event: EventKind) -> Event {
-        let at = self.world.map_position(cell.at());
+    fn body_event(&self, cell: &BodyState, event: EventKind) -> Event {
+        let at = self.world.map_position(cell.position());
         Event { cycle: self.now, body: cell.id, at, event }
     }
 
     /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
-    pub(super) fn judge(&self, walk: &Walk, slot: Slot) -> Verdict {
+    pub(super) fn walk_result(&self, walk: &StepPath, slot: Slot) -> WalkResult {
         let base = self.base(self.cell(slot));
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
-                let word = self.floor.get(at(base, offset));
+                let word = self.floor.get(box_index(base, offset));
                 // A path that turns back enters boxes that the body itself still covers.
                 if !word.is_free() && word.slot() != slot {
                     let by = (word != T::WALL).then(|| word.slot());
                     let kind = self.state.kind_of(word);
-                    return Verdict { steps, contact: Some(Touch { kind, side: step.side, by }) };
+                    return WalkResult {
+                        steps,
+                        contact: Some(Blocker { kind, side: step.side, by }),
+                    };
                 }
             }
         }
-        Verdict { steps: walk.steps.len(), contact: None }
+        WalkResult { steps: walk.steps.len(), contact: None }
     }
 
     /// Makes the first `steps` steps of a walk.
     #[inline]
-    fn make(&self, walk: &Walk, steps: usize, slot: Slot) {
+    fn execute_steps(&self, walk: &StepPath, steps: usize, slot: Slot) {
         if steps == 0 {
             return;
         }
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, marks) = (self.base(cell), self.type_of(cell).marks);
-        let (mut moved, mut first_visits) = (cell.at(), 0);
+        let (mut moved, mut first_visits) = (cell.position(), 0);
         for step in &walk.steps[..steps] {
-            step.leave.iter().for_each(|&offset| floor.set(at(base, offset), T::FREE));
+            step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
             for &offset in &step.enter {
-                let index = at(base, offset);
+                let index = box_index(base, offset);
                 floor.set(index, T::standing(slot));
                 first_visits += u32::from(marks && self.state.visited.insert(index));
             }
@@ -190,8 +193,8 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Returns the distribution over the walks that are not blocked here, or, when none is left,
     /// the first blocked one as an error.
-    fn rescaled(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
-        let free = |walk: &Walk| self.judge(walk, slot).contact.is_none();
+    fn unblocked_distribution(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
+        let free = |walk: &StepPath| self.walk_result(walk, slot).contact.is_none();
         let mut row: Vec<f64> = action
             .probabilities
             .iter()
@@ -211,22 +214,28 @@ impl<T: BoxWord> Scene<'_, T> {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, own) = (self.base(cell), &self.type_of(cell).own);
         let opens = cell.facing.get() == Facing::CLOSED;
-        if !opens && !all_free(floor, base, own) {
+        if !opens && !are_free(floor, base, own) {
             return;
         }
         let word = if opens { T::FREE } else { T::standing(slot) };
-        own.iter().for_each(|&offset| floor.set(at(base, offset), word));
+        own.iter().for_each(|&offset| floor.set(box_index(base, offset), word));
         cell.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
         if scratch.keep_events {
-            let event = if opens { EventKind::Opened } else { EventKind::Closed };
-            scratch.events.push(self.event(cell, event));
+            let event = if opens { EventKind::DoorOpened } else { EventKind::DoorClosed };
+            scratch.events.push(self.body_event(cell, event));
         }
     }
 
     /// Records the result of an action in a log for learning: the steps and the turn that were
     /// really made, not those that the drawn transition would have made in free space.
     /// People have no effector to learn, so theirs are left out.
-    fn sample_motion(&self, walk: &Walk, verdict: Verdict, cell: &BodyCell, scratch: &mut Scratch) {
+    fn record_motion(
+        &self,
+        walk: &StepPath,
+        verdict: WalkResult,
+        cell: &BodyState,
+        scratch: &mut Scratch,
+    ) {
         if matches!(self.type_of(cell).role, Role::Mover(_)) {
             return;
         }

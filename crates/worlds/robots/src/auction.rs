@@ -4,11 +4,11 @@
 //! the highest in all of them, because then all bodies that conflict with it and come before it
 //! have acted. So the outcome is that of the policy `random`, because the bids are its draws.
 
-use super::scene::{Scene, at, with_scene};
+use super::cycle_context::{CycleContext, box_index, with_scene};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::{BoxWord, Position};
 use sidestep_kernel::world::Auction;
-use sidestep_kernel::{Slot, Turn};
+use sidestep_kernel::{PhaseContext, Slot};
 use std::sync::atomic::Ordering::Relaxed;
 
 /// A body's bid of one round.
@@ -23,14 +23,14 @@ pub(super) struct Bid {
     value: u64,
 }
 
-impl<T: BoxWord> Scene<'_, T> {
+impl<T: BoxWord> CycleContext<'_, T> {
     /// Bids for all boxes that a body covers or may come to cover.
     fn bid(&self, slot: Slot) -> Bid {
         let cell = self.cell(slot);
         let [word, draw] = self.act_words(cell.id);
         // Inverted, because the smallest (draw, id) acts first.
         let value = !(u64::from(draw) << 32 | u64::from(cell.id));
-        let bid = Bid { slot, word, at: cell.at(), value };
+        let bid = Bid { slot, word, at: cell.position(), value };
         self.for_each_box_of(bid, |index| {
             self.state.bids[index].fetch_max(value, Relaxed);
         });
@@ -55,7 +55,8 @@ impl<T: BoxWord> Scene<'_, T> {
         let cell = self.cell(bid.slot);
         let body = self.type_of(cell);
         let base = bid.at.index(self.world.stride);
-        let mut all = |boxes: &[i32]| boxes.iter().for_each(|&offset| each(at(base, offset)));
+        let mut all =
+            |boxes: &[i32]| boxes.iter().for_each(|&offset| each(box_index(base, offset)));
         all(&body.own);
         if !cell.intent.get().is_idle()
             && let Some(action) = body.actions.get(usize::from(cell.action.get()))
@@ -66,12 +67,12 @@ impl<T: BoxWord> Scene<'_, T> {
 }
 
 impl Auction<Self> for RobotsWorld {
-    fn bid(&self, turn: &mut Turn<'_, Self>, body: Slot) {
+    fn bid(&self, turn: &mut PhaseContext<'_, Self>, body: Slot) {
         let bid = with_scene!(self, turn.state, turn.now, |scene| scene.bid(body));
         turn.scratch.bids.push(bid);
     }
 
-    fn act_on_bids(&self, turn: &mut Turn<'_, Self>, pending: &mut Vec<Slot>) {
+    fn act_on_bids(&self, turn: &mut PhaseContext<'_, Self>, pending: &mut Vec<Slot>) {
         pending.clear();
         let bids = std::mem::take(&mut turn.scratch.bids);
         with_scene!(self, turn.state, turn.now, |scene| {
@@ -86,7 +87,7 @@ impl Auction<Self> for RobotsWorld {
         turn.scratch.bids = bids;
     }
 
-    fn retract_bids(&self, turn: &mut Turn<'_, Self>) {
+    fn retract_bids(&self, turn: &mut PhaseContext<'_, Self>) {
         with_scene!(self, turn.state, turn.now, |scene| {
             turn.scratch.bids.drain(..).for_each(|bid| scene.retract(bid));
         });

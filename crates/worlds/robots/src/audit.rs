@@ -21,7 +21,7 @@ impl RobotsWorld {
         for (index, (&wall, owner)) in self.walls.iter().zip(&owner).enumerate() {
             let expected = match owner {
                 Some(slot) => Occupant::Body(*slot),
-                None if wall == FREE => Occupant::Nobody,
+                None if wall == FREE => Occupant::Empty,
                 None => Occupant::Wall,
             };
             let shown = state.floor.occupant(index);
@@ -38,8 +38,8 @@ impl RobotsWorld {
         slot: Slot,
         owner: &mut [Option<Slot>],
     ) -> Result<(), String> {
-        let at = state.at(slot);
-        for &offset in &state.type_in(self, slot).own {
+        let at = state.position(slot);
+        for &offset in &state.body_type(self, slot).own {
             let index = at.index(self.stride).wrapping_add_signed(offset) as usize;
             let is_wall = self.walls.get(index).is_none_or(|&w| w != FREE);
             if is_wall {

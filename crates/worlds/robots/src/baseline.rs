@@ -18,9 +18,9 @@
 //! Both write claims, as the double pool does; the lock does not use them.
 
 use super::Scratch;
+use super::cycle_context::{CycleContext, with_scene};
 use super::metrics::Metrics;
 use super::scenario::Compiled;
-use super::scene::{Scene, with_scene};
 use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::BoxWord;
@@ -54,18 +54,18 @@ impl Strategy {
 
 /// A run of a robots world under one of the rejected strategies.
 #[derive(Debug)]
-pub struct Baseline {
+pub struct BaselineRun {
     compiled: Compiled,
     state: RobotsState,
     strategy: Strategy,
-    crew: Vec<Hand>,
+    workers: Vec<BandWorker>,
     cycle: Cycle,
     serial_acts: u64,
 }
 
 /// A worker's own data.
 #[derive(Debug, Default)]
-struct Hand {
+struct BandWorker {
     scratch: Scratch,
     /// Bodies anchored in this worker's band.
     own: Vec<Slot>,
@@ -75,7 +75,7 @@ struct Hand {
 
 /// Data that the workers of a partition pass to each other.
 #[derive(Debug)]
-struct Borders {
+struct HaloExchange {
     /// Columns of each band in the padded grid; the outer bands reach over the map's edge.
     bands: Vec<Range<u32>>,
     /// Bodies of this cycle that are not inside one band.
@@ -84,17 +84,17 @@ struct Borders {
     inboxes: Vec<Mutex<Vec<Slot>>>,
 }
 
-impl Baseline {
+impl BaselineRun {
     /// Returns a run at its start, with `workers` workers (at least 1).
     pub fn new(compiled: Compiled, strategy: Strategy, workers: usize) -> Self {
         let state = RobotsState::restore(&compiled.world, &compiled.start_snapshot());
         let mut crew = Vec::new();
-        crew.resize_with(workers.max(1), Hand::default);
+        crew.resize_with(workers.max(1), BandWorker::default);
         let bands = compiled.world.bands(crew.len());
         for slot in 0..compiled.world.bodies.len() as Slot {
-            crew[band_of(&bands, state.at(slot).col())].own.push(slot);
+            crew[band_of(&bands, state.position(slot).col())].own.push(slot);
         }
-        Self { compiled, state, strategy, crew, cycle: 0, serial_acts: 0 }
+        Self { compiled, state, strategy, workers: crew, cycle: 0, serial_acts: 0 }
     }
 
     /// Runs `cycles` cycles.
@@ -105,7 +105,7 @@ impl Baseline {
             Strategy::OneLock => self.advance_one_lock(span),
         }
         self.cycle += cycles;
-        self.serial_acts = self.crew.iter().map(|hand| hand.serial_acts).sum();
+        self.serial_acts = self.workers.iter().map(|hand| hand.serial_acts).sum();
     }
 
     /// Returns the state by entity id.
@@ -119,7 +119,7 @@ impl Baseline {
     }
 
     /// Returns the share of the bodies' cycles that one worker did while all others waited.
-    pub fn serial_share(&self) -> f64 {
+    pub fn serial_fraction(&self) -> f64 {
         let all = self.compiled.world.bodies.len() as u64 * self.cycle;
         self.serial_acts as f64 / all.max(1) as f64
     }
@@ -127,13 +127,13 @@ impl Baseline {
     fn advance_one_lock(&mut self, span: Range<Cycle>) {
         let (world, state) = (&*self.compiled.world, &self.state);
         let the_world = Mutex::new(());
-        workers::run(&mut self.crew, |worker, hand| {
+        workers::run(&mut self.workers, |worker, hand| {
             for (pool, now) in (0u64..).zip(span.clone()) {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
                     with_scene!(world, state, now, |scene| for slot in bodies {
                         let _turn = lock(&the_world);
                         scene.perceive(slot as Slot, &mut hand.scratch);
-                        scene.act_drawn(slot as Slot, &mut hand.scratch);
+                        scene.act_with_draw(slot as Slot, &mut hand.scratch);
                     });
                 });
                 worker.barrier();
@@ -143,8 +143,8 @@ impl Baseline {
 
     fn advance_partition(&mut self, span: Range<Cycle>) {
         let (world, state) = (&*self.compiled.world, &self.state);
-        let borders = Borders::new(world.bands(self.crew.len()));
-        workers::run(&mut self.crew, |worker, hand| {
+        let borders = HaloExchange::new(world.bands(self.workers.len()));
+        workers::run(&mut self.workers, |worker, hand| {
             for now in span.clone() {
                 with_scene!(world, state, now, |scene| {
                     partition_cycle(scene, &borders, worker, hand);
@@ -157,19 +157,19 @@ impl Baseline {
 /// Runs a worker's part of one cycle: its own bodies perceive; barrier; those inside the band act;
 /// barrier; one worker moves the rest and hands over; barrier.
 fn partition_cycle<T: BoxWord>(
-    scene: &Scene<'_, T>,
-    borders: &Borders,
+    scene: &CycleContext<'_, T>,
+    borders: &HaloExchange,
     worker: &Worker<'_>,
-    hand: &mut Hand,
+    hand: &mut BandWorker,
 ) {
-    let Hand { scratch, own, serial_acts } = hand;
+    let BandWorker { scratch, own, serial_acts } = hand;
     own.iter().for_each(|&slot| scene.perceive(slot, scratch));
     worker.barrier();
     let band = &borders.bands[worker.index()];
     own.retain(|&slot| {
-        let inside = scene.stays_inside(slot, band);
+        let inside = scene.is_inside(slot, band);
         if inside {
-            scene.act_drawn(slot, scratch);
+            scene.act_with_draw(slot, scratch);
         } else {
             lock(&borders.crossing).push(slot);
         }
@@ -182,21 +182,21 @@ fn partition_cycle<T: BoxWord>(
         crossing.sort_unstable();
         *serial_acts += crossing.len() as u64;
         for slot in crossing {
-            scene.act_drawn(slot, scratch);
-            borders.hand_over(slot, scene.cell(slot).at().col());
+            scene.act_with_draw(slot, scratch);
+            borders.transfer(slot, scene.cell(slot).position().col());
         }
     }
     worker.barrier();
     own.append(&mut lock(&borders.inboxes[worker.index()]));
 }
 
-impl Borders {
+impl HaloExchange {
     fn new(bands: Vec<Range<u32>>) -> Self {
         let inboxes = bands.iter().map(|_| Mutex::default()).collect();
         Self { bands, crossing: Mutex::default(), inboxes }
     }
 
-    fn hand_over(&self, slot: Slot, col: u32) {
+    fn transfer(&self, slot: Slot, col: u32) {
         lock(&self.inboxes[band_of(&self.bands, col)]).push(slot);
     }
 }
@@ -223,11 +223,11 @@ impl RobotsWorld {
     }
 }
 
-impl<T: BoxWord> Scene<'_, T> {
+impl<T: BoxWord> CycleContext<'_, T> {
     /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
-    fn stays_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
+    fn is_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
         let (world, cell) = (self.world, self.cell(slot));
-        let (col, width) = (cell.at().col(), self.type_of(cell).size.0);
+        let (col, width) = (cell.position().col(), self.type_of(cell).size.0);
         let reach = world.reach;
         if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
             return true;
@@ -245,7 +245,7 @@ impl<T: BoxWord> Scene<'_, T> {
 }
 
 /// Returns the first breach of the laws in a state: two bodies in a box, or one in a wall.
-pub fn breach(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
+pub fn find_violation(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
     let width = world.map.width();
     let mut owner: Vec<Option<EntityId>> = vec![None; world.map.cells().len()];
     for (id, body) in (0..).zip(&snapshot.bodies) {
@@ -295,10 +295,10 @@ mod tests {
         let compiled = crowd();
         for strategy in Strategy::ALL {
             for workers in [1, 2, 3, 8] {
-                let mut run = Baseline::new(compiled.clone(), strategy, workers);
+                let mut run = BaselineRun::new(compiled.clone(), strategy, workers);
                 for _ in 0..40 {
                     run.advance(5);
-                    assert_eq!(breach(&compiled.world, &run.snapshot()), None);
+                    assert_eq!(find_violation(&compiled.world, &run.snapshot()), None);
                 }
                 // A replay remembers how many actions it has started.
                 let snapshot = run.snapshot();
@@ -309,31 +309,31 @@ mod tests {
 
     #[test]
     fn bodies_of_a_partition_are_never_lost_and_change_bands() {
-        let mut run = Baseline::new(crowd(), Strategy::SpatialPartition, 3);
-        let before: Vec<Vec<Slot>> = run.crew.iter().map(|hand| hand.own.clone()).collect();
+        let mut run = BaselineRun::new(crowd(), Strategy::SpatialPartition, 3);
+        let before: Vec<Vec<Slot>> = run.workers.iter().map(|hand| hand.own.clone()).collect();
         run.advance(300);
-        let mut all: Vec<Slot> = run.crew.iter().flat_map(|hand| hand.own.clone()).collect();
+        let mut all: Vec<Slot> = run.workers.iter().flat_map(|hand| hand.own.clone()).collect();
         all.sort_unstable();
         assert_eq!(all, (0..121).collect::<Vec<Slot>>());
-        assert!(run.crew.iter().zip(&before).any(|(hand, before)| hand.own != *before));
-        assert!(run.serial_share() > 0.0 && run.serial_share() < 0.9);
+        assert!(run.workers.iter().zip(&before).any(|(hand, before)| hand.own != *before));
+        assert!(run.serial_fraction() > 0.0 && run.serial_fraction() < 0.9);
     }
 
     #[test]
     fn one_worker_has_no_borders() {
-        let mut run = Baseline::new(crowd(), Strategy::SpatialPartition, 1);
+        let mut run = BaselineRun::new(crowd(), Strategy::SpatialPartition, 1);
         run.advance(100);
-        assert_eq!(run.serial_share(), 0.0);
+        assert_eq!(run.serial_fraction(), 0.0);
     }
 
     #[test]
     fn bodies_on_each_other_and_in_walls_are_breaches() {
         let compiled = crowd();
         let mut snapshot = compiled.start_snapshot();
-        assert_eq!(breach(&compiled.world, &snapshot), None);
+        assert_eq!(find_violation(&compiled.world, &snapshot), None);
         snapshot.bodies[1].at = snapshot.bodies[0].at;
-        assert!(breach(&compiled.world, &snapshot).is_some_and(|b| b.contains("one box")));
+        assert!(find_violation(&compiled.world, &snapshot).is_some_and(|b| b.contains("one box")));
         snapshot.bodies[1].at = (39, 0);
-        assert!(breach(&compiled.world, &snapshot).is_some_and(|b| b.contains("wall")));
+        assert!(find_violation(&compiled.world, &snapshot).is_some_and(|b| b.contains("wall")));
     }
 }

@@ -8,13 +8,16 @@ use serde_json::Value;
 use sidestep_import::write::map_files;
 use sidestep_kernel::InputError;
 use sidestep_map::GridMap;
-use sidestep_scenario::{Bundle, Resolved, Source};
+use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 
 /// Returns the scenario with every file that it names beside it.
 ///
 /// # Errors
 /// When such a file can no longer be read.
-pub(crate) fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
+pub(crate) fn resolve(
+    source: &Source,
+    compiled: &Compiled,
+) -> Result<ResolvedScenario, InputError> {
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
     // Written even where it is the preset, because the run depends on it.

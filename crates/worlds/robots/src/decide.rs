@@ -5,25 +5,25 @@
 //! robot's knowledge is in its [`Memory`], which is part of the state.
 
 mod announce;
-pub(crate) mod ask;
 mod external;
 mod goto;
-mod patient;
+pub(crate) mod pass_request;
 mod plan;
 mod random;
 mod replay;
 mod sidestep;
+mod stall_detector;
 mod touch;
 mod wander;
 
 pub use announce::Announce;
 pub use external::External;
 pub use goto::{Avoidance, Goto, Shuttle};
-pub use patient::Patient;
 pub use plan::Planner;
 pub use random::Random;
 pub use replay::Replay;
-pub use sidestep::Trust;
+pub use sidestep::SensorTrust;
+pub use stall_detector::StallDetector;
 pub use wander::Wander;
 
 use super::effector::{ActionId, Side};
@@ -52,7 +52,7 @@ pub struct Contact {
 
 /// A message heard over the radio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Heard {
+pub struct ReceivedMessage {
     /// Id of the robot that sent it.
     pub sender: EntityId,
     /// The message itself.
@@ -75,7 +75,7 @@ pub enum Sector {
 impl Sector {
     /// Returns the sector of a bearing in degrees, positive to the left. The diagonals belong to
     /// the sides.
-    pub fn of(bearing_deg: f64) -> Self {
+    pub fn from_bearing_deg(bearing_deg: f64) -> Self {
         let turned = bearing_deg.rem_euclid(360.0);
         if !(45.0..=315.0).contains(&turned) {
             Self::Ahead
@@ -111,11 +111,11 @@ pub struct Percept<'a> {
     pub heading: u8,
     /// Last broadcasts of the robots in radio range, by sender; those that have said nothing yet are
     /// left out.
-    pub heard: &'a [Heard],
+    pub heard: &'a [ReceivedMessage],
 }
 
 /// Returns the nearest class reported in each sector, for percepts that are made by hand.
-pub fn nearest_in(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
+pub fn nearest_by_sector(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
     let mut nearest = [UNSEEN; 4];
     for (reading, &sector) in readings.iter().zip(sectors) {
         if reading.observation != NOTHING {
@@ -135,11 +135,11 @@ impl Percept<'_> {
 
 /// A mark on the robot's way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trip {
+pub enum TripEvent {
     /// The robot is where its trips start; time counts from here.
-    Begun,
+    Started,
     /// A trip is complete, and the next one starts.
-    Done,
+    Completed,
 }
 
 /// A robot's choice for this cycle.
@@ -148,7 +148,7 @@ pub struct Decision {
     /// The action to try.
     pub action: ActionId,
     /// Whether the last action started or completed a trip; trips are counted and timed.
-    pub trip: Option<Trip>,
+    pub trip: Option<TripEvent>,
     /// Message that others in radio range hear from the next cycle on; `None` keeps the last one.
     pub broadcast: Option<u64>,
 }
@@ -168,7 +168,7 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
 
     /// Returns whether its robots ask each other to make room. Then word 2 of the memory holds the
     /// robot's request, and the world writes the one that it hears into word 3.
-    fn asks(&self) -> bool {
+    fn has_requests(&self) -> bool {
         false
     }
 
@@ -180,7 +180,7 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
 
     /// Returns the ways to all places that it wants to reach, so that a check can say which of them
     /// are out of reach.
-    fn ways(&self) -> &[Arc<FlowField>] {
+    fn flow_fields(&self) -> &[Arc<FlowField>] {
         &[]
     }
 }

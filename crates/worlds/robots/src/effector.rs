@@ -71,7 +71,7 @@ impl Side {
 }
 
 /// Largest number of steps of a path.
-pub(crate) const MAX_PATH: usize = 16;
+pub(crate) const MAX_PATH_STEPS: usize = 16;
 
 /// One way an action may end, in free space.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +112,7 @@ impl EffectorModel {
     }
 
     /// Returns whether some action may not end as intended.
-    pub(super) fn errs(&self) -> bool {
+    pub(super) fn has_errors(&self) -> bool {
         self.transitions.iter().any(|list| list[0].p < 1.0)
     }
 
@@ -167,18 +167,18 @@ pub(crate) struct Step {
 
 /// A transition at a heading, prepared for walking on the grid.
 #[derive(Debug, Clone)]
-pub(crate) struct Walk {
+pub(crate) struct StepPath {
     /// Its steps.
     pub(crate) steps: Vec<Step>,
     /// Quarter turns to the left.
     pub(crate) turn: u8,
     /// All steps together, for the many walks that meet no obstacle.
-    pub(crate) whole: Whole,
+    pub(crate) whole: NetEffect,
 }
 
 /// The effect of a walk that meets no obstacle, as index offsets from the anchor before it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Whole {
+pub(crate) struct NetEffect {
     /// Boxes entered that the body did not cover at the start; all of them must be free.
     pub(crate) enter: Box<[i32]>,
     /// Boxes covered at the start and not at the end.
@@ -189,7 +189,7 @@ pub(crate) struct Whole {
     pub(crate) delta: (i32, i32),
 }
 
-impl Whole {
+impl NetEffect {
     fn new(steps: &[Step], own: &[i32]) -> Self {
         let delta = steps.iter().fold((0, 0), |d, s| (d.0 + s.delta.0, d.1 + s.delta.1));
         let mut now: Vec<i32> = own.to_vec();
@@ -215,17 +215,17 @@ impl Whole {
 /// The boxes that an action may sweep, as a tree of steps, depth first. It is a tree because boxes
 /// behind a wall need not be claimed: a blocked step leaves out its subtree.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Sweep {
+pub(crate) struct SweptVolume {
     /// The steps.
-    pub(crate) nodes: Box<[SweepNode]>,
+    pub(crate) nodes: Box<[SweptVolumeNode]>,
     /// Index offsets of the boxes entered, step after step.
     pub(crate) boxes: Box<[i32]>,
 }
 
-/// One step of a [`Sweep`].
+/// One step of a [`SweptVolume`].
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SweepNode {
-    /// Start of its boxes in [`Sweep::boxes`].
+pub(crate) struct SweptVolumeNode {
+    /// Start of its boxes in [`SweptVolume::boxes`].
     pub(crate) first: u32,
     /// End of its boxes there.
     pub(crate) end: u32,
@@ -241,9 +241,9 @@ pub(crate) struct Action {
     /// Probabilities as given, kept for exact computations and for rescaling.
     pub(crate) probabilities: Vec<f64>,
     /// The walk of each outcome.
-    pub(crate) walks: Vec<Walk>,
+    pub(crate) walks: Vec<StepPath>,
     /// The tree of everything that the action may sweep.
-    pub(crate) sweep: Sweep,
+    pub(crate) sweep: SweptVolume,
     /// The boxes of `sweep`, each listed once.
     pub(crate) claims: Box<[i32]>,
 }
@@ -265,11 +265,11 @@ impl Action {
     ) -> Result<Self, RowError> {
         let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
         let own = own_boxes(body, stride);
-        let walks: Vec<Walk> = transitions
+        let walks: Vec<StepPath> = transitions
             .iter()
             .map(|t| {
                 let steps = steps(&t.path, heading, body, stride);
-                Walk { whole: Whole::new(&steps, &own), steps, turn: t.turn }
+                StepPath { whole: NetEffect::new(&steps, &own), steps, turn: t.turn }
             })
             .collect();
         let possible: Vec<(&[Side], &[Step])> = transitions
@@ -283,7 +283,7 @@ impl Action {
         let mut claims: Vec<i32> = boxes.iter().copied().filter(|b| !own.contains(b)).collect();
         claims.sort_unstable();
         claims.dedup();
-        let sweep = Sweep { nodes: nodes.into(), boxes: boxes.into() };
+        let sweep = SweptVolume { nodes: nodes.into(), boxes: boxes.into() };
         let (claims, distribution) = (claims.into(), Categorical::new(&probabilities)?);
         Ok(Self { distribution, probabilities, walks, sweep, claims })
     }
@@ -299,7 +299,7 @@ pub(crate) fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
 fn push_sweep(
     paths: &[(&[Side], &[Step])],
     depth: usize,
-    nodes: &mut Vec<SweepNode>,
+    nodes: &mut Vec<SweptVolumeNode>,
     boxes: &mut Vec<i32>,
 ) {
     for side in Side::ALL {
@@ -308,7 +308,7 @@ fn push_sweep(
         let Some((_, steps)) = along.first() else { continue };
         let (first, node) = (boxes.len() as u32, nodes.len());
         boxes.extend_from_slice(&steps[depth].enter);
-        nodes.push(SweepNode { first, end: boxes.len() as u32, after: 0 });
+        nodes.push(SweptVolumeNode { first, end: boxes.len() as u32, after: 0 });
         push_sweep(&along, depth + 1, nodes, boxes);
         nodes[node].after = nodes.len() as u32;
     }

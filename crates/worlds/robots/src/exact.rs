@@ -12,29 +12,29 @@
 //!               `---> Pomdp: observations as well, as text        observe.rs pomdp.rs names.rs
 //! ```
 
-mod building;
-mod chain;
 mod compare;
+mod markov_chain;
 mod names;
 mod observe;
 mod obstacle;
 mod pomdp;
 mod sparse;
+mod static_map;
 mod summary;
 
-pub use chain::{Chain, ChainState, Stationary, total_variation};
 pub use compare::{Comparison, SIGNIFICANCE, compare, sampling_limit};
+pub use markov_chain::{ChainState, MarkovChain, StationaryDistribution, total_variation};
 pub use observe::Beam;
-pub use obstacle::{Outcome, Pose, here_and_now};
+pub use obstacle::{ActionOutcome, GridPose, outcome_distribution};
 pub use pomdp::{MAX_BEAMS, Pomdp, PomdpOptions, PomdpSize};
 pub use summary::{Summary, VisitedBox};
 
 use super::decide::Random;
 use super::effector::{ActionId, FORWARD, ObstacleRule, Side};
 use super::scenario::Compiled;
-use building::{Building, Robot};
 use sidestep_kernel::InputError;
-use sparse::Sparse;
+use sparse::SparseMatrix;
+use static_map::{Robot, StaticMap};
 use std::collections::BTreeMap;
 
 /// Largest number of poses of a model.
@@ -56,7 +56,7 @@ pub fn policy(name: &str) -> Result<Random, InputError> {
         "forward" => Ok(Random::always(FORWARD)),
         "bounce" => Ok(Random::bounce()),
         _ => {
-            let remedy = sidestep_scenario::nearest(name, &POLICIES);
+            let remedy = sidestep_scenario::suggestion(name, &POLICIES);
             Err(InputError::new("--policy", format!("unknown policy `{name}`"), remedy))
         }
     }
@@ -64,43 +64,43 @@ pub fn policy(name: &str) -> Result<Random, InputError> {
 
 /// Every pose that a robot can reach from its start, with the outcomes of each action there.
 #[derive(Debug, Clone)]
-pub struct Model {
+pub struct MarkovModel {
     place: String,
-    building: Building,
+    building: StaticMap,
     robot: Robot,
     rule: ObstacleRule,
     kinds: Vec<String>,
     /// Poses in the order in which the search finds them; the first is the start.
-    poses: Vec<Pose>,
+    poses: Vec<GridPose>,
     /// Outcomes, in row `pose * actions + action`.
-    outcomes: Sparse<Arrival>,
+    outcomes: SparseMatrix<ModelTransition>,
 }
 
 /// One outcome of an action at a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Arrival {
+struct ModelTransition {
     /// Index of the pose reached.
     to: u32,
     contact: Option<(u8, Side)>,
     p: f64,
 }
 
-impl Model {
+impl MarkovModel {
     /// Computes the model of a scenario with one robot and nothing else that moves; doors
     /// that never open are walls of their kind.
     ///
     /// # Errors
     /// When there are more robots or other moving bodies, or more than [`MAX_STATES`] poses.
     pub fn new(compiled: &Compiled) -> Result<Self, InputError> {
-        let (building, robot) = building::only_robot(compiled)?;
+        let (building, robot) = static_map::single_robot(compiled)?;
         let mut model = Self {
-            place: building::place(compiled),
+            place: static_map::source_name(compiled),
             building,
             poses: vec![robot.start],
             robot,
             rule: compiled.world.obstacle_rule,
             kinds: compiled.world.kinds.clone(),
-            outcomes: Sparse::default(),
+            outcomes: SparseMatrix::default(),
         };
         model.explore()?;
         Ok(model)
@@ -113,14 +113,14 @@ impl Model {
         while let Some(&pose) = self.poses.get(next) {
             next += 1;
             for action in 0..self.actions().len() {
-                let outcomes = self.here_and_now(pose, action as ActionId);
+                let outcomes = self.outcome_distribution(pose, action as ActionId);
                 let poses = &mut self.poses;
-                let arrivals = outcomes.into_iter().map(|(Outcome { pose, contact }, p)| {
+                let arrivals = outcomes.into_iter().map(|(ActionOutcome { pose, contact }, p)| {
                     let to = *index_of.entry(pose).or_insert_with(|| {
                         poses.push(pose);
                         poses.len() as u32 - 1
                     });
-                    Arrival { to, contact, p }
+                    ModelTransition { to, contact, p }
                 });
                 self.outcomes.push(arrivals);
             }
@@ -144,14 +144,18 @@ impl Model {
     ///
     /// # Panics
     /// When the robot has no such action.
-    pub fn here_and_now(&self, pose: Pose, action: ActionId) -> Vec<(Outcome, f64)> {
+    pub fn outcome_distribution(
+        &self,
+        pose: GridPose,
+        action: ActionId,
+    ) -> Vec<(ActionOutcome, f64)> {
         let transitions = &self.robot.actions[usize::from(action)];
         let kind_at = |col, row| self.building.kind_at(col, row);
-        here_and_now(transitions, self.robot.size, pose, self.rule, kind_at)
+        outcome_distribution(transitions, self.robot.size, pose, self.rule, kind_at)
     }
 
     /// Returns every pose that can be reached; the first is the start.
-    pub fn poses(&self) -> &[Pose] {
+    pub fn poses(&self) -> &[GridPose] {
         &self.poses
     }
 
@@ -175,8 +179,8 @@ impl Model {
     ///
     /// # Errors
     /// When the policy chooses an action that the robot does not have.
-    pub fn chain(&self, policy: &Random) -> Result<Chain, InputError> {
-        Chain::new(self, policy)
+    pub fn chain(&self, policy: &Random) -> Result<MarkovChain, InputError> {
+        MarkovChain::new(self, policy)
     }
 
     /// Returns the model with its observations, in the form that planners read.
@@ -188,7 +192,7 @@ impl Model {
     }
 
     /// Returns the outcomes of an action at the pose with this index.
-    fn arrivals(&self, pose: usize, action: usize) -> &[Arrival] {
+    fn model_transitions(&self, pose: usize, action: usize) -> &[ModelTransition] {
         self.outcomes.row(pose * self.actions().len() + action)
     }
 }

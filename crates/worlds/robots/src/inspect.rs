@@ -6,106 +6,114 @@ mod senses;
 #[cfg(test)]
 mod tests;
 
+use super::cycle_context::{CycleContext, with_scene};
 use super::effector::Action;
-use super::join::Place;
+use super::join::GroupMember;
 use super::policy::ConflictPolicy;
 use super::rows::HEADING_NAMES;
-use super::scene::{Scene, with_scene};
 use super::state::RobotsState;
 use super::world::{RobotsWorld, Role};
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::view::{self, Inspection, MarkShape, Section, Table, Value, Who};
+use sidestep_kernel::view::{
+    self, BodyId, FactSection, FactTable, FactValue, Inspection, MarkShape,
+};
 use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
 use sidestep_map::Rect;
 
 /// Largest number of members of a conflict group that are listed: those around the body.
-const MOST_MEMBERS: usize = 64;
+const MAX_MEMBERS: usize = 64;
 
 impl RobotsWorld {
     /// Returns the inspection of a body in cycle `now`; `None` for one that is not there.
-    pub(super) fn inspect(&self, state: &RobotsState, now: Cycle, who: Who) -> Option<Inspection> {
+    pub(super) fn inspect(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        who: BodyId,
+    ) -> Option<Inspection> {
         let id = who.number;
-        if id as usize >= self.bodies.len() || self.who(id) != who {
+        if id as usize >= self.bodies.len() || self.body_id(id) != who {
             return None;
         }
-        let copy = state.copied(self);
+        let copy = state.trial_copy(self);
         let slot = copy.slot_of_id[id as usize];
         let kind = &self.kinds[usize::from(self.type_of(id).kind)];
-        let told = Inspection::new(who, now, format!("{kind} {id}"));
-        Some(with_scene!(self, &copy, now, |scene| Looking { scene, slot, id, told }.all()))
+        let inspection = Inspection::new(who, now, format!("{kind} {id}"));
+        Some(with_scene!(self, &copy, now, |scene| Inspector { scene, slot, id, inspection }
+            .inspect()))
     }
 
     /// Returns a body's heading in words.
-    fn heading(heading: u8) -> &'static str {
+    fn heading_name(heading: u8) -> &'static str {
         HEADING_NAMES[usize::from(heading % 4)]
     }
 }
 
 /// A look at one body, on a state that is its own.
-struct Looking<'a, T: BoxWord> {
-    scene: &'a Scene<'a, T>,
+struct Inspector<'a, T: BoxWord> {
+    scene: &'a CycleContext<'a, T>,
     slot: Slot,
     id: EntityId,
-    told: Inspection,
+    inspection: Inspection,
 }
 
-impl<'a, T: BoxWord> Looking<'a, T> {
-    fn all(mut self) -> Inspection {
+impl<'a, T: BoxWord> Inspector<'a, T> {
+    fn inspect(mut self) -> Inspection {
         let scratch = &mut self.scene.world.scratch();
         // Robots decided from outside perceive within a cycle only where readings are recorded.
         scratch.keep_readings = true;
-        self.is_now();
-        self.perceives(scratch);
+        self.add_present();
+        self.add_percept(scratch);
         let bodies = 0..self.scene.world.bodies.len() as Slot;
         bodies.clone().for_each(|slot| self.scene.perceive(slot, scratch));
-        self.claims();
-        let groups = Groups::new(bodies.len());
+        self.add_claims();
+        let groups = ConflictGroups::new(bodies.len());
         bodies.for_each(|slot| self.scene.join(slot, &groups));
         let mut members = Vec::new();
         groups.members(groups.leader(self.slot), &mut members);
         self.scene.order(&members, scratch);
         let order = std::mem::take(&mut scratch.order);
-        self.is_in_conflict(&order);
+        self.add_conflict_group(&order);
         for place in order.iter().take_while(|place| place.slot != self.slot) {
             self.scene.act(place.slot, place.word, scratch);
         }
         let own = order.iter().find(|place| place.slot == self.slot);
-        self.acts(own.map_or(0, |place| place.word), scratch);
-        self.told
+        self.add_outcome(own.map_or(0, |place| place.word), scratch);
+        self.inspection
     }
 
     /// Tells the facts known before the cycle.
-    fn is_now(&mut self) {
+    fn add_present(&mut self) {
         let (scene, cell) = (self.scene, self.scene.cell(self.slot));
         let body = &scene.world.bodies[self.id as usize];
-        let section = Section::new("Now")
-            .fact("place", self.place())
+        let section = FactSection::new("Now")
+            .fact("place", self.position_m())
             .fact("heading", self.facing())
             .fact("due", body.is_due(scene.now))
-            .fact("acts every", Value::number(f64::from(body.period), "cycles"));
+            .fact("acts every", FactValue::number(f64::from(body.period), "cycles"));
         let section = match &scene.type_of(cell).role {
             Role::Robot(_) => section.fact("last contact", self.last_contact()),
             _ => section,
         };
-        self.told.tell(section);
+        self.inspection.add_section(section);
     }
 
     /// Returns where the body is.
-    fn place(&self) -> view::Place {
+    fn position_m(&self) -> view::Vec3 {
         self.scene.world.visible_body(self.id, self.scene.cell(self.slot)).pose.at_m
     }
 
     /// Returns its heading, or of a door whether it is open.
-    fn facing(&self) -> Value {
+    fn facing(&self) -> FactValue {
         let cell = self.scene.cell(self.slot);
         match &self.scene.type_of(cell).role {
             Role::Door(_) => (if cell.facing.get().is_open() { "open" } else { "closed" }).into(),
-            _ => RobotsWorld::heading(cell.facing.get().heading()).into(),
+            _ => RobotsWorld::heading_name(cell.facing.get().heading()).into(),
         }
     }
 
-    fn last_contact(&self) -> Value {
+    fn last_contact(&self) -> FactValue {
         let contact = self.scene.cell(self.slot).contact.get().get();
         let kinds = &self.scene.world.kinds;
         let words = |c: super::decide::Contact| {
@@ -123,7 +131,7 @@ impl<'a, T: BoxWord> Looking<'a, T> {
     }
 
     /// Tells the boxes that it may come to cover.
-    fn claims(&mut self) {
+    fn add_claims(&mut self) {
         let (scene, slot) = (self.scene, self.slot);
         let intent = scene.cell(slot).intent.get();
         let mut boxes = Vec::new();
@@ -135,19 +143,23 @@ impl<'a, T: BoxWord> Looking<'a, T> {
         boxes.dedup_by_key(|(index, _)| *index);
         let is_taken = |(_, word): &&(usize, T)| !word.is_free() && word.slot() != slot;
         let taken = boxes.iter().filter(is_taken).count();
-        self.told.tell(
-            Section::new("Claims")
-                .fact("boxes", Value::count(boxes.len()))
-                .fact("boxes that others cover", Value::count(taken)),
+        self.inspection.add_section(
+            FactSection::new("Claims")
+                .fact("boxes", FactValue::count(boxes.len()))
+                .fact("boxes that others cover", FactValue::count(taken)),
         );
         for (index, _) in boxes {
             let corners_m = self.box_corners_m(index);
-            self.told.mark(view::Role::Claim, "claimed", MarkShape::Area { corners_m });
+            self.inspection.add_mark(
+                view::MarkRole::Claim,
+                "claimed",
+                MarkShape::Area { corners_m },
+            );
         }
     }
 
     /// Returns the corners of a box, by its index in the padded grid.
-    fn box_corners_m(&self, index: usize) -> Vec<view::Place> {
+    fn box_corners_m(&self, index: usize) -> Vec<view::Vec3> {
         let world = self.scene.world;
         let col = index as u32 % world.stride - world.border;
         let row = index as u32 / world.stride - world.border;
@@ -155,30 +167,30 @@ impl<'a, T: BoxWord> Looking<'a, T> {
     }
 
     /// Tells the group that is in conflict, in its order of acting.
-    fn is_in_conflict(&mut self, order: &[Place]) {
+    fn add_conflict_group(&mut self, order: &[GroupMember]) {
         let world = self.scene.world;
         let own = order.iter().position(|place| place.slot == self.slot).unwrap_or(0);
-        let from = own.saturating_sub(MOST_MEMBERS / 2);
-        let mut table = Table::new(["turn", "body", "draw"]);
-        let members = order.iter().enumerate().skip(from).take(MOST_MEMBERS);
+        let from = own.saturating_sub(MAX_MEMBERS / 2);
+        let mut table = FactTable::new(["turn", "body", "draw"]);
+        let members = order.iter().enumerate().skip(from).take(MAX_MEMBERS);
         for (k, place) in members.filter(|_| order.len() > 1) {
             let cell = self.scene.cell(place.slot);
-            let (who, draw) = (world.who(cell.id), f64::from(place.key.1) / 4_294_967_296.0);
+            let (who, draw) = (world.body_id(cell.id), f64::from(place.key.1) / 4_294_967_296.0);
             let draw = match world.policy {
-                ConflictPolicy::Fixed => Value::None,
-                _ => Value::number(draw, ""),
+                ConflictPolicy::Fixed => FactValue::None,
+                _ => FactValue::number(draw, ""),
             };
-            table.row([Value::count(k + 1), who.into(), draw]);
-            let boxes = world.type_of(cell.id).boxes(world.map_position(cell.at()));
+            table.push_row([FactValue::count(k + 1), who.into(), draw]);
+            let boxes = world.type_of(cell.id).boxes(world.map_position(cell.position()));
             let corners_m = world.corners_m(boxes);
             let label = format!("{}. {who}", k + 1);
-            self.told.mark(view::Role::Group, label, MarkShape::Area { corners_m });
+            self.inspection.add_mark(view::MarkRole::Group, label, MarkShape::Area { corners_m });
         }
-        self.told.tell(
-            Section::new("Conflict group")
-                .fact("bodies", Value::count(order.len()))
+        self.inspection.add_section(
+            FactSection::new("Conflict group")
+                .fact("bodies", FactValue::count(order.len()))
                 .fact("policy", world.policy.name())
-                .fact("turn", Value::count(own + 1))
+                .fact("turn", FactValue::count(own + 1))
                 .table(table),
         );
     }
@@ -186,10 +198,11 @@ impl<'a, T: BoxWord> Looking<'a, T> {
 
 impl RobotsWorld {
     /// Returns the corners of a rectangle of boxes.
-    fn corners_m(&self, Rect { col, row, width, height }: Rect) -> Vec<view::Place> {
+    fn corners_m(&self, Rect { col, row, width, height }: Rect) -> Vec<view::Vec3> {
         let corner = |x: u32, y: u32| {
             let side_m = self.map.box_size_m;
-            let [x_m, y_m] = self.map.plane.place([f64::from(x) * side_m, f64::from(y) * side_m]);
+            let [x_m, y_m] =
+                self.map.plane.transform_point([f64::from(x) * side_m, f64::from(y) * side_m]);
             [x_m, y_m, 0.0]
         };
         let (east, north) = (col + width, row + height);

@@ -1,37 +1,39 @@
 //! *Join*: groups of bodies with claims that meet, and the order in which a group's bodies act.
 
 use super::Scratch;
-use super::decide::ask::{ASKED, ASKING, REACH_BOXES, request};
+use super::cycle_context::{CycleContext, box_index};
+use super::decide::pass_request::{
+    HEARD_REQUEST_WORD, MAX_REQUEST_BOXES, OWN_REQUEST_WORD, own_request,
+};
 use super::effector::FORWARD;
 use super::policy::ConflictPolicy;
 use super::purpose;
-use super::scene::{Scene, at};
-use super::state::BodyCell;
+use super::state::BodyState;
 use super::world::{BodyType, Role};
 use sidestep_kernel::Slot;
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::space::BoxWord;
 
 /// A body's place in the order of its group.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct GroupMember {
     pub(super) key: (u8, u32, u32),
     pub(super) slot: Slot,
     pub(super) word: u32,
 }
 
-impl<T: BoxWord> Scene<'_, T> {
+impl<T: BoxWord> CycleContext<'_, T> {
     /// Joins a body with all bodies that have claims meeting its own: those named in a box that
     /// it may come to cover, because they stand there or may come there too.
     #[inline]
-    pub(super) fn join(&self, slot: Slot, groups: &Groups) {
+    pub(super) fn join(&self, slot: Slot, groups: &ConflictGroups) {
         let cell = self.cell(slot);
         let intent = cell.intent.get();
         if intent.is_idle() {
             return;
         }
         if self.world.has_asks {
-            self.hand_over_request(cell);
+            self.deliver_request(cell);
         }
         // The same neighbor is often met in several boxes; joining it once is enough.
         let mut last_met = slot;
@@ -47,29 +49,32 @@ impl<T: BoxWord> Scene<'_, T> {
         }
         let base = self.base(cell);
         let boxes = &*self.type_of(cell).actions[usize::from(cell.action.get())].claims;
-        boxes.iter().for_each(|&offset| meet(self.floor.get(at(base, offset))));
+        boxes.iter().for_each(|&offset| meet(self.floor.get(box_index(base, offset))));
     }
 
     /// Hands a robot's request to the first body in its direction, if that is a robot that takes
     /// part. Bodies stand still in this phase, so it is the same one in every order.
-    fn hand_over_request(&self, cell: &BodyCell) {
+    fn deliver_request(&self, cell: &BodyState) {
         let body = self.type_of(cell);
-        if !asks(body) {
+        if !has_requests(body) {
             return;
         }
-        let Some((direction, word)) = request(cell.memory[ASKING].get()) else { return };
+        let Some((direction, word)) = own_request(cell.memory[OWN_REQUEST_WORD].get()) else {
+            return;
+        };
         let forward = &body.actions[usize::from(body.action_index(direction, FORWARD))];
         let Some(step) = forward.walks.first().and_then(|walk| walk.steps.first()) else { return };
         let base = self.base(cell);
-        for k in 0..REACH_BOXES {
+        for k in 0..MAX_REQUEST_BOXES {
             let far = k * (step.delta.1 * self.world.stride as i32 + step.delta.0);
-            let words = step.enter.iter().map(|&offset| self.floor.get(at(base, offset + far)));
+            let words =
+                step.enter.iter().map(|&offset| self.floor.get(box_index(base, offset + far)));
             // The bodies that stand there are asked, and none behind them.
             let mut taken = words.filter(|word| !word.is_free()).peekable();
             let is_taken = taken.peek().is_some();
             for other in taken.filter(|&word| word != T::WALL).map(|word| self.cell(word.slot())) {
-                if asks(self.type_of(other)) {
-                    other.memory[ASKED].raise(word);
+                if has_requests(self.type_of(other)) {
+                    other.memory[HEARD_REQUEST_WORD].raise_to(word);
                 }
             }
             if is_taken {
@@ -90,7 +95,7 @@ impl<T: BoxWord> Scene<'_, T> {
         order.extend(group.iter().map(|&slot| {
             let cell = self.cell(slot);
             let [word, draw] = self.act_words(cell.id);
-            Place { key: self.priority(cell, draw, first), slot, word }
+            GroupMember { key: self.priority(cell, draw, first), slot, word }
         }));
         order.sort_unstable_by_key(|place| place.key);
     }
@@ -98,7 +103,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// Returns the key by which the smaller acts earlier: rank by the policy, fair draw, id. It is
     /// unique per body because the id is part of it.
     #[inline]
-    fn priority(&self, cell: &BodyCell, draw: u32, first_heading: u8) -> (u8, u32, u32) {
+    fn priority(&self, cell: &BodyState, draw: u32, first_heading: u8) -> (u8, u32, u32) {
         let id = cell.id;
         match self.world.policy {
             ConflictPolicy::Fixed => (0, 0, id),
@@ -118,7 +123,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     /// Returns the heading of a body; none for doors, which have no heading and go first.
-    fn heading_of(&self, cell: &BodyCell) -> Option<u8> {
+    fn heading_of(&self, cell: &BodyState) -> Option<u8> {
         let is_door = matches!(self.type_of(cell).role, Role::Door(_));
         (!is_door).then(|| cell.facing.get().heading())
     }
@@ -142,8 +147,8 @@ impl<T: BoxWord> Scene<'_, T> {
 }
 
 /// Returns whether a body is a robot that takes part in requests.
-fn asks(body: &BodyType) -> bool {
-    matches!(&body.role, Role::Robot(model) if model.behaviour.asks())
+fn has_requests(body: &BodyType) -> bool {
+    matches!(&body.role, Role::Robot(model) if model.behaviour.has_requests())
 }
 
 #[cfg(test)]

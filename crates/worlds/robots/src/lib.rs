@@ -15,49 +15,49 @@ mod act;
 mod auction;
 mod audit;
 pub mod baseline;
+mod broadcast;
 mod bundle;
+mod contact_remarks;
+mod cycle_context;
 pub mod decide;
 pub mod effector;
 pub mod exact;
+mod external;
 mod inspect;
 mod join;
-mod kind;
-mod law;
 pub mod learn;
-mod meanings;
+mod metric_info;
 pub mod metrics;
 mod odometry;
-mod outside;
 mod perceive;
 pub mod policy;
 mod purpose;
 mod ray;
 mod remarks;
 pub mod rows;
-pub mod run;
 pub mod scenario;
-mod scene;
 pub mod sensor;
 pub mod state;
+mod text;
 mod view;
-mod voice;
-mod words;
 pub mod world;
+pub mod world_impl;
+mod world_type;
 
+use cycle_context::with_scene;
 use effector::Side;
-pub use kind::Robots;
 pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
-pub use run::{RobotsRun, robots_run};
-use scene::with_scene;
 use sensor::Reading;
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::world::Auction;
-use sidestep_kernel::{Cycle, EntityId, Phases, Slot, Turn};
+use sidestep_kernel::{Cycle, EntityId, PhaseContext, Phases, Slot};
 use state::RobotsState;
 use std::ops::Range;
 pub use world::RobotsWorld;
 use world::StorageOrder;
+pub use world_impl::{RobotsRun, robots_run};
+pub use world_type::Robots;
 
 /// Something that happened to a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,9 +85,9 @@ pub enum EventKind {
         with: Option<EntityId>,
     },
     /// A door has opened.
-    Opened,
+    DoorOpened,
     /// A door has closed.
-    Closed,
+    DoorClosed,
 }
 
 /// The true and the reported reading of one beam, kept where a log for learning is wanted.
@@ -129,9 +129,9 @@ pub struct MotionSample {
 pub struct Scratch {
     readings: Vec<Reading>,
     /// The rows of the readings that a sensor's beams truly have.
-    truths: Vec<sensor::Row>,
-    heard: Vec<decide::Heard>,
-    order: Vec<join::Place>,
+    truths: Vec<sensor::RowIndex>,
+    heard: Vec<decide::ReceivedMessage>,
+    order: Vec<join::GroupMember>,
     bids: Vec<auction::Bid>,
     keep_events: bool,
     keep_readings: bool,
@@ -160,24 +160,24 @@ impl Phases for RobotsWorld {
     }
 
     #[inline]
-    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
         with_scene!(turn.world, turn.state, turn.now, |scene| {
             bodies.for_each(|slot| scene.perceive(slot as Slot, turn.scratch));
         });
     }
 
     #[inline]
-    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
         with_scene!(turn.world, turn.state, turn.now, |scene| {
             bodies.for_each(|slot| scene.join(slot as Slot, groups));
         });
     }
 
     #[inline]
-    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
         with_scene!(turn.world, turn.state, turn.now, |scene| {
             if let [alone] = *group {
-                return scene.act_drawn(alone, turn.scratch);
+                return scene.act_with_draw(alone, turn.scratch);
             }
             scene.order(group, turn.scratch);
             let order = std::mem::take(&mut turn.scratch.order);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Counters of one robot, or their sums over all robots.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Counts {
+pub struct Counters {
     /// Number of actions started.
     pub actions: u64,
     /// Number of contacts in total.
@@ -31,7 +31,7 @@ pub struct Counts {
 pub struct Metrics {
     /// Sums over all robots.
     #[serde(flatten)]
-    pub total: Counts,
+    pub total: Counters,
     /// Share of the free boxes that have been covered by a robot.
     pub coverage: f64,
     /// Share of actions that ended in a contact.
@@ -44,13 +44,13 @@ pub struct Metrics {
 
 impl RobotsWorld {
     /// Returns the counters of a robot after `cycle` cycles.
-    pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counts {
+    pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counters {
         let (i, kinds) = (id as usize, self.kinds.len());
         let cell = state.body(id);
         let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
         let named = self.kinds.iter().cloned().zip(by_kind.clone());
         let trips = u64::from(cell.trips.get());
-        Counts {
+        Counters {
             actions: self.bodies[i].actions_before(cycle),
             contacts: by_kind.sum(),
             contacts_by_kind: named.collect(),
@@ -62,8 +62,8 @@ impl RobotsWorld {
     }
 
     /// Returns the counters of all robots together after `cycle` cycles.
-    pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counts {
-        let mut total = Counts::default();
+    pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counters {
+        let mut total = Counters::default();
         let mut trip_cycles = 0;
         for &id in &self.robots {
             let one = self.counts(state, cycle, id);
@@ -87,7 +87,7 @@ impl RobotsWorld {
         let free = self.map.count(Cell::Free).max(1);
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
-            coverage: (self.covered_at_start() + total.first_visits) as f64 / free as f64,
+            coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
             contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
             group_sizes: groups.counts[..used].to_vec(),
             largest_group: groups.largest,
@@ -96,7 +96,7 @@ impl RobotsWorld {
     }
 
     /// Returns the number of boxes under robots at the start, which do not count as first visits.
-    fn covered_at_start(&self) -> u64 {
+    fn boxes_covered_at_start(&self) -> u64 {
         let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
         self.robots.iter().map(boxes).sum()
     }

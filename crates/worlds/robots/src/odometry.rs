@@ -10,14 +10,14 @@ use std::f64::consts::FRAC_PI_2;
 /// action as it was intended, slips unnoticed. An action that an obstacle cuts short stalls the wheels, so that
 /// they claim the motion that was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Claimed {
+pub(super) struct DeadReckoning {
     /// Boxes along the axes of that frame.
     at_boxes: [i64; 2],
     /// Quarter turns to the left, 0 to 3.
     facing: u8,
 }
 
-impl Claimed {
+impl DeadReckoning {
     /// Adds an action of a robot.
     pub(super) fn add(&mut self, world: &RobotsWorld, sample: &MotionSample) {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return };
@@ -43,8 +43,8 @@ impl Claimed {
     }
 
     /// Returns the turn of each heading in the frame in which wheels began to count.
-    pub(super) fn turns() -> [[f64; 4]; 4] {
-        [0.0, 1.0, 2.0, 3.0].map(|quarters| Pose::heading([0.0; 3], quarters * FRAC_PI_2).turn)
+    pub(super) fn heading_orientations() -> [[f64; 4]; 4] {
+        [0.0, 1.0, 2.0, 3.0].map(|quarters| Pose::from_heading([0.0; 3], quarters * FRAC_PI_2).turn)
     }
 }
 
@@ -61,7 +61,7 @@ fn motion(transition: &Transition) -> (i32, i32, u8) {
 mod tests {
     use crate::robots_run;
     use sidestep_kernel::Simulation;
-    use sidestep_kernel::view::Look;
+    use sidestep_kernel::view::FrameOptions;
     use sidestep_scenario::Source;
 
     /// A robot in a corridor with wheels that do nothing half of the time.
@@ -77,10 +77,10 @@ mod tests {
         );
         let mut run = robots_run(&Source::new("corridor.toml", text, ""), 1)
             .unwrap_or_else(|e| panic!("{e}"));
-        run.watch_odometry();
+        run.enable_odometry();
         let mut seen = Vec::new();
         for _ in 0..=cycles {
-            let frame = run.frame(Look::BODIES);
+            let frame = run.frame(FrameOptions::WITHOUT_SCANS);
             let [x, y, _] = frame.odometry[0].1.at_m;
             let [true_x, true_y, _] = frame.bodies[0].pose.at_m;
             seen.push(([x, y], [true_x - 0.25, true_y - 0.25]));

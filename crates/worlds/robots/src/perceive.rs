@@ -1,48 +1,48 @@
 //! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
 
-use super::decide::{Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
-use super::effector::Sweep;
+use super::cycle_context::{CycleContext, are_free, box_index};
+use super::decide::{Decision, Memory, Percept, ReceivedMessage, Sector, TripEvent, UNSEEN};
+use super::effector::SweptVolume;
 use super::purpose;
-use super::scene::{Scene, all_free, at};
-use super::sensor::{Reading, Row};
-use super::state::{BodyCell, Facing, Intent, KeptPose};
-use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role};
+use super::sensor::{Reading, RowIndex};
+use super::state::{BodyState, Facing, Intent, PackedPose};
+use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::{Column, Slot};
 
-impl<T: BoxWord> Scene<'_, T> {
+impl<T: BoxWord> CycleContext<'_, T> {
     /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
     #[inline]
     pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
         let (world, cell) = (self.world, self.cell(slot));
         if let Some(frames) = &self.state.frames {
             let index = (self.now - frames.first) as usize * frames.bodies + cell.id as usize;
-            frames.poses.set(index, KeptPose::of(cell.at(), cell.facing.get()));
+            frames.poses.set(index, PackedPose::new(cell.position(), cell.facing.get()));
         }
         let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
         if !is_due && world.radio.is_some() {
-            self.state.voices.say(cell.id, self.now, None);
+            self.state.voices.record(cell.id, self.now, None);
         }
         let intent = match &self.type_of(cell).role {
             _ if !is_due => Intent::IDLE,
-            Role::Robot(model) => self.robot_decides(model, slot, scratch),
-            Role::Mover(mover) => self.mover_draws(mover, cell),
-            Role::Door(door) => self.door_wants(door, cell),
+            Role::Robot(model) => self.decide_robot(model, slot, scratch),
+            Role::Mover(mover) => self.mover_intent(mover, cell),
+            Role::Door(door) => self.door_intent(door, cell),
         };
         let is_clear = !intent.is_idle() && self.claim(slot, intent);
-        cell.intent.set(if is_clear { intent.clear() } else { intent });
+        cell.intent.set(if is_clear { intent.with_clear() } else { intent });
     }
 
     #[inline]
-    fn robot_decides(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
+    fn decide_robot(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
         let cell = self.cell(slot);
         let (decision, memory) = self.decision(model, slot, scratch);
         store_memory(cell, memory);
-        self.note(cell, decision);
+        self.record_decision(cell, decision);
         let known = usize::from(decision.action) < model.body.effector.actions.len();
         debug_assert!(known, "behaviors choose among the effector's actions");
-        if known { Intent::action(decision.action) } else { Intent::IDLE }
+        if known { Intent::from_action(decision.action) } else { Intent::IDLE }
     }
 
     /// Returns a robot's decision, and its memory after that; its readings and the words that it
@@ -55,7 +55,7 @@ impl<T: BoxWord> Scene<'_, T> {
         scratch: &mut Scratch,
     ) -> (Decision, Memory) {
         let cell = self.cell(slot);
-        let nearest = self.percept(model, slot, scratch);
+        let nearest = self.fill_percept(model, slot, scratch);
         let percept = Percept {
             now: self.now,
             id: cell.id,
@@ -63,7 +63,7 @@ impl<T: BoxWord> Scene<'_, T> {
             sectors: &model.body.sectors,
             nearest_in: nearest,
             contact: cell.contact.get().get(),
-            at: self.world.map_position(cell.at()),
+            at: self.world.map_position(cell.position()),
             heading: cell.facing.get().heading(),
             heard: &scratch.heard,
         };
@@ -77,7 +77,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// class reported per sector. A robot decided from outside was observed before the cycle:
     /// perceiving again would show the same, and is left out unless readings are recorded.
     #[inline(always)]
-    fn percept(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> [u8; 4] {
+    fn fill_percept(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> [u8; 4] {
         scratch.heard.clear();
         if model.is_external && !scratch.keep_readings {
             scratch.readings.clear();
@@ -92,17 +92,17 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Records the parts of a decision beside the action: trips and broadcasts.
     #[inline]
-    fn note(&self, cell: &BodyCell, decision: Decision) {
+    fn record_decision(&self, cell: &BodyState, decision: Decision) {
         let now = self.now;
         if let Some(trip) = decision.trip {
-            if trip == Trip::Done {
+            if trip == TripEvent::Completed {
                 cell.trips.set(cell.trips.get() + 1);
                 cell.trip_cycles.set(cell.trip_cycles.get() + now - cell.trip_begun.get());
             }
             cell.trip_begun.set(now);
         }
         if self.world.radio.is_some() {
-            self.state.voices.say(cell.id, now, decision.broadcast);
+            self.state.voices.record(cell.id, now, decision.broadcast);
         }
     }
 
@@ -112,7 +112,7 @@ impl<T: BoxWord> Scene<'_, T> {
     pub(super) fn sense(
         &self,
         model: &RobotModel,
-        cell: &BodyCell,
+        cell: &BodyState,
         scratch: &mut Scratch,
     ) -> [u8; 4] {
         let id = cell.id;
@@ -124,9 +124,9 @@ impl<T: BoxWord> Scene<'_, T> {
             let beams = first..first + sensor.ends.len();
             first = beams.end;
             let (readings, sectors) = (&mut readings[beams.clone()], &model.body.sectors[beams]);
-            cast(self, sensor, cell, truths);
+            cast_beams(self, sensor, cell, truths);
             let words = |block| self.world.streams.block(id, self.now, purpose::sense(s), block);
-            report(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
+            sample_reports(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
             if scratch.keep_readings {
                 let samples = truths.iter().zip(&*readings).map(|(&row, &reported)| {
                     let (truth, sensor) = (sensor.table.truth(row), s as u16);
@@ -139,7 +139,11 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     /// Returns for each beam of a sensor the first thing that it meets, and the distance to that in boxes.
-    pub(super) fn met(&self, sensor: &MountedSensor, cell: &BodyCell) -> Vec<Option<(T, f64)>> {
+    pub(super) fn beam_hits(
+        &self,
+        sensor: &MountedSensor,
+        cell: &BodyState,
+    ) -> Vec<Option<(T, f64)>> {
         let base = self.base(cell);
         let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
         let mut from = 0;
@@ -148,7 +152,7 @@ impl<T: BoxWord> Scene<'_, T> {
             from = usize::from(end);
             let mut all =
                 boxes[span.clone()].iter().zip(&sensor.distances[span]).flat_map(|(four, far)| {
-                    four.offsets.iter().map(|&o| self.floor.get(at(base, o))).zip(*far)
+                    four.offsets.iter().map(|&o| self.floor.get(box_index(base, o))).zip(*far)
                 });
             all.find(|(word, _)| !word.is_free())
         };
@@ -157,21 +161,21 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Returns the intent of a mover: people and the like continue as before or draw a new
     /// direction.
-    fn mover_draws(&self, mover: &Mover, cell: &BodyCell) -> Intent {
+    fn mover_intent(&self, mover: &Mover, cell: &BodyState) -> Intent {
         let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
-        if !mover.straight.happens(words[0]) {
-            cell.facing.set(Facing::toward((words[1] >> 30) as u8));
+        if !mover.straight.sample(words[0]) {
+            cell.facing.set(Facing::from_heading((words[1] >> 30) as u8));
         }
-        Intent::ONLY
+        Intent::ONLY_ACTION
     }
 
     /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
     /// a body blocks waits.
-    fn door_wants(&self, door: &Door, cell: &BodyCell) -> Intent {
+    fn door_intent(&self, door: &Door, cell: &BodyState) -> Intent {
         let is_open = cell.facing.get().is_open();
         let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];
         let wants_open = door.wants_open(is_open, self.now, draw);
-        if wants_open == is_open { Intent::IDLE } else { Intent::ONLY }
+        if wants_open == is_open { Intent::IDLE } else { Intent::ONLY_ACTION }
     }
 
     /// Claims every free box that the body may come to cover, and returns whether all of them are
@@ -184,8 +188,8 @@ impl<T: BoxWord> Scene<'_, T> {
             let action = body.action_index(cell.facing.get().heading(), intent.number());
             cell.action.set(action);
             let boxes = &*body.actions[usize::from(action)].claims;
-            if all_free(floor, base, boxes) {
-                boxes.iter().for_each(|&offset| floor.set(at(base, offset), claim));
+            if are_free(floor, base, boxes) {
+                boxes.iter().for_each(|&offset| floor.set(box_index(base, offset), claim));
                 return true;
             }
         }
@@ -204,9 +208,9 @@ impl<T: BoxWord> Scene<'_, T> {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, body) = (self.base(cell), self.type_of(cell));
         match body.actions.get(usize::from(cell.action.get())) {
-            Some(action) => sweep(floor, &action.sweep, base, each),
+            Some(action) => for_each_swept(floor, &action.sweep, base, each),
             None => body.own.iter().for_each(|&offset| {
-                let index = at(base, offset);
+                let index = box_index(base, offset);
                 each(index, floor.get(index));
             }),
         }
@@ -214,17 +218,17 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
     /// Robots that have said nothing yet are left out.
-    pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
+    pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<ReceivedMessage>) {
         let (world, state, id) = (self.world, self.state, self.cell(slot).id);
         for &sender in &world.robots {
             let other = state.slot_of_id[sender as usize];
             if other == slot || !self.in_radio_range(radio, slot, other) {
                 continue;
             }
-            let Some(word) = state.voices.heard(sender, self.now) else { continue };
+            let Some(word) = state.voices.last_broadcast(sender, self.now) else { continue };
             let draws = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
-            if !radio.loss.happens(draws[0]) {
-                heard.push(Heard { sender, word });
+            if !radio.loss.sample(draws[0]) {
+                heard.push(ReceivedMessage { sender, word });
             }
         }
     }
@@ -233,7 +237,7 @@ impl<T: BoxWord> Scene<'_, T> {
         // Twice the distance between centers, because then all numbers are integers.
         let center = |slot: Slot| {
             let cell = self.cell(slot);
-            let (at, size) = (cell.at(), self.type_of(cell).size);
+            let (at, size) = (cell.position(), self.type_of(cell).size);
             (
                 2 * i64::from(at.col()) + i64::from(size.0),
                 2 * i64::from(at.row()) + i64::from(size.1),
@@ -247,12 +251,17 @@ impl<T: BoxWord> Scene<'_, T> {
 
 /// Walks the tree of an action's steps, and leaves out the boxes behind a wall.
 #[inline]
-fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl FnMut(usize, T)) {
+fn for_each_swept<T: BoxWord>(
+    floor: &Column<T>,
+    sweep: &SweptVolume,
+    base: u32,
+    mut each: impl FnMut(usize, T),
+) {
     let mut node = 0;
     while let Some(step) = sweep.nodes.get(node) {
         let mut walled = false;
         for &offset in &sweep.boxes[step.first as usize..step.end as usize] {
-            let index = at(base, offset);
+            let index = box_index(base, offset);
             let word = floor.get(index);
             if word == T::WALL {
                 walled = true;
@@ -269,11 +278,11 @@ fn sweep<T: BoxWord>(floor: &Column<T>, sweep: &Sweep, base: u32, mut each: impl
 /// This and [`report`] are two small loops, each in a function of its own, because together they
 /// would run out of registers.
 #[inline(never)]
-fn cast<T: BoxWord>(
-    scene: &Scene<'_, T>,
+fn cast_beams<T: BoxWord>(
+    scene: &CycleContext<'_, T>,
     sensor: &MountedSensor,
-    cell: &BodyCell,
-    truths: &mut Vec<Row>,
+    cell: &BodyState,
+    truths: &mut Vec<RowIndex>,
 ) {
     let (floor, state, base) = (scene.floor, scene.state, scene.base(cell));
     let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
@@ -291,9 +300,9 @@ fn cast<T: BoxWord>(
 
 /// Returns the first box along a beam that holds something: its content and distance class.
 #[inline]
-fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Option<(T, u8)> {
-    let look = |offset: i32| floor.get(at(base, offset));
-    for Crossed { offsets: [a, b, c, d], classes } in beam {
+fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[BeamBoxes]) -> Option<(T, u8)> {
+    let look = |offset: i32| floor.get(box_index(base, offset));
+    for BeamBoxes { offsets: [a, b, c, d], classes } in beam {
         let four = [look(*a), look(*b), look(*c), look(*d)];
         let [a, b, c, d] = four;
         if !(a & b & c & d).is_free() {
@@ -307,9 +316,9 @@ fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[Crossed]) -> Opti
 /// Draws each beam's report from its true reading, and notes the nearest class per sector; `words`
 /// are the sensor's draws, four at a time.
 #[inline(never)]
-fn report<'a>(
+fn sample_reports<'a>(
     sensor: &MountedSensor,
-    truths: &[Row],
+    truths: &[RowIndex],
     words: impl Fn(u16) -> [u32; 4],
     mut readings: impl Iterator<Item = (&'a mut Reading, &'a Sector)>,
     nearest: &mut [u8; 4],
@@ -317,7 +326,7 @@ fn report<'a>(
     for (block, truths) in (0..).zip(truths.chunks(4)) {
         let words = if sensor.table.reliable { [0; 4] } else { words(block) };
         for ((&truth, word), (reading, &sector)) in truths.iter().zip(words).zip(&mut readings) {
-            let reported = sensor.table.report(truth, word);
+            let reported = sensor.table.sample(truth, word);
             *reading = reported.reading;
             let nearest = &mut nearest[sector as usize];
             *nearest = reported.nearness.min(*nearest);
@@ -326,17 +335,17 @@ fn report<'a>(
 }
 
 #[inline]
-pub(super) fn memory_of(cell: &BodyCell) -> Memory {
+pub(super) fn memory_of(cell: &BodyState) -> Memory {
     Memory { words: std::array::from_fn(|k| cell.memory[k].get()) }
 }
 
 #[inline]
-fn store_memory(cell: &BodyCell, memory: Memory) {
+fn store_memory(cell: &BodyState, memory: Memory) {
     cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
 }
 
 /// Returns the names of a reading's observation and class in its sensor, for logs.
-pub(super) fn name_of(reading: Reading, sensor: &super::sensor::SensorModel) -> (&str, &str) {
+pub(super) fn reading_names(reading: Reading, sensor: &super::sensor::SensorModel) -> (&str, &str) {
     let observation = &sensor.observations[usize::from(reading.observation)];
     let class = sensor.distance_classes.get(usize::from(reading.class));
     (observation, class.map_or("beyond", String::as_str))

@@ -12,9 +12,9 @@ const WALL: usize = 1;
 /// Returns the remarks, warnings first.
 pub(super) fn remarks(compiled: &Compiled) -> Vec<Remark> {
     let mut remarks = compiled.remarks.clone();
-    for sensor in mounted(&compiled.world) {
-        remarks.extend(unseen(&compiled.world, sensor));
-        remarks.extend(never_true(sensor));
+    for sensor in mounted_sensors(&compiled.world) {
+        remarks.extend(unseen_kinds(&compiled.world, sensor));
+        remarks.extend(unused_classes(sensor));
     }
     // Sorting is stable: among equals the order of the scenario stays.
     remarks.sort_by_key(|remark| remark.severity);
@@ -22,7 +22,7 @@ pub(super) fn remarks(compiled: &Compiled) -> Vec<Remark> {
 }
 
 /// Returns the sensors in use, each once.
-fn mounted(world: &RobotsWorld) -> impl Iterator<Item = &MountedSensor> {
+fn mounted_sensors(world: &RobotsWorld) -> impl Iterator<Item = &MountedSensor> {
     let sensors = world.types.iter().flat_map(|ty| match &ty.role {
         Role::Robot(model) => model.body.sensors.as_slice(),
         _ => &[],
@@ -33,7 +33,7 @@ fn mounted(world: &RobotsWorld) -> impl Iterator<Item = &MountedSensor> {
 }
 
 /// Returns a note on the kinds that a sensor reads as nothing.
-fn unseen(world: &RobotsWorld, sensor: &MountedSensor) -> Option<Remark> {
+fn unseen_kinds(world: &RobotsWorld, sensor: &MountedSensor) -> Option<Remark> {
     let bodies = world.bodies.iter().map(|body| usize::from(world.type_of(body.id).kind));
     let mut is_met = vec![false; world.kinds.len()];
     bodies.chain([WALL]).for_each(|kind| is_met[kind] = true);
@@ -48,7 +48,7 @@ fn unseen(world: &RobotsWorld, sensor: &MountedSensor) -> Option<Remark> {
 }
 
 /// Returns a note on the distance classes in which no box ever is.
-fn never_true(sensor: &MountedSensor) -> Option<Remark> {
+fn unused_classes(sensor: &MountedSensor) -> Option<Remark> {
     let model = &sensor.model;
     let classes = || sensor.boxes[0].iter().flat_map(|crossed| crossed.classes);
     let never = (0..model.distance_classes.len()).filter(|&k| !classes().any(|c| c == k as u8));

@@ -1,54 +1,54 @@
 //! The tables that a run records, and the rows that wait to be recorded.
 
 use super::effector::Side;
-use super::odometry::Claimed;
-use super::perceive::name_of;
+use super::odometry::DeadReckoning;
+use super::perceive::reading_names;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
-use super::state::{Frames, RobotsState};
+use super::state::{PoseBuffer, RobotsState};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
     BlockBuffer, Buffer, Buffers, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer, Table,
     TableSchema, Values,
 };
-use sidestep_kernel::view::{Log, Plane};
+use sidestep_kernel::view::{Isometry2, Log};
 use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
 /// Number of poses kept before they must be recorded: as many as fit a processor's cache,
-const FEW_POSES: usize = 1 << 18;
+const TARGET_BUFFER_POSES: usize = 1 << 18;
 /// or more for very many bodies, so that cycles run at least sixteen in a row,
-const CYCLES_IN_A_ROW: usize = 16;
+const MIN_BUFFER_CYCLES: usize = 16;
 /// but never more than this.
-const MAX_POSES: usize = 1 << 24;
+const MAX_BUFFER_POSES: usize = 1 << 24;
 /// Number of bodies for which poses are collected together: a cache line of each cycle.
-const TRANSPOSED: usize = 16;
+const BODIES_PER_BLOCK: usize = 16;
 
 /// Names of the headings by number.
 pub(crate) const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
-const CYCLE: &str = "cycle, counted from 0";
-const HEADING: &str =
+const CYCLE_DESCRIPTION: &str = "cycle, counted from 0";
+const HEADING_DESCRIPTION: &str =
     "heading, counterclockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
-const BODY: &str = "entity id: robots first, then people, then doors";
+const BODY_DESCRIPTION: &str = "entity id: robots first, then people, then doors";
 
 /// Returns the table of poses, which are recorded as whole columns because they are many.
-fn trajectories(world: &RobotsWorld) -> TableSchema {
+fn trajectory_table(world: &RobotsWorld) -> TableSchema {
     let column = ColumnSpec::new;
     let columns = vec![
         column("cycle", ColumnType::U64, "the pose at the beginning of this cycle"),
-        column("body", ColumnType::U32, BODY),
+        column("body", ColumnType::U32, BODY_DESCRIPTION),
         column("col_boxes", ColumnType::U32, "column of the body's lower-left box, from the west"),
         column("row_boxes", ColumnType::U32, "row of the body's lower-left box, from the south"),
-        ColumnSpec::label("heading", HEADING, HEADING_NAMES),
+        ColumnSpec::label("heading", HEADING_DESCRIPTION, HEADING_NAMES),
     ];
-    TableSchema { about: about_boxes(world), ..TableSchema::new("trajectories", columns) }
+    TableSchema { about: box_notes(world), ..TableSchema::new("trajectories", columns) }
 }
 
 /// Returns the notes that turn boxes into meters of the world, and ids into kinds of bodies.
-fn about_boxes(world: &RobotsWorld) -> Vec<(String, String)> {
-    let Plane { origin_m: [x, y], yaw_rad } = world.map.plane;
+fn box_notes(world: &RobotsWorld) -> Vec<(String, String)> {
+    let Isometry2 { origin_m: [x, y], yaw_rad } = world.map.plane;
     let box_m = world.map.box_size_m;
     let numbers = [("box_m", box_m), ("origin_x_m", x), ("origin_y_m", y), ("yaw_rad", yaw_rad)];
     let mut about: Vec<_> = numbers.map(|(name, v)| (name.into(), v.to_string())).into();
@@ -62,20 +62,20 @@ fn about_boxes(world: &RobotsWorld) -> Vec<(String, String)> {
     about
 }
 
-fn events(world: &RobotsWorld) -> Table<Event> {
+fn event_table(world: &RobotsWorld) -> Table<Event> {
     let names = ["contact", "door_opened", "door_closed"];
     let kinds = world.kinds.iter().cloned().chain([String::new()]);
     let no_kind = world.kinds.len() as u32;
     let sides = Side::ALL.iter().map(|side| side.name()).chain([""]);
     let no_side = Side::ALL.len() as u32;
     Table::new("events")
-        .about(about_boxes(world))
-        .u64("cycle", CYCLE, |e: &Event| e.cycle)
-        .u32("body", BODY, |e| e.body)
+        .with_about(box_notes(world))
+        .u64("cycle", CYCLE_DESCRIPTION, |e: &Event| e.cycle)
+        .u32("body", BODY_DESCRIPTION, |e| e.body)
         .label("event", "what happened", names, |e| match e.event {
             EventKind::Contact { .. } => 0,
-            EventKind::Opened => 1,
-            EventKind::Closed => 2,
+            EventKind::DoorOpened => 1,
+            EventKind::DoorClosed => 2,
         })
         .label("kind", "kind of the thing touched, empty otherwise", kinds, move |e| {
             match e.event {
@@ -95,7 +95,7 @@ fn events(world: &RobotsWorld) -> Table<Event> {
 }
 
 /// The true and the reported reading of a beam, each an observation and a class of distance.
-struct Reading {
+struct ReadingRow {
     cycle: Cycle,
     robot: EntityId,
     sensor: u16,
@@ -103,13 +103,13 @@ struct Reading {
     reported: [u32; 2],
 }
 
-fn readings(
+fn reading_table(
     world: &RobotsWorld,
-    Vocabulary { observations, classes }: Vocabulary,
-) -> Table<Reading> {
+    ReadingLabels { observations, classes }: ReadingLabels,
+) -> Table<ReadingRow> {
     Table::new("readings")
-        .about(about_boxes(world))
-        .u64("cycle", CYCLE, |r: &Reading| r.cycle)
+        .with_about(box_notes(world))
+        .u64("cycle", CYCLE_DESCRIPTION, |r: &ReadingRow| r.cycle)
         .u32("robot", "entity id", |r| r.robot)
         .u32("sensor", "number of the sensor on its robot", |r| u32::from(r.sensor))
         .label("true", "what the beam met", observations.clone(), |r| r.truth[0])
@@ -118,11 +118,11 @@ fn readings(
         .label("reported_class", "the reported distance class", classes, |r| r.reported[1])
 }
 
-fn motions(world: &RobotsWorld) -> Table<MotionSample> {
+fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
     let action = "action tried: 0 forward, 1 left, 2 right, 3 stay, then the effector's own";
     Table::new("motions")
-        .about(about_boxes(world))
-        .u64("cycle", CYCLE, |s: &MotionSample| s.cycle)
+        .with_about(box_notes(world))
+        .u64("cycle", CYCLE_DESCRIPTION, |s: &MotionSample| s.cycle)
         .u32("robot", "entity id", |s| s.robot)
         .u32("action", action, |s| u32::from(s.action))
         .i32("ahead_boxes", "displacement ahead in the heading before", |s| s.ahead)
@@ -136,14 +136,14 @@ fn motions(world: &RobotsWorld) -> Table<MotionSample> {
 
 /// The tables, and their rows until they are recorded.
 #[derive(Debug, Default)]
-struct Rows {
+struct RowBuffers {
     trajectories: BlockBuffer,
     events: RowBuffer<Event>,
-    readings: RowBuffer<Reading>,
+    readings: RowBuffer<ReadingRow>,
     motions: RowBuffer<MotionSample>,
 }
 
-impl Buffers for Rows {
+impl Buffers for RowBuffers {
     fn buffers(&self) -> Vec<&dyn Buffer> {
         vec![&self.trajectories, &self.events, &self.readings, &self.motions]
     }
@@ -155,86 +155,86 @@ impl Buffers for Rows {
 
 /// Data that a run keeps beside its state: events and samples that wait to be recorded.
 #[derive(Debug, Default)]
-pub struct Books {
+pub struct Collector {
     record: RecordSection,
     /// First cycle of which the poses are not recorded yet.
     recorded: Cycle,
     is_recording: bool,
-    rows: Rows,
+    rows: RowBuffers,
     /// Events as the workers have gathered them,
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
     /// The claims of each robot's wheels, by id, while odometry is watched.
-    odometry: Option<Vec<Claimed>>,
+    odometry: Option<Vec<DeadReckoning>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,
 }
 
-impl Books {
+impl Collector {
     /// Returns the empty books of a run that records the tables named in `record` once recording starts.
     pub(crate) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
     /// Starts to keep rows from cycle `now` on.
-    pub(super) fn begin(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
+    pub(super) fn start(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         let record = &self.record;
-        self.rows.trajectories.begin(record.trajectories.then(|| trajectories(world)));
-        self.rows.events.begin(record.events.then(|| events(world)));
-        self.rows
-            .readings
-            .begin(record.calibration.then(|| readings(world, Vocabulary::of(world))));
-        self.rows.motions.begin(record.calibration.then(|| motions(world)));
+        self.rows.trajectories.start(record.trajectories.then(|| trajectory_table(world)));
+        self.rows.events.start(record.events.then(|| event_table(world)));
+        self.rows.readings.start(
+            record.calibration.then(|| reading_table(world, ReadingLabels::from_world(world))),
+        );
+        self.rows.motions.start(record.calibration.then(|| motion_table(world)));
         if record.trajectories {
             let bodies = world.bodies.len();
-            let wanted = (FEW_POSES / bodies).max(CYCLES_IN_A_ROW);
-            let capacity = wanted.min(MAX_POSES / bodies).clamp(1, 4096);
-            state.frames = Some(Frames::new(now, capacity, bodies));
+            let wanted = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);
+            let capacity = wanted.min(MAX_BUFFER_POSES / bodies).clamp(1, 4096);
+            state.frames = Some(PoseBuffer::new(now, capacity, bodies));
         }
         (self.is_recording, self.recorded) = (true, now);
     }
 
     /// Continues from cycle `now`, after its state was restored.
-    pub(super) fn go_on(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
+    pub(super) fn resume(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         self.recorded = now;
         if self.is_recording {
-            self.begin(world, state, now);
+            self.start(world, state, now);
         }
     }
 
     /// Starts to keep the events that frames report.
     pub(super) fn watch(&mut self) {
-        self.log.is_kept = true;
+        self.log.is_enabled = true;
     }
 
     /// Starts to keep the claims of wheels.
     pub(super) fn watch_odometry(&mut self, world: &RobotsWorld) {
         // Robots have the first ids.
-        self.odometry.get_or_insert_with(|| vec![Claimed::default(); world.robots.len()]);
+        self.odometry.get_or_insert_with(|| vec![DeadReckoning::default(); world.robots.len()]);
     }
 
     /// Returns the claims of each robot's wheels, by id; nothing unless odometry is watched.
-    pub(super) fn odometry(&self) -> &[Claimed] {
+    pub(super) fn odometry(&self) -> &[DeadReckoning] {
         self.odometry.as_deref().unwrap_or_default()
     }
 
     /// Makes a worker keep the events and samples that are wanted.
     pub(super) fn prepare(&self, scratch: &mut Scratch) {
-        scratch.keep_events = self.log.is_kept || self.rows.events.is_kept();
-        scratch.keep_readings = self.rows.readings.is_kept();
-        scratch.keep_motions = self.rows.motions.is_kept() || self.odometry.is_some();
+        scratch.keep_events = self.log.is_enabled || self.rows.events.is_enabled();
+        scratch.keep_readings = self.rows.readings.is_enabled();
+        scratch.keep_motions = self.rows.motions.is_enabled() || self.odometry.is_some();
     }
 
     /// Takes a worker's events and samples over.
-    pub(super) fn gather(&mut self, scratch: &mut Scratch) {
+    pub(super) fn collect(&mut self, scratch: &mut Scratch) {
         self.gathered.append(&mut scratch.events);
         self.sensor_samples.append(&mut scratch.sensor_samples);
         self.motion_samples.append(&mut scratch.motion_samples);
     }
 
     /// Files the gathered rows in an order that does not depend on the workers that saw them.
-    pub(super) fn book(&mut self, world: &RobotsWorld) {
+    pub(super) fn commit(&mut self, world: &RobotsWorld) {
         self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
         self.gathered.iter().for_each(|&event| self.log.push(event));
         self.rows.events.extend(self.gathered.drain(..));
@@ -261,14 +261,14 @@ impl Books {
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError> {
         if let Some(frames) = &mut state.frames {
-            self.rows.trajectories.set(poses(world, frames, self.recorded..now));
+            self.rows.trajectories.set(pose_columns(world, frames, self.recorded..now));
             frames.first = now;
         }
         self.sensor_samples.sort_by_key(|s| (s.cycle, s.robot));
         if !self.sensor_samples.is_empty() {
-            let vocabulary = Vocabulary::of(world);
+            let vocabulary = ReadingLabels::from_world(world);
             let samples = self.sensor_samples.drain(..);
-            self.rows.readings.extend(samples.filter_map(|s| vocabulary.reading(world, &s)));
+            self.rows.readings.extend(samples.filter_map(|s| vocabulary.reading_row(world, &s)));
         }
         self.recorded = now;
         self.rows.record(recorder)
@@ -276,7 +276,7 @@ impl Books {
 }
 
 /// Returns the columns of the table of poses in these cycles.
-fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values> {
+fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) -> Vec<Values> {
     let cycles = (span.end - span.start) as usize;
     let moving: Vec<EntityId> =
         (0..world.bodies.len() as EntityId).filter(|&id| !world.is_door(id)).collect();
@@ -286,8 +286,8 @@ fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values
     let from = (span.start - frames.first) as usize;
     // Poses are stored by cycle and written by body: a few bodies at a time, so that reads within a
     // cycle lie together.
-    let mut ways = vec![Vec::new(); TRANSPOSED];
-    for some in moving.chunks(TRANSPOSED) {
+    let mut ways = vec![Vec::new(); BODIES_PER_BLOCK];
+    for some in moving.chunks(BODIES_PER_BLOCK) {
         ways.iter_mut().for_each(Vec::clear);
         for cycle in from..from + cycles {
             for (way, &id) in ways.iter_mut().zip(some) {
@@ -312,13 +312,13 @@ fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values
 }
 
 /// The labels of readings, sorted: observations and distance classes of all sensors.
-struct Vocabulary {
+struct ReadingLabels {
     observations: Vec<String>,
     classes: Vec<String>,
 }
 
-impl Vocabulary {
-    fn of(world: &RobotsWorld) -> Self {
+impl ReadingLabels {
+    fn from_world(world: &RobotsWorld) -> Self {
         let (mut observations, mut classes) = (Vec::new(), vec!["beyond".to_string()]);
         for sensor in world.sensors() {
             observations.extend(sensor.observations.iter().cloned());
@@ -332,7 +332,7 @@ impl Vocabulary {
     }
 
     /// Returns the row of a sample; `None` for a body without sensors.
-    fn reading(&self, world: &RobotsWorld, sample: &SensorSample) -> Option<Reading> {
+    fn reading_row(&self, world: &RobotsWorld, sample: &SensorSample) -> Option<ReadingRow> {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return None };
         let sensor = &model.body.sensors[usize::from(sample.sensor)].model;
         let index = |names: &[String], name: &str| {
@@ -341,12 +341,12 @@ impl Vocabulary {
         let labels = |(observation, class): (&str, &str)| {
             [index(&self.observations, observation), index(&self.classes, class)]
         };
-        Some(Reading {
+        Some(ReadingRow {
             cycle: sample.cycle,
             robot: sample.robot,
             sensor: sample.sensor,
-            truth: labels(name_of(sample.truth, sensor)),
-            reported: labels(name_of(sample.reported, sensor)),
+            truth: labels(reading_names(sample.truth, sensor)),
+            reported: labels(reading_names(sample.reported, sensor)),
         })
     }
 }

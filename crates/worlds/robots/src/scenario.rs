@@ -2,12 +2,12 @@
 
 mod compile;
 mod kinds;
-mod located;
-mod parts;
-mod placing;
+mod located_section;
+mod placement_grid;
 mod random;
 mod schema;
 mod tables;
+mod values;
 
 pub use crate::world::StorageOrder;
 pub use compile::{Behaviours, Compiled, presets};
@@ -16,15 +16,15 @@ pub(super) use schema::{profile as profile_schema, sections};
 use super::effector::ObstacleRule;
 use super::policy::ConflictPolicy;
 use super::world::Regime;
-use parts::{BoxSide, Period, Placing, QuarterTurns, Side, Steps};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::{AboveBelow, AboveTo, Number, Positive, Sections, Share, Spanned};
+use sidestep_scenario::{Fraction, LeftOpen, Number, Open, Positive, Sections, Spanned};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use values::{BoxSide, PathSteps, Period, QuarterTurns, SideBoxes, StartPose};
 
 /// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -101,21 +101,21 @@ pub(super) struct KindSection {
 pub(super) struct SensorSection {
     pub(super) bearings_deg: Spanned<Vec<f64>>,
     /// Length of the beams.
-    pub(super) range_m: Number<AboveTo<0, 10_000>>,
+    pub(super) range_m: Number<LeftOpen<0, 10_000>>,
     pub(super) observations: Spanned<Vec<String>>,
     #[serde(default)]
     pub(super) designates: BTreeMap<Spanned<String>, Spanned<String>>,
     /// Probability of each report, one row for each true observation.
-    pub(super) confusion: Spanned<Rows>,
+    pub(super) confusion: Spanned<MatrixRows>,
     #[serde(default)]
-    pub(super) confusion_by_class: BTreeMap<Spanned<String>, Spanned<Rows>>,
+    pub(super) confusion_by_class: BTreeMap<Spanned<String>, Spanned<MatrixRows>>,
     #[serde(default)]
     pub(super) distance_edges_m: Option<Spanned<Vec<f64>>>,
     /// Names of the distance classes, one more than there are edges.
     #[serde(default)]
     pub(super) distance_classes: Option<Spanned<Vec<String>>>,
     #[serde(default)]
-    pub(super) distance_confusion: Option<Spanned<Rows>>,
+    pub(super) distance_confusion: Option<Spanned<MatrixRows>>,
     /// Counts and sources of a learned table; nothing depends on them.
     #[serde(default, rename = "evidence")]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
@@ -123,7 +123,7 @@ pub(super) struct SensorSection {
 }
 
 /// Rows of a matrix by name.
-pub(super) type Rows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
+pub(super) type MatrixRows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 
 /// Actions by name; `box_m` and `evidence` name the data on which they rest.
 #[derive(Debug, Clone, Default)]
@@ -193,7 +193,7 @@ pub(super) struct TransitionSection {
     pub(super) p: f64,
     /// Steps: F ahead, L to the left, B back, R to the right.
     #[serde(default)]
-    pub(super) path: Steps,
+    pub(super) path: PathSteps,
     /// Turn after the steps, in degrees, positive to the left.
     #[serde(default)]
     pub(super) turn: QuarterTurns,
@@ -211,11 +211,11 @@ pub(super) struct RobotSection {
     pub(super) count: Option<Spanned<u32>>,
     /// Places: [column, row] or [column, row, heading].
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Placing>>,
+    pub(super) at: Vec<Spanned<StartPose>>,
     /// Rectangle in which places are drawn.
     pub(super) region: Option<Spanned<[u32; 4]>>,
     pub(super) scen: Option<Spanned<PathBuf>>,
-    pub(super) size: Option<Side>,
+    pub(super) size: Option<SideBoxes>,
     pub(super) period: Option<Period>,
     pub(super) phase: Option<u32>,
     #[serde(default)]
@@ -266,7 +266,7 @@ pub(super) enum AvoidanceSection {
 
 impl BehaviourSection {
     /// Returns every key but `kind`, and whether it is given.
-    fn given(&self) -> [(&'static str, bool); 9] {
+    fn given_keys(&self) -> [(&'static str, bool); 9] {
         // Without `..`, so that a new key cannot be forgotten here.
         let Self {
             kind: _,
@@ -306,14 +306,14 @@ pub(super) struct MoverSection {
     pub(super) count: Option<Spanned<u32>>,
     /// Places: [column, row].
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Placing>>,
+    pub(super) at: Vec<Spanned<StartPose>>,
     /// Rectangle in which places are drawn.
     pub(super) region: Option<Spanned<[u32; 4]>>,
-    pub(super) size: Option<[Side; 2]>,
+    pub(super) size: Option<[SideBoxes; 2]>,
     pub(super) period: Option<Period>,
     /// Cycle of the period in which they act.
     pub(super) phase: Option<u32>,
-    pub(super) p_straight: Option<Share>,
+    pub(super) p_straight: Option<Fraction>,
 }
 
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -323,8 +323,8 @@ pub(super) struct DoorSection {
     #[serde(default = "door_kind")]
     pub(super) kind: Spanned<String>,
     #[serde(default)]
-    pub(super) at: Vec<Spanned<Placing>>,
-    pub(super) size: Option<[Side; 2]>,
+    pub(super) at: Vec<Spanned<StartPose>>,
+    pub(super) size: Option<[SideBoxes; 2]>,
     #[serde(default)]
     pub(super) office: bool,
     pub(super) periodic: Option<Spanned<PeriodicSection>>,
@@ -346,16 +346,16 @@ pub(super) struct PeriodicSection {
 #[serde(deny_unknown_fields)]
 pub(super) struct RandomSection {
     /// Chance per cycle that a closed door opens.
-    pub(super) p_open: Share,
+    pub(super) p_open: Fraction,
     /// Chance per cycle that an open door closes.
-    pub(super) p_close: Share,
+    pub(super) p_close: Fraction,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RadioSection {
-    pub(super) range_m: Number<AboveBelow<0, 1_000_000>>,
-    pub(super) loss: Option<Share>,
+    pub(super) range_m: Number<Open<0, 1_000_000>>,
+    pub(super) loss: Option<Fraction>,
 }
 
 /// The tables that a run keeps in addition to its summary.

@@ -91,42 +91,42 @@ impl SensorModel {
 /// between at most two reports (Walker's alias method, built by Vose's algorithm). A report
 /// has its probability within 2^-31.
 #[derive(Debug, Clone)]
-pub(crate) struct ReadingTable {
+pub(crate) struct AliasTable {
     classes: usize,
     bits: u32,
-    columns: Box<[Split]>,
+    columns: Box<[AliasColumn]>,
     /// Whether every reading is the truth, so that no draw is needed.
     pub(crate) reliable: bool,
 }
 
-/// A true reading's row in a [`ReadingTable`].
+/// A true reading's row in a [`AliasTable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Row(u32);
+pub(crate) struct RowIndex(u32);
 
 /// One column of a row: below the threshold the first reading is reported, else the second.
 #[derive(Debug, Clone, Copy)]
-struct Split {
+struct AliasColumn {
     threshold: u32,
-    reports: [Report; 2],
+    reports: [SampledReading; 2],
 }
 
 /// A drawn reading, with its nearness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Report {
+pub(crate) struct SampledReading {
     /// The reading.
     pub(crate) reading: Reading,
     /// Its distance class, or [`UNSEEN`] where nothing is reported.
     pub(crate) nearness: u8,
 }
 
-impl From<Reading> for Report {
+impl From<Reading> for SampledReading {
     fn from(reading: Reading) -> Self {
         let nearness = if reading.observation == NOTHING { UNSEEN } else { reading.class };
         Self { reading, nearness }
     }
 }
 
-impl ReadingTable {
+impl AliasTable {
     /// Prepares the table of a sensor.
     ///
     /// # Errors
@@ -150,20 +150,20 @@ impl ReadingTable {
 
     /// Returns the row of a true reading.
     #[inline]
-    pub(crate) fn row(&self, truth: Reading) -> Row {
+    pub(crate) fn row(&self, truth: Reading) -> RowIndex {
         let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
-        Row((row << self.bits) as u32)
+        RowIndex((row << self.bits) as u32)
     }
 
     /// Returns the true reading of a row.
-    pub(crate) fn truth(&self, row: Row) -> Reading {
+    pub(crate) fn truth(&self, row: RowIndex) -> Reading {
         let row = row.0 as usize >> self.bits;
         Reading { observation: (row / self.classes) as u8, class: (row % self.classes) as u8 }
     }
 
     /// Returns the report for the true reading of `row`, drawn with the uniform word `u`.
     #[inline]
-    pub(crate) fn report(&self, row: Row, u: u32) -> Report {
+    pub(crate) fn sample(&self, row: RowIndex, u: u32) -> SampledReading {
         let column = (u64::from(u) << self.bits >> 32) as usize;
         let split = &self.columns[row.0 as usize | column];
         split.reports[usize::from(u << self.bits >= split.threshold)]
@@ -171,17 +171,18 @@ impl ReadingTable {
 }
 
 /// Returns the columns of a row, `n` of them with probability 1/n each.
-fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<Split> {
+fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<AliasColumn> {
     let padding = row[0].0;
     row.resize(n, (padding, 0.0));
     let mut weights: Vec<f64> = row.iter().map(|r| r.1 * n as f64).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| weights[i] < 1.0);
-    let full = |reading| Split { threshold: u32::MAX, reports: [Report::from(reading); 2] };
-    let mut columns: Vec<Split> = row.iter().map(|r| full(r.0)).collect();
+    let full =
+        |reading| AliasColumn { threshold: u32::MAX, reports: [SampledReading::from(reading); 2] };
+    let mut columns: Vec<AliasColumn> = row.iter().map(|r| full(r.0)).collect();
     while let (Some(&of), Some(from)) = (small.last(), large.last().copied()) {
         small.pop();
         let threshold = (weights[of] * (1u64 << 32) as f64).round() as u32;
-        columns[of] = Split { threshold, reports: [row[of].0.into(), row[from].0.into()] };
+        columns[of] = AliasColumn { threshold, reports: [row[of].0.into(), row[from].0.into()] };
         weights[from] -= 1.0 - weights[of];
         if weights[from] < 1.0 {
             large.pop();

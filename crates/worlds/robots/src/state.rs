@@ -1,16 +1,16 @@
 //! The state of a run, in columns by slot, and its snapshot by entity id.
 
-mod codes;
+mod packed;
 
+use super::broadcast::BroadcastBuffer;
 use super::policy::ConflictPolicy;
-use super::voice::Voices;
 use super::world::{Body, BodyType, RobotsWorld};
-pub use codes::{Facing, LastContact};
-pub(crate) use codes::{Intent, KeptPose};
+pub use packed::{Facing, LastContact};
+pub(crate) use packed::{Intent, PackedPose};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::{Coded, Shared};
+use sidestep_kernel::column::{AtomicCell, Packed};
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::space::{BoxWord, Floor, Marks, Position};
+use sidestep_kernel::space::{AtomicBitSet, BoxWord, Floor, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::AtomicU64;
 
@@ -25,9 +25,9 @@ pub struct RobotsState {
     /// The body that stands in, or claims, each box of the padded grid.
     pub(crate) floor: Floor,
     /// Boxes that a robot has ever covered.
-    pub(crate) visited: Marks,
+    pub(crate) visited: AtomicBitSet,
     /// The changing part of each body, by slot.
-    pub bodies: Box<[BodyCell]>,
+    pub bodies: Box<[BodyState]>,
     /// Kind of each body, by slot.
     pub(crate) kinds: Box<[u8]>,
     /// Slot of each entity, by id.
@@ -37,61 +37,61 @@ pub struct RobotsState {
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub(crate) bids: Box<[AtomicU64]>,
     /// Last broadcast of each robot.
-    pub(crate) voices: Voices,
+    pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
-    pub(crate) frames: Option<Frames>,
+    pub(crate) frames: Option<PoseBuffer>,
 }
 
 /// One body's share of the state, in one cache line.
 #[derive(Debug, Clone, Default)]
 #[repr(align(64))]
-pub struct BodyCell {
+pub struct BodyState {
     /// Lower-left box, as a [`Position`] word.
-    pub(crate) anchor: Shared<u32>,
+    pub(crate) anchor: AtomicCell<u32>,
     /// Heading; of a door, whether it is open.
-    pub facing: Shared<Facing>,
+    pub facing: AtomicCell<Facing>,
     /// The action that the body is about to do in this cycle.
-    pub(crate) intent: Shared<Intent>,
+    pub(crate) intent: AtomicCell<Intent>,
     /// The obstacle that stopped the last action.
-    pub contact: Shared<LastContact>,
+    pub contact: AtomicCell<LastContact>,
     /// A robot's memory; its behavior gives the words their meaning.
-    pub memory: [Shared<u32>; 4],
+    pub memory: [AtomicCell<u32>; 4],
     /// Cycles from one action to the next; constant.
     pub period: u32,
     /// Unit moves made, in boxes.
-    pub moves: Shared<u32>,
+    pub moves: AtomicCell<u32>,
     /// Number of boxes that this robot was the first to cover.
-    pub first_visits: Shared<u32>,
+    pub first_visits: AtomicCell<u32>,
     /// Number of trips completed.
-    pub trips: Shared<u32>,
+    pub trips: AtomicCell<u32>,
     /// Cycles spent on completed trips.
-    pub trip_cycles: Shared<u64>,
+    pub trip_cycles: AtomicCell<u64>,
     /// Cycle in which the present trip started.
-    pub trip_begun: Shared<u64>,
+    pub trip_begun: AtomicCell<u64>,
     /// Entity id; constant.
     pub id: u32,
     /// Index of its type; constant.
     pub ty: u16,
     /// Index of the action that it is about to do, see `BodyType::actions`.
-    pub(crate) action: Shared<u16>,
+    pub(crate) action: AtomicCell<u16>,
 }
 
-impl BodyCell {
-    fn of(body: &Body) -> Self {
+impl BodyState {
+    fn from_body(body: &Body) -> Self {
         let &Body { id, ty, period, .. } = body;
         Self { id, ty, period, ..Self::default() }
     }
 
     /// Returns the position of the lower-left box.
     #[inline(always)]
-    pub fn at(&self) -> Position {
+    pub fn position(&self) -> Position {
         Position::from_word(self.anchor.get())
     }
 }
 
 /// Poses of all bodies over some cycles; those of one cycle are stored together.
 #[derive(Debug)]
-pub(crate) struct Frames {
+pub(crate) struct PoseBuffer {
     /// Cycle of the first pose.
     pub(crate) first: Cycle,
     /// Number of cycles for which there is room.
@@ -99,13 +99,13 @@ pub(crate) struct Frames {
     /// Number of poses per cycle, one for each body.
     pub(crate) bodies: usize,
     /// Poses at `(cycle - first) * bodies + id`.
-    pub(crate) poses: Column<KeptPose>,
+    pub(crate) poses: Column<PackedPose>,
 }
 
-impl Frames {
+impl PoseBuffer {
     /// Returns room for `capacity` cycles of `bodies` bodies, starting with cycle `first`.
     pub(crate) fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
-        let poses = Column::filled(capacity * bodies, KeptPose::default());
+        let poses = Column::filled(capacity * bodies, PackedPose::default());
         Self { first, capacity, bodies, poses }
     }
 }
@@ -115,9 +115,9 @@ impl Frames {
 pub struct BodyRecord {
     /// Column and row of the lower-left box, in map coordinates.
     pub at: (u32, u32),
-    /// See [`BodyCell::facing`].
+    /// See [`BodyState::facing`].
     pub facing: Facing,
-    /// See [`BodyCell::contact`].
+    /// See [`BodyState::contact`].
     pub contact: LastContact,
     /// The robot's memory.
     pub memory: [u32; 4],
@@ -154,22 +154,25 @@ impl RobotsState {
         let bids = if in_rounds { world.walls.len() } else { 0 };
         Self {
             floor: Floor::new(world.walls.iter().map(|&kind| kind == WALL), n),
-            visited: Marks::none(world.walls.len()),
+            visited: AtomicBitSet::empty(world.walls.len()),
             kinds: ids.iter().map(|&id| world.type_of(id).kind).collect(),
-            bodies: ids.iter().map(|&id| BodyCell::of(&world.bodies[id as usize])).collect(),
+            bodies: ids
+                .iter()
+                .map(|&id| BodyState::from_body(&world.bodies[id as usize]))
+                .collect(),
             slot_of_id,
             contacts: Column::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
-            voices: Voices::silent(if world.radio.is_some() { n } else { 0 }),
+            voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
     }
 
     /// Returns a copy on which a cycle can be tried. It knows no boxes as visited, and records no poses.
-    pub(super) fn copied(&self, world: &RobotsWorld) -> Self {
+    pub(super) fn trial_copy(&self, world: &RobotsWorld) -> Self {
         Self {
             floor: self.floor.clone(),
-            visited: Marks::none(world.walls.len()),
+            visited: AtomicBitSet::empty(world.walls.len()),
             bodies: self.bodies.clone(),
             kinds: self.kinds.clone(),
             slot_of_id: self.slot_of_id.clone(),
@@ -191,26 +194,26 @@ impl RobotsState {
     }
 
     /// Returns the changing part of the body with this id.
-    pub fn body(&self, id: EntityId) -> &BodyCell {
+    pub fn body(&self, id: EntityId) -> &BodyState {
         &self.bodies[self.slot_of_id[id as usize] as usize]
     }
 
     /// Returns the anchor of the body in a slot.
     #[inline(always)]
-    pub fn at(&self, slot: Slot) -> Position {
-        self.bodies[slot as usize].at()
+    pub fn position(&self, slot: Slot) -> Position {
+        self.bodies[slot as usize].position()
     }
 
     /// Returns the type of the body in a slot.
     #[inline]
-    pub(crate) fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
+    pub(crate) fn body_type<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
     }
 
     /// Stores bodies that are near on the map near in memory, because bodies mostly read the boxes
     /// around them: in bands of eight rows, each from west to east.
     pub(super) fn arrange(&mut self, world: &RobotsWorld) {
-        let place = |cell: &BodyCell| (cell.at().row() >> 3, cell.at().col(), cell.id);
+        let place = |cell: &BodyState| (cell.position().row() >> 3, cell.position().col(), cell.id);
         self.bodies.sort_unstable_by_key(place);
         for slot in 0..self.bodies.len() {
             let cell = &self.bodies[slot];
@@ -230,26 +233,26 @@ impl RobotsState {
 
     /// Returns the state in the order of ids after `cycle` cycles.
     pub fn snapshot(&self, world: &RobotsWorld, cycle: Cycle) -> Snapshot {
-        let bodies = self.slot_of_id.iter().map(|&slot| self.record(world, slot, cycle));
-        Snapshot { cycle, bodies: bodies.collect(), visited: self.visited(world) }
+        let bodies = self.slot_of_id.iter().map(|&slot| self.body_record(world, slot, cycle));
+        Snapshot { cycle, bodies: bodies.collect(), visited: self.visited_bits(world) }
     }
 
-    fn record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
+    fn body_record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
         let body = &self.bodies[slot as usize];
         let (i, kinds) = (body.id as usize, world.kinds.len());
         BodyRecord {
-            at: world.map_position(body.at()),
+            at: world.map_position(body.position()),
             facing: body.facing.get(),
             contact: body.contact.get(),
             memory: std::array::from_fn(|k| body.memory[k].get()),
-            voice: self.voices.heard(body.id, cycle),
+            voice: self.voices.last_broadcast(body.id, cycle),
             counts: [body.moves.get(), body.first_visits.get(), body.trips.get()],
             trip: [body.trip_cycles.get(), body.trip_begun.get()],
             contacts: (0..kinds).map(|k| self.contacts.get(i * kinds + k)).collect(),
         }
     }
 
-    fn visited(&self, world: &RobotsWorld) -> Vec<u8> {
+    fn visited_bits(&self, world: &RobotsWorld) -> Vec<u8> {
         let mut bits = vec![0u8; world.map_boxes().div_ceil(8)];
         for (k, index) in world.map_indices().enumerate() {
             if self.visited.contains(index) {
@@ -268,12 +271,12 @@ impl RobotsState {
             }
         }
         for (record, &slot) in snapshot.bodies.iter().zip(&state.slot_of_id) {
-            state.put(world, slot, record);
+            state.restore_body(world, slot, record);
         }
         state
     }
 
-    fn put(&self, world: &RobotsWorld, slot: Slot, record: &BodyRecord) {
+    fn restore_body(&self, world: &RobotsWorld, slot: Slot, record: &BodyRecord) {
         let body = &self.bodies[slot as usize];
         let i = body.id as usize;
         body.facing.set(record.facing);
@@ -298,11 +301,11 @@ impl RobotsState {
 
     /// Writes a body into the boxes it covers.
     pub(super) fn occupy(&self, world: &RobotsWorld, slot: Slot) {
-        let body = self.type_in(world, slot);
-        let base = self.at(slot).index(world.stride);
+        let body = self.body_type(world, slot);
+        let base = self.position(slot).index(world.stride);
         for &offset in &body.own {
             let index = base.wrapping_add_signed(offset) as usize;
-            self.floor.stand(index, slot);
+            self.floor.place(index, slot);
             if body.marks {
                 self.visited.insert(index);
             }
@@ -325,22 +328,22 @@ impl Snapshot {
     /// Returns the digest of this state (promise D1): every value, by id, little-endian.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
-        hasher.u64(self.cycle);
-        hasher.u64(self.bodies.len() as u64);
+        hasher.write_u64(self.cycle);
+        hasher.write_u64(self.bodies.len() as u64);
         for body in &self.bodies {
-            hasher.u32(body.at.0);
-            hasher.u32(body.at.1);
-            hasher.u8(body.facing.code());
-            hasher.u32(u32::from(body.contact.code()));
+            hasher.write_u32(body.at.0);
+            hasher.write_u32(body.at.1);
+            hasher.write_u8(body.facing.to_bits());
+            hasher.write_u32(u32::from(body.contact.to_bits()));
             let voice = body.voice.unwrap_or(0);
-            body.trip.iter().chain([&voice]).for_each(|&w| hasher.u64(w));
+            body.trip.iter().chain([&voice]).for_each(|&w| hasher.write_u64(w));
             let words = body.memory.iter().chain(&body.counts).chain(&body.contacts);
-            words.for_each(|&w| hasher.u32(w));
+            words.for_each(|&w| hasher.write_u32(w));
         }
-        hasher.bytes(&self.visited);
+        hasher.write_bytes(&self.visited);
         // Whether 0 is a word or silence; nothing is added where no robot has spoken.
         let spoke = (0u32..).zip(&self.bodies).filter(|(_, body)| body.voice.is_some());
-        spoke.for_each(|(id, _)| hasher.u32(id));
+        spoke.for_each(|(id, _)| hasher.write_u32(id));
         hasher.finish()
     }
 }

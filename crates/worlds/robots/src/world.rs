@@ -4,12 +4,12 @@ use super::decide::{Behaviour, Sector};
 use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::ray::{Crossing, EPSILON, crossings, turn_crossing};
-use super::sensor::{Reading, ReadingTable, Row, SensorModel};
+use super::sensor::{AliasTable, Reading, RowIndex, SensorModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::control::Teams;
-use sidestep_kernel::distr::{Chance, RowError};
+use sidestep_kernel::distr::{Bernoulli, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
@@ -17,7 +17,7 @@ use sidestep_map::{GridMap, Rect};
 use std::sync::Arc;
 
 /// Boxes of a beam that are read together, even past a wall.
-pub(super) const BEAM_STEP: usize = 4;
+pub(super) const BEAM_CHUNK_BOXES: usize = 4;
 
 /// The order in which bodies are stored; no result depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,12 +72,12 @@ impl Regime {
     }
 
     /// Returns whether sensors are reliable.
-    pub(crate) fn reliable_sensors(self) -> bool {
+    pub(crate) fn has_reliable_sensors(self) -> bool {
         matches!(self, Self::Reliable | Self::Effectors)
     }
 
     /// Returns whether effectors are reliable.
-    pub(crate) fn reliable_effectors(self) -> bool {
+    pub(crate) fn has_reliable_effectors(self) -> bool {
         matches!(self, Self::Reliable | Self::Sensors)
     }
 }
@@ -109,7 +109,7 @@ pub struct RobotsWorld {
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
-    /// Rings of wall around the map. They are there because whole paths, and [`BEAM_STEP`] boxes of
+    /// Rings of wall around the map. They are there because whole paths, and [`BEAM_CHUNK_BOXES`] boxes of
     /// a beam, are read at once without a check against the map's edge.
     pub(super) border: u32,
     /// Width of the padded grid, in boxes.
@@ -226,25 +226,25 @@ pub struct RobotBody {
 pub struct MountedSensor {
     /// The sensor as data.
     pub model: SensorModel,
-    pub(super) table: ReadingTable,
+    pub(super) table: AliasTable,
     /// The boxes that its beams cross, for each heading.
-    pub(super) boxes: [Box<[Crossed]>; 4],
+    pub(super) boxes: [Box<[BeamBoxes]>; 4],
     /// The distance in boxes to each of them, the same for all headings.
-    pub(super) distances: Box<[[f64; BEAM_STEP]]>,
+    pub(super) distances: Box<[[f64; BEAM_CHUNK_BOXES]]>,
     /// End of each beam's boxes in the lists of `boxes`.
     pub(super) ends: Box<[u16]>,
     /// The row of each beam's report when it meets nothing.
-    pub(super) nothing_row: Row,
+    pub(super) nothing_row: RowIndex,
     pub(super) nothing: Reading,
 }
 
 /// Consecutive boxes on a beam's way.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Crossed {
+pub(super) struct BeamBoxes {
     /// Index offsets from the anchor.
-    pub(super) offsets: [i32; BEAM_STEP],
+    pub(super) offsets: [i32; BEAM_CHUNK_BOXES],
     /// Distance class of an obstacle in each of them.
-    pub(super) classes: [u8; BEAM_STEP],
+    pub(super) classes: [u8; BEAM_CHUNK_BOXES],
 }
 
 impl MountedSensor {
@@ -260,9 +260,9 @@ impl MountedSensor {
         reliable: bool,
     ) -> Result<Self, RowError> {
         let range = model.range_m / box_size_m;
-        let beam = |&deg: &f64| in_fours(crossings(size, deg, range));
+        let beam = |&deg: &f64| beam_chunks(crossings(size, deg, range));
         let beams: Vec<_> = model.bearings_deg.iter().map(beam).collect();
-        let crossed = |four: [Crossing; BEAM_STEP], heading| Crossed {
+        let crossed = |four: [Crossing; BEAM_CHUNK_BOXES], heading| BeamBoxes {
             offsets: four.map(|c| {
                 let turned = turn_crossing(c, size, heading);
                 turned.dy * stride as i32 + turned.dx
@@ -278,7 +278,7 @@ impl MountedSensor {
             end
         });
         let ends = ends.collect();
-        let (table, nothing) = (ReadingTable::new(&model, reliable)?, model.nothing());
+        let (table, nothing) = (AliasTable::new(&model, reliable)?, model.nothing());
         let nothing_row = table.row(nothing);
         Ok(Self { model, table, boxes, distances, ends, nothing_row, nothing })
     }
@@ -289,7 +289,7 @@ impl MountedSensor {
     }
 
     /// Returns whether every reading is the truth by its tables or because errors are off.
-    pub(super) fn never_errs(&self) -> bool {
+    pub(super) fn is_error_free(&self) -> bool {
         let is_certain = |row: &[f64], truth: usize| row[truth] == 1.0;
         let all = |matrix: &[Vec<f64>]| {
             // The last row of a matrix of classes, `beyond`, is used only for spurious reports.
@@ -303,7 +303,7 @@ impl MountedSensor {
     }
 
     /// Returns the observation that a kind designates.
-    pub(super) fn designates(&self, kind: u8) -> u8 {
+    pub(super) fn designated_observation(&self, kind: u8) -> u8 {
         self.model.designates[usize::from(kind)]
     }
 
@@ -318,11 +318,11 @@ impl MountedSensor {
     }
 }
 
-/// Returns a beam's crossings in groups of [`BEAM_STEP`]. The last crossing is repeated to fill the
+/// Returns a beam's crossings in groups of [`BEAM_CHUNK_BOXES`]. The last crossing is repeated to fill the
 /// last group, so that the first box met stays the same.
-fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
+fn beam_chunks(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_CHUNK_BOXES]> {
     if let Some(&last) = beam.last() {
-        beam.resize(beam.len().next_multiple_of(BEAM_STEP), last);
+        beam.resize(beam.len().next_multiple_of(BEAM_CHUNK_BOXES), last);
     }
     beam.as_chunks().0.to_vec()
 }
@@ -331,7 +331,7 @@ fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
 #[derive(Debug, Clone)]
 pub struct Mover {
     /// Chance to continue in the same direction; otherwise a new one is drawn.
-    pub(crate) straight: Chance,
+    pub(crate) straight: Bernoulli,
 }
 
 /// The rule by which a door opens and closes.
@@ -349,9 +349,9 @@ pub enum Door {
     /// Opens or closes by chance.
     Random {
         /// Chance per cycle that a closed door opens.
-        open: Chance,
+        open: Bernoulli,
         /// Chance per cycle that an open door closes.
-        close: Chance,
+        close: Bernoulli,
     },
 }
 
@@ -361,7 +361,7 @@ impl Door {
         match *self {
             Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
             Self::Random { open, close } => {
-                let toggles = if is_open { close.happens(draw()) } else { open.happens(draw()) };
+                let toggles = if is_open { close.sample(draw()) } else { open.sample(draw()) };
                 is_open != toggles
             }
         }
@@ -374,7 +374,7 @@ pub struct Radio {
     /// Square of the range, in half boxes.
     pub(super) reach2_half_boxes: u64,
     /// Chance that a reception is lost.
-    pub(super) loss: Chance,
+    pub(super) loss: Bernoulli,
 }
 
 impl Radio {
@@ -382,7 +382,7 @@ impl Radio {
     pub(crate) fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
         // A robot exactly at the range hears, even where rounding makes the quotient smaller.
         let reach = 2.0 * (range_m / box_size_m + EPSILON);
-        Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
+        Self { reach2_half_boxes: (reach * reach) as u64, loss: Bernoulli::new(loss) }
     }
 }
 

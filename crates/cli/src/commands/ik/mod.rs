@@ -6,16 +6,16 @@
 //! targets  many targets from a table, and the table of their answers
 //! ```
 
-mod ask;
-mod found;
+mod args;
+mod output;
 mod targets;
 
 use super::arm::ArmArgs;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use ask::GoalArgs;
+use args::GoalArgs;
 use clap::Args;
-use found::Found;
+use output::IkOutput;
 use sidestep::worlds::chain::kinematics::Vector;
 use std::path::PathBuf;
 
@@ -108,31 +108,37 @@ pub(crate) struct IkArgs {
 pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     let arm = args.arm.load()?;
     if let Some(path) = &args.targets {
-        return targets::answer(path, &arm, &args.goal, console);
+        return targets::solve_table(path, &arm, &args.goal, console);
     }
     let (body, remarks) = args.goal.body(&arm)?;
     let goal = args.goal.goal(args.pose()?, &body)?;
     let answer = arm.chosen.chain.solve(&goal, &arm.values)?;
     remarks.iter().for_each(|remark| console.note(remark));
-    let found = Found::new(&arm, &goal, answer, remarks);
+    let found = IkOutput::new(&arm, &goal, answer, remarks);
     if let Some(path) = &args.png {
         found.placed.picture(Some(goal.target.origin_m), &goal.spheres).write(path)?;
     }
-    console.result(&found, || found.text())?;
+    console.print_result(&found, || found.text())?;
     Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
 }
 
 impl IkArgs {
-    fn pose(&self) -> Result<ask::Target, Failure> {
+    fn pose(&self) -> Result<args::TipTarget, Failure> {
         let text = self.target.as_deref().unwrap_or_default();
-        let position_m: Vector = ask::place("--target", "x,y,z", text)?;
+        let position_m: Vector = args::parse_lengths("--target", "x,y,z", text)?;
         let target = match (&self.rpy, &self.quaternion) {
-            (Some(text), _) => ask::Target::rpy(position_m, ask::angles("--rpy", text)?),
+            (Some(text), _) => {
+                args::TipTarget::from_rpy(position_m, args::parse_rpy("--rpy", text)?)
+            }
             (None, Some(text)) => {
                 let place = "--quaternion";
-                ask::Target::quaternion(place, position_m, ask::quaternion(place, text)?)?
+                args::TipTarget::from_quaternion(
+                    place,
+                    position_m,
+                    args::parse_quaternion(place, text)?,
+                )?
             }
-            (None, None) => ask::Target::position(position_m),
+            (None, None) => args::TipTarget::from_position(position_m),
         };
         Ok(target)
     }

@@ -1,26 +1,26 @@
 //! Many targets from a table, and the table of their answers.
 
 use super::super::arm::Arm;
-use super::ask::{GoalArgs, Target};
+use super::args::{GoalArgs, TipTarget};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use cpu_time::ProcessTime;
 use serde::Serialize;
 use sidestep::import::table::{CsvRow, CsvTable};
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::kinematics::ArmAnswer;
+use sidestep::worlds::chain::kinematics::IkResult;
 use std::path::Path;
 
 /// Names of the columns of positions, without and with orientations.
-const POSITION: [&str; 3] = ["x", "y", "z"];
-const WITH_RPY: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
-const WITH_QUATERNION: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
+const POSITION_COLUMNS: [&str; 3] = ["x", "y", "z"];
+const RPY_COLUMNS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+const QUATERNION_COLUMNS: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 /// The largest number in a table: a place in m, or an angle in rad.
-const MOST: f64 = 1e7;
+const MAX_VALUE: f64 = 1e7;
 
 /// The answers to all targets.
 #[derive(Debug, Serialize)]
-struct Answers {
+struct IkTable {
     targets: usize,
     reached: usize,
     /// Meshes that stand as boxes, and shapes that could not be read.
@@ -29,12 +29,12 @@ struct Answers {
     joint_names: Vec<String>,
     /// CPU time of the search in us per target. It is no part of the results.
     cpu_us_per_target: f64,
-    answers: Vec<Row>,
+    answers: Vec<IkTableRow>,
 }
 
 /// The answer to a target.
 #[derive(Debug, Serialize)]
-struct Row {
+struct IkTableRow {
     reached: bool,
     error_m: f64,
     error_rad: f64,
@@ -51,36 +51,36 @@ struct Row {
 ///
 /// # Errors
 /// When the table or an option is wrong.
-pub(super) fn answer(
+pub(super) fn solve_table(
     path: &Path,
     arm: &Arm,
     args: &GoalArgs,
     console: Console,
 ) -> Result<ExitCode, Failure> {
     let (body, remarks) = args.body(arm)?;
-    let goals = read(path)?.into_iter().map(|target| args.goal(target, &body));
+    let goals = read_targets(path)?.into_iter().map(|target| args.goal(target, &body));
     let goals = goals.collect::<Result<Vec<_>, InputError>>()?;
     let started = ProcessTime::now();
     let solved = goals.iter().map(|goal| arm.chosen.chain.solve(goal, &arm.values));
     let solved = solved.collect::<Result<Vec<_>, InputError>>()?;
     let cpu_us = started.elapsed().as_secs_f64() * 1e6;
-    let answers = Answers {
+    let answers = IkTable {
         targets: goals.len(),
         reached: solved.iter().filter(|answer| answer.reached).count(),
         remarks,
         joint_names: arm.chosen.chain.variables.iter().map(|v| v.name.clone()).collect(),
         cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
-        answers: solved.into_iter().map(Row::new).collect(),
+        answers: solved.into_iter().map(IkTableRow::new).collect(),
     };
-    console.result(&answers, || answers.table())?;
-    let Answers { targets, reached, cpu_us_per_target, remarks, .. } = &answers;
+    console.print_result(&answers, || answers.to_csv())?;
+    let IkTable { targets, reached, cpu_us_per_target, remarks, .. } = &answers;
     remarks.iter().for_each(|remark| console.note(remark));
     console.note(format!("{reached} of {targets} reached, {cpu_us_per_target:.0} us each"));
     Ok(if reached == targets { ExitCode::Done } else { ExitCode::Failed })
 }
 
-impl Row {
-    fn new(answer: ArmAnswer) -> Self {
+impl IkTableRow {
+    fn new(answer: IkResult) -> Self {
         Self {
             reached: answer.reached,
             error_m: answer.error_m,
@@ -94,7 +94,7 @@ impl Row {
     }
 
     /// Returns the row as CSV, with the number of its target.
-    fn line(&self, target: usize, joints: &[f64]) -> String {
+    fn csv_line(&self, target: usize, joints: &[f64]) -> String {
         let Self { reached, error_m, error_rad, iterations, starts, .. } = self;
         let joints: String = joints.iter().map(|value| format!(",{value}")).collect();
         let reason = self.reason.as_deref().unwrap_or_default().replace('"', "\"\"");
@@ -104,9 +104,9 @@ impl Row {
     }
 }
 
-impl Answers {
+impl IkTable {
     /// Returns the answers as CSV: a row for each posture, with the number of its target from 1.
-    fn table(&self) -> String {
+    fn to_csv(&self) -> String {
         let names: String = self
             .joint_names
             .iter()
@@ -116,7 +116,7 @@ impl Answers {
             format!("target,reached,error_m,error_rad,iterations,starts{names},reason\n");
         for (i, row) in self.answers.iter().enumerate() {
             for joints in std::iter::once(&row.joints).chain(&row.others) {
-                text += &row.line(i + 1, joints);
+                text += &row.csv_line(i + 1, joints);
             }
         }
         text
@@ -124,42 +124,43 @@ impl Answers {
 }
 
 /// Reads the targets.
-fn read(path: &Path) -> Result<Vec<Target>, InputError> {
+fn read_targets(path: &Path) -> Result<Vec<TipTarget>, InputError> {
     let table = CsvTable::read(path)?;
-    let turns = |names: &[&str]| names[POSITION.len()..].iter().any(|n| table.find(n).is_some());
-    let (turned, of_quaternion) = (turns(&WITH_RPY), turns(&WITH_QUATERNION));
+    let turns =
+        |names: &[&str]| names[POSITION_COLUMNS.len()..].iter().any(|n| table.find(n).is_some());
+    let (turned, of_quaternion) = (turns(&RPY_COLUMNS), turns(&QUATERNION_COLUMNS));
     if turned && of_quaternion {
         let cause = "the header has both angles and quaternions";
         let remedy = "keep roll,pitch,yaw or qx,qy,qz,qw";
-        return Err(InputError::new(table.place(), cause, remedy).at(1, 1));
+        return Err(InputError::new(table.place(), cause, remedy).with_position(1, 1));
     }
     if turned {
-        with_rpy(&table)
+        read_rpy_targets(&table)
     } else if of_quaternion {
-        with_quaternion(&table)
+        read_quaternion_targets(&table)
     } else {
-        let position = table.columns(POSITION)?;
-        let target = |row| Ok(Target::position(values(&table, row, position)?));
+        let position = table.columns(POSITION_COLUMNS)?;
+        let target = |row| Ok(TipTarget::from_position(values(&table, row, position)?));
         table.rows().map(target).collect()
     }
 }
 
-fn with_rpy(table: &CsvTable) -> Result<Vec<Target>, InputError> {
-    let [x, y, z, roll, pitch, yaw] = table.columns(WITH_RPY)?;
+fn read_rpy_targets(table: &CsvTable) -> Result<Vec<TipTarget>, InputError> {
+    let [x, y, z, roll, pitch, yaw] = table.columns(RPY_COLUMNS)?;
     let target = |row| {
         let position_m = values(table, row, [x, y, z])?;
-        Ok(Target::rpy(position_m, values(table, row, [roll, pitch, yaw])?))
+        Ok(TipTarget::from_rpy(position_m, values(table, row, [roll, pitch, yaw])?))
     };
     table.rows().map(target).collect()
 }
 
-fn with_quaternion(table: &CsvTable) -> Result<Vec<Target>, InputError> {
-    let [x, y, z, quaternion @ ..] = table.columns(WITH_QUATERNION)?;
+fn read_quaternion_targets(table: &CsvTable) -> Result<Vec<TipTarget>, InputError> {
+    let [x, y, z, quaternion @ ..] = table.columns(QUATERNION_COLUMNS)?;
     let target = |row: CsvRow| {
         let place = row.field(quaternion[0]);
         let position_m = values(table, row, [x, y, z])?;
-        Target::quaternion(table.place(), position_m, values(table, row, quaternion)?)
-            .map_err(|error| error.at(place.line, place.column))
+        TipTarget::from_quaternion(table.place(), position_m, values(table, row, quaternion)?)
+            .map_err(|error| error.with_position(place.line, place.column))
     };
     table.rows().map(target).collect()
 }
@@ -173,7 +174,7 @@ fn values<const N: usize>(
     for (value, column) in found.iter_mut().zip(columns) {
         let word = row.field(column);
         *value = word.number(&table.place())?;
-        if value.abs() > MOST {
+        if value.abs() > MAX_VALUE {
             let cause = format!("{value} is out of range");
             return Err(word.error(&table.place(), cause, "give places in m and angles in rad"));
         }

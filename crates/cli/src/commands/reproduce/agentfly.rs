@@ -1,13 +1,15 @@
 //! `sidestep reproduce agentfly`.
 
-use super::{EXAMPLES, Outcome, check_vacant, deliver};
+use super::{EXAMPLES, PaperResults, check_vacant, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::link;
-use crate::progress::Stages;
+use crate::progress::StageProgress;
 use clap::Args;
-use sidestep_papers::agentfly::{self, AgentflyPlan, Measured, Sockets};
-use sidestep_session::fleet::{Clock, Common, FleetJob, Flown, Job, NodeNow, Told, Topology};
+use sidestep_papers::agentfly::{self, AgentflyConfig, FlightMeasurement, SocketMeasurements};
+use sidestep_session::fleet::{
+    ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, NodeStatus, Topology,
+};
 use std::path::{Path, PathBuf};
 
 /// Seconds after which an airplane that is not heard is taken to be gone: all share this machine.
@@ -31,41 +33,42 @@ pub(super) struct AgentflyArgs {
 }
 
 /// Measures over real sockets, if the program is there that carries them.
-fn sockets(plan: &AgentflyPlan, console: Console) -> Result<Sockets, Failure> {
-    if let Err(missing) = link::find() {
+fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeasurements, Failure> {
+    if let Err(missing) = link::find_program() {
         let reason = missing.to_string();
         console.note(format!("The part over real sockets is left out: {reason}"));
-        return Ok(Sockets::LeftOut { reason });
+        return Ok(SocketMeasurements::LeftOut { reason });
     }
-    let folder = tempfile::tempdir().map_err(|e| Failure::write(&std::env::temp_dir(), &e))?;
+    let folder =
+        tempfile::tempdir().map_err(|e| Failure::cannot_write(&std::env::temp_dir(), &e))?;
     let file = folder.path().join("superconflict.toml");
-    let stages = Stages::new(console);
-    let mut flies = |text: &str| -> Result<Measured, Failure> {
-        std::fs::write(&file, text).map_err(|e| Failure::write(&file, &e))?;
-        flown(&file)
+    let stages = StageProgress::new(console);
+    let mut flies = |text: &str| -> Result<FlightMeasurement, Failure> {
+        std::fs::write(&file, text).map_err(|e| Failure::cannot_write(&file, &e))?;
+        measure_fleet(&file)
     };
-    let measured = agentfly::measure(plan, &mut flies, &mut |what, share| stages.at(what, share));
+    let measured = agentfly::measure(plan, &mut flies, &mut |what, share| stages.set(what, share));
     stages.clear();
     measured
 }
 
 /// Flies a scenario with a process for each airplane, and returns the measurements.
-fn flown(file: &Path) -> Result<Measured, Failure> {
-    let mut measured = Measured::default();
-    link::run(&Job::Fleet(job(file)), |told| {
-        if let Told::Ended { fleet, .. } = told {
-            let sum = |of: fn(&NodeNow) -> u64| fleet.nodes.iter().map(of).sum::<u64>() as f64;
+fn measure_fleet(file: &Path) -> Result<FlightMeasurement, Failure> {
+    let mut measured = FlightMeasurement::default();
+    link::run_job(&Job::Fleet(fleet_job(file)), |told| {
+        if let LinkMessage::Ended { fleet, .. } = told {
+            let sum = |of: fn(&NodeStatus) -> u64| fleet.nodes.iter().map(of).sum::<u64>() as f64;
             let (messages, bytes) = (sum(|node| node.packets), sum(|node| node.bytes));
-            measured = Measured { elapsed_s: fleet.flown_s, messages, bytes };
+            measured = FlightMeasurement { elapsed_s: fleet.flown_s, messages, bytes };
         }
     })?;
     Ok(measured)
 }
 
-fn job(file: &Path) -> FleetJob {
-    let build = sidestep_session::build().into();
-    let common = Common {
-        flown: Flown { file: file.into(), overrides: Vec::new(), build },
+fn fleet_job(file: &Path) -> FleetJob {
+    let build = sidestep_session::build_id().into();
+    let common = CommonSettings {
+        flown: JobScenario { file: file.into(), overrides: Vec::new(), build },
         tls: None,
         lease_s: LEASE_S,
         metrics: None,
@@ -75,7 +78,7 @@ fn job(file: &Path) -> FleetJob {
     FleetJob {
         common,
         nodes: None,
-        clock: Clock::Lockstep,
+        clock: ClockMode::Lockstep,
         topology: Topology::Mesh,
         listen: vec!["tcp/127.0.0.1:0".into()],
         out: None,
@@ -85,15 +88,21 @@ fn job(file: &Path) -> FleetJob {
 }
 
 pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCode, Failure> {
-    let default = if args.quick { AgentflyPlan::quick() } else { AgentflyPlan::default() };
-    let plan = AgentflyPlan { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
+    let default = if args.quick { AgentflyConfig::quick() } else { AgentflyConfig::default() };
+    let plan =
+        AgentflyConfig { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }
-    let stages = Stages::new(console);
-    let report = agentfly::run(&plan, &mut |what, share| stages.at(what, share));
+    let stages = StageProgress::new(console);
+    let report = agentfly::run(&plan, &mut |what, share| stages.set(what, share));
     stages.clear();
-    let report = report?.with_sockets(sockets(&plan, console)?);
+    let report = report?.with_sockets(measure_sockets(&plan, console)?);
     let (document, claims, quick) = (report.document(), &report.claims, plan.quick);
-    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
+    store_and_print(
+        &report,
+        &PaperResults { document, claims, quick },
+        args.out.as_deref(),
+        console,
+    )
 }

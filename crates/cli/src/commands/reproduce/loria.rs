@@ -1,18 +1,20 @@
 //! `sidestep reproduce loria`.
 
-use super::{EXAMPLES, Outcome, check_vacant, deliver, drawn};
+use super::{EXAMPLES, PaperResults, check_vacant, scene_picture, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::progress::Stages;
+use crate::progress::StageProgress;
 use clap::Args;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, describe};
 use sidestep_papers::Scene;
 use sidestep_papers::loria::scenes;
-use sidestep_papers::loria::{LoriaError, LoriaPlan, NewRecorder, Report, in_memory, run_recorded};
-use sidestep_record::{Origin, ParquetRecorder};
+use sidestep_papers::loria::{
+    LoriaConfig, LoriaError, LoriaReport, NewRecorder, in_memory, run_recorded,
+};
+use sidestep_record::{ParquetRecorder, Provenance};
 use std::path::{Path, PathBuf};
 
 /// The extent of the experiments.
@@ -41,9 +43,9 @@ pub(super) struct LoriaArgs {
 }
 
 impl LoriaArgs {
-    fn plan(&self) -> LoriaPlan {
-        let default = if self.quick { LoriaPlan::quick() } else { LoriaPlan::default() };
-        LoriaPlan {
+    fn plan(&self) -> LoriaConfig {
+        let default = if self.quick { LoriaConfig::quick() } else { LoriaConfig::default() };
+        LoriaConfig {
             seeds: self.seeds.unwrap_or(default.seeds),
             cycles: self.cycles.unwrap_or(default.cycles),
             workers: self.workers.unwrap_or(default.workers),
@@ -58,30 +60,35 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
         None => run(&args.plan(), &mut in_memory, console)?,
         Some(folder) => {
             check_vacant(folder)?;
-            recorded(&args.plan(), folder, console)?
+            run_with_recordings(&args.plan(), folder, console)?
         }
     };
     let scenes = scenes::all(&report.plan);
-    let pictures: Vec<Picture> = scenes.iter().map(described).collect::<Result<_, _>>()?;
+    let pictures: Vec<Picture> = scenes.iter().map(described_picture).collect::<Result<_, _>>()?;
     let document = report.document(pictures);
     let (claims, quick) = (&report.claims, report.plan.quick);
-    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
+    store_and_print(
+        &report,
+        &PaperResults { document, claims, quick },
+        args.out.as_deref(),
+        console,
+    )
 }
 
 /// Returns a picture with a caption that starts with a description of the scene.
-fn described(scene: &Scene) -> Result<Picture, DrawError> {
+fn described_picture(scene: &Scene) -> Result<Picture, DrawError> {
     let what = describe(&scene.scenery, &scene.frame, &scene.trails);
-    let picture = drawn(scene)?;
+    let picture = scene_picture(scene)?;
     Ok(Picture { caption: format!("{what} {}", picture.caption), ..picture })
 }
 
 fn run(
-    plan: &LoriaPlan,
+    plan: &LoriaConfig,
     recorders: &mut NewRecorder<'_>,
     console: Console,
-) -> Result<Report, Failure> {
-    let stages = Stages::new(console);
-    let report = run_recorded(plan, recorders, &mut |what, share| stages.at(what, share));
+) -> Result<LoriaReport, Failure> {
+    let stages = StageProgress::new(console);
+    let report = run_recorded(plan, recorders, &mut |what, share| stages.set(what, share));
     stages.clear();
     report.map_err(|e| match e {
         LoriaError::Plan(e) => Failure::Input(e),
@@ -91,10 +98,14 @@ fn run(
 
 /// Runs the experiments with recordings on disk, as the paper did, and deletes these at the end;
 /// after a failure also the folder, if it was made for them.
-fn recorded(plan: &LoriaPlan, folder: &Path, console: Console) -> Result<Report, Failure> {
+fn run_with_recordings(
+    plan: &LoriaConfig,
+    folder: &Path,
+    console: Console,
+) -> Result<LoriaReport, Failure> {
     let timed = folder.join("timed-runs");
     let found = folder.exists();
-    std::fs::create_dir_all(&timed).map_err(|e| Failure::write(&timed, &e))?;
+    std::fs::create_dir_all(&timed).map_err(|e| Failure::cannot_write(&timed, &e))?;
     let (at, above) = (timed.clone(), folder.to_path_buf());
     let clean_up = move |failed: bool| {
         let _ = std::fs::remove_dir_all(&at);
@@ -103,7 +114,7 @@ fn recorded(plan: &LoriaPlan, folder: &Path, console: Console) -> Result<Report,
         }
     };
     let interrupted = clean_up.clone();
-    interrupt::end_with(move || interrupted(true))?;
+    interrupt::on_interrupt(move || interrupted(true))?;
     let mut made = 0;
     let mut new = |schemas: &[TableSchema]| {
         made += 1;
@@ -116,7 +127,7 @@ fn recorded(plan: &LoriaPlan, folder: &Path, console: Console) -> Result<Report,
 
 fn recorder(folder: &Path, schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
     std::fs::create_dir(folder).map_err(|e| RecordError::new(folder.display(), e))?;
-    let origin = Origin {
+    let origin = Provenance {
         program_version: env!("CARGO_PKG_VERSION").into(),
         scenario: "a timed run of `sidestep reproduce loria`".into(),
         seed: 1,

@@ -4,18 +4,18 @@ mod agentfly;
 mod loria;
 mod serpentine;
 
-use crate::console::{Console, aligned};
+use crate::console::{Console, align_pairs};
 use crate::exit::{ExitCode, Failure};
-use crate::pages::{Pages, Raster};
+use crate::report_files::{PngOutput, ReportFiles};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
-use sidestep_document::claim::{Claim, tally};
+use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::Picture;
-use sidestep_draw::{DrawError, Options, Style, draw};
+use sidestep_draw::{DrawError, PictureOptions, Style, draw};
 use sidestep_papers::Scene;
-use sidestep_session::replace;
+use sidestep_session::write_atomically;
 use std::io::Write;
 use std::path::Path;
 
@@ -57,9 +57,9 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
 }
 
 /// Returns a picture with its title and caption beside it.
-fn drawn(scene: &Scene) -> Result<Picture, DrawError> {
+fn scene_picture(scene: &Scene) -> Result<Picture, DrawError> {
     let (title, caption) = (String::new(), String::new());
-    let options = Options { style: Style::MAP, title, caption };
+    let options = PictureOptions { style: Style::MAP, title, caption };
     let svg = draw(&scene.scenery, &scene.frame, &scene.trails, &options)?;
     Ok(Picture { title: scene.title.clone(), caption: scene.caption.clone(), svg })
 }
@@ -76,32 +76,32 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
 }
 
 /// The results of a paper's experiments.
-struct Outcome<'a> {
+struct PaperResults<'a> {
     document: Document,
     claims: &'a [Claim],
     quick: bool,
 }
 
 /// Stores the report if a folder was given, and prints the results.
-fn deliver(
+fn store_and_print(
     report: &impl Serialize,
-    outcome: &Outcome<'_>,
+    outcome: &PaperResults<'_>,
     out: Option<&Path>,
     console: Console,
 ) -> Result<ExitCode, Failure> {
     if let Some(folder) = out {
         let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
-        let pages = Pages { html: folder.join("report.html"), pictures: "figures".into() };
-        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
-        replace(&folder.join("report.json"), |file| file.write_all(&json))?;
-        pages.store(&outcome.document, Raster::AlsoPng)?;
+        let pages = ReportFiles { html: folder.join("report.html"), pictures: "figures".into() };
+        std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(folder, &e))?;
+        write_atomically(&folder.join("report.json"), |file| file.write_all(&json))?;
+        pages.store(&outcome.document, PngOutput::AlsoPng)?;
     }
-    console.result(report, || summary(outcome, out))?;
+    console.print_result(report, || summary(outcome, out))?;
     Ok(ExitCode::Done)
 }
 
 /// Returns the verdicts in a few lines, and where the report is.
-fn summary(outcome: &Outcome<'_>, out: Option<&Path>) -> String {
+fn summary(outcome: &PaperResults<'_>, out: Option<&Path>) -> String {
     let lines: Vec<_> = outcome.claims.iter().map(claim_line).collect();
     let report = match out {
         Some(folder) => format!("Report: {}", folder.join("report.html").display()),
@@ -109,9 +109,9 @@ fn summary(outcome: &Outcome<'_>, out: Option<&Path>) -> String {
     };
     format!(
         "{}{}\n{}{report}\n",
-        tally(outcome.claims),
+        verdict_summary(outcome.claims),
         if outcome.quick { " A rehearsal: without weight." } else { "" },
-        aligned(&lines),
+        align_pairs(&lines),
     )
 }
 

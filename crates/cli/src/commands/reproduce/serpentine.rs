@@ -1,12 +1,12 @@
 //! `sidestep reproduce serpentine`.
 
-use super::{EXAMPLES, Outcome, check_vacant, deliver, drawn};
+use super::{EXAMPLES, PaperResults, check_vacant, scene_picture, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::progress::Stages;
+use crate::progress::StageProgress;
 use clap::Args;
 use sidestep_document::document::Picture;
-use sidestep_papers::serpentine::{self, SerpentinePlan};
+use sidestep_papers::serpentine::{self, SerpentineConfig};
 use std::path::PathBuf;
 
 /// The extent of the experiments.
@@ -27,12 +27,13 @@ pub(super) struct SerpentineArgs {
 }
 
 impl SerpentineArgs {
-    fn plan(&self) -> SerpentinePlan {
-        let default = if self.quick { SerpentinePlan::quick() } else { SerpentinePlan::default() };
+    fn plan(&self) -> SerpentineConfig {
+        let default =
+            if self.quick { SerpentineConfig::quick() } else { SerpentineConfig::default() };
         match self.seeds.map(|n| n as usize) {
             None => default,
             Some(seeds) => {
-                SerpentinePlan { seeds, field_seeds: 3 * seeds, snake_seeds: seeds, ..default }
+                SerpentineConfig { seeds, field_seeds: 3 * seeds, snake_seeds: seeds, ..default }
             }
         }
     }
@@ -42,12 +43,18 @@ pub(super) fn reproduce(args: &SerpentineArgs, console: Console) -> Result<ExitC
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }
-    let stages = Stages::new(console);
-    let report = serpentine::run(&args.plan(), &mut |what, share| stages.at(what, share));
+    let stages = StageProgress::new(console);
+    let report = serpentine::run(&args.plan(), &mut |what, share| stages.set(what, share));
     stages.clear();
     let report = report?;
-    let pictures: Vec<Picture> = report.scenes.iter().map(drawn).collect::<Result<_, _>>()?;
+    let pictures: Vec<Picture> =
+        report.scenes.iter().map(scene_picture).collect::<Result<_, _>>()?;
     let (document, claims) = (report.document(pictures), &report.claims);
     let quick = report.plan.quick;
-    deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
+    store_and_print(
+        &report,
+        &PaperResults { document, claims, quick },
+        args.out.as_deref(),
+        console,
+    )
 }

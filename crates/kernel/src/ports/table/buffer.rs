@@ -62,18 +62,18 @@ pub struct RowBuffer<R> {
 
 impl<R> RowBuffer<R> {
     /// Keeps rows of `table` from now on; none without a table.
-    pub fn begin(&mut self, table: Option<Table<R>>) {
+    pub fn start(&mut self, table: Option<Table<R>>) {
         self.table = table;
     }
 
     /// Returns whether rows are kept at all.
-    pub fn is_kept(&self) -> bool {
+    pub fn is_enabled(&self) -> bool {
         self.table.is_some()
     }
 
     /// Keeps a row, if rows are kept at all.
     pub fn push(&mut self, row: R) {
-        if self.is_kept() {
+        if self.is_enabled() {
             self.rows.push(row);
         }
     }
@@ -81,7 +81,7 @@ impl<R> RowBuffer<R> {
 
 impl<R> Extend<R> for RowBuffer<R> {
     fn extend<I: IntoIterator<Item = R>>(&mut self, rows: I) {
-        if self.is_kept() {
+        if self.is_enabled() {
             self.rows.extend(rows);
         }
     }
@@ -124,12 +124,12 @@ pub struct BlockBuffer {
 
 impl BlockBuffer {
     /// Keeps a block of `schema` from now on; none without a schema.
-    pub fn begin(&mut self, schema: Option<TableSchema>) {
+    pub fn start(&mut self, schema: Option<TableSchema>) {
         self.schema = schema;
     }
 
     /// Returns whether a block is kept at all.
-    pub fn is_kept(&self) -> bool {
+    pub fn is_enabled(&self) -> bool {
         self.schema.is_some()
     }
 
@@ -184,9 +184,9 @@ mod tests {
     #[test]
     fn rows_wait_until_they_are_recorded() {
         let mut tables = Two::default();
-        tables.kept.begin(Some(table("kept")));
-        tables.blocks.begin(Some(table("blocks").schema()));
-        assert_eq!((tables.kept.is_kept(), tables.unwanted.is_kept()), (true, false));
+        tables.kept.start(Some(table("kept")));
+        tables.blocks.start(Some(table("blocks").schema()));
+        assert_eq!((tables.kept.is_enabled(), tables.unwanted.is_enabled()), (true, false));
         tables.kept.extend([1, 2]);
         tables.unwanted.push(3);
         let mut recorder = MemoryRecorder::new(&tables.schemas());
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn a_table_with_many_rows_is_full() {
         let mut tables = Two::default();
-        tables.kept.begin(Some(table("kept")));
+        tables.kept.start(Some(table("kept")));
         tables.kept.extend(0..MAX_ROWS as u32 - 1);
         assert!(!tables.is_full());
         tables.kept.push(0);

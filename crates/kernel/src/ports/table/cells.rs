@@ -8,7 +8,7 @@ struct Mask(Option<Vec<bool>>);
 
 impl Mask {
     /// Drops the mask where nothing is missing, so that equal cells have equal masks.
-    fn of(valid: Vec<bool>) -> Self {
+    fn from_valid(valid: Vec<bool>) -> Self {
         Self((!valid.iter().all(|valid| *valid)).then_some(valid))
     }
 
@@ -30,7 +30,7 @@ impl Mask {
             self.extend(before, rows - before, false);
         } else if let Some(mut valid) = self.0.take() {
             valid.truncate(rows);
-            *self = Self::of(valid);
+            *self = Self::from_valid(valid);
         }
     }
 
@@ -45,12 +45,13 @@ impl Mask {
     fn retain(&mut self, keep: &[bool]) {
         if let Some(mut valid) = self.0.take() {
             retain(&mut valid, keep);
-            *self = Self::of(valid);
+            *self = Self::from_valid(valid);
         }
     }
 
     fn pick(&self, order: &[usize]) -> Self {
-        let picked = |valid: &Vec<bool>| Self::of(order.iter().map(|&row| valid[row]).collect());
+        let picked =
+            |valid: &Vec<bool>| Self::from_valid(order.iter().map(|&row| valid[row]).collect());
         self.0.as_ref().map_or_else(Self::default, picked)
     }
 }

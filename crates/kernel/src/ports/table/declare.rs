@@ -22,7 +22,7 @@ use std::fmt;
 /// ```
 pub struct Table<R> {
     name: String,
-    columns: Vec<Column<R>>,
+    columns: Vec<TableColumn<R>>,
     about: Vec<(String, String)>,
 }
 
@@ -30,31 +30,31 @@ pub struct Table<R> {
 /// the getter is inlined into its loop.
 type ReadColumn<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
 
-struct Column<R> {
+struct TableColumn<R> {
     spec: ColumnSpec,
     values: ReadColumn<R>,
 }
 
 /// The result of a getter of a column with the cells `C`: the value, or an `Option` of it where it
 /// may be missing.
-pub trait Cell<C> {
+pub trait CellValue<C> {
     /// Whether it may be missing.
     const IS_NULLABLE: bool;
 }
 
-impl<T> Cell<Cells<T>> for T {
+impl<T> CellValue<Cells<T>> for T {
     const IS_NULLABLE: bool = false;
 }
 
-impl<T> Cell<Cells<T>> for Option<T> {
+impl<T> CellValue<Cells<T>> for Option<T> {
     const IS_NULLABLE: bool = true;
 }
 
-impl Cell<Texts> for String {
+impl CellValue<Texts> for String {
     const IS_NULLABLE: bool = false;
 }
 
-impl Cell<Texts> for Option<String> {
+impl CellValue<Texts> for Option<String> {
     const IS_NULLABLE: bool = true;
 }
 
@@ -63,7 +63,7 @@ macro_rules! typed {
     ($($name:ident, $variant:ident, $cells:ty, $what:literal;)*) => {$(
         #[doc = concat!("Adds a column of ", $what, "; `get` reads it from a row.")]
         #[must_use]
-        pub fn $name<V: Cell<$cells>>(
+        pub fn $name<V: CellValue<$cells>>(
             self,
             name: &str,
             meaning: &str,
@@ -97,7 +97,7 @@ impl<R> Table<R> {
 
     /// Adds a column of labels; `get` reads the label's index from a row.
     #[must_use]
-    pub fn label<V: Cell<Cells<u32>>, L: Into<String>>(
+    pub fn label<V: CellValue<Cells<u32>>, L: Into<String>>(
         self,
         name: &str,
         meaning: &str,
@@ -117,13 +117,13 @@ impl<R> Table<R> {
         spec: ColumnSpec,
         values: impl Fn(&[R]) -> Values + Send + Sync + 'static,
     ) -> Self {
-        self.columns.push(Column { spec, values: Box::new(values) });
+        self.columns.push(TableColumn { spec, values: Box::new(values) });
         self
     }
 
-    /// Sets facts about all rows, by name: see [`TableSchema::about`].
+    /// Sets facts about all rows, by name: see [`TableSchema::with_about`].
     #[must_use]
-    pub fn about(self, about: Vec<(String, String)>) -> Self {
+    pub fn with_about(self, about: Vec<(String, String)>) -> Self {
         Self { about, ..self }
     }
 
@@ -149,7 +149,7 @@ impl<R> fmt::Debug for Table<R> {
 ///
 /// # Panics
 /// When the thing is not in the list.
-pub fn label_of<T: PartialEq>(all: &[T], one: &T) -> u32 {
+pub fn label_index<T: PartialEq>(all: &[T], one: &T) -> u32 {
     all.iter().position(|other| other == one).expect("the list has all of them") as u32
 }
 
@@ -176,6 +176,6 @@ mod tests {
         assert_eq!(block[7].text(2), "2");
         let nullable = table.schema().columns.iter().map(|c| c.is_nullable).collect::<Vec<_>>();
         assert_eq!(nullable, [false, false, false, true, false, false, false, true]);
-        assert_eq!(label_of(&["a", "b"], &"b"), 1);
+        assert_eq!(label_index(&["a", "b"], &"b"), 1);
     }
 }

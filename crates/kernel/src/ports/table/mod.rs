@@ -23,7 +23,7 @@ mod values;
 pub use buffer::{BlockBuffer, Buffer, Buffers, RowBuffer};
 pub use cells::{Cells, Texts};
 pub use column_type::ColumnType;
-pub use declare::{Table, label_of};
+pub use declare::{Table, label_index};
 pub use schema::{ColumnSpec, TableSchema};
 pub use unit::split_unit;
 pub use values::{RoleColumn, Values};

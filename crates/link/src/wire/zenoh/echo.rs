@@ -11,31 +11,31 @@ use zenoh::key_expr::KeyExpr;
 use zenoh::sample::Sample;
 
 /// Marks of frames that are no mail.
-const QUESTION: &[u8] = b"question";
-const ANSWER: &[u8] = b"answer";
+const ECHO_REQUEST: &[u8] = b"question";
+const ECHO_REPLY: &[u8] = b"answer";
 
 /// Time after which a question counts for nothing if none has followed it.
-const FORGOTTEN: Duration = Duration::from_secs(2);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The questions that a node has asked of others over its links, and their answers.
-pub(super) struct Echoes {
+pub(super) struct EchoProbes {
     /// The first and the last question since the last answer.
     asked: BTreeMap<EntityId, (Instant, Instant)>,
     answered: Receiver<EntityId>,
     answers: Sender<EntityId>,
 }
 
-impl Default for Echoes {
+impl Default for EchoProbes {
     fn default() -> Self {
         let (answers, answered) = channel();
         Self { asked: BTreeMap::new(), answered, answers }
     }
 }
 
-impl Echoes {
+impl EchoProbes {
     /// Returns the function of node `me` that answers questions, takes answers, and leaves mail alone; it returns
     /// whether the frame was no mail. It is called by a thread of the session.
-    pub(super) fn taking(
+    pub(super) fn handler(
         &self,
         me: EntityId,
         session: Session,
@@ -46,9 +46,9 @@ impl Echoes {
             let from =
                 <[u8; 4]>::try_from(&*sample.payload().to_bytes()).map(EntityId::from_le_bytes);
             match (&*mark, from) {
-                (QUESTION, Ok(from)) => send(&session, me, from, ANSWER),
+                (ECHO_REQUEST, Ok(from)) => send(&session, me, from, ECHO_REPLY),
                 // The receiver is gone when the wire is.
-                (ANSWER, Ok(from)) => drop(answers.send(from)),
+                (ECHO_REPLY, Ok(from)) => drop(answers.send(from)),
                 // From another build.
                 _ => {}
             }
@@ -57,31 +57,31 @@ impl Echoes {
     }
 
     /// Asks another node, and returns whether it has left all questions unanswered for some time.
-    pub(super) fn are_missing(
+    pub(super) fn probe(
         &mut self,
         session: &Session,
         me: EntityId,
         of: EntityId,
         within: Duration,
     ) -> bool {
-        self.take_answers();
+        self.receive_replies();
         let now = Instant::now();
         let (first, last) = self.asked.entry(of).or_insert((now, now));
-        if now.duration_since(*last) > FORGOTTEN {
+        if now.duration_since(*last) > PROBE_TIMEOUT {
             *first = now;
         }
         *last = now;
-        send(session, me, of, QUESTION);
+        send(session, me, of, ECHO_REQUEST);
         now.duration_since(*first) > within
     }
 
     /// Forgets all questions, as needed where links are new.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.asked.clear();
     }
 
     /// Takes the answers that have come. Returns whether no question is open.
-    pub(super) fn take_answers(&mut self) -> bool {
+    pub(super) fn receive_replies(&mut self) -> bool {
         for from in self.answered.try_iter() {
             self.asked.remove(&from);
         }
@@ -90,7 +90,7 @@ impl Echoes {
 }
 
 fn send(session: &Session, me: EntityId, to: EntityId, mark: &'static [u8]) {
-    let key = KeyExpr::try_from(super::key(super::Party::Node(to)));
+    let key = KeyExpr::try_from(super::peer_key(super::Peer::Node(to)));
     let key = key.expect("a path of letters and digits is a key");
     put(session, &key, &me.to_le_bytes(), Some(mark));
 }

@@ -1,39 +1,39 @@
 //! Pitfalls of Zenoh that this wire avoids, each shown to be one, on loopback.
 
 use super::*;
-use crate::mail::{Heard, Mail};
-use crate::wire::endpoint::hold;
-use crate::words::Word;
+use crate::messenger::{Messenger, Received};
+use crate::protocol::Message;
+use crate::wire::endpoint::reserve_port;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Time longer than anything here takes.
-const LONG: Duration = Duration::from_secs(30);
+const TEST_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// A hundred times the time that a frame on loopback takes.
-const SOON: Duration = Duration::from_millis(300);
+const SHORT_WAIT: Duration = Duration::from_millis(300);
 
-const A: Party = Party::Node(1);
-const B: Party = Party::Node(2);
+const A: Peer = Peer::Node(1);
+const B: Peer = Peer::Node(2);
 
 fn free() -> String {
-    hold("tcp/127.0.0.1:0").expect("a free port").endpoint
+    reserve_port("tcp/127.0.0.1:0").expect("a free port").endpoint
 }
 
-fn line(mode: &str, me: Party, [listen, connect]: [&[String]; 2]) -> (Line, Receiver<Vec<u8>>) {
-    let connected_within = (mode == "client").then_some(LONG);
-    let session = Settings { mode, listen, connect, connected_within, ..Settings::default() }
+fn line(mode: &str, me: Peer, [listen, connect]: [&[String]; 2]) -> (ZenohLink, Receiver<Vec<u8>>) {
+    let connected_within = (mode == "client").then_some(TEST_TIMEOUT);
+    let session = ZenohConfig { mode, listen, connect, connected_within, ..ZenohConfig::default() }
         .open()
         .expect("open");
     let (arrives, arrived) = channel();
-    (Line::new(session, me, &arrives, &Echoes::default()).expect("a line"), arrived)
+    (ZenohLink::new(session, me, &arrives, &EchoProbes::default()).expect("a line"), arrived)
 }
 
 /// Sends a frame again and again until it has come.
-fn reaches(from: &mut Line, to: Party, arrived: &Receiver<Vec<u8>>) {
-    let until = Instant::now() + LONG;
+fn reaches(from: &mut ZenohLink, to: Peer, arrived: &Receiver<Vec<u8>>) {
+    let until = Instant::now() + TEST_TIMEOUT;
     loop {
         from.send(to, b"frame");
         if arrived.recv_timeout(Duration::from_millis(20)).is_ok() {
@@ -49,17 +49,17 @@ fn reaches(from: &mut Line, to: Party, arrived: &Receiver<Vec<u8>>) {
 fn a_peer_does_not_relay_and_a_router_does() {
     for (hub, leaf, relays) in [("peer", "peer", false), ("router", "client", true)] {
         let at = [free()];
-        let (_hub, at_hub) = line(hub, Party::Server, [&at, &[]]);
+        let (_hub, at_hub) = line(hub, Peer::Server, [&at, &[]]);
         let (mut a, _at_a) = line(leaf, A, [&[], &at]);
         let (mut b, at_b) = line(leaf, B, [&[], &at]);
-        reaches(&mut a, Party::Server, &at_hub);
-        reaches(&mut b, Party::Server, &at_hub);
+        reaches(&mut a, Peer::Server, &at_hub);
+        reaches(&mut b, Peer::Server, &at_hub);
         if relays {
             reaches(&mut a, B, &at_b);
         } else {
             a.send(B, b"frame");
             assert!(
-                at_b.recv_timeout(SOON).is_err(),
+                at_b.recv_timeout(SHORT_WAIT).is_err(),
                 "peers relay now: the wire can be made simpler"
             );
         }
@@ -70,16 +70,22 @@ fn a_peer_does_not_relay_and_a_router_does() {
 fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
     let at = [free()];
     let hub = ZenohWire::server(&at, None).expect("a server");
-    let held: Vec<Held> = (0..3).map(|_| hold("tcp/127.0.0.1:0").expect("a free port")).collect();
-    let listens = |held: &Held| if is_mesh { vec![held.endpoint.clone()] } else { Vec::new() };
+    let held: Vec<PortReservation> =
+        (0..3).map(|_| reserve_port("tcp/127.0.0.1:0").expect("a free port")).collect();
+    let listens =
+        |held: &PortReservation| if is_mesh { vec![held.endpoint.clone()] } else { Vec::new() };
     let members: Vec<Member> = (0..)
         .zip(&held)
-        .map(|(agent, held)| Member { agent, life: crate::words::Life(0), listens: listens(held) })
+        .map(|(agent, held)| Member {
+            agent,
+            life: crate::protocol::Incarnation(0),
+            listens: listens(held),
+        })
         .collect();
-    let node = |(agent, held): (EntityId, Held)| {
-        let wire = ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers");
-        let mut wire = if is_mesh { wire.listening(vec![held]) } else { wire };
-        wire.join(agent, &members).expect("a mesh");
+    let node = |(agent, held): (EntityId, PortReservation)| {
+        let wire = ZenohWire::node(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+        let mut wire = if is_mesh { wire.with_listeners(vec![held]) } else { wire };
+        wire.connect_mesh(agent, &members).expect("a mesh");
         wire
     };
     let nodes = (0..).zip(held).map(node).collect();
@@ -90,24 +96,28 @@ fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
 fn a_frame_for_all_others_comes_once_to_each_of_them_and_to_nobody_else() {
     for is_mesh in [true, false] {
         let (mut hub, mut nodes) = three(is_mesh);
-        let others = [0, 2].map(Party::Node);
+        let others = [0, 2].map(Peer::Node);
         for k in [0, 2] {
-            let until = Instant::now() + LONG;
+            let until = Instant::now() + TEST_TIMEOUT;
             while nodes[k].receive(Duration::from_millis(20)).is_none() {
                 assert!(Instant::now() < until, "no frame has come to {k}, mesh {is_mesh}");
-                nodes[1].send(&[Party::Node(k as EntityId)], b"there");
+                nodes[1].send(&[Peer::Node(k as EntityId)], b"there");
             }
         }
         for k in [0, 2] {
-            while nodes[k].receive(SOON).is_some() {}
+            while nodes[k].receive(SHORT_WAIT).is_some() {}
         }
         nodes[1].send(&others, b"all");
         for k in [0, 2] {
-            assert_eq!(nodes[k].receive(LONG).as_deref(), Some(&b"all"[..]), "mesh {is_mesh}");
-            assert_eq!(nodes[k].receive(SOON), None, "it comes once");
+            assert_eq!(
+                nodes[k].receive(TEST_TIMEOUT).as_deref(),
+                Some(&b"all"[..]),
+                "mesh {is_mesh}"
+            );
+            assert_eq!(nodes[k].receive(SHORT_WAIT), None, "it comes once");
         }
-        assert_eq!(nodes[1].receive(SOON), None, "not to the sender");
-        assert_eq!(hub.receive(SOON), None, "not to the server");
+        assert_eq!(nodes[1].receive(SHORT_WAIT), None, "not to the sender");
+        assert_eq!(hub.receive(SHORT_WAIT), None, "not to the server");
     }
 }
 
@@ -166,34 +176,34 @@ fn frames_vanish_in_a_partition_and_letters_do_not() {
     let server = free();
     let cable = Cable::to(&server, false);
     let wire = ZenohWire::server(&[server], None).expect("a server");
-    let mut hub = Mail::new(Party::Server, Box::new(wire));
-    let wire =
-        ZenohWire::node(A, std::slice::from_ref(&cable.endpoint), None, LONG).expect("it answers");
-    let mut node = Mail::new(A, Box::new(wire));
-    node.meet(Party::Server, hub.life());
-    hub.meet(A, node.life());
-    let mut hear = |node: &mut Mail, word: Word, within: Duration| {
+    let mut hub = Messenger::new(Peer::Server, Box::new(wire));
+    let wire = ZenohWire::node(A, std::slice::from_ref(&cable.endpoint), None, TEST_TIMEOUT)
+        .expect("it answers");
+    let mut node = Messenger::new(A, Box::new(wire));
+    node.connect(Peer::Server, hub.incarnation());
+    hub.connect(A, node.incarnation());
+    let mut hear = |node: &mut Messenger, word: Message, within: Duration| {
         let until = Instant::now() + within;
         while Instant::now() < until {
             node.receive(Duration::from_millis(1));
             match hub.receive(Duration::from_millis(5)) {
-                Some(Heard { word: heard, .. }) if heard == word => return true,
+                Some(Received { word: heard, .. }) if heard == word => return true,
                 _ => {}
             }
         }
         false
     };
-    node.letter(Party::Server, Word::Close(1));
-    assert!(hear(&mut node, Word::Close(1), LONG));
+    node.send_reliable(Peer::Server, Message::Close(1));
+    assert!(hear(&mut node, Message::Close(1), TEST_TIMEOUT));
     cable.cut(true);
-    node.note(Party::Server, Word::Hello);
-    node.letter(Party::Server, Word::Close(2));
-    assert!(!hear(&mut node, Word::Close(2), 2 * Duration::from_millis(LEASE_MS)), "it is cut");
+    node.send_best_effort(Peer::Server, Message::Hello);
+    node.send_reliable(Peer::Server, Message::Close(2));
+    assert!(!hear(&mut node, Message::Close(2), 2 * Duration::from_millis(LEASE_MS)), "it is cut");
     cable.cut(false);
     let healed = Instant::now();
-    assert!(hear(&mut node, Word::Close(2), LONG), "a letter comes in the end");
+    assert!(hear(&mut node, Message::Close(2), TEST_TIMEOUT), "a letter comes in the end");
     assert!(healed.elapsed() < Duration::from_secs(8), "{:?}", healed.elapsed());
-    assert!(!hear(&mut node, Word::Hello, SOON), "a note that was cut off is gone");
+    assert!(!hear(&mut node, Message::Hello, SHORT_WAIT), "a note that was cut off is gone");
 }
 
 /// Carries the frames of one end of a link, but from the third on only those of one byte, signs of life, while the
@@ -241,8 +251,8 @@ fn deaf_at_first(server: &str) -> String {
 fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>) {
     let at = [free()];
     let hub = ZenohWire::server(&at, None).expect("a server");
-    let held = [0, 1].map(|_| hold("tcp/127.0.0.1:0").expect("a free port"));
-    let lives = [5, 6].map(crate::words::Life);
+    let held = [0, 1].map(|_| reserve_port("tcp/127.0.0.1:0").expect("a free port"));
+    let lives = [5, 6].map(crate::protocol::Incarnation);
     let seen_at = [seen(&held[0].endpoint), held[1].endpoint.clone()];
     let members: Vec<Member> = (0..)
         .zip(lives)
@@ -250,9 +260,9 @@ fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>)
         .map(|((agent, life), seen)| Member { agent, life, listens: vec![seen] })
         .collect();
     let node = |(agent, held)| {
-        let wire = ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers");
-        let mut wire = wire.listening(vec![held]);
-        wire.join(agent, &members).expect("a mesh");
+        let wire = ZenohWire::node(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+        let mut wire = wire.with_listeners(vec![held]);
+        wire.connect_mesh(agent, &members).expect("a mesh");
         wire
     };
     let [first_held, second_held] = held;
@@ -267,7 +277,7 @@ fn is_open(wire: &ZenohWire, member: &Member) -> bool {
 
 /// Waits until something holds, as it will at some time.
 fn until(mut is_so: impl FnMut() -> bool) {
-    let until = Instant::now() + LONG;
+    let until = Instant::now() + TEST_TIMEOUT;
     while !is_so() {
         assert!(Instant::now() < until, "it never is");
         std::thread::sleep(Duration::from_millis(20));
@@ -282,21 +292,21 @@ fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
     // Rarely, because a sender gives no other sign of life.
     let mut comes = |second: &mut ZenohWire, times: u32| {
         (0..times).any(|_| {
-            second.send(&[Party::Node(0)], b"frame");
+            second.send(&[Peer::Node(0)], b"frame");
             first.receive(Duration::from_millis(LEASE_MS / 3)).is_some()
         })
     };
     assert!(!comes(&mut second, 4), "it is deaf");
     assert!(is_open(&second, &members[0]), "and nobody says so");
-    assert!(!second.is_deaf_to(&members[0], LONG), "it was asked just now");
+    assert!(!second.is_half_open(&members[0], TEST_TIMEOUT), "it was asked just now");
     let is_deaf = |wire: &mut ZenohWire| {
         std::thread::sleep(Duration::from_millis(LEASE_MS / 3));
-        wire.is_deaf_to(&members[0], Duration::from_secs(1))
+        wire.is_half_open(&members[0], Duration::from_secs(1))
     };
     assert!((0..20).any(|_| is_deaf(&mut second)), "it answers nothing");
-    second.reopen().expect("its endpoint is free again");
+    second.reopen_links().expect("its endpoint is free again");
     assert!(comes(&mut second, 40), "it is heard");
-    let other = Member { agent: 0, life: crate::words::Life(7), listens: Vec::new() };
+    let other = Member { agent: 0, life: crate::protocol::Incarnation(7), listens: Vec::new() };
     assert!(!is_open(&second, &other), "another life of it is not there");
 }
 
@@ -305,11 +315,11 @@ fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
 fn a_node_that_takes_nothing_is_not_taken_for_deaf() {
     let ([_hub, mut first, mut second], members) = two_in_a_mesh(ToString::to_string);
     for _ in 0..3 {
-        assert!(!second.is_deaf_to(&members[0], LONG));
-        until(|| second.echoes.take_answers());
+        assert!(!second.is_half_open(&members[0], TEST_TIMEOUT));
+        until(|| second.echoes.receive_replies());
     }
-    second.send(&[Party::Node(0)], b"frame");
-    assert_eq!(first.receive(LONG).as_deref(), Some(&b"frame"[..]), "no question is mail");
+    second.send(&[Peer::Node(0)], b"frame");
+    assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]), "no question is mail");
 }
 
 #[test]
@@ -324,12 +334,12 @@ fn links_that_could_not_be_opened_are_opened_at_another_time() {
         other = TcpListener::bind(&port).ok();
         other.is_some()
     });
-    assert!(second.reopen().is_err(), "somebody else has its port");
+    assert!(second.reopen_links().is_err(), "somebody else has its port");
     drop(other);
-    until(|| second.reopen().is_ok());
+    until(|| second.reopen_links().is_ok());
     until(|| is_open(&second, &members[0]));
-    second.send(&[Party::Node(0)], b"frame");
-    assert_eq!(first.receive(LONG).as_deref(), Some(&b"frame"[..]));
+    second.send(&[Peer::Node(0)], b"frame");
+    assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]));
 }
 
 /// An end that takes connections and never answers, as one behind a cut cable, holds up no other for long.
@@ -342,21 +352,21 @@ fn a_link_that_is_not_answered_is_tried_again_soon() {
         let is_cut = cable.is_cut.clone();
         std::thread::spawn(move || {
             // As long as one try may take.
-            std::thread::sleep(Duration::from_millis(OPENED_WITHIN_MS));
+            std::thread::sleep(Duration::from_millis(OPEN_TIMEOUT_MS));
             is_cut.store(false, Ordering::Relaxed);
         })
     };
     let began = Instant::now();
     let at = std::slice::from_ref(&cable.endpoint);
-    ZenohWire::node(A, at, None, LONG).expect("it answers in the end");
+    ZenohWire::node(A, at, None, TEST_TIMEOUT).expect("it answers in the end");
     assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
     mended.join().expect("no panic");
 }
 
 #[test]
 fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
-    let held = hold("tcp/127.0.0.1:0").expect("a free port");
-    let again = hold(&held.endpoint).expect_err("it is held");
+    let held = reserve_port("tcp/127.0.0.1:0").expect("a free port");
+    let again = reserve_port(&held.endpoint).expect_err("it is held");
     assert!(
         matches!(again, WireError::Taken { ref endpoint, .. } if *endpoint == held.endpoint),
         "{again}"
@@ -365,7 +375,11 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
     assert!(matches!(server, Err(WireError::Taken { .. })));
     for wrong in ["127.0.0.1:7600", "udp/127.0.0.1:1", "tcp/127.0.0.1", "tcp/:1", "tcp/a:99999", ""]
     {
-        assert_eq!(hold(wrong).map(drop), Err(WireError::NoEndpoint(wrong.into())), "{wrong}");
+        assert_eq!(
+            reserve_port(wrong).map(drop),
+            Err(WireError::NoEndpoint(wrong.into())),
+            "{wrong}"
+        );
     }
 }
 
@@ -373,7 +387,7 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
 fn nobody_who_answers_is_an_error_in_time() {
     let at = [free()];
     let began = Instant::now();
-    let found = ZenohWire::node(A, &at, None, SOON);
+    let found = ZenohWire::node(A, &at, None, SHORT_WAIT);
     assert!(matches!(found, Err(WireError::NoAnswer { .. })));
     assert!(began.elapsed() < Duration::from_secs(8));
 }

@@ -9,12 +9,12 @@ mod setting;
 mod tests;
 mod time;
 
-use super::Report;
-use crate::claims::{Comparison, File, Words, in_every_run, judged};
+use super::LoriaReport;
+use crate::claims::{ClaimsFile, PaperClaims, ThresholdTest, judge_every_run, judge_thresholds};
 use sidestep_document::claim::{Claim, Verdict};
 
 /// Judges all claims.
-pub(super) fn judge(report: &Report) -> Vec<Claim> {
+pub(super) fn judge(report: &LoriaReport) -> Vec<Claim> {
     let mut claims = setting::claims(report);
     claims.extend(behaviour::claims(report));
     claims.extend(time::claims(report));
@@ -22,9 +22,10 @@ pub(super) fn judge(report: &Report) -> Vec<Claim> {
 }
 
 /// The words of the report.
-pub(super) static WORDS: Words = Words::new(|| File::read(include_str!("../report.toml")));
+pub(super) static CLAIMS: PaperClaims =
+    PaperClaims::new(|| ClaimsFile::read(include_str!("../report.toml")));
 
 /// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
-    WORDS.claim(id, verdict, ours.into())
+    CLAIMS.claim(id, verdict, ours.into())
 }

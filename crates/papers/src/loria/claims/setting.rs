@@ -1,9 +1,9 @@
 //! E-1 to E-7: the setting of the experiments.
 
-use super::super::Report;
-use super::{Claim, Verdict, claim, in_every_run};
+use super::super::LoriaReport;
+use super::{Claim, Verdict, claim, judge_every_run};
 
-pub(super) fn claims(report: &Report) -> Vec<Claim> {
+pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
     vec![
         suites(report),
         floors(report),
@@ -15,7 +15,7 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
     ]
 }
 
-fn suites(report: &Report) -> Claim {
+fn suites(report: &LoriaReport) -> Claim {
     let runs: usize = report.reliability.cells.iter().map(|cell| cell.outcomes.len()).sum();
     let builds: usize = report.genericity.builds.iter().map(|b| b.outcomes.len()).sum();
     let timed = report.performance.timings.len() + report.strategies.trials.len();
@@ -30,11 +30,11 @@ fn suites(report: &Report) -> Claim {
     )
 }
 
-fn floors(report: &Report) -> Claim {
+fn floors(report: &LoriaReport) -> Claim {
     claim("E-2", Verdict::Setting, report.reliability.floors.join("; "))
 }
 
-fn processors(report: &Report) -> Claim {
+fn processors(report: &LoriaReport) -> Claim {
     let p = &report.performance;
     let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
     Claim {
@@ -50,11 +50,11 @@ fn processors(report: &Report) -> Claim {
     }
 }
 
-fn sequential(report: &Report) -> Claim {
+fn sequential(report: &LoriaReport) -> Claim {
     let p = &report.performance;
     claim(
         "E-4",
-        in_every_run(p.digests.len() + 1, p.is_deterministic()),
+        judge_every_run(p.digests.len() + 1, p.is_deterministic()),
         format!(
             "With 1 worker, with more, and recorded: {}, {}.",
             digests(report),
@@ -63,7 +63,7 @@ fn sequential(report: &Report) -> Claim {
     )
 }
 
-fn digests(report: &Report) -> &'static str {
+fn digests(report: &LoriaReport) -> &'static str {
     if report.performance.is_deterministic() { "one digest" } else { "different digests" }
 }
 
@@ -72,17 +72,17 @@ const GENERIC: &str = "Held when in every run every robot acts in every cycle an
                        come to share a box";
 
 /// Describes runs with or without a camera, and returns whether all kept the laws.
-fn builds(report: &Report, camera: bool) -> (String, Verdict) {
+fn builds(report: &LoriaReport, camera: bool) -> (String, Verdict) {
     let [lawful, with_trips, all] = report.genericity.runs(camera);
     let text = format!(
         "Sizes 1 to 5: {lawful} of {all} runs kept the laws, {with_trips} completed trips within \
          {} cycles",
         report.genericity.cycles
     );
-    (text, in_every_run(all, lawful == all))
+    (text, judge_every_run(all, lawful == all))
 }
 
-fn sizes(report: &Report) -> Claim {
+fn sizes(report: &LoriaReport) -> Claim {
     let (ours, verdict) = builds(report, false);
     Claim {
         reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
@@ -90,7 +90,7 @@ fn sizes(report: &Report) -> Claim {
     }
 }
 
-fn camera(report: &Report) -> Claim {
+fn camera(report: &LoriaReport) -> Claim {
     let (ours, verdict) = builds(report, true);
     let effect = report.genericity.camera_effect();
     Claim {
@@ -103,7 +103,7 @@ fn camera(report: &Report) -> Claim {
     }
 }
 
-fn regimes(report: &Report) -> Claim {
+fn regimes(report: &LoriaReport) -> Claim {
     let r = &report.reliability;
     claim(
         "E-7",
@@ -112,7 +112,7 @@ fn regimes(report: &Report) -> Claim {
             "{} variants x {} seeds, four regimes at each of {} places.",
             r.cells.len(),
             report.plan.seeds,
-            r.places().len()
+            r.base_keys().len()
         ),
     )
 }

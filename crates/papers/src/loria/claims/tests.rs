@@ -1,13 +1,13 @@
 //! Tests of verdicts on made-up numbers.
 
 use super::super::cost_model::{CostModel, Parameter};
-use super::super::floor::Mind;
-use super::super::genericity::{Build, Genericity};
-use super::super::measure::{Outcome, Variant};
-use super::super::performance::{Initialization, Performance, Timing, loads};
-use super::super::reliability::Reliability;
-use super::super::strategies::{Strategies, Trial};
-use super::super::{LoriaPlan, Report};
+use super::super::floor::AvoidancePolicy;
+use super::super::genericity::{BuildOutcomes, GenericityResults};
+use super::super::measure::{LoriaVariant, RunMeasures};
+use super::super::performance::{InitializationCost, LoadTiming, PerformanceResults, loads};
+use super::super::reliability::ReliabilityResults;
+use super::super::strategies::{StrategyResults, StrategyTiming};
+use super::super::{LoriaConfig, LoriaReport};
 use super::*;
 use sidestep::statistics::Interval;
 use sidestep::worlds::robots::baseline::Strategy;
@@ -15,7 +15,7 @@ use sidestep::worlds::robots::world::Regime;
 use sidestep_document::Estimate;
 
 /// Outcomes as the paper has them; where `is_right` is false, each order is the other way around.
-fn outcome(variant: &Variant, seed: usize, is_right: bool) -> Outcome {
+fn outcome(variant: &LoriaVariant, seed: usize, is_right: bool) -> RunMeasures {
     // Errors of both kinds are worst, those of sensors worse than those of effectors.
     let rank = match variant.regime {
         Regime::Reliable => 0.0,
@@ -25,51 +25,52 @@ fn outcome(variant: &Variant, seed: usize, is_right: bool) -> Outcome {
     };
     let sign = if is_right { 1.0 } else { -1.0 };
     let noise = 0.01 * (seed % 5) as f64;
-    let saved = if variant.mind == Mind::Filter { 1.0 + 0.5 * rank } else { 0.0 };
-    Outcome {
+    let saved = if variant.mind == AvoidancePolicy::Filter { 1.0 + 0.5 * rank } else { 0.0 };
+    RunMeasures {
         contacts: Some(100.0 + sign * rank * (1.0 + noise)),
         trip_cycles: Some(500.0 + sign * ((10.0 + noise) * rank - saved)),
         straightness: Some(0.8 - sign * 0.01 * rank * (1.0 + noise)),
         lateral_moves: Some(100.0 + sign * rank * (1.0 + noise)),
         trips: Some(3.0),
         lawful: true,
-        ..Outcome::default()
+        ..RunMeasures::default()
     }
 }
 
 /// Factors near one value, by repeat.
-fn near(value: f64, plan: &LoriaPlan) -> Vec<Option<f64>> {
+fn near(value: f64, plan: &LoriaConfig) -> Vec<Option<f64>> {
     (0..plan.repeats).map(|k| Some(value * (1.0 + 0.001 * k as f64))).collect()
 }
 
-fn genericity(plan: &LoriaPlan) -> Genericity {
-    let lawful = Outcome { lawful: true, ..Outcome::default() };
-    let build = |camera| Build { size: 2, camera, outcomes: vec![lawful.clone(); plan.seeds] };
-    Genericity { builds: [false, true].map(build).into(), cycles: plan.cycles }
+fn genericity(plan: &LoriaConfig) -> GenericityResults {
+    let lawful = RunMeasures { lawful: true, ..RunMeasures::default() };
+    let build =
+        |camera| BuildOutcomes { size: 2, camera, outcomes: vec![lawful.clone(); plan.seeds] };
+    GenericityResults { builds: [false, true].map(build).into(), cycles: plan.cycles }
 }
 
 /// Timings on a quiet machine of two processors.
-fn performance(plan: &LoriaPlan) -> Performance {
+fn performance(plan: &LoriaConfig) -> PerformanceResults {
     let loads = loads(plan);
     let timing = |load: usize, workers: usize, recorded| {
         let dear = if loads[load].operations > 1000 { 0.1 } else { 0.0 };
         let ratios = near(if workers == 1 { 1.0 } else { 1.2 + dear }, plan);
-        Timing {
+        LoadTiming {
             load,
             workers,
             recorded,
-            cycle_ms: Estimate::of(near(1.0, plan)),
-            speed_up: Estimate::of_factors(ratios.iter().copied()),
+            cycle_ms: Estimate::from_values(near(1.0, plan)),
+            speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::of_factors(near(workers as f64, plan)),
+            machine: Estimate::from_factors(near(workers as f64, plan)),
         }
     };
     let of_load =
         |load| [(1, false), (2, false), (1, true), (2, true)].map(|(w, r)| timing(load, w, r));
-    let share = Estimate::of(near(0.001, plan));
+    let share = Estimate::from_values(near(0.001, plan));
     let initialization =
-        |load| Initialization { load, seconds: 0.1, share_alone: share, share_together: share };
-    Performance {
+        |load| InitializationCost { load, seconds: 0.1, share_alone: share, share_together: share };
+    PerformanceResults {
         processors: 2,
         timings: (0..loads.len()).flat_map(of_load).collect(),
         initialization: (0..loads.len()).map(initialization).collect(),
@@ -79,18 +80,18 @@ fn performance(plan: &LoriaPlan) -> Performance {
     }
 }
 
-fn strategies(plan: &LoriaPlan) -> Strategies {
+fn strategies(plan: &LoriaConfig) -> StrategyResults {
     let loads = loads(plan);
     let trial = |load: usize, strategy: &str, value: f64| {
         let ratios = near(value, plan);
-        Trial {
+        StrategyTiming {
             load,
             strategy: strategy.into(),
             workers: 2,
-            cycle_ms: Estimate::of(near(1.0, plan)),
-            speed_up: Estimate::of_factors(ratios.iter().copied()),
+            cycle_ms: Estimate::from_values(near(1.0, plan)),
+            speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::of_factors(near(2.0, plan)),
+            machine: Estimate::from_factors(near(2.0, plan)),
             contacts: 1.0,
             serial_share: 0.0,
             valid: true,
@@ -101,7 +102,7 @@ fn strategies(plan: &LoriaPlan) -> Strategies {
         let others = Strategy::ALL.map(|strategy| trial(load, strategy.name(), 1.1));
         others.into_iter().chain([trial(load, "double pool", 1.5)]).collect::<Vec<_>>()
     };
-    Strategies { trials: (0..loads.len()).flat_map(of_load).collect(), loads }
+    StrategyResults { trials: (0..loads.len()).flat_map(of_load).collect(), loads }
 }
 
 fn cost_model(low: f64) -> CostModel {
@@ -115,11 +116,13 @@ fn cost_model(low: f64) -> CostModel {
 }
 
 /// A report of a full plan that satisfies the paper.
-fn ideal() -> Report {
-    let plan = LoriaPlan { most_workers: 2, ..LoriaPlan::default() };
-    Report {
+fn ideal() -> LoriaReport {
+    let plan = LoriaConfig { most_workers: 2, ..LoriaConfig::default() };
+    LoriaReport {
         program_version: "0".into(),
-        reliability: Reliability::made_up(&plan, |variant, seed| outcome(variant, seed, true)),
+        reliability: ReliabilityResults::synthetic(&plan, |variant, seed| {
+            outcome(variant, seed, true)
+        }),
         genericity: genericity(&plan),
         performance: performance(&plan),
         strategies: strategies(&plan),
@@ -129,7 +132,7 @@ fn ideal() -> Report {
     }
 }
 
-fn ids(report: &Report, verdict: Verdict) -> Vec<&'static str> {
+fn ids(report: &LoriaReport, verdict: Verdict) -> Vec<&'static str> {
     judge(report).iter().filter(|c| c.verdict == verdict).map(|c| c.id).collect()
 }
 
@@ -146,10 +149,10 @@ fn ideal_numbers_hold_all_claims_that_are_judged_and_settings_are_not() {
     assert_eq!(ids(&report, Verdict::Setting), ["E-1", "E-2", "E-3", "E-7"]);
 }
 
-fn set(timings: &mut [Timing], plan: &LoriaPlan, value: f64) {
+fn set(timings: &mut [LoadTiming], plan: &LoriaConfig, value: f64) {
     for timing in timings {
         timing.ratios = near(value, plan);
-        timing.speed_up = Estimate::of_factors(timing.ratios.iter().copied());
+        timing.speed_up = Estimate::from_factors(timing.ratios.iter().copied());
     }
 }
 
@@ -157,17 +160,23 @@ fn set(timings: &mut [Timing], plan: &LoriaPlan, value: f64) {
 /// every claim, and here each claim has a number that refutes it.
 #[test]
 fn each_claim_has_a_number_that_refutes_it() {
-    type Spoil = fn(&mut Report);
+    type Spoil = fn(&mut LoriaReport);
     let cases: [(Spoil, &[&str]); 9] = [
         (|r| r.performance.recorded_digest = "other".into(), &["E-4"]),
         (|r| r.genericity.builds[0].outcomes[7].lawful = false, &["E-5"]),
         (|r| r.genericity.builds[1].outcomes[7].lawful = false, &["E-6"]),
         (
-            |r| r.reliability = Reliability::made_up(&r.plan, |v, seed| outcome(v, seed, false)),
+            |r| {
+                r.reliability =
+                    ReliabilityResults::synthetic(&r.plan, |v, seed| outcome(v, seed, false))
+            },
             &["E-8", "E-9", "E-10a", "E-11"],
         ),
         (
-            |r| r.performance.initialization[0].share_alone = Estimate::of(near(0.1, &r.plan)),
+            |r| {
+                r.performance.initialization[0].share_alone =
+                    Estimate::from_values(near(0.1, &r.plan))
+            },
             &["E-12"],
         ),
         (|r| set(&mut r.performance.timings, &r.plan, 0.8), &["E-13a", "E-15a"]),
@@ -191,7 +200,7 @@ fn a_busy_machine_refutes_nothing_about_time() {
     set(&mut report.performance.timings, &report.plan.clone(), 0.8);
     report.strategies.trials[0].ratios = near(1.9, &report.plan);
     for timing in &mut report.performance.timings {
-        timing.machine = Estimate::of_factors(near(1.0, &report.plan));
+        timing.machine = Estimate::from_factors(near(1.0, &report.plan));
     }
     assert_eq!(ids(&report, Verdict::Refuted), [""; 0]);
     assert_eq!(ids(&report, Verdict::Undecided), ["E-13a", "E-13b", "E-15a", "P-3"]);
@@ -199,9 +208,11 @@ fn a_busy_machine_refutes_nothing_about_time() {
 
 #[test]
 fn too_few_runs_decide_nothing_that_is_a_mean() {
-    let plan = LoriaPlan { most_workers: 2, ..LoriaPlan::quick() };
-    let report = Report {
-        reliability: Reliability::made_up(&plan, |variant, seed| outcome(variant, seed, true)),
+    let plan = LoriaConfig { most_workers: 2, ..LoriaConfig::quick() };
+    let report = LoriaReport {
+        reliability: ReliabilityResults::synthetic(&plan, |variant, seed| {
+            outcome(variant, seed, true)
+        }),
         performance: performance(&plan),
         strategies: strategies(&plan),
         plan,

@@ -1,8 +1,8 @@
 //! E-12 to E-15 and P-3: time, and its parts.
 
-use super::super::Report;
-use super::super::performance::{Performance, REFERENCE_CYCLES, Timing};
-use super::{Claim, Comparison, Verdict, claim, judged};
+use super::super::LoriaReport;
+use super::super::performance::{LoadTiming, PerformanceResults, REFERENCE_CYCLES};
+use super::{Claim, ThresholdTest, Verdict, claim, judge_thresholds};
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
 
@@ -12,7 +12,7 @@ const SMALL_SHARE: f64 = 0.05;
 /// Efficiency with the most workers below which it is said to fall quickly.
 const LOW_EFFICIENCY: f64 = 0.75;
 
-pub(super) fn claims(report: &Report) -> Vec<Claim> {
+pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
     let p = &report.performance;
     vec![
         initialization(p),
@@ -26,9 +26,9 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
     ]
 }
 
-fn initialization(p: &Performance) -> Claim {
+fn initialization(p: &PerformanceResults) -> Claim {
     let shares = || p.initialization.iter().map(|i| i.share_alone);
-    let worst = shares().max_by(|a, b| a.or_zero().total_cmp(&b.or_zero()));
+    let worst = shares().max_by(|a, b| a.mean_or_zero().total_cmp(&b.mean_or_zero()));
     Claim {
         reason: format!(
             "Held when below {:.0} % for every load, by its interval over repeats; the paper's share and \
@@ -37,7 +37,7 @@ fn initialization(p: &Performance) -> Claim {
         ),
         ..claim(
             "E-12",
-            judged(shares().map(|share| Comparison::below(&share, SMALL_SHARE))),
+            judge_thresholds(shares().map(|share| ThresholdTest::below(&share, SMALL_SHARE))),
             format!(
                 "Initialization takes up to {} of a run of {REFERENCE_CYCLES} cycles with one \
              worker (share, largest of {} loads).",
@@ -49,32 +49,33 @@ fn initialization(p: &Performance) -> Claim {
 }
 
 /// Returns whether time over workers decides nothing: there is one processor, or others were using them.
-fn is_excused(p: &Performance) -> bool {
-    p.most_workers() == 1 || p.was_busy()
+fn is_time_inconclusive(p: &PerformanceResults) -> bool {
+    p.max_workers() == 1 || p.is_machine_busy()
 }
 
 /// Returns a verdict that does not blame a program for a machine that is busy or small.
-fn unless_excused(p: &Performance, verdict: Verdict) -> Verdict {
+fn unless_inconclusive(p: &PerformanceResults, verdict: Verdict) -> Verdict {
     match verdict {
-        Verdict::Refuted if is_excused(p) => Verdict::Undecided,
+        Verdict::Refuted if is_time_inconclusive(p) => Verdict::Undecided,
         verdict => verdict,
     }
 }
 
-fn time_falls(report: &Report) -> Claim {
+fn time_falls(report: &LoriaReport) -> Claim {
     let p = &report.performance;
-    let most = p.most_workers();
-    let timings = || p.at_most_workers(false).chain(p.at_most_workers(true));
-    let falls = judged(timings().map(|timing| Comparison::above(&timing.speed_up, 1.0)));
-    let machine = Estimate::of(timings().map(|timing| timing.machine.mean));
+    let most = p.max_workers();
+    let timings = || p.at_max_workers(false).chain(p.at_max_workers(true));
+    let falls =
+        judge_thresholds(timings().map(|timing| ThresholdTest::above(&timing.speed_up, 1.0)));
+    let machine = Estimate::from_values(timings().map(|timing| timing.machine.mean));
     claim(
         "E-13a",
-        unless_excused(p, falls),
+        unless_inconclusive(p, falls),
         format!(
             "Speed-up with {most} workers: {} unrecorded, {} recorded ({} loads, {} repeats of \
              each; mere arithmetic in turn with them: {machine}).",
-            range(p.at_most_workers(false)),
-            range(p.at_most_workers(true)),
+            range(p.at_max_workers(false)),
+            range(p.at_max_workers(true)),
             p.loads.len(),
             report.plan.repeats,
         ),
@@ -82,18 +83,18 @@ fn time_falls(report: &Report) -> Claim {
 }
 
 /// Returns the mean speed-ups of some loads.
-fn range<'a>(timings: impl Iterator<Item = &'a Timing>) -> String {
+fn range<'a>(timings: impl Iterator<Item = &'a LoadTiming>) -> String {
     let means: Vec<f64> = timings.filter_map(|timing| timing.speed_up.mean).collect();
     let least = means.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = means.iter().copied().fold(0.0, f64::max);
     format!("{least:.2} to {greatest:.2}")
 }
 
-fn efficiency_falls(p: &Performance) -> Claim {
-    let most = p.most_workers();
+fn efficiency_falls(p: &PerformanceResults) -> Claim {
+    let most = p.max_workers();
     let by_load: Vec<String> = p
-        .at_most_workers(false)
-        .map(|t| format!("{:.2}", t.speed_up.or_zero() / most as f64))
+        .at_max_workers(false)
+        .map(|t| format!("{:.2}", t.speed_up.mean_or_zero() / most as f64))
         .collect();
     let efficiency = p.efficiency();
     Claim {
@@ -105,9 +106,9 @@ fn efficiency_falls(p: &Performance) -> Claim {
         ),
         ..claim(
             "E-13b",
-            match is_excused(p) {
+            match is_time_inconclusive(p) {
                 true => Verdict::Undecided,
-                false => judged([Comparison::below(&efficiency, LOW_EFFICIENCY)]),
+                false => judge_thresholds([ThresholdTest::below(&efficiency, LOW_EFFICIENCY)]),
             },
             format!(
                 "Efficiency with {most} workers, unrecorded: {efficiency}; by load: {}.",
@@ -117,11 +118,11 @@ fn efficiency_falls(p: &Performance) -> Claim {
     }
 }
 
-fn lost_speed_up(p: &Performance) -> Claim {
+fn lost_speed_up(p: &PerformanceResults) -> Claim {
     claim(
         "E-13c",
         Verdict::Lost,
-        format!("With {} workers: {}.", p.most_workers(), range(p.at_most_workers(false))),
+        format!("With {} workers: {}.", p.max_workers(), range(p.at_max_workers(false))),
     )
 }
 
@@ -129,31 +130,31 @@ fn second_machine() -> Claim {
     claim("E-14", Verdict::Lost, "One machine was used.")
 }
 
-fn costly_decisions(p: &Performance) -> Claim {
+fn costly_decisions(p: &PerformanceResults) -> Claim {
     let gain = p.gain_by_cost();
     let operations = || p.loads.iter().map(|load| load.operations);
     let (least, most) = (operations().min().unwrap_or(0), operations().max().unwrap_or(0));
     let speed_up = |cost: u32| {
-        let timings = p.at_most_workers(false).filter(|t| p.loads[t.load].operations == cost);
-        Estimate::of_factors(timings.flat_map(|timing| timing.ratios.iter().copied()))
+        let timings = p.at_max_workers(false).filter(|t| p.loads[t.load].operations == cost);
+        Estimate::from_factors(timings.flat_map(|timing| timing.ratios.iter().copied()))
     };
     claim(
         "E-15a",
-        match is_excused(p) {
+        match is_time_inconclusive(p) {
             true => Verdict::Undecided,
-            false => judged([Comparison::above(&gain, 0.0)]),
+            false => judge_thresholds([ThresholdTest::above(&gain, 0.0)]),
         },
         format!(
             "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
              difference {gain}.",
-            p.most_workers(),
+            p.max_workers(),
             speed_up(least),
             speed_up(most),
         ),
     )
 }
 
-fn conflicts(report: &Report) -> Claim {
+fn conflicts(report: &LoriaReport) -> Claim {
     let model = &report.cost_model;
     let c_s = model.parameter("c_s").and_then(|p| p.interval_ns);
     let shown = |name: &str| match model.parameter(name) {
@@ -165,7 +166,7 @@ fn conflicts(report: &Report) -> Claim {
     };
     claim(
         "E-15b",
-        judged([Comparison::interval_above(c_s, 0.0)]),
+        judge_thresholds([ThresholdTest::interval_above(c_s, 0.0)]),
         format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
              {} runs, R2 of the second step {:.3}.",
@@ -180,7 +181,7 @@ fn conflicts(report: &Report) -> Claim {
 }
 
 /// Judges the claim about strategies that the paper rejects before any experiment.
-fn rejected(report: &Report) -> Claim {
+fn rejected(report: &LoriaReport) -> Claim {
     let s = &report.strategies;
     let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));
     let all = || leads.iter().flat_map(|(_, leads)| leads);
@@ -194,10 +195,10 @@ fn rejected(report: &Report) -> Claim {
             listed.join("; ")
         )
     });
-    let ahead = judged(all().map(|lead| Comparison::above(lead, 0.0)));
+    let ahead = judge_thresholds(all().map(|lead| ThresholdTest::above(lead, 0.0)));
     claim(
         "P-3",
-        unless_excused(&report.performance, ahead),
+        unless_inconclusive(&report.performance, ahead),
         format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
             shown.collect::<Vec<_>>().join("; ")

@@ -1,16 +1,19 @@
 //! Claims about chains of any kind: their invariants, their initiators, their cost.
 
-use super::super::Report;
-use super::super::arm::{Arms, PLANNERS};
-use super::super::broken::Broken;
-use super::super::initiators::Initiators;
-use super::super::movers::{ESCAPES, Movers};
-use super::super::postures::{Postures, Way};
-use super::super::rotation::{RULES, Rotations};
-use super::super::scaling::Scaling;
-use super::super::snake::Snakes;
-use super::{Claim, Comparison, both, claim, every, every_trial, in_every_run, judged, listed};
-use crate::cells::{CaseResults, least, mm, most};
+use super::super::SerpentineReport;
+use super::super::arm::{ArmResults, PLANNERS};
+use super::super::broken_chain::BreakResults;
+use super::super::initiators::InitiatorResults;
+use super::super::movers::{ESCAPES, MoverResults};
+use super::super::postures::{IkMethod, PostureResults};
+use super::super::rotation::{RULES, RotationResults};
+use super::super::scaling::ScalingResults;
+use super::super::snake::SnakeResults;
+use super::{
+    Claim, ThresholdTest, claim, combined_verdict, join_texts, judge_all_runs, judge_all_trials,
+    judge_every_run, judge_thresholds,
+};
+use crate::cells::{CaseResults, format_mm, max_value, min_value};
 
 /// Tolerance of the rods' limits, meters.
 const ROD_TOLERANCE_M: f64 = 1e-9;
@@ -20,7 +23,7 @@ const GROWTH: f64 = 2.0;
 /// Largest growth of the time of a motion with any number of far obstacles, as a factor.
 const FAR_GROWTH: f64 = 2.0;
 
-pub(super) fn claims(report: &Report) -> Vec<Claim> {
+pub(super) fn claims(report: &SerpentineReport) -> Vec<Claim> {
     vec![
         moving_obstacles(&report.movers),
         local_cost(&report.scaling),
@@ -41,30 +44,33 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
     ]
 }
 
-fn moving_obstacles(movers: &Movers) -> Claim {
+fn moving_obstacles(movers: &MoverResults) -> Claim {
     let told = |escape: &'static str| {
-        let cells: Vec<_> = movers.of(escape).collect();
+        let cells: Vec<_> = movers.cells_with_escape(escape).collect();
         let worst = cells.iter().map(|c| c.number("inside_percent")).fold(0.0, f64::max);
         format!("{escape}: up to {worst:.2} % of steps inside")
     };
     claim(
         "P2",
-        every(movers.of(ESCAPES[2]), |c| c.number("inside_percent") == 0.0),
-        listed(ESCAPES, told),
+        judge_all_runs(movers.cells_with_escape(ESCAPES[2]), |c| c.number("inside_percent") == 0.0),
+        join_texts(ESCAPES, told),
     )
 }
 
-fn local_cost(scaling: &Scaling) -> Claim {
+fn local_cost(scaling: &ScalingResults) -> Claim {
     let (growth, far) = (scaling.growth(), scaling.far_growth());
     let repeats = scaling.far.iter().map(|f| f.us_by_repeat.len()).sum();
-    let verdict = both(&[
-        judged([Comparison::below(&growth, GROWTH), Comparison::below(&far, FAR_GROWTH)]),
-        in_every_run(repeats, scaling.far.iter().all(|f| f.same)),
+    let verdict = combined_verdict(&[
+        judge_thresholds([
+            ThresholdTest::below(&growth, GROWTH),
+            ThresholdTest::below(&far, FAR_GROWTH),
+        ]),
+        judge_every_run(repeats, scaling.far.iter().all(|f| f.same)),
     ]);
     let ours = format!(
         "per moved connector, longest over shortest chain: {growth}; with most over with fewest far \
          balls: {far}; same bits with them: {}",
-        listed(&scaling.far, |f| if f.same { "yes".into() } else { "no".into() }),
+        join_texts(&scaling.far, |f| if f.same { "yes".into() } else { "no".into() }),
     );
     claim("P5, E4", verdict, ours)
 }
@@ -72,51 +78,54 @@ fn local_cost(scaling: &Scaling) -> Claim {
 /// Connectors of a highly redundant chain.
 const MANY: usize = 1000;
 
-fn few_and_many(report: &Report) -> Claim {
-    let links: Vec<_> = report.postures.of(Way::ThereAndBack).collect();
+fn few_and_many(report: &SerpentineReport) -> Claim {
+    let links: Vec<_> = report.postures.cells_with_method(IkMethod::ThereAndBack).collect();
     let few = links.iter().map(|c| c.count("links")).min();
     let many = report.scaling.sizes.iter().max_by_key(|s| s.connectors);
     let ours = format!(
         "from {} links, {}, to {} connectors, of which a motion of the first moves {}",
         few.map_or("-".into(), |n| n.to_string()),
-        listed(links.first(), |c| c.share("reached").to_string()),
+        join_texts(links.first(), |c| c.proportion("reached").to_string()),
         many.map_or("-".into(), |s| s.connectors.to_string()),
         many.map_or("-".into(), |s| format!("{:.0}", s.fixed_moved)),
     );
     let large = || report.scaling.sizes.iter().filter(|s| s.connectors >= MANY);
     let repeats = large().map(|s| s.fixed_us_by_repeat.len()).sum();
     let all_move = large().all(|s| s.fixed_moved > 0.99 * (s.connectors - 1) as f64);
-    let verdict = both(&[
-        every_trial(links.iter().map(|c| c.share("reached"))),
-        in_every_run(repeats, all_move),
+    let verdict = combined_verdict(&[
+        judge_all_trials(links.iter().map(|c| c.proportion("reached"))),
+        judge_every_run(repeats, all_move),
     ]);
     claim("P6", verdict, ours)
 }
 
-fn joints(arms: &Arms) -> Claim {
-    let ours = listed(PLANNERS, |planner| {
+fn joints(arms: &ArmResults) -> Claim {
+    let ours = join_texts(PLANNERS, |planner| {
         let told = |c: &CaseResults| {
             format!(
                 "{} pillars: {} runs reach all, fastest joint at {:.3} of its limit",
                 c.count("pillars"),
-                c.share("reached"),
+                c.proportion("reached"),
                 c.number("fastest")
             )
         };
-        format!("planner {planner}: {}", listed(arms.with(planner), told))
+        format!("planner {planner}: {}", join_texts(arms.cells_with_planner(planner), told))
     });
     let is_kept = |c: &CaseResults| {
         let broken = ["outside", "too_fast", "penetrations"].map(|name| c.count(name));
         broken == [0; 3] && c.number("off_m") <= ROD_TOLERANCE_M
     };
-    let verdict = both(&[
-        every(PLANNERS.into_iter().flat_map(|planner| arms.with(planner)), is_kept),
-        every_trial(arms.with(PLANNERS[1]).map(|c| c.share("reached"))),
+    let verdict = combined_verdict(&[
+        judge_all_runs(
+            PLANNERS.into_iter().flat_map(|planner| arms.cells_with_planner(planner)),
+            is_kept,
+        ),
+        judge_all_trials(arms.cells_with_planner(PLANNERS[1]).map(|c| c.proportion("reached"))),
     ]);
     claim("K1, K4", verdict, ours)
 }
 
-fn structure_kept(report: &Report) -> Claim {
+fn structure_kept(report: &SerpentineReport) -> Claim {
     let all_cells = [
         &report.corridor.cells,
         &report.rotations.cells,
@@ -125,13 +134,13 @@ fn structure_kept(report: &Report) -> Claim {
         &report.pushing.cells,
     ];
     let cells = || all_cells.into_iter().flatten();
-    let worst = most(cells().map(|c| c.number("rod_violation_m")));
+    let worst = max_value(cells().map(|c| c.number("rod_violation_m")));
     let ours = format!("rods outside their limits by {worst:.1e} m at most");
-    claim("V5", every(cells(), |c| c.number("rod_violation_m") <= ROD_TOLERANCE_M), ours)
+    claim("V5", judge_all_runs(cells(), |c| c.number("rod_violation_m") <= ROD_TOLERANCE_M), ours)
 }
 
-fn creeps(snakes: &Snakes) -> Claim {
-    let ours = listed(snakes.at_rest(), |c| {
+fn creeps(snakes: &SnakeResults) -> Claim {
+    let ours = join_texts(snakes.at_rest(), |c| {
         format!(
             "{} connectors, {} % filled: {} % of the wanted way, {} of {} steps inside",
             c.count("connectors"),
@@ -141,26 +150,26 @@ fn creeps(snakes: &Snakes) -> Claim {
             c.count("steps")
         )
     });
-    let on_the_way = |c: &CaseResults| Comparison::above(c.estimate("way_percent"), 90.0);
-    let verdict = both(&[
-        judged(snakes.at_rest().map(on_the_way)),
-        every(snakes.at_rest(), |c| c.count("penetrations") == 0),
+    let on_the_way = |c: &CaseResults| ThresholdTest::above(c.estimate("way_percent"), 90.0);
+    let verdict = combined_verdict(&[
+        judge_thresholds(snakes.at_rest().map(on_the_way)),
+        judge_all_runs(snakes.at_rest(), |c| c.count("penetrations") == 0),
     ]);
     claim("V6", verdict, ours)
 }
 
-fn any_initiator(initiators: &Initiators) -> Claim {
+fn any_initiator(initiators: &InitiatorResults) -> Claim {
     claim(
         "R4, R5",
-        every_trial([&initiators.moved, &initiators.halves_alike]),
+        judge_all_trials([&initiators.moved, &initiators.halves_alike]),
         format!("moved: {}; halves alike: {}", initiators.moved, initiators.halves_alike),
     )
 }
 
-fn fixed_bases(initiators: &Initiators) -> Claim {
+fn fixed_bases(initiators: &InitiatorResults) -> Claim {
     claim(
         "R7",
-        every_trial([&initiators.base_objected, &initiators.kept]),
+        judge_all_trials([&initiators.base_objected, &initiators.kept]),
         format!(
             "the base objected: {}; nothing moved: {}",
             initiators.base_objected, initiators.kept
@@ -168,10 +177,10 @@ fn fixed_bases(initiators: &Initiators) -> Claim {
     )
 }
 
-fn failed_parts(initiators: &Initiators) -> Claim {
+fn failed_parts(initiators: &InitiatorResults) -> Claim {
     claim(
         "R8",
-        every_trial([&initiators.failed_objected, &initiators.told]),
+        judge_all_trials([&initiators.failed_objected, &initiators.told]),
         format!(
             "the failed one objected: {}; told: {}",
             initiators.failed_objected, initiators.told
@@ -179,19 +188,23 @@ fn failed_parts(initiators: &Initiators) -> Claim {
     )
 }
 
-fn one_turn(rotations: &Rotations) -> Claim {
-    let ours = listed(RULES, |rule| {
-        let cells: Vec<_> = rotations.of(rule).collect();
+fn one_turn(rotations: &RotationResults) -> Claim {
+    let ours = join_texts(RULES, |rule| {
+        let cells: Vec<_> = rotations.cells_with_rule(rule).collect();
         let inside: u64 = cells.iter().map(|c| c.count("penetrations")).sum();
         let steps: u64 = cells.iter().map(|c| c.count("steps")).sum();
-        let clearance_m = least(cells.iter().map(|c| c.maybe("min_clearance_m")));
-        format!("{rule}: {inside} of {steps} steps inside, clearance {} mm", mm(clearance_m))
+        let clearance_m = min_value(cells.iter().map(|c| c.optional_number("min_clearance_m")));
+        format!("{rule}: {inside} of {steps} steps inside, clearance {} mm", format_mm(clearance_m))
     });
-    claim("A7, A8", every(rotations.of(RULES[1]), |c| c.count("penetrations") == 0), ours)
+    claim(
+        "A7, A8",
+        judge_all_runs(rotations.cells_with_rule(RULES[1]), |c| c.count("penetrations") == 0),
+        ours,
+    )
 }
 
-fn bend_limits(initiators: &Initiators) -> Claim {
-    let ours = listed(&initiators.bends, |b| {
+fn bend_limits(initiators: &InitiatorResults) -> Claim {
+    let ours = join_texts(&initiators.bends, |b| {
         let place = if b.in_space { "in space" } else { "in the plane" };
         format!(
             "{}\u{b0} {place}: {} beyond, sharpest {:.3}\u{b0}",
@@ -200,74 +213,99 @@ fn bend_limits(initiators: &Initiators) -> Claim {
     });
     let motions = initiators.bends.iter().map(|b| b.moved.hits as usize).sum();
     let kept = initiators.bends.iter().all(|b| b.exceeded == 0 && b.moved.hits > 0);
-    claim("F1", in_every_run(motions, kept), ours)
+    claim("F1", judge_every_run(motions, kept), ours)
 }
 
-fn posture_by_veto(postures: &Postures) -> Claim {
+fn posture_by_veto(postures: &PostureResults) -> Claim {
     // A motion of fixed rods always displaces the base, which objects: there is nothing to judge.
-    let slack = || postures.of(Way::Veto).filter(|c| c.number("slack") > 0.0);
-    let fixed = most(
-        postures.of(Way::Veto).filter(|c| c.number("slack") == 0.0).map(|c| c.number("reached")),
+    let slack = || postures.cells_with_method(IkMethod::Veto).filter(|c| c.number("slack") > 0.0);
+    let fixed = max_value(
+        postures
+            .cells_with_method(IkMethod::Veto)
+            .filter(|c| c.number("slack") == 0.0)
+            .map(|c| c.number("reached")),
     );
     claim(
         "F2a",
-        judged(slack().map(|c| Comparison::share_above(c.share("reached"), 0.99))),
+        judge_thresholds(
+            slack().map(|c| ThresholdTest::proportion_above(c.proportion("reached"), 0.99)),
+        ),
         format!(
             "with 10 % of slack, {}; rods of fixed length: at most {fixed:.1} %",
-            listed(slack(), |c| format!("{} links: {}", c.count("links"), c.share("reached")))
+            join_texts(slack(), |c| format!(
+                "{} links: {}",
+                c.count("links"),
+                c.proportion("reached")
+            ))
         ),
     )
 }
 
-fn posture_there_and_back(postures: &Postures) -> Claim {
-    let [free, back] = [Way::FreeBase, Way::ThereAndBack]
-        .map(|way| every_trial(postures.of(way).map(|c| c.share("reached"))));
-    let ours = listed(postures.of(Way::ThereAndBack).filter(|c| c.number("slack") == 0.0), |c| {
+fn posture_there_and_back(postures: &PostureResults) -> Claim {
+    let [free, back] = [IkMethod::FreeBase, IkMethod::ThereAndBack].map(|way| {
+        judge_all_trials(postures.cells_with_method(way).map(|c| c.proportion("reached")))
+    });
+    let ours = join_texts(
+        postures.cells_with_method(IkMethod::ThereAndBack).filter(|c| c.number("slack") == 0.0),
+        |c| {
+            format!(
+                "{} links: {}, {:.0} us",
+                c.count("links"),
+                c.proportion("reached"),
+                c.number("median_us")
+            )
+        },
+    );
+    claim("F2b", combined_verdict(&[free, back]), ours)
+}
+
+fn rejoined(broken: &BreakResults) -> Claim {
+    let none_gone = || broken.cells.iter().filter(|c| c.count("gone") == 0);
+    let ours = join_texts(none_gone(), |c| {
         format!(
-            "{} links: {}, {:.0} us",
-            c.count("links"),
-            c.share("reached"),
-            c.number("median_us")
+            "{} thrown by {} m: {}",
+            c.count("scattered"),
+            c.number("by_m"),
+            c.proportion("whole")
         )
     });
-    claim("F2b", both(&[free, back]), ours)
+    claim(
+        "F3a",
+        judge_all_runs(none_gone(), |c| {
+            c.is_true_in_all_runs("whole") && c.is_true_in_all_runs("ends_kept")
+        }),
+        ours,
+    )
 }
 
-fn rejoined(broken: &Broken) -> Claim {
-    let none_gone = || broken.cells.iter().filter(|c| c.count("gone") == 0);
-    let ours = listed(none_gone(), |c| {
-        format!("{} thrown by {} m: {}", c.count("scattered"), c.number("by_m"), c.share("whole"))
-    });
-    claim("F3a", every(none_gone(), |c| c.in_all("whole") && c.in_all("ends_kept")), ours)
-}
-
-fn rejoined_with_fewer(broken: &Broken) -> Claim {
+fn rejoined_with_fewer(broken: &BreakResults) -> Claim {
     let gone = || broken.cells.iter().filter(|c| c.count("gone") > 0);
-    let ours = listed(gone(), |c| {
-        let who = if c.is("may_come") { "an end may come" } else { "nobody may come" };
+    let ours = join_texts(gone(), |c| {
+        let who = if c.is_true("may_come") { "an end may come" } else { "nobody may come" };
         format!(
             "{} less {}, {who}: {} whole, {} refused",
             c.count("scattered"),
             c.count("gone"),
-            c.share("whole"),
+            c.proportion("whole"),
             c.count("too_long")
         )
     });
     let as_can = |c: &CaseResults| {
-        let whole = if c.is("may_come") { c.share("whole").n } else { c.share("can").hits };
-        c.share("whole").hits == whole && c.in_all("ends_kept")
+        let whole =
+            if c.is_true("may_come") { c.proportion("whole").n } else { c.proportion("can").hits };
+        c.proportion("whole").hits == whole && c.is_true_in_all_runs("ends_kept")
     };
-    claim("F3b", every(gone(), as_can), ours)
+    claim("F3b", judge_all_runs(gone(), as_can), ours)
 }
 
-fn in_space(snakes: &Snakes) -> Claim {
-    let ours = listed(snakes.at_rest(), |c| {
+fn in_space(snakes: &SnakeResults) -> Claim {
+    let ours = join_texts(snakes.at_rest(), |c| {
         format!(
             "{} % filled: clearance {} mm, vetoes {} %",
             100.0 * c.number("filled"),
-            c.mm("min_clearance_m"),
+            c.format_mm("min_clearance_m"),
             c.estimate("veto_percent")
         )
     });
-    claim("F4", every(snakes.at_rest(), |c| c.count("penetrations") == 0), ours)
+    claim("F4", judge_all_runs(snakes.at_rest(), |c| c.count("penetrations") == 0), ours)
 }

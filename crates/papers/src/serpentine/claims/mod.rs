@@ -9,23 +9,25 @@ mod swarms;
 #[cfg(test)]
 mod tests;
 
-use super::Report;
+use super::SerpentineReport;
 use crate::claims::{
-    Comparison, File, Words, both, every, every_trial, in_every_run, judged, listed,
+    ClaimsFile, PaperClaims, ThresholdTest, combined_verdict, join_texts, judge_all_runs,
+    judge_all_trials, judge_every_run, judge_thresholds,
 };
 use sidestep_document::claim::{Claim, Verdict};
 
 /// Judges all claims.
-pub(super) fn judge(report: &Report) -> Vec<Claim> {
+pub(super) fn judge(report: &SerpentineReport) -> Vec<Claim> {
     let mut claims = chains::claims(report);
     claims.extend(swarms::claims(report));
     claims
 }
 
 /// The words of the report.
-pub(super) static WORDS: Words = Words::new(|| File::read(include_str!("../report.toml")));
+pub(super) static CLAIMS: PaperClaims =
+    PaperClaims::new(|| ClaimsFile::read(include_str!("../report.toml")));
 
 /// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
-    WORDS.claim(id, verdict, ours.into())
+    CLAIMS.claim(id, verdict, ours.into())
 }

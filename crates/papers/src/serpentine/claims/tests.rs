@@ -3,27 +3,27 @@
 use super::super::*;
 use super::*;
 use crate::cells::Value::{Count, Maybe, Number, Word, Yes};
-use crate::cells::{CaseResults, Share, Value};
+use crate::cells::{CaseResults, Proportion, Value};
 use sidestep_document::Estimate;
 
 fn yes(n: usize) -> Value {
-    Value::Share(Share::of(vec![true; n]))
+    Value::Share(Proportion::from_flags(vec![true; n]))
 }
 
 fn no() -> Value {
-    Value::Share(Share::of([false]))
+    Value::Share(Proportion::from_flags([false]))
 }
 
 fn sure(value: f64) -> Value {
-    Value::Estimate(Estimate::of([Some(value); 10]))
+    Value::Estimate(Estimate::from_values([Some(value); 10]))
 }
 
 fn no_target() -> Value {
-    Value::Share(Share::new(0, TARGETS as u64))
+    Value::Share(Proportion::new(0, TARGETS as u64))
 }
 
-fn half() -> Share {
-    Share::new(5, 10)
+fn half() -> Proportion {
+    Proportion::new(5, 10)
 }
 
 /// Targets of a full plan.
@@ -59,7 +59,7 @@ fn clean() -> Vec<(&'static str, Value)> {
 }
 
 /// A minimal report that satisfies the slides: one cell of each kind.
-fn ideal() -> Report {
+fn ideal() -> SerpentineReport {
     let ride = |leaving| {
         let case = [("width_m", Number(2.0)), ("followers", Count(15)), ("leaving", word(leaving))];
         CaseResults::new(case, clean())
@@ -77,7 +77,7 @@ fn ideal() -> Report {
     let reached =
         |planner| CaseResults::new([("pillars", Count(3)), ("planner", word(planner))], clean());
     let met = |escape| CaseResults::new([("escape", word(escape))], clean());
-    let solved = |way: postures::Way| {
+    let solved = |way: postures::IkMethod| {
         let case = [("way", word(way.key())), ("links", Count(7)), ("slack", Number(0.1))];
         CaseResults::new(case, clean())
     };
@@ -90,7 +90,7 @@ fn ideal() -> Report {
         ];
         CaseResults::new(case, clean())
     };
-    let size = |connectors| scaling::Size {
+    let size = |connectors| scaling::OpenTiming {
         connectors,
         fixed_us: connectors as f64,
         fixed_us_by_repeat: vec![connectors as f64; 5],
@@ -100,8 +100,8 @@ fn ideal() -> Report {
     };
     let case = [("filled", Number(0.1)), ("movers", Count(0)), ("connectors", Count(450))];
     let snake = CaseResults::new(case, clean());
-    let all = Share::of([true; 30]);
-    let bend = initiators::Bend {
+    let all = Proportion::from_flags([true; 30]);
+    let bend = initiators::BendLimitResult {
         limit_deg: 60.0,
         in_space: true,
         moved: all,
@@ -109,31 +109,36 @@ fn ideal() -> Report {
         exceeded: 0,
         sharpest_deg: 60.0,
     };
-    use postures::Way::{FreeBase, LeastSquares, ThereAndBack, Veto};
-    Report {
-        plan: SerpentinePlan::quick(),
+    use postures::IkMethod::{FreeBase, LeastSquares, ThereAndBack, Veto};
+    SerpentineReport {
+        plan: SerpentineConfig::quick(),
         program_version: "0".into(),
-        corridor: corridor::Corridor { cells: vec![ride("latched"), ride("level")] },
-        rotations: rotation::Rotations { cells: vec![turned("union"), turned("literal")] },
-        fields: field::Fields {
+        corridor: corridor::CorridorResults { cells: vec![ride("latched"), ride("level")] },
+        rotations: rotation::RotationResults { cells: vec![turned("union"), turned("literal")] },
+        fields: field::FieldResults {
             cells: vec![
                 crossed("latched", true, 0.0),
                 crossed("level", false, 0.0),
                 crossed("latched", true, 1.0),
             ],
         },
-        pushing: pushing::Pushing { cells: Vec::new() },
-        movers: movers::Movers { cells: vec![met("off"), met("look-ahead")] },
-        snakes: snake::Snakes { cells: vec![snake] },
-        scaling: scaling::Scaling {
+        pushing: pushing::PushingResults { cells: Vec::new() },
+        movers: movers::MoverResults { cells: vec![met("off"), met("look-ahead")] },
+        snakes: snake::SnakeResults { cells: vec![snake] },
+        scaling: scaling::ScalingResults {
             sizes: vec![size(50), size(1000)],
-            far: vec![scaling::Far { balls: 0, us: 1.0, us_by_repeat: vec![1.0; 5], same: true }],
+            far: vec![scaling::FarObstacleTiming {
+                balls: 0,
+                us: 1.0,
+                us_by_repeat: vec![1.0; 5],
+                same: true,
+            }],
         },
-        broken: broken::Broken { cells: vec![joined(0), joined(2)] },
-        postures: postures::Postures {
+        broken: broken_chain::BreakResults { cells: vec![joined(0), joined(2)] },
+        postures: postures::PostureResults {
             cells: [Veto, FreeBase, ThereAndBack, LeastSquares].map(solved).into(),
         },
-        initiators: initiators::Initiators {
+        initiators: initiators::InitiatorResults {
             moved: all,
             halves_alike: all,
             base_objected: all,
@@ -142,13 +147,13 @@ fn ideal() -> Report {
             told: all,
             bends: vec![bend],
         },
-        arms: arm::Arms { cells: arm::PLANNERS.map(reached).into() },
+        arms: arm::ArmResults { cells: arm::PLANNERS.map(reached).into() },
         claims: Vec::new(),
         scenes: Vec::new(),
     }
 }
 
-fn ids(report: &Report, verdict: Verdict) -> Vec<&'static str> {
+fn ids(report: &SerpentineReport, verdict: Verdict) -> Vec<&'static str> {
     judge(report).iter().filter(|c| c.verdict == verdict).map(|c| c.id).collect()
 }
 
@@ -178,31 +183,31 @@ fn nothing_measured_is_undecided() {
 /// every claim, and here each claim has a number that refutes it.
 #[test]
 fn each_claim_has_a_number_that_refutes_it() {
-    type Spoil = fn(&mut Report);
+    type Spoil = fn(&mut SerpentineReport);
     let cases: [(Spoil, &[&str]); 27] = [
-        (|r| r.corridor.cells[0].put("bumper_events", Count(1)), &["E2"]),
-        (|r| r.corridor.cells[0].put("vetoes", Count(1)), &["E3"]),
-        (|r| r.corridor.cells[0].put("penetrations", Count(1)), &["N6a", "E2"]),
-        (|r| r.corridor.cells[0].put("in_band_percent", sure(50.0)), &["N3"]),
-        (|r| r.corridor.cells[1].put("rod_violation_m", Number(1e-6)), &["V5"]),
-        (|r| r.rotations.cells[1].put("penetrations", Count(1)), &["A7, A8"]),
-        (|r| r.fields.cells[0].put("untouched", no()), &["N5b"]),
-        (|r| r.fields.cells[1].put("arrived", no()), &["N5a"]),
-        (|r| r.fields.cells[2].put("arrived", no()), &["N6b"]),
-        (|r| r.movers.cells[1].put("inside_percent", sure(0.1)), &["P2"]),
-        (|r| r.arms.cells[0].put("too_fast", Count(1)), &["K1, K4"]),
-        (|r| r.arms.cells[1].put("outside", Count(1)), &["K1, K4"]),
-        (|r| r.arms.cells[1].put("reached", no()), &["K1, K4"]),
-        (|r| r.snakes.cells[0].put("real_time", sure(0.9)), &["E1"]),
-        (|r| r.snakes.cells[0].put("penetrations", Count(1)), &["V6", "F4"]),
-        (|r| r.snakes.cells[0].put("way_percent", sure(50.0)), &["V6"]),
+        (|r| r.corridor.cells[0].set_value("bumper_events", Count(1)), &["E2"]),
+        (|r| r.corridor.cells[0].set_value("vetoes", Count(1)), &["E3"]),
+        (|r| r.corridor.cells[0].set_value("penetrations", Count(1)), &["N6a", "E2"]),
+        (|r| r.corridor.cells[0].set_value("in_band_percent", sure(50.0)), &["N3"]),
+        (|r| r.corridor.cells[1].set_value("rod_violation_m", Number(1e-6)), &["V5"]),
+        (|r| r.rotations.cells[1].set_value("penetrations", Count(1)), &["A7, A8"]),
+        (|r| r.fields.cells[0].set_value("untouched", no()), &["N5b"]),
+        (|r| r.fields.cells[1].set_value("arrived", no()), &["N5a"]),
+        (|r| r.fields.cells[2].set_value("arrived", no()), &["N6b"]),
+        (|r| r.movers.cells[1].set_value("inside_percent", sure(0.1)), &["P2"]),
+        (|r| r.arms.cells[0].set_value("too_fast", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cells[1].set_value("outside", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cells[1].set_value("reached", no()), &["K1, K4"]),
+        (|r| r.snakes.cells[0].set_value("real_time", sure(0.9)), &["E1"]),
+        (|r| r.snakes.cells[0].set_value("penetrations", Count(1)), &["V6", "F4"]),
+        (|r| r.snakes.cells[0].set_value("way_percent", sure(50.0)), &["V6"]),
         (|r| r.scaling.sizes[1].fixed_us_by_repeat = vec![3e3; 5], &["P5, E4"]),
         (|r| r.scaling.sizes[1].fixed_moved = 600.0, &["P6"]),
         (|r| r.scaling.far[0].same = false, &["P5, E4"]),
-        (|r| r.broken.cells[0].put("ends_kept", no()), &["F3a"]),
-        (|r| r.broken.cells[1].put("whole", no()), &["F3b"]),
-        (|r| r.postures.cells[0].put("reached", no_target()), &["F2a"]),
-        (|r| r.postures.cells[2].put("reached", no_target()), &["P6", "F2b"]),
+        (|r| r.broken.cells[0].set_value("ends_kept", no()), &["F3a"]),
+        (|r| r.broken.cells[1].set_value("whole", no()), &["F3b"]),
+        (|r| r.postures.cells[0].set_value("reached", no_target()), &["F2a"]),
+        (|r| r.postures.cells[2].set_value("reached", no_target()), &["P6", "F2b"]),
         (|r| r.initiators.bends[0].exceeded = 1, &["F1"]),
         (|r| r.initiators.moved = half(), &["R4, R5"]),
         (|r| r.initiators.kept = half(), &["R7"]),
@@ -220,16 +225,16 @@ fn each_claim_has_a_number_that_refutes_it() {
 
 #[test]
 fn a_full_plan_has_runs_enough_to_decide() {
-    let plan = SerpentinePlan::default();
+    let plan = SerpentineConfig::default();
     let least = [plan.seeds, plan.field_seeds, plan.snake_seeds, plan.breaks];
-    assert!(least.into_iter().all(|n| n >= crate::claims::LEAST_RUNS), "{least:?}");
+    assert!(least.into_iter().all(|n| n >= crate::claims::MIN_RUNS), "{least:?}");
     assert_eq!(plan.ik_targets, TARGETS, "as many as 99 % takes");
 }
 
 #[test]
 fn discs_that_only_touching_chains_run_into_say_nothing_of_those_that_look_ahead() {
     let mut report = ideal();
-    report.movers.cells[0].put("inside_percent", sure(30.0));
+    report.movers.cells[0].set_value("inside_percent", sure(30.0));
     let claims = judge(&report);
     assert_eq!(claims[0].verdict, Verdict::Held);
     assert!(claims[0].ours.contains("off: up to 30.00 %"), "{}", claims[0].ours);
@@ -237,10 +242,10 @@ fn discs_that_only_touching_chains_run_into_say_nothing_of_those_that_look_ahead
 
 #[test]
 fn a_full_plan_runs_all_variants_of_the_sweep_files() {
-    let plan = SerpentinePlan::default();
+    let plan = SerpentineConfig::default();
     let studies = [corridor::study, rotation::study, movers::study, snake::study];
     let full = studies.map(|study| study(&plan).expect("right files").len());
     assert_eq!(full, [7 * 4, 9 * 3, 8 * 2 * 5, 2 * 4]);
-    let quick = studies.map(|study| study(&SerpentinePlan::quick()).expect("right files").len());
+    let quick = studies.map(|study| study(&SerpentineConfig::quick()).expect("right files").len());
     assert_eq!(quick, [2 * 3, 3, 8 * 2, 4]);
 }

@@ -2,7 +2,7 @@
 
 use super::super::shares::Share;
 use super::*;
-use crate::whole::WholeTable;
+use crate::run_table::LoadedTable;
 use sidestep_kernel::ports::Values;
 
 type Folder = SweepFolder<Vec<u32>>;
@@ -53,7 +53,7 @@ fn a_sweep_goes_from_plan_over_shares_to_one_table() {
     assert_eq!((runs(None), runs(Some(share))), (vec![7], vec![]));
     let cells_again = cells();
     let refs: Vec<_> = cells_again.iter().collect();
-    folder.end_share(share, journal, &refs).unwrap();
+    folder.finish_share(share, journal, &refs).unwrap();
     let again = folder.journal(share, |_: u32| ()).unwrap();
     assert!(again.is_none(), "a share that is done is done");
     assert!(runs(None).is_empty());
@@ -61,7 +61,7 @@ fn a_sweep_goes_from_plan_over_shares_to_one_table() {
     folder.parts(|part| parts.push(part.columns)).unwrap();
     assert_eq!(parts, [cells()]);
     assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
-    let mut completion = folder.completion(&refs, &refs).unwrap();
+    let mut completion = folder.results_writer(&refs, &refs).unwrap();
     assert!(!folder.is_complete());
     completion.append(&refs, &refs).unwrap();
     completion.append(&refs, &refs).unwrap();
@@ -83,7 +83,7 @@ fn tables_and_shares_of_another_sweep_are_refused() {
     let columns = cells();
     let refs: Vec<_> = columns.iter().collect();
     let complete = |folder: &Folder| {
-        let mut completion = folder.completion(&refs, &refs).unwrap();
+        let mut completion = folder.results_writer(&refs, &refs).unwrap();
         completion.append(&refs, &refs).unwrap();
         completion.finish().unwrap();
     };
@@ -104,10 +104,10 @@ fn tables_and_shares_of_another_sweep_are_refused() {
     own.results::<String>().and_then(|_| own.timings::<String>()).unwrap();
     let (other, share) = (other("share", vec![4, 5], "g"), Share { index: 0, count: 1 });
     let journal = other.journal(share, |_: u32| ()).unwrap().unwrap();
-    other.end_share(share, journal, &refs).unwrap();
+    other.finish_share(share, journal, &refs).unwrap();
     let part = "shares/0-of-1.parquet";
     fs::copy(other.path().join(part), own.path().join(part)).unwrap();
-    let refused = own.parts(|_: WholeTable<String>| panic!("a foreign part")).unwrap_err();
+    let refused = own.parts(|_: LoadedTable<String>| panic!("a foreign part")).unwrap_err();
     assert!(refused.cause().contains("another sweep"), "{refused}");
 }
 
@@ -124,13 +124,13 @@ fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing()
     let before = names();
     let columns = cells();
     let refs: Vec<_> = columns.iter().collect();
-    let mut completion = folder.completion(&refs, &refs).unwrap();
+    let mut completion = folder.results_writer(&refs, &refs).unwrap();
     completion.append(&refs, &refs).unwrap();
     drop(completion);
     // A kill leaves its files there.
-    std::mem::forget(folder.scratch().unwrap());
-    fs::write(folder.path().join(SCRATCH).join("old"), "rest").unwrap();
-    let scratch = folder.scratch().unwrap();
+    std::mem::forget(folder.temp_folder().unwrap());
+    fs::write(folder.path().join(TEMP_FOLDER).join("old"), "rest").unwrap();
+    let scratch = folder.temp_folder().unwrap();
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
     drop(scratch);
     assert_eq!(names(), before);

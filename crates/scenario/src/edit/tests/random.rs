@@ -29,15 +29,15 @@ fn texts() -> Vec<String> {
 }
 
 /// A path into values: keys, and numbers of elements.
-type Way = Vec<Result<String, usize>>;
+type ValuePath = Vec<Result<String, usize>>;
 
-fn ways(value: &Value, way: &mut Way, found: &mut Vec<Way>) {
+fn collect_paths(value: &Value, way: &mut ValuePath, found: &mut Vec<ValuePath>) {
     if !way.is_empty() {
         found.push(way.clone());
     }
     let mut below = |step, inner: &Value| {
         way.push(step);
-        ways(inner, way, found);
+        collect_paths(inner, way, found);
         way.pop();
     };
     match value {
@@ -47,7 +47,7 @@ fn ways(value: &Value, way: &mut Way, found: &mut Vec<Way>) {
     }
 }
 
-fn key(way: &Way) -> String {
+fn key(way: &ValuePath) -> String {
     let parts = way.iter().map(|step| match step {
         Ok(name) => format!("{name:?}"),
         Err(number) => number.to_string(),
@@ -88,7 +88,7 @@ fn plain(value: &Value) -> serde_json::Value {
 }
 
 /// Edits values in a plain way.
-fn edit_values(root: &mut Value, way: &Way, edit: &Edit) {
+fn edit_values(root: &mut Value, way: &ValuePath, edit: &Edit) {
     let (last, parent) = way.split_last().expect("a way");
     match (edit, last) {
         (Edit::Set { value, .. }, Err(_)) => *get(root, way) = value_of(value),
@@ -132,10 +132,13 @@ fn any_value() -> impl Strategy<Value = serde_json::Value> {
 }
 
 /// Returns an edit of a random kind at a random place, with its way; `None` where it does not fit.
-fn edit_at(root: &mut Value, pick: &(usize, u8, usize, serde_json::Value)) -> Option<(Way, Edit)> {
+fn edit_at(
+    root: &mut Value,
+    pick: &(usize, u8, usize, serde_json::Value),
+) -> Option<(ValuePath, Edit)> {
     let (place, kind, at, value) = pick;
     let mut all = Vec::new();
-    ways(root, &mut Vec::new(), &mut all);
+    collect_paths(root, &mut Vec::new(), &mut all);
     let mut way = all[place % all.len()].clone();
     let count = get(root, &way).as_array().map(Vec::len);
     let is_list = get(root, &way).as_array().is_some_and(|items| items.iter().all(Value::is_table));
@@ -220,7 +223,7 @@ proptest! {
         let source = Source::new("s.toml", texts[file % texts.len()].as_str(), "");
         let mut root = parsed(&source.text);
         let mut all = Vec::new();
-        ways(&root, &mut Vec::new(), &mut all);
+        collect_paths(&root, &mut Vec::new(), &mut all);
         let way = &all[place % all.len()];
         let (document, key) = (source.text.parse::<toml_edit::Document<String>>().expect("TOML"), key(way));
         let item = way.iter().fold(document.as_item(), |item, step| match step {
@@ -254,7 +257,7 @@ proptest! {
         let source = Source::new("s.toml", if end { text } else { text.trim_end() }, "");
         let mut root = parsed(&source.text);
         let mut all = Vec::new();
-        ways(&root, &mut Vec::new(), &mut all);
+        collect_paths(&root, &mut Vec::new(), &mut all);
         let way = &all[place % all.len()];
         let (edit, gone) = match get(&mut root, way) {
             Value::Array(items) => {

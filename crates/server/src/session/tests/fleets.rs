@@ -1,25 +1,25 @@
 //! Fleets that fly elsewhere: each view once, events once, no order taken, and the loss reported.
 
 use super::*;
-use crate::screen::Screen;
+use crate::fleet_feed::FleetFeed;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::view::Look;
-use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
+use sidestep::kernel::view::FrameOptions;
+use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus, NodeStatus};
 
 const AT: &str = "tcp/127.0.0.1:7600";
 
 /// A flight that is computed elsewhere.
-struct Elsewhere {
+struct RemoteFlight {
     run: Box<dyn Simulation>,
-    screen: Arc<Screen>,
+    screen: Arc<FleetFeed>,
     number: u64,
-    events: Vec<sidestep::kernel::view::Entry>,
+    events: Vec<sidestep::kernel::view::LogEvent>,
 }
 
-impl Elsewhere {
-    fn begin() -> Self {
+impl RemoteFlight {
+    fn start() -> Self {
         let run = flight();
-        let screen = Arc::new(Screen::new(AT.into(), staged(run.as_ref())));
+        let screen = Arc::new(FleetFeed::new(AT.into(), staged(run.as_ref())));
         Self { run, screen, number: 0, events: Vec::new() }
     }
 
@@ -27,27 +27,30 @@ impl Elsewhere {
     fn restart(&mut self) {
         self.run = flight();
         (self.number, self.events) = (0, Vec::new());
-        self.screen.begin(staged(self.run.as_ref()));
+        self.screen.restart(staged(self.run.as_ref()));
     }
 
     /// Flies on and shows the flight, with all events so far.
-    fn show(&mut self, cycles: u64, is_over: bool) {
+    fn publish(&mut self, cycles: u64, is_over: bool) {
         self.run.advance(cycles);
         self.number += 1;
-        let mut frame = self.run.frame(Look::BODIES);
+        let mut frame = self.run.frame(FrameOptions::WITHOUT_SCANS);
         self.events.append(&mut frame.log);
         frame.log.clone_from(&self.events);
         // As with connectors: the number on the network is not that of the body.
-        let node = |agent| NodeNow { agent, number: 4, part: Some(agent), ..NodeNow::default() };
+        let node =
+            |agent| NodeStatus { agent, number: 4, part: Some(agent), ..NodeStatus::default() };
         let (nodes, noun) = ((0..6).map(node).collect(), "connector".into());
-        let fleet = FleetNow { cycle: frame.cycle, cycles: 40, noun, nodes, ..FleetNow::default() };
-        self.screen.show(Seen { number: self.number, frame, fleet, is_over });
+        let fleet =
+            FleetStatus { cycle: frame.cycle, cycles: 40, noun, nodes, ..FleetStatus::default() };
+        self.screen.publish(FleetFrame { number: self.number, frame, fleet, is_over });
     }
 
     fn page(&self) -> Page {
         let folder = tempfile::tempdir().expect("a folder");
-        let means = Means { screens: vec![self.screen.clone()], ..means(folder.path(), 1) };
-        let (page, opened) = Page::of(means, Subject::Fleet { path: AT.into() }, folder);
+        let means = SessionDeps { screens: vec![self.screen.clone()], ..means(folder.path(), 1) };
+        let (page, opened) =
+            Page::open_target(means, OpenTarget::Fleet { path: AT.into() }, folder);
         let opened = &opened["answer"];
         assert_eq!(
             (&opened["is"], &opened["scene"]["agent"]),
@@ -61,12 +64,12 @@ fn flight() -> Box<dyn Simulation> {
     let source = Source::new("s.toml", AIRPLANES, "");
     let compiled = WORLDS.compile(&source).expect("it is right");
     let mut run = compiled.start(&source, 1);
-    run.watch();
+    run.enable_events();
     run
 }
 
-fn staged(run: &dyn Simulation) -> Staged {
-    Staged {
+fn staged(run: &dyn Simulation) -> FleetScene {
+    FleetScene {
         build: "b".into(),
         world: run.world().into(),
         agent: run.agent().into(),
@@ -90,13 +93,13 @@ fn status(page: &mut Page, is_it: impl Fn(&Value) -> bool) -> Value {
 
 #[test]
 fn views_are_shown_as_they_are_heard_and_no_event_twice() {
-    let mut elsewhere = Elsewhere::begin();
-    elsewhere.show(0, false);
+    let mut elsewhere = RemoteFlight::start();
+    elsewhere.publish(0, false);
     let mut page = elsewhere.page();
     page.ask(json!({ "do": "credit", "session": 1, "frames": 100 }));
     page.until("a frame", |page| (!page.frames.is_empty()).then_some(()));
     for _ in 0..4 {
-        elsewhere.show(9, false);
+        elsewhere.publish(9, false);
         let cycle = elsewhere.run.cycle() as f64;
         let now = status(&mut page, |status| status["cycle"] == cycle);
         assert_eq!((&now["state"], &now["cycles_planned"]), (&"watched".into(), &40.0.into()));
@@ -108,14 +111,14 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
     let told =
         page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "most": 5000 }));
     assert_eq!(told["entries"].as_array().map(Vec::len), Some(elsewhere.events.len()));
-    elsewhere.show(4, true);
+    elsewhere.publish(4, true);
     status(&mut page, |status| status["state"] == "over");
 }
 
 #[test]
 fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
-    let mut elsewhere = Elsewhere::begin();
-    elsewhere.show(1, false);
+    let mut elsewhere = RemoteFlight::start();
+    elsewhere.publish(1, false);
     let mut page = elsewhere.page();
     for call in [
         json!({ "do": "play", "session": 1, "speed": "fastest" }),
@@ -126,34 +129,35 @@ fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
         let cause = page.wait(id)["problem"]["cause"].clone();
         assert_eq!(cause, "a fleet is only watched here", "{call}");
     }
-    elsewhere.screen.lose("it was not heard", "watch it again");
+    elsewhere.screen.mark_lost("it was not heard", "watch it again");
     assert_eq!(ended(&mut page)["problem"]["cause"], "it was not heard");
     status(&mut page, |status| status["state"] == "failed");
 }
 
 #[test]
 fn a_fleet_that_is_lost_cannot_be_opened_and_the_one_that_flies_there_next_can() {
-    let mut elsewhere = Elsewhere::begin();
-    elsewhere.show(1, false);
-    elsewhere.screen.lose("it was not heard", "watch it again");
+    let mut elsewhere = RemoteFlight::start();
+    elsewhere.publish(1, false);
+    elsewhere.screen.mark_lost("it was not heard", "watch it again");
     let folder = tempfile::tempdir().expect("a folder");
-    let means = Means { screens: vec![elsewhere.screen.clone()], ..means(folder.path(), 1) };
-    let (mut page, refused) = Page::of(means, Subject::Fleet { path: AT.into() }, folder);
+    let means = SessionDeps { screens: vec![elsewhere.screen.clone()], ..means(folder.path(), 1) };
+    let (mut page, refused) =
+        Page::open_target(means, OpenTarget::Fleet { path: AT.into() }, folder);
     assert_eq!(refused["problem"]["cause"], "it was not heard");
     drop(page);
     elsewhere.restart();
     page = elsewhere.page();
-    elsewhere.show(3, false);
+    elsewhere.publish(3, false);
     status(&mut page, |status| status["cycle"] == 3.0);
 }
 
 #[test]
 fn a_fleet_that_is_over_stays_to_be_seen_until_another_one_flies_there() {
-    let mut elsewhere = Elsewhere::begin();
-    elsewhere.show(2, true);
+    let mut elsewhere = RemoteFlight::start();
+    elsewhere.publish(2, true);
     let mut page = elsewhere.page();
     status(&mut page, |status| status["state"] == "over");
-    elsewhere.screen.lose("nobody answers", "watch it again");
+    elsewhere.screen.mark_lost("nobody answers", "watch it again");
     // A second one finds it, too.
     drop(elsewhere.page());
     elsewhere.restart();
@@ -164,8 +168,8 @@ fn a_fleet_that_is_over_stays_to_be_seen_until_another_one_flies_there() {
 #[test]
 fn a_fleet_that_the_command_line_did_not_name_is_no_fleet() {
     let folder = tempfile::tempdir().expect("a folder");
-    let what = Subject::Fleet { path: AT.into() };
-    let (_, refused) = Page::of(means(folder.path(), 1), what, folder);
+    let what = OpenTarget::Fleet { path: AT.into() };
+    let (_, refused) = Page::open_target(means(folder.path(), 1), what, folder);
     assert_eq!(
         refused["problem"]["remedy"],
         format!("start the studio with it: sidestep studio {AT}")

@@ -1,9 +1,9 @@
 //! Recordings: computed again by the build that made them, otherwise shown from their own tables.
 
 use super::*;
-use sidestep::kernel::view::{Frame, Look, Place, Who as Body};
-use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
-use sidestep_session::{Journey, Keep, Recorded, Unwatched};
+use sidestep::kernel::view::{BodyId as Body, Frame, FrameOptions, Vec3};
+use sidestep_record::{McapFooter, McapProvenance, McapRecorder, Provenance, Status};
+use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun};
 use std::path::PathBuf;
 
 /// Records a scenario into the folder `r`.
@@ -11,9 +11,9 @@ fn recorded(text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let (run, source) = (folder.path().join("r"), Source::new("s.toml", text, ""));
     let compiled = WORLDS.compile(&source).expect("valid");
-    let keep = Keep { folder: Some(&run), ..Keep::default() };
-    let journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
-    journey.travel(&Unwatched).expect("recorded");
+    let keep = OutputPaths { folder: Some(&run), ..OutputPaths::default() };
+    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+    journey.run_to_end(&NoWatcher).expect("recorded");
     folder
 }
 
@@ -31,8 +31,8 @@ fn made_by_another(folder: &tempfile::TempDir) {
 }
 
 fn opened(folder: tempfile::TempDir) -> (Page, Value) {
-    let what = Subject::Recording { path: path(&folder).display().to_string() };
-    Page::of(means(folder.path(), 2), what, folder)
+    let what = OpenTarget::Recording { path: path(&folder).display().to_string() };
+    Page::open_target(means(folder.path(), 2), what, folder)
 }
 
 fn banner(status: &Value) -> String {
@@ -41,9 +41,9 @@ fn banner(status: &Value) -> String {
 
 /// Places of agents, in micrometers: rows of tables are as exact as their columns.
 fn places(frame: &Frame) -> Vec<(Body, [i64; 3])> {
-    let rounded = |at_m: Place| at_m.map(|m| (m * 1e6).round() as i64);
+    let rounded = |at_m: Vec3| at_m.map(|m| (m * 1e6).round() as i64);
     let agents = frame.bodies.iter().filter(|body| body.kind.is_agent());
-    let mut places: Vec<_> = agents.map(|body| (body.who(), rounded(body.pose.at_m))).collect();
+    let mut places: Vec<_> = agents.map(|body| (body.id(), rounded(body.pose.at_m))).collect();
     places.sort_unstable();
     places
 }
@@ -52,25 +52,31 @@ fn places(frame: &Frame) -> Vec<(Body, [i64; 3])> {
 fn a_recording_of_another_build_shows_everybody_where_they_were() {
     for (text, cycles) in [(ROBOTS, 600), (CHAINS, 150), (AIRPLANES, 40)] {
         let folder = recorded(text);
-        let open = || Recorded::open(WORLDS, &path(&folder)).expect("a recording");
+        let open = || RecordedRun::open(WORLDS, &path(&folder)).expect("a recording");
         let mut again = open().start(1).expect("of this build");
         made_by_another(&folder);
         assert!(open().start(1).is_err(), "it is not computed again");
-        let mut shown = open().shown(1).expect("its tables are there");
+        let mut shown = open().start_for_viewing(1).expect("its tables are there");
         let way = [0, cycles / 10, cycles / 5, cycles / 2];
         for cycle in way {
             again.advance(cycle - again.cycle());
             shown.advance(cycle - shown.cycle());
-            let (one, other) = (again.frame(Look::BODIES), shown.frame(Look::BODIES));
+            let (one, other) = (
+                again.frame(FrameOptions::WITHOUT_SCANS),
+                shown.frame(FrameOptions::WITHOUT_SCANS),
+            );
             assert!(!places(&one).is_empty());
             assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
             assert_eq!(one.time_s, other.time_s);
         }
         let back = shown.checkpoint();
         shown.advance(u64::MAX);
-        assert!(shown.is_over() && !shown.frame(Look::BODIES).bodies.is_empty());
+        assert!(shown.is_over() && !shown.frame(FrameOptions::WITHOUT_SCANS).bodies.is_empty());
         shown.restore(&back).expect("its own");
-        assert_eq!(places(&shown.frame(Look::BODIES)), places(&again.frame(Look::BODIES)));
+        assert_eq!(
+            places(&shown.frame(FrameOptions::WITHOUT_SCANS)),
+            places(&again.frame(FrameOptions::WITHOUT_SCANS))
+        );
     }
 }
 
@@ -78,27 +84,27 @@ fn a_recording_of_another_build_shows_everybody_where_they_were() {
 fn filmed_by_another(text: &str, cycles: u64, path: &std::path::Path) {
     let source = Source::new("s.toml", text, "");
     let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
-    run.watch();
-    let origin = McapOrigin {
+    run.enable_events();
+    let origin = McapProvenance {
         world: run.world().into(),
         build: "0.0.9+abc".into(),
-        origin: Origin {
+        origin: Provenance {
             program_version: "0.0.9".into(),
             scenario: text.into(),
-            seed: run.plan().seed,
+            seed: run.config().seed,
         },
         files: Vec::new(),
-        cycles_planned: run.plan().cycles,
+        cycles_planned: run.config().cycles,
         every: 1,
     };
     let mut recorder = McapRecorder::create(path, origin, &run.scenery()).expect("a file");
     for _ in 0..cycles {
-        recorder.frame(&run.frame(Look::BODIES)).expect("written");
+        recorder.write_frame(&run.frame(FrameOptions::WITHOUT_SCANS)).expect("written");
         run.advance(1);
     }
-    recorder.frame(&run.frame(Look::BODIES)).expect("written");
+    recorder.write_frame(&run.frame(FrameOptions::WITHOUT_SCANS)).expect("written");
     let digest = run.digest().to_string();
-    let end = McapEnd { status: Status::Complete, cycles_done: cycles, digest };
+    let end = McapFooter { status: Status::Complete, cycles_done: cycles, digest };
     recorder.finish(&end).expect("finished");
 }
 
@@ -110,13 +116,16 @@ fn a_film_of_another_build_shows_everybody_where_they_were_and_says_so() {
         filmed_by_another(text, cycles, &film);
         let source = Source::new("s.toml", text, "");
         let mut again = WORLDS.compile(&source).expect("valid").start(&source, 1);
-        let recorded = Recorded::open(WORLDS, &film).expect("a film");
+        let recorded = RecordedRun::open(WORLDS, &film).expect("a film");
         assert!(recorded.start(1).is_err(), "it is not computed again");
-        let mut shown = recorded.shown(1).expect("its messages are there");
+        let mut shown = recorded.start_for_viewing(1).expect("its messages are there");
         for cycle in [0, cycles / 5, cycles / 2, cycles] {
             again.advance(cycle - again.cycle());
             shown.advance(cycle - shown.cycle());
-            let (one, other) = (again.frame(Look::BODIES), shown.frame(Look::BODIES));
+            let (one, other) = (
+                again.frame(FrameOptions::WITHOUT_SCANS),
+                shown.frame(FrameOptions::WITHOUT_SCANS),
+            );
             assert!(!places(&one).is_empty());
             assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
             assert_eq!(one.bodies.len(), other.bodies.len());
@@ -133,19 +142,19 @@ fn a_film_of_another_build_has_its_events() {
     filmed_by_another(ROBOTS, 200, &path(&folder));
     let source = Source::new("s.toml", ROBOTS, "");
     let mut again = WORLDS.compile(&source).expect("valid").start(&source, 1);
-    again.watch();
+    again.enable_events();
     let told = |frame: Frame| -> Vec<_> {
         frame.log.into_iter().map(|e| (e.cycle, e.level, e.who, e.words)).collect()
     };
     let mut then = Vec::new();
     for _ in 0..200 {
         again.advance(1);
-        then.extend(told(again.frame(Look::BODIES)));
+        then.extend(told(again.frame(FrameOptions::WITHOUT_SCANS)));
     }
-    let recorded = Recorded::open(WORLDS, &path(&folder)).expect("a film");
-    let mut shown = recorded.shown(1).expect("its messages are there");
+    let recorded = RecordedRun::open(WORLDS, &path(&folder)).expect("a film");
+    let mut shown = recorded.start_for_viewing(1).expect("its messages are there");
     shown.advance(200);
-    let shown = told(shown.frame(Look::BODIES));
+    let shown = told(shown.frame(FrameOptions::WITHOUT_SCANS));
     assert!(!shown.is_empty());
     // The last event may come at the very end, after the last frame of the film.
     then.retain(|event| event.0 < 200);

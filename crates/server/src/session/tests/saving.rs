@@ -24,15 +24,16 @@ fn naming(map: &str) -> String {
     )
 }
 
-fn scenario(path: &Path) -> Subject {
-    Subject::Scenario { path: path.display().to_string() }
+fn scenario(path: &Path) -> OpenTarget {
+    OpenTarget::Scenario { path: path.display().to_string() }
 }
 
 /// A page that has opened the scenario, and the folder that may be read.
 fn page() -> (Page, PathBuf) {
     let folder = places();
     let inside = folder.path().join("in");
-    let (page, opened) = Page::of(means(&inside, 1), scenario(&inside.join("s.toml")), folder);
+    let (page, opened) =
+        Page::open_target(means(&inside, 1), scenario(&inside.join("s.toml")), folder);
     assert!(opened.get("problem").is_none(), "{opened}");
     (page, inside)
 }
@@ -61,14 +62,15 @@ fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
     let reply = page.save(&naming("../../out/secret.map"), Some(&deep), None, false);
     assert_eq!(reply["problem"]["place"], "../../out/secret.map", "{reply}");
     fs::write(&stolen, naming("../out/secret.map")).expect("written");
-    let open =
-        |means: Means| Page::of(means, scenario(&stolen), tempfile::tempdir().expect("a folder")).1;
+    let open = |means: SessionDeps| {
+        Page::open_target(means, scenario(&stolen), tempfile::tempdir().expect("a folder")).1
+    };
     let reply = open(means(&inside, 1));
     assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
-    let reads = Means { read_only: true, ..means(&inside, 1) };
+    let reads = SessionDeps { read_only: true, ..means(&inside, 1) };
     assert_eq!(open(reads)["answer"]["is"], "opened", "no page can have written it");
     let own = means(&inside, 1);
-    let named = Means { files: own.files.with_named_by([&*stolen].into_iter()), ..own };
+    let named = SessionDeps { files: own.files.with_files_named_by([&*stolen].into_iter()), ..own };
     assert_eq!(open(named)["answer"]["is"], "opened", "it was named at start");
 }
 
@@ -82,7 +84,7 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
     }
     let deep = inside.join("deep/x.toml");
     fs::write(&deep, naming("../m.map")).expect("written");
-    let (mut page, opened) = Page::of(means(&inside, 1), scenario(&deep), folder);
+    let (mut page, opened) = Page::open_target(means(&inside, 1), scenario(&deep), folder);
     assert_eq!(opened["answer"]["is"], "opened");
     let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), None, false);
     assert_eq!(saved["answer"]["is"], "saved");

@@ -1,17 +1,17 @@
 //! A world of frogs on lily pads, written against the kernel and the scenario format alone. It
 //! shows the parts of a new world: phases, a run, rows, a picture, and its `Kind`.
 
-mod kind;
 mod rows;
-mod run;
+mod world_impl;
+mod world_type;
 
-pub(crate) use kind::Pond;
+pub(crate) use world_type::Pond;
 
-use rows::{Event, What};
+use rows::{Event, FrogAction};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_kernel::{Column, Cycle, Phases, Slot, Turn};
+use sidestep_kernel::{Column, Cycle, PhaseContext, Phases, Slot};
 use std::ops::Range;
 
 const HOP: Purpose = Purpose(1);
@@ -63,7 +63,7 @@ impl PondWorld {
     /// Returns the pad that a frog wants: one beside its own, or its own at the bank.
     fn wanted(&self, frog: Slot, pad: u32, now: Cycle) -> u32 {
         let (column, row) = (pad % self.width, pad / self.width);
-        match self.streams.draws(frog, now, HOP).below(4) {
+        match self.streams.draws(frog, now, HOP).uniform_below(4) {
             0 if column + 1 < self.width => pad + 1,
             1 if column > 0 => pad - 1,
             2 if row + 1 < self.height => pad + self.width,
@@ -89,14 +89,14 @@ impl Phases for PondWorld {
         self.frogs as usize
     }
 
-    fn claim(turn: &mut Turn<'_, Self>, bodies: Range<usize>) {
+    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
         for frog in bodies {
             let pad = turn.state.pad.get(frog);
             turn.state.goal.set(frog, turn.world.wanted(frog as Slot, pad, turn.now));
         }
     }
 
-    fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
+    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
         let claims = |frog: usize| [turn.state.pad.get(frog), turn.state.goal.get(frog)];
         for frog in bodies {
             let own = claims(frog);
@@ -105,7 +105,7 @@ impl Phases for PondWorld {
         }
     }
 
-    fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {
+    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
         group.sort_unstable();
         let state = turn.state;
         for &mut frog in group {
@@ -113,8 +113,9 @@ impl Phases for PondWorld {
             if pad == goal {
                 continue;
             }
-            let what = if state.frog.get(goal as usize) == 0 { What::Hop } else { What::Bump };
-            if what == What::Hop {
+            let what =
+                if state.frog.get(goal as usize) == 0 { FrogAction::Hop } else { FrogAction::Bump };
+            if what == FrogAction::Hop {
                 state.frog.set(pad as usize, 0);
                 state.frog.set(goal as usize, frog + 1);
                 state.pad.set(frog as usize, goal);

@@ -9,26 +9,26 @@ use sidestep_kernel::{Cycle, Slot};
 pub(crate) struct Event {
     pub(super) cycle: Cycle,
     pub(super) frog: Slot,
-    pub(super) what: What,
+    pub(super) what: FrogAction,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum What {
+pub(crate) enum FrogAction {
     Hop,
     Bump,
 }
 
 /// The pad of a frog at the start of a cycle.
 #[derive(Debug)]
-struct Place {
+struct PadRow {
     cycle: Cycle,
     frog: Slot,
     at_m: [f64; 2],
 }
 
-fn trajectories() -> Table<Place> {
+fn trajectories() -> Table<PadRow> {
     Table::new("trajectories")
-        .u64("cycle", "cycle at whose start this holds", |p: &Place| p.cycle)
+        .u64("cycle", "cycle at whose start this holds", |p: &PadRow| p.cycle)
         .u32("frog", "number of the frog", |p| p.frog)
         .f64("x_m", "position east", |p| p.at_m[0])
         .f64("y_m", "position north", |p| p.at_m[1])
@@ -44,19 +44,19 @@ fn events() -> Table<Event> {
 /// Rows that wait to be passed on.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    places: RowBuffer<Place>,
+    places: RowBuffer<PadRow>,
     events: RowBuffer<Event>,
 }
 
 impl Rows {
     pub(super) fn begin(&mut self) {
-        self.places.begin(Some(trajectories()));
-        self.events.begin(Some(events()));
+        self.places.start(Some(trajectories()));
+        self.events.start(Some(events()));
     }
 
     pub(super) fn poses(&mut self, world: &PondWorld, state: &PondState, now: Cycle) {
         for (frog, pad) in (0..).zip(state.pad.iter()) {
-            self.places.push(Place { cycle: now, frog, at_m: world.place_m(pad) });
+            self.places.push(PadRow { cycle: now, frog, at_m: world.place_m(pad) });
         }
     }
 

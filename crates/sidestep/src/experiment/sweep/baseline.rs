@@ -5,19 +5,19 @@
 //! the variant without a method *and its own number of airplanes*. One that gives all keys, or fits
 //! a single variant for another reason, is that variant, for all others.
 
-use super::variant::{Base, DEFAULT, Setting, Variant};
-use crate::scenario::nearest;
+use super::variant::{BaseScenario, DEFAULT_LABEL, Setting, Variant};
+use crate::scenario::suggestion;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::Value;
 
 /// Largest number of values that an error lists.
-const MOST_NAMED: usize = 20;
+const MAX_LISTED_VALUES: usize = 20;
 
 /// The baseline as requested: the values of some keys, the name of a variant, or both.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Wanted {
+pub struct BaselineSpec {
     /// The name of a listed variant.
     pub name: Option<String>,
     /// Values; `(default)` where a variant does not set the key.
@@ -50,34 +50,35 @@ impl Baseline {
 }
 
 /// The variants, and the requested baseline.
-pub(super) struct Search<'a> {
-    pub(super) wanted: &'a Wanted,
+pub(super) struct BaselineMatcher<'a> {
+    pub(super) wanted: &'a BaselineSpec,
     pub(super) variants: &'a [Variant],
     /// Keys that variants set, in the order of their columns.
     pub(super) parameters: &'a [String],
-    pub(super) base: Base<'a>,
+    pub(super) base: BaseScenario<'a>,
     pub(super) place: &'a str,
 }
 
-impl Search<'_> {
+impl BaselineMatcher<'_> {
     /// Returns the baseline; `name_of` names a variant, `word` a setting.
     ///
     /// # Errors
     /// When no variant is the baseline, or no other variant corresponds to one.
-    pub(super) fn found(
+    pub(super) fn baseline(
         &self,
         name_of: impl Fn(usize) -> String,
         word: impl Fn(&Setting) -> String,
     ) -> Result<Option<Baseline>, InputError> {
-        let Wanted { name, settings } = self.wanted;
+        let BaselineSpec { name, settings } = self.wanted;
         if name.is_none() && settings.is_empty() {
             return Ok(None);
         }
         let defaults = self.defaults();
-        let fits: Vec<bool> = self.variants.iter().map(|v| self.fits(v, &defaults)).collect();
+        let fits: Vec<bool> =
+            self.variants.iter().map(|v| self.matches_spec(v, &defaults)).collect();
         let found: Vec<usize> = (0..fits.len()).filter(|&k| fits[k]).collect();
         match found[..] {
-            [] => Err(self.nothing(&defaults)),
+            [] => Err(self.no_match_error(&defaults)),
             [one] => {
                 let of = (0..fits.len()).map(|k| (k != one).then_some(one as u32)).collect();
                 Ok(Some(Baseline { name: name_of(one), of, alone: 0 }))
@@ -85,20 +86,20 @@ impl Search<'_> {
             _ => {
                 let words = name.iter().cloned().chain(settings.iter().map(word));
                 let name = words.collect::<Vec<_>>().join(", ");
-                self.matched(name, &fits, &defaults).map(Some)
+                self.paired_baseline(name, &fits, &defaults).map(Some)
             }
         }
     }
 
     /// Returns the baseline of which each variant has one of its own: that with the same values of
     /// all other keys.
-    fn matched(
+    fn paired_baseline(
         &self,
         name: String,
         fits: &[bool],
         defaults: &Defaults,
     ) -> Result<Baseline, InputError> {
-        let others = self.other_keys();
+        let others = self.unmatched_keys();
         let rest = |k: usize| -> Vec<String> {
             let value = |key: &&String| value_of(&self.variants[k], key, defaults);
             others.iter().map(|key| value(key).map_or_else(String::new, canonical)).collect()
@@ -120,7 +121,7 @@ impl Search<'_> {
 
     /// Returns the keys of which the baseline says nothing; the name of a listed variant speaks for
     /// all keys of the list.
-    fn other_keys(&self) -> Vec<&String> {
+    fn unmatched_keys(&self) -> Vec<&String> {
         let named = self.variants.iter().filter(|_| self.wanted.name.is_some());
         let of_list = named.flat_map(|v| &v.settings[..v.named]).map(|s| s.key.as_str());
         let own = self.wanted.settings.iter().map(|s| s.key.as_str());
@@ -134,20 +135,20 @@ impl Search<'_> {
         self.parameters.iter().filter_map(value).collect()
     }
 
-    fn fits(&self, variant: &Variant, defaults: &Defaults) -> bool {
-        let Wanted { name, settings } = self.wanted;
+    fn matches_spec(&self, variant: &Variant, defaults: &Defaults) -> bool {
+        let BaselineSpec { name, settings } = self.wanted;
         let has_name = name.is_none() || *name == variant.name;
-        has_name && settings.iter().all(|setting| self.has(variant, setting, defaults))
+        has_name && settings.iter().all(|setting| self.has_setting(variant, setting, defaults))
     }
 
     /// Returns whether the variant has this setting, or the scenario where the variant does not set the key.
-    fn has(
+    fn has_setting(
         &self,
         variant: &Variant,
         Setting { key, value }: &Setting,
         defaults: &Defaults,
     ) -> bool {
-        if value.as_str() == Some(DEFAULT) {
+        if value.as_str() == Some(DEFAULT_LABEL) {
             return self.parameters.contains(key) && variant.value(key).is_none();
         }
         let is_value = |own: &Value| canonical(own) == canonical(value);
@@ -155,7 +156,7 @@ impl Search<'_> {
     }
 
     /// Returns the error that names the setting that no variant has, and the existing ones instead.
-    fn nothing(&self, defaults: &Defaults) -> InputError {
+    fn no_match_error(&self, defaults: &Defaults) -> InputError {
         let wrong = |cause: String, remedy: String| InputError::new(self.place, cause, remedy);
         let names: Vec<&str> = self.variants.iter().filter_map(|v| v.name.as_deref()).collect();
         if let Some(name) = &self.wanted.name
@@ -163,11 +164,12 @@ impl Search<'_> {
         {
             let remedy = match names.is_empty() {
                 true => "give a value, e.g. regime=both, or name the variants of the sweep's file",
-                false => &nearest(name, &names),
+                false => &suggestion(name, &names),
             };
             return wrong(format!("no variant has the name `{name}`"), remedy.into());
         }
-        let is_missing = |s: &&Setting| !self.variants.iter().any(|v| self.has(v, s, defaults));
+        let is_missing =
+            |s: &&Setting| !self.variants.iter().any(|v| self.has_setting(v, s, defaults));
         let Some(Setting { key, value }) = self.wanted.settings.iter().find(is_missing) else {
             let cause = "no variant has all of the baseline at once";
             return wrong(cause.into(), "give what one variant has".into());
@@ -180,7 +182,7 @@ impl Search<'_> {
         let known: Vec<&str> = self.parameters.iter().map(String::as_str).collect();
         let remedy = match known.is_empty() {
             true => format!("vary it, e.g. --vary {key}={value},..."),
-            false => nearest(key, &known),
+            false => suggestion(key, &known),
         };
         wrong(format!("the baseline has `{key}`, which is not varied"), remedy)
     }
@@ -190,8 +192,8 @@ impl Search<'_> {
         let mut values: Vec<String> = Vec::new();
         for variant in self.variants {
             let value = value_of(variant, key, defaults);
-            let value = value.map_or_else(|| DEFAULT.to_string(), Value::to_string);
-            if !values.contains(&value) && values.len() < MOST_NAMED {
+            let value = value.map_or_else(|| DEFAULT_LABEL.to_string(), Value::to_string);
+            if !values.contains(&value) && values.len() < MAX_LISTED_VALUES {
                 values.push(value);
             }
         }
@@ -229,7 +231,8 @@ mod tests {
         let sweep = Sweep::parse(&Source::new("sweep.toml", text, ""))?;
         let variants = sweep.design.variants(&sweep.place)?;
         let source = Source::new("s.toml", SCENARIO, "");
-        let plan = Plan::new(&sweep, variants, Base { world: "w", seed: 1, source: &source })?;
+        let plan =
+            Plan::new(&sweep, variants, BaseScenario { world: "w", seed: 1, source: &source })?;
         plan.baseline.map(|b| (b.name, b.of)).ok_or_else(|| InputError::new("", "none", ""))
     }
 

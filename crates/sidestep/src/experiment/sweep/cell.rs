@@ -7,11 +7,11 @@ use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
 
 /// Cycles between two checks whether to go on.
-const SLICE: Cycle = 256;
+const INTERRUPT_CHECK_CYCLES: Cycle = 256;
 
 /// Endings of the names of metrics that a clock measured: they are kept beside the results, because
 /// they differ when the cell is run again.
-const BY_CLOCK: [&str; 2] = ["cpu_s", "wall_s"];
+const CLOCK_METRIC_SUFFIXES: [&str; 2] = ["cpu_s", "wall_s"];
 
 /// The outcome of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ pub struct Outcome {
 }
 
 /// The simulation of a cell, at its start.
-pub struct Started {
+pub struct CellRun {
     cell: Cell,
     simulation: Box<dyn Simulation>,
     until: Cycle,
@@ -42,34 +42,34 @@ pub struct Started {
 ///
 /// # Errors
 /// When the scenario is wrong with this seed.
-pub fn start(
+pub fn start_cell(
     worlds: Worlds,
     cell: Cell,
     source: &Source,
     workers: usize,
-) -> Result<Started, InputError> {
-    let source = source.clone().with(&[format!("seed={}", cell.seed)])?;
+) -> Result<CellRun, InputError> {
+    let source = source.clone().with_overrides(&[format!("seed={}", cell.seed)])?;
     let compiled = worlds.compile(&source)?;
     let until = compiled.plan().cycles;
-    Ok(Started { cell, simulation: compiled.start(&source, workers), until })
+    Ok(CellRun { cell, simulation: compiled.start(&source, workers), until })
 }
 
 /// Returns the names of the metrics that runs of a scenario have, in order.
 pub fn metric_names(simulation: &dyn Simulation) -> Vec<String> {
-    let names = flat(&simulation.metrics()).into_iter().map(|(name, _)| name);
-    let names = names.filter(|name| !is_by_clock(name));
+    let names = flattened(&simulation.metrics()).into_iter().map(|(name, _)| name);
+    let names = names.filter(|name| !is_clock_metric(name));
     std::iter::once("cycles_run".to_string()).chain(names).collect()
 }
 
-fn is_by_clock(name: &str) -> bool {
-    BY_CLOCK.iter().any(|end| name.ends_with(end))
+fn is_clock_metric(name: &str) -> bool {
+    CLOCK_METRIC_SUFFIXES.iter().any(|end| name.ends_with(end))
 }
 
-impl Started {
+impl CellRun {
     /// Returns the same simulation, which unwinds within a cycle when `interrupt` is raised.
     #[must_use]
-    pub fn heeding(mut self, interrupt: Interrupt) -> Self {
-        self.simulation.heed(interrupt);
+    pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
+        self.simulation.set_interrupt(interrupt);
         self
     }
 
@@ -80,17 +80,18 @@ impl Started {
             if !go_on() {
                 return None;
             }
-            simulation.advance(SLICE.min(self.until - simulation.cycle()));
+            simulation.advance(INTERRUPT_CHECK_CYCLES.min(self.until - simulation.cycle()));
         }
-        Some(Outcome::of(self.cell, simulation))
+        Some(Outcome::from_simulation(self.cell, simulation))
     }
 }
 
 impl Outcome {
     /// Returns the outcome of a simulation that has ended.
-    pub fn of(cell: Cell, simulation: &dyn Simulation) -> Self {
-        let (costs, metrics) =
-            flat(&simulation.metrics()).into_iter().partition(|(name, _)| is_by_clock(name));
+    pub fn from_simulation(cell: Cell, simulation: &dyn Simulation) -> Self {
+        let (costs, metrics) = flattened(&simulation.metrics())
+            .into_iter()
+            .partition(|(name, _)| is_clock_metric(name));
         Self {
             cell: cell.id,
             cycles: simulation.cycle(),
@@ -102,7 +103,7 @@ impl Outcome {
     }
 
     /// Returns the outcome of a cell in which the simulation broke one of its own rules.
-    pub fn failed(cell: Cell, why: impl Into<String>) -> Self {
+    pub fn from_failure(cell: Cell, why: impl Into<String>) -> Self {
         Self {
             cell: cell.id,
             cycles: 0,
@@ -116,18 +117,18 @@ impl Outcome {
 
 /// Returns nested tables as dotted names. Lists of tables become their number (`NAME_count`); lists
 /// of numbers (histograms) are left out, because they are not a single value.
-fn flat(value: &Value) -> Map<String, Value> {
+fn flattened(value: &Value) -> Map<String, Value> {
     let mut found = Map::new();
-    add(&mut found, "", value);
+    add_flattened(&mut found, "", value);
     found
 }
 
-fn add(found: &mut Map<String, Value>, name: &str, value: &Value) {
+fn add_flattened(found: &mut Map<String, Value>, name: &str, value: &Value) {
     match value {
         Value::Object(table) => {
             for (key, value) in table {
                 let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
-                add(found, &name, value);
+                add_flattened(found, &name, value);
             }
         }
         Value::Array(items) if items.iter().any(Value::is_number) => {}
@@ -158,7 +159,7 @@ mod tests {
 
     fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
         let source = Source::new("s.toml", text, "");
-        let started = start(WORLDS, cell(seed), &source, workers).expect("valid");
+        let started = start_cell(WORLDS, cell(seed), &source, workers).expect("valid");
         started.run(&|| true).expect("not stopped")
     }
 
@@ -183,13 +184,13 @@ mod tests {
     #[test]
     fn a_run_that_is_to_stop_is_no_row() {
         let source = Source::new("s.toml", ROBOTS, "");
-        assert_eq!(start(WORLDS, cell(1), &source, 1).expect("valid").run(&|| false), None);
+        assert_eq!(start_cell(WORLDS, cell(1), &source, 1).expect("valid").run(&|| false), None);
     }
 
     #[test]
     fn nested_metrics_have_dotted_names_and_lists_are_counted() {
         let value = json!({ "a": { "b": 1, "c": null }, "d": [1, 2], "e": [{ "f": 1 }], "g": [] });
-        let names: Vec<(String, Value)> = flat(&value).into_iter().collect();
+        let names: Vec<(String, Value)> = flattened(&value).into_iter().collect();
         let expected =
             [("a.b", json!(1)), ("a.c", json!(null)), ("e_count", json!(1)), ("g_count", json!(0))];
         assert_eq!(names, expected.map(|(name, value)| (name.to_string(), value)));

@@ -1,6 +1,6 @@
 //! A variant against the baseline, on the same replicates.
 
-use super::groups::Groups;
+use super::groups::RunGroups;
 use super::table::RunColumn;
 use crate::statistics::{Bootstrap, Interval, Pairs, holm};
 use serde::Serialize;
@@ -49,7 +49,7 @@ pub struct Comparison {
 }
 
 /// The baseline of each variant.
-pub(super) struct Reference {
+pub(super) struct BaselineIndex {
     /// Its name in tables.
     pub(super) name: String,
     /// The variant that each variant is compared with, if there is one.
@@ -58,9 +58,9 @@ pub(super) struct Reference {
 
 /// Returns the comparison of every variant with that which corresponds to it, in one metric.
 pub(super) fn comparisons(
-    groups: &Groups<'_>,
+    groups: &RunGroups<'_>,
     metric: &RunColumn,
-    reference: &Reference,
+    reference: &BaselineIndex,
     bootstrap: Option<&Bootstrap>,
 ) -> Vec<Comparison> {
     let is_share = matches!(metric.values, Values::Bool(_));
@@ -74,7 +74,7 @@ pub(super) fn comparisons(
         let there = own.iter().zip(&base).take(most).filter(|(a, b)| a.is_some() || b.is_some());
         let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
         let names = [variant, baseline].map(|v| groups.variants[v].clone());
-        let compared = compared(names, &Pairs::of(&own, &base), is_share, bootstrap);
+        let compared = compare_pairs(names, &Pairs::from_columns(&own, &base), is_share, bootstrap);
         Some(Comparison { seedless, ..compared })
     };
     let mut all: Vec<Comparison> = (0..groups.variants.len()).filter_map(pairs_of).collect();
@@ -83,13 +83,13 @@ pub(super) fn comparisons(
     all
 }
 
-fn compared(
+fn compare_pairs(
     [variant, baseline]: [String; 2],
     pairs: &Pairs,
     is_share: bool,
     bootstrap: Option<&Bootstrap>,
 ) -> Comparison {
-    let (lower, equal, higher) = pairs.signs();
+    let (lower, equal, higher) = pairs.sign_counts();
     let ratio = pairs.ratio();
     Comparison {
         variant,

@@ -10,7 +10,7 @@ use toml::Value;
 pub const MAX_VARIANTS: usize = 1_000_000;
 
 /// The random stream of a hypercube's permutations and places.
-const PLACES: Purpose = Purpose(0);
+const SAMPLE_STREAM: Purpose = Purpose(0);
 
 /// A key and all values that it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,18 +56,18 @@ fn parse_values(text: &str) -> Vec<Value> {
 /// Latin hypercube sampling: of each range, every n-th part is used once (McKay, Beckman, Conover,
 /// "A comparison of three methods for selecting values of input variables", 1979).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hypercube {
+pub struct LatinHypercube {
     /// Number of samples, at least 1.
     pub samples: usize,
     /// Random seed of places and pairings.
     pub seed: u64,
     /// The sides of the box.
-    pub ranges: Vec<Range>,
+    pub ranges: Vec<ParameterRange>,
 }
 
 /// A side of a hypercube.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Range {
+pub struct ParameterRange {
     /// Path of the key.
     pub key: String,
     /// Its smallest value.
@@ -80,9 +80,9 @@ pub struct Range {
     pub is_integer: bool,
 }
 
-impl Range {
+impl ParameterRange {
     /// Returns the value at `share` (0 included, 1 excluded) of the way from `low` to `high`.
-    fn at(&self, share: f64) -> Value {
+    fn value_at(&self, share: f64) -> Value {
         // Each whole number gets an equal part of the range.
         let (low, high) =
             if self.is_integer { (self.low, self.high + 1.0) } else { (self.low, self.high) };
@@ -98,7 +98,7 @@ impl Range {
     }
 }
 
-impl Hypercube {
+impl LatinHypercube {
     /// Returns all samples, in order.
     fn samples(&self) -> Vec<Variant> {
         let streams = Streams::new(Seed(self.seed));
@@ -109,17 +109,17 @@ impl Hypercube {
                 // more samples.
                 let mut parts: Vec<usize> = (0..self.samples).collect();
                 for k in (1..self.samples).rev() {
-                    let mut draws = streams.draws(side, 2 * k as u64, PLACES);
-                    parts.swap(k, draws.below(k as u32 + 1) as usize);
+                    let mut draws = streams.draws(side, 2 * k as u64, SAMPLE_STREAM);
+                    parts.swap(k, draws.uniform_below(k as u32 + 1) as usize);
                 }
                 let place = |(k, part): (usize, usize)| {
-                    let u = streams.draws(side, 2 * k as u64 + 1, PLACES).uniform();
-                    range.at((part as f64 + u) / self.samples as f64)
+                    let u = streams.draws(side, 2 * k as u64 + 1, SAMPLE_STREAM).uniform();
+                    range.value_at((part as f64 + u) / self.samples as f64)
                 };
                 parts.into_iter().enumerate().map(place).collect()
             })
             .collect();
-        let setting = |k: usize, (range, side): (&Range, &Vec<Value>)| Setting {
+        let setting = |k: usize, (range, side): (&ParameterRange, &Vec<Value>)| Setting {
             key: range.key.clone(),
             value: side[k].clone(),
         };
@@ -137,7 +137,7 @@ pub struct Design {
     /// Variants that are listed one by one.
     pub list: Vec<Variant>,
     /// Samples of a hypercube.
-    pub hypercube: Option<Hypercube>,
+    pub hypercube: Option<LatinHypercube>,
     /// Keys that are varied independently; the last one changes first.
     pub factors: Vec<Factor>,
 }
@@ -165,7 +165,7 @@ impl Design {
                 return Err(wrong(cause, "vary less: at most a million variants"));
             }
         }
-        self.check_different().map_err(|what| {
+        self.check_unique().map_err(|what| {
             wrong(
                 format!("{what} is there twice"),
                 "give every value once; --replicate runs it again",
@@ -176,13 +176,14 @@ impl Design {
             variants.push(Variant::default());
         }
         if let Some(hypercube) = &self.hypercube {
-            variants = product(variants, &hypercube.samples());
+            variants = cross_product(variants, &hypercube.samples());
         }
         for factor in &self.factors {
             let setting = |value: &Value| {
                 vec![Setting { key: factor.key.clone(), value: value.clone() }].into()
             };
-            variants = product(variants, &factor.values.iter().map(setting).collect::<Vec<_>>());
+            variants =
+                cross_product(variants, &factor.values.iter().map(setting).collect::<Vec<_>>());
         }
         for variant in &variants {
             check_keys(&variant.settings).map_err(|key| {
@@ -206,7 +207,7 @@ impl Design {
     }
 
     /// Returns a key of this kind that variants set, if every variant sets one.
-    pub(super) fn key_of_each(&self, is_such: impl Fn(&str) -> bool) -> Option<&str> {
+    pub(super) fn common_key(&self, is_such: impl Fn(&str) -> bool) -> Option<&str> {
         self.shared_keys().find(|key| is_such(key)).or_else(|| {
             // Every variant has the settings of one entry of the list.
             let keys = self.list.iter().map(|entry| entry.keys().find(|key| is_such(key)));
@@ -216,18 +217,18 @@ impl Design {
 
     /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole
     /// numbers are few.
-    fn check_different(&self) -> Result<(), String> {
+    fn check_unique(&self) -> Result<(), String> {
         let words = |v: &Variant| v.settings.iter().map(Setting::to_override).collect::<Vec<_>>();
         let listed = self.list.iter().map(|variant| words(variant).join(", "));
-        if let Some(twice) = first_twice(listed) {
+        if let Some(twice) = first_duplicate(listed) {
             return Err(format!("the variant `{twice}`"));
         }
         let names = self.list.iter().filter_map(|variant| variant.name.clone());
-        if let Some(twice) = first_twice(names) {
+        if let Some(twice) = first_duplicate(names) {
             return Err(format!("a variant with the name `{twice}`"));
         }
         for Factor { key, values } in &self.factors {
-            if let Some(twice) = first_twice(values.iter().map(Value::to_string)) {
+            if let Some(twice) = first_duplicate(values.iter().map(Value::to_string)) {
                 return Err(format!("`{key}` = {twice}"));
             }
         }
@@ -236,14 +237,14 @@ impl Design {
 }
 
 /// Returns the first word that was there before.
-fn first_twice(mut words: impl Iterator<Item = String>) -> Option<String> {
+fn first_duplicate(mut words: impl Iterator<Item = String>) -> Option<String> {
     let mut seen = BTreeSet::new();
     words.find(|word| !seen.insert(word.clone()))
 }
 
 /// Returns every one of `firsts` with every one of `seconds`.
-fn product(firsts: Vec<Variant>, seconds: &[Variant]) -> Vec<Variant> {
-    firsts.iter().flat_map(|a| seconds.iter().map(move |b| a.and(b))).collect()
+fn cross_product(firsts: Vec<Variant>, seconds: &[Variant]) -> Vec<Variant> {
+    firsts.iter().flat_map(|a| seconds.iter().map(move |b| a.with_settings_of(b))).collect()
 }
 
 /// Checks that no key is set twice; the error is the first such key.
@@ -304,7 +305,7 @@ mod tests {
 
     #[test]
     fn a_hypercube_meets_every_part_of_every_side_once() {
-        let range = |key: &str, is_log, is_integer| Range {
+        let range = |key: &str, is_log, is_integer| ParameterRange {
             key: key.into(),
             low: 1.0,
             high: 10.0,
@@ -315,7 +316,7 @@ mod tests {
         let ranges =
             vec![range("a", false, false), range("b", true, false), range("c", false, true)];
         let design = Design {
-            hypercube: Some(Hypercube { samples: n, seed: 3, ranges }),
+            hypercube: Some(LatinHypercube { samples: n, seed: 3, ranges }),
             ..Design::default()
         };
         let variants = design.variants("test").expect("valid");

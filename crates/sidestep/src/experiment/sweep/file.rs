@@ -1,7 +1,7 @@
 //! A sweep file: the scenario, its variants, and the number of runs.
 
-use super::baseline::Wanted;
-use super::design::{self, Design, Factor, Hypercube};
+use super::baseline::BaselineSpec;
+use super::design::{self, Design, Factor, LatinHypercube};
 use super::variant::{Setting, Variant};
 use crate::scenario::{FORMAT, Source, Spanned, schema};
 use schemars::JsonSchema;
@@ -13,11 +13,11 @@ use std::str::FromStr;
 use toml::Value;
 
 /// Default number of runs of each variant.
-const REPLICATES: u32 = 10;
+const DEFAULT_REPLICATES: u32 = 10;
 /// Default of the largest number of runs of each variant, if a precision ends them.
-pub const MAX_RUNS: u32 = 1000;
+pub const DEFAULT_MAX_RUNS: u32 = 1000;
 /// Largest number of samples of a hypercube, and of runs of a variant.
-const MOST: u64 = 1_000_000;
+const MAX_COUNT: u64 = 1_000_000;
 
 /// The description of a sweep, as requested.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,11 +39,11 @@ pub struct Sweep {
     /// The seed of the first run, if it is not the scenario's.
     pub first_seed: Option<u64>,
     /// The precision at which a variant has had enough runs, if it is not run for all replicates.
-    pub until: Option<Until>,
+    pub until: Option<Precision>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
     /// The variant that others are compared with; empty for no comparison.
-    pub baseline: Wanted,
+    pub baseline: BaselineSpec,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
@@ -51,7 +51,7 @@ pub struct Sweep {
 /// A requested precision: a variant is run until the 95 % confidence intervals of means are this
 /// narrow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Until {
+pub struct Precision {
     /// Largest half width of the interval; above 0.
     pub half_width: f64,
     /// Whether the half width is a share of the mean.
@@ -60,7 +60,7 @@ pub struct Until {
     pub metrics: Vec<String>,
 }
 
-impl Until {
+impl Precision {
     /// Checks that the half width is one that an interval can have.
     pub(super) fn check(&self) -> Result<(), String> {
         match self.half_width > 0.0 && self.half_width.is_finite() {
@@ -71,7 +71,7 @@ impl Until {
 }
 
 /// Parses `ci=0.05`, a share of the mean, or `abs=2.5`, in the metric's unit.
-impl FromStr for Until {
+impl FromStr for Precision {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -184,18 +184,18 @@ struct UntilSection {
 
 /// Returns the JSON Schema of a sweep file.
 pub fn schema() -> serde_json::Value {
-    let mut keys = schema::of::<SweepFile>();
+    let mut keys = schema::for_type::<SweepFile>();
     keys["properties"]["format"]["const"] = FORMAT.into();
-    schema::of_file("A sweep: many variants of a scenario", keys, "")
+    schema::for_file("A sweep: many variants of a scenario", keys, "")
 }
 
 /// Keys that no scenario has.
-const OF_SWEEPS: [&str; 6] =
+const SWEEP_KEYS: [&str; 6] =
     ["replicates", "vary", "variant", "latin_hypercube", "until", "baseline"];
 
 impl Sweep {
     /// Returns a sweep of the unchanged scenario, with ten runs.
-    pub fn of_scenario(scenario: impl Into<PathBuf>) -> Self {
+    pub fn from_scenario(scenario: impl Into<PathBuf>) -> Self {
         let scenario = scenario.into();
         Self {
             place: scenario.display().to_string(),
@@ -204,22 +204,22 @@ impl Sweep {
             given: None,
             fixed: Vec::new(),
             design: Design::default(),
-            replicates: REPLICATES,
+            replicates: DEFAULT_REPLICATES,
             first_seed: None,
             until: None,
             metrics: Vec::new(),
-            baseline: Wanted::default(),
+            baseline: BaselineSpec::default(),
             record: false,
         }
     }
 
-    /// Returns a sweep like [`Sweep::of_scenario`] of a scenario that was read already.
-    pub fn of_source(source: Source) -> Self {
+    /// Returns a sweep like [`Sweep::from_scenario`] of a scenario that was read already.
+    pub fn from_source(source: Source) -> Self {
         let place = source.place.clone();
-        Self { given: Some(source), ..Self::of_scenario(place) }
+        Self { given: Some(source), ..Self::from_scenario(place) }
     }
 
-    /// Reads a sweep file; a scenario file stands for [`Sweep::of_scenario`]. The key `scenario`
+    /// Reads a sweep file; a scenario file stands for [`Sweep::from_scenario`]. The key `scenario`
     /// distinguishes the two.
     ///
     /// # Errors
@@ -227,16 +227,16 @@ impl Sweep {
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         if !is_toml {
-            return Ok(Self::of_scenario(path));
+            return Ok(Self::from_scenario(path));
         }
         let source = Source::read(path, &[])?;
         let table: toml::Table = source.parse()?;
         // A file with a misspelled `scenario` gets a better error from the reader of sweeps.
-        let is_sweep = |t: &toml::Table| OF_SWEEPS.iter().any(|key| t.contains_key(*key));
+        let is_sweep = |t: &toml::Table| SWEEP_KEYS.iter().any(|key| t.contains_key(*key));
         if table.contains_key("scenario") || (!table.contains_key("world") && is_sweep(&table)) {
             Self::parse(&source)
         } else {
-            Ok(Self::of_scenario(path))
+            Ok(Self::from_scenario(path))
         }
     }
 
@@ -251,8 +251,8 @@ impl Sweep {
             let remedy = format!("write `format = {FORMAT}`");
             return Err(source.error(Some(file.format.span()), cause, remedy));
         }
-        let reader = Reader { source };
-        let until = file.until.as_ref().map(|section| reader.until(section)).transpose()?;
+        let reader = SweepReader { source };
+        let until = file.until.as_ref().map(|section| reader.precision(section)).transpose()?;
         let replicates = reader.replicates(&file)?;
         Ok(Self {
             place: source.place.clone(),
@@ -260,7 +260,11 @@ impl Sweep {
             given: None,
             fixed: settings(&file.set),
             design: Design {
-                list: file.variant.iter().map(|t| reader.listed(t)).collect::<Result<_, _>>()?,
+                list: file
+                    .variant
+                    .iter()
+                    .map(|t| reader.listed_variant(t))
+                    .collect::<Result<_, _>>()?,
                 hypercube: file
                     .latin_hypercube
                     .as_ref()
@@ -275,7 +279,10 @@ impl Sweep {
             first_seed: file.first_seed,
             until,
             metrics: file.metrics,
-            baseline: file.baseline.as_ref().map_or(Ok(Wanted::default()), |b| reader.wanted(b))?,
+            baseline: file
+                .baseline
+                .as_ref()
+                .map_or(Ok(BaselineSpec::default()), |b| reader.baseline(b))?,
             name: file.name,
             record: file.record,
         })
@@ -316,11 +323,11 @@ fn leaves(table: &toml::Table, is_leaf: &impl Fn(&toml::Table) -> bool) -> Vec<(
     found
 }
 
-struct Reader<'a> {
+struct SweepReader<'a> {
     source: &'a Source,
 }
 
-impl Reader<'_> {
+impl SweepReader<'_> {
     /// Returns how often each variant is run, at most.
     fn replicates(&self, file: &SweepFile) -> Result<u32, InputError> {
         match (&file.replicates, &file.until) {
@@ -331,10 +338,10 @@ impl Reader<'_> {
             }
             (Some(n), None) => self.count(*n.get_ref(), n.span(), "replicates"),
             (None, Some(until)) => {
-                let max = until.get_ref().max_runs.unwrap_or(MAX_RUNS.into());
+                let max = until.get_ref().max_runs.unwrap_or(DEFAULT_MAX_RUNS.into());
                 self.count(max, until.span(), "max_runs")
             }
-            (None, None) => Ok(REPLICATES),
+            (None, None) => Ok(DEFAULT_REPLICATES),
         }
     }
 
@@ -352,12 +359,12 @@ impl Reader<'_> {
     }
 
     /// Returns an entry of the list; its `name` names it, and is no setting.
-    fn listed(&self, table: &Spanned<toml::Table>) -> Result<Variant, InputError> {
+    fn listed_variant(&self, table: &Spanned<toml::Table>) -> Result<Variant, InputError> {
         let mut own = table.get_ref().clone();
         match own.remove("name") {
             None => Ok(settings(&own).into()),
             Some(Value::String(name)) if !name.is_empty() => {
-                Ok(Variant::called(name, settings(&own)))
+                Ok(Variant::with_name(name, settings(&own)))
             }
             Some(name) => {
                 let cause = format!("`name` = {name} is no name of a variant");
@@ -367,10 +374,12 @@ impl Reader<'_> {
     }
 
     /// Returns the baseline: a table of settings, or the name of a variant.
-    fn wanted(&self, value: &Spanned<Value>) -> Result<Wanted, InputError> {
+    fn baseline(&self, value: &Spanned<Value>) -> Result<BaselineSpec, InputError> {
         match value.get_ref() {
-            Value::String(name) => Ok(Wanted { name: Some(name.clone()), settings: Vec::new() }),
-            Value::Table(table) => Ok(Wanted { name: None, settings: settings(table) }),
+            Value::String(name) => {
+                Ok(BaselineSpec { name: Some(name.clone()), settings: Vec::new() })
+            }
+            Value::Table(table) => Ok(BaselineSpec { name: None, settings: settings(table) }),
             _ => {
                 let remedy = "give the values of one or several keys, { regime = \"both\" }, or the \
                               name of a variant, in quotes";
@@ -379,7 +388,7 @@ impl Reader<'_> {
         }
     }
 
-    fn hypercube(&self, section: &Spanned<HypercubeSection>) -> Result<Hypercube, InputError> {
+    fn hypercube(&self, section: &Spanned<HypercubeSection>) -> Result<LatinHypercube, InputError> {
         let HypercubeSection { samples, seed, range } = section.get_ref();
         let is_range = |t: &toml::Table| t.contains_key("low") && !t["low"].is_table();
         let found = leaves(range.get_ref(), &is_range);
@@ -407,14 +416,14 @@ impl Reader<'_> {
                 let cause = format!("the range of `{key}` is {low} to {high}, with integer = true");
                 return Err(wrong(cause, "give whole numbers; both ends are included"));
             }
-            Ok(design::Range { key, low, high, is_log, is_integer })
+            Ok(design::ParameterRange { key, low, high, is_log, is_integer })
         };
         let ranges = found.into_iter().map(one).collect::<Result<_, _>>()?;
         let samples = self.count(*samples.get_ref(), samples.span(), "samples")? as usize;
-        Ok(Hypercube { samples, seed: *seed, ranges })
+        Ok(LatinHypercube { samples, seed: *seed, ranges })
     }
 
-    fn until(&self, section: &Spanned<UntilSection>) -> Result<Until, InputError> {
+    fn precision(&self, section: &Spanned<UntilSection>) -> Result<Precision, InputError> {
         let UntilSection { ci, abs, metrics, .. } = section.get_ref();
         let (half_width, is_relative) = match (ci, abs) {
             (Some(ci), None) => (*ci, true),
@@ -424,7 +433,7 @@ impl Reader<'_> {
                 return Err(self.source.error(Some(section.span()), "no single precision", remedy));
             }
         };
-        let until = Until { half_width, is_relative, metrics: metrics.clone() };
+        let until = Precision { half_width, is_relative, metrics: metrics.clone() };
         let wrong = |cause| self.source.error(Some(section.span()), cause, "give a number above 0");
         until.check().map_err(wrong)?;
         Ok(until)
@@ -432,10 +441,10 @@ impl Reader<'_> {
 
     fn count(&self, n: u64, span: Range<usize>, key: &str) -> Result<u32, InputError> {
         match n {
-            1..=MOST => Ok(n as u32),
+            1..=MAX_COUNT => Ok(n as u32),
             _ => {
                 let cause = format!("{key} = {n}");
-                Err(self.source.error(Some(span), cause, format!("give 1 to {MOST}")))
+                Err(self.source.error(Some(span), cause, format!("give 1 to {MAX_COUNT}")))
             }
         }
     }
@@ -530,7 +539,7 @@ max_runs = 200
 
     #[test]
     fn seeds_are_no_parameter() {
-        let mut sweep = Sweep::of_scenario("s.toml");
+        let mut sweep = Sweep::from_scenario("s.toml");
         sweep.design.factors.push(Factor::parse("seed=1,2").expect("valid"));
         assert!(sweep.check().expect_err("refused").remedy().contains("first_seed"));
     }
@@ -538,15 +547,15 @@ max_runs = 200
     #[test]
     fn precisions_are_written_as_shares_or_in_units() {
         assert_eq!(
-            "ci=0.05".parse::<Until>().map(|u| (u.half_width, u.is_relative)),
+            "ci=0.05".parse::<Precision>().map(|u| (u.half_width, u.is_relative)),
             Ok((0.05, true))
         );
         assert_eq!(
-            "abs=2".parse::<Until>().map(|u| (u.half_width, u.is_relative)),
+            "abs=2".parse::<Precision>().map(|u| (u.half_width, u.is_relative)),
             Ok((2.0, false))
         );
         for bad in ["ci", "ci=0", "ci=x", "sd=1", "abs=inf"] {
-            assert!(bad.parse::<Until>().is_err(), "{bad}");
+            assert!(bad.parse::<Precision>().is_err(), "{bad}");
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::Label;
 use super::options::SummaryOptions;
 use super::table::{Role, RunColumn, RunTable};
-use super::variant::DEFAULT;
-use crate::scenario::{Meaning, told};
+use super::variant::DEFAULT_LABEL;
+use crate::scenario::{MetricInfo, metric_label};
 use crate::statistics::{Sample, wilson};
 use serde::Serialize;
 use sidestep_document::Estimate;
@@ -13,7 +13,7 @@ use sidestep_kernel::ports::Values;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most characters of a value in the name of a level that stands for several parameters.
-const LONGEST_NAME: usize = 40;
+const MAX_LEVEL_NAME_CHARS: usize = 40;
 
 /// A value of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,7 +29,7 @@ impl Level {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Number(value) => value.to_string(),
-            Self::Text(text) if text.is_empty() => DEFAULT.into(),
+            Self::Text(text) if text.is_empty() => DEFAULT_LABEL.into(),
             Self::Text(text) => text.clone(),
         }
     }
@@ -50,7 +50,7 @@ pub struct Parameter {
 }
 
 /// The runs of a table, found by variant and replicate.
-pub(super) struct Groups<'a> {
+pub(super) struct RunGroups<'a> {
     pub(super) table: &'a RunTable,
     /// Names of the variants, in the order of their first runs.
     pub(super) variants: Vec<String>,
@@ -60,21 +60,24 @@ pub(super) struct Groups<'a> {
     pub(super) paired: bool,
     pub(super) parameters: Vec<Parameter>,
     /// The metrics in words.
-    meanings: &'static [Meaning],
+    meanings: &'static [MetricInfo],
     /// Whether seeds change nothing, variant by variant.
     pub(super) seedless: Vec<bool>,
     /// The run of each variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
-impl<'a> Groups<'a> {
+impl<'a> RunGroups<'a> {
     /// Groups the runs of `table`, of which the options give the names, tell the variants in which seeds
     /// change nothing, and have the metrics in words.
-    pub(super) fn of(table: &'a RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
+    pub(super) fn from_table(
+        table: &'a RunTable,
+        options: &SummaryOptions,
+    ) -> Result<Self, InputError> {
         table.check()?;
-        let runs = ordered(table);
+        let runs = row_order(table);
         let label = |run: usize| variant_name(table, run, options.names.as_deref());
-        let replicate = table.of_role(Role::Replicate).next();
+        let replicate = table.columns_with_role(Role::Replicate).next();
         let mut variants: Vec<String> = Vec::new();
         let mut places: BTreeMap<String, usize> = BTreeMap::new();
         let mut counts: Vec<i64> = Vec::new();
@@ -115,12 +118,12 @@ impl<'a> Groups<'a> {
 
     /// Returns the label of a metric.
     pub(super) fn label(&self, metric: &RunColumn) -> Label {
-        Label::of_metric(&metric.name, self.meanings)
+        Label::from_metric(&metric.name, self.meanings)
     }
 
     /// Returns the thing that a metric counts or measures; empty where its world does not say.
     pub(super) fn meaning(&self, metric: &RunColumn) -> &'static str {
-        told(self.meanings, &metric.name).meaning
+        metric_label(self.meanings, &metric.name).meaning
     }
 
     /// Returns the number of runs of a variant.
@@ -158,9 +161,9 @@ impl<'a> Groups<'a> {
         if let [variant] = group {
             let values = self.values(metric, *variant);
             if matches!(metric.values, Values::Bool(_)) {
-                return share(&values, self.seedless[*variant]);
+                return proportion(&values, self.seedless[*variant]);
             }
-            return Estimate::of(values);
+            return Estimate::from_values(values);
         }
         let columns: Vec<_> = group.iter().map(|v| self.by_replicate(metric, *v)).collect();
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
@@ -170,7 +173,7 @@ impl<'a> Groups<'a> {
         };
         // Where all are seedless, every replicate gives the same number.
         let all = if group.iter().all(|v| self.seedless[*v]) { 1 } else { usize::MAX };
-        Estimate::of((0..self.replicates.len().min(all)).map(mean))
+        Estimate::from_values((0..self.replicates.len().min(all)).map(mean))
     }
 
     /// Returns whether every level of `parameter` occurs with the same levels of all others, as in a full
@@ -195,18 +198,18 @@ impl<'a> Groups<'a> {
     }
 }
 
-fn share(values: &[Option<f64>], seedless: bool) -> Estimate {
-    let values = Sample::of(values.iter().copied()).values;
+fn proportion(values: &[Option<f64>], seedless: bool) -> Estimate {
+    let values = Sample::from_runs(values.iter().copied()).values;
     let (yes, n) = (values.iter().sum::<f64>(), values.len());
-    let mut share = Estimate::of(values.into_iter().map(Some));
+    let mut share = Estimate::from_values(values.into_iter().map(Some));
     share.interval = (n > 0 && !seedless).then(|| wilson(yes, n as f64));
     share
 }
 
 /// Returns the rows in the order of their cells.
-fn ordered(table: &RunTable) -> Vec<usize> {
+fn row_order(table: &RunTable) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..table.runs()).collect();
-    if let Some(cell) = table.of_role(Role::Cell).next() {
+    if let Some(cell) = table.columns_with_role(Role::Cell).next() {
         match &cell.values {
             Values::I64(numbers) => rows.sort_by_key(|&run| numbers.get(run)),
             values => rows.sort_by_key(|&run| values.text(run)),
@@ -218,13 +221,13 @@ fn ordered(table: &RunTable) -> Vec<usize> {
 /// Returns the variant's name, or its parameters if the table has no names; with `names`, the table
 /// has their numbers.
 fn variant_name(table: &RunTable, run: usize, names: Option<&[String]>) -> String {
-    if let Some(column) = table.of_role(Role::Variant).next() {
+    if let Some(column) = table.columns_with_role(Role::Variant).next() {
         let number = || column.values.number(run).map(|n| n as usize);
         let named = names.and_then(|names| names.get(number()?).cloned());
         return named.unwrap_or_else(|| column.values.text(run));
     }
     let parts: Vec<String> = table
-        .of_role(Role::Parameter)
+        .columns_with_role(Role::Parameter)
         .map(|p| format!("{}={}", p.name, p.values.text(run)))
         .collect();
     if parts.is_empty() { "all runs".into() } else { parts.join(", ") }
@@ -270,15 +273,15 @@ fn parameters(
         let name = column.name.clone();
         (levels.len() > 1).then_some(Parameter { name, numeric, levels, of_variant })
     };
-    together(table.of_role(Role::Parameter).filter_map(varied))
+    merge_confounded(table.columns_with_role(Role::Parameter).filter_map(varied))
 }
 
 /// Returns the parameters, of which those that always change together are one: their variants are the
 /// same, and share an axis. Numbers stay apart, because each is an axis of its own.
-fn together(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
+fn merge_confounded(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
     let mut apart: Vec<Parameter> = Vec::new();
     for parameter in parameters {
-        match apart.iter_mut().find(|other| other.goes_with(&parameter)) {
+        match apart.iter_mut().find(|other| other.is_confounded_with(&parameter)) {
             Some(other) => other.absorb(&parameter),
             None => apart.push(parameter),
         }
@@ -288,7 +291,7 @@ fn together(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
 
 impl Parameter {
     /// Returns whether two parameters, not both of them numbers, tell the same variants apart.
-    fn goes_with(&self, other: &Self) -> bool {
+    fn is_confounded_with(&self, other: &Self) -> bool {
         let mut pairs: Vec<_> = self.of_variant.iter().zip(&other.of_variant).collect();
         pairs.sort_unstable();
         pairs.dedup();
@@ -305,7 +308,7 @@ impl Parameter {
             let others =
                 variant.map_or(String::new(), |v| other.levels[other.of_variant[v]].name());
             // A whole list of things is no name of a bar.
-            let is_short = !others.is_empty() && others.chars().count() <= LONGEST_NAME;
+            let is_short = !others.is_empty() && others.chars().count() <= MAX_LEVEL_NAME_CHARS;
             Level::Text(if is_short { format!("{own}, {others}") } else { own })
         };
         self.levels = (0..self.levels.len()).map(level).collect();

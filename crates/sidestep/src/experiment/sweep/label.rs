@@ -1,6 +1,6 @@
 //! Names with units in them, split into words and unit.
 
-use crate::scenario::{Meaning, told};
+use crate::scenario::{MetricInfo, metric_label};
 use serde::Serialize;
 use sidestep_kernel::ports::table::split_unit;
 use std::fmt;
@@ -17,16 +17,16 @@ pub struct Label {
 impl Label {
     /// Returns the label of a column: `mean_delay_percent` is "mean delay", in %. The path of a key
     /// stays as it is, because users write it so: `chains.gap_m` is "chains.gap", in m.
-    pub fn of(name: &str) -> Self {
+    pub fn from_name(name: &str) -> Self {
         let (quantity, unit) = split_unit(name);
         let text = if name.contains('.') { quantity.into() } else { quantity.replace('_', " ") };
         Self { text, unit }
     }
 
     /// Returns the label of a metric, in the words of its world.
-    pub fn of_metric(name: &str, meanings: &[Meaning]) -> Self {
-        let told = told(meanings, name);
-        Self { text: told.words, unit: told.unit }
+    pub fn from_metric(name: &str, meanings: &[MetricInfo]) -> Self {
+        let label = metric_label(meanings, name);
+        Self { text: label.words, unit: label.unit }
     }
 }
 
@@ -40,7 +40,7 @@ impl fmt::Display for Label {
 }
 
 /// The label with a capital, as a title begins.
-pub(super) fn sentence(label: &Label) -> String {
+pub(super) fn capitalized(label: &Label) -> String {
     let text = label.to_string();
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
@@ -70,7 +70,7 @@ mod tests {
             ("", ""),
         ];
         for (name, label) in expected {
-            assert_eq!(Label::of(name).to_string(), label);
+            assert_eq!(Label::from_name(name).to_string(), label);
         }
     }
 }

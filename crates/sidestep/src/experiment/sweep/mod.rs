@@ -32,42 +32,42 @@
 
 pub mod baseline;
 pub mod cell;
-mod changes;
 mod charts;
+pub mod column_schema;
 pub mod compare;
 pub mod design;
 pub mod file;
 mod groups;
 pub mod label;
 mod options;
+mod overrides;
 pub mod plan;
+mod plan_summary;
 pub mod rounds;
 pub mod rows;
+pub mod scheduler;
 pub mod seeds;
-pub mod shape;
 mod summarize;
 pub mod summary;
 pub mod table;
 mod text;
-mod told;
 pub mod variant;
-pub mod work;
 
-pub use baseline::{Baseline, Wanted};
-pub use cell::{Outcome, Started, start};
-pub use changes::Changes;
+pub use baseline::{Baseline, BaselineSpec};
+pub use cell::{CellRun, Outcome, start_cell};
+pub use column_schema::ColumnSchema;
 pub use compare::Comparison;
-pub use design::{Design, Factor, Hypercube, Range};
-pub use file::{Sweep, Until};
+pub use design::{Design, Factor, LatinHypercube, ParameterRange};
+pub use file::{Precision, Sweep};
 pub use groups::{Level, Parameter};
 pub use label::Label;
-pub use options::{Against, SummaryOptions};
+pub use options::{BaselineChoice, SummaryOptions};
+pub use overrides::SweepOverrides;
 pub use plan::{Cell, Plan, Shard};
-pub use rows::Rows;
-pub use shape::Shape;
-pub use summary::{LeftOut, Summary};
+pub use rows::RunTableBuilder;
+pub use summary::{OmittedMetric, Summary};
 pub use table::{Role, RunColumn, RunTable};
-pub use variant::{Base, Setting, Variant};
+pub use variant::{BaseScenario, Setting, Variant};
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Options of a summary.
 
-use crate::scenario::Meaning;
+use crate::scenario::MetricInfo;
 use crate::statistics::Bootstrap;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,7 @@ pub struct SummaryOptions {
     pub max_metrics: usize,
     /// The baseline of variants; `None` for the first variant, but for nothing in grids of
     /// several parameters and in scattered designs, where the first is like no other.
-    pub against: Option<Against>,
+    pub against: Option<BaselineChoice>,
     /// Names of the variants, where the table has their numbers.
     pub names: Option<Vec<String>>,
     /// Variants in which seeds change nothing: their one value has no interval.
@@ -21,12 +21,12 @@ pub struct SummaryOptions {
     /// Options of bootstrap intervals.
     pub bootstrap: Bootstrap,
     /// The metrics in words.
-    pub meanings: &'static [Meaning],
+    pub meanings: &'static [MetricInfo],
 }
 
 /// The baseline of variants.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Against {
+pub enum BaselineChoice {
     /// The variant of this name.
     Variant(String),
     /// Each with a variant of its own.

@@ -1,9 +1,9 @@
 //! The cells of a sweep, and their shares.
 
-use super::baseline::{Baseline, Search};
-use super::file::{Sweep, Until};
-use super::variant::{Base, Setting, Variant};
-use crate::scenario::Seeds;
+use super::baseline::{Baseline, BaselineMatcher};
+use super::file::{Precision, Sweep};
+use super::variant::{BaseScenario, Setting, Variant};
+use crate::scenario::SeedEffect;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sidestep_kernel::InputError;
@@ -34,7 +34,7 @@ pub struct Plan {
     /// The seed of replicate 0; replicate `k` has this plus `k`.
     pub first_seed: u64,
     /// The precision at which a variant has had enough runs, if it is not run for all replicates.
-    pub until: Option<Until>,
+    pub until: Option<Precision>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
     /// The baseline that the variants are compared with.
@@ -46,7 +46,7 @@ pub struct Plan {
 }
 
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
-const MOST_RUNS: u64 = 10_000_000;
+const MAX_SWEEP_RUNS: u64 = 10_000_000;
 
 impl Serialize for Plan {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
@@ -80,7 +80,11 @@ impl Plan {
     ///
     /// # Errors
     /// When seeds overflow, or the baseline is no variant.
-    pub fn new(sweep: &Sweep, variants: Vec<Variant>, base: Base<'_>) -> Result<Self, InputError> {
+    pub fn new(
+        sweep: &Sweep,
+        variants: Vec<Variant>,
+        base: BaseScenario<'_>,
+    ) -> Result<Self, InputError> {
         let mut parameters: Vec<String> = Vec::new();
         for setting in variants.iter().flat_map(|v| &v.settings) {
             if !parameters.contains(&setting.key) {
@@ -108,15 +112,19 @@ impl Plan {
     }
 
     /// Returns the baseline that is asked for, among the plan's variants.
-    fn baseline_of(&self, sweep: &Sweep, base: Base<'_>) -> Result<Option<Baseline>, InputError> {
-        let search = Search {
+    fn baseline_of(
+        &self,
+        sweep: &Sweep,
+        base: BaseScenario<'_>,
+    ) -> Result<Option<Baseline>, InputError> {
+        let search = BaselineMatcher {
             wanted: &sweep.baseline,
             variants: &self.variants,
             parameters: &self.parameters,
             base,
             place: &sweep.place,
         };
-        search.found(|k| self.names().swap_remove(k), |setting| self.word(setting))
+        search.baseline(|k| self.names().swap_remove(k), |setting| self.short_setting(setting))
     }
 
     /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
@@ -128,11 +136,11 @@ impl Plan {
         if variants == 0 || replicates == 0 {
             return Err(format!("a plan of {variants} variants with {replicates} runs each"));
         }
-        if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MOST_RUNS) {
+        if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MAX_SWEEP_RUNS) {
             return Err(format!("{variants} variants with {replicates} runs each are too many"));
         }
         check_seeds(self.first_seed, replicates)?;
-        self.until.iter().try_for_each(Until::check)?;
+        self.until.iter().try_for_each(Precision::check)?;
         self.variants.iter().try_for_each(|variant| variant.check(&self.parameters))?;
         self.baseline.iter().try_for_each(|baseline| baseline.check(variants))
     }
@@ -141,16 +149,16 @@ impl Plan {
     /// (`method=pc, n=8`).
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> =
-            self.variants.iter().map(|v| v.label(|s| self.word(s))).collect();
+            self.variants.iter().map(|v| v.label(|s| self.short_setting(s))).collect();
         let plain = if names.len() == 1 { "all runs" } else { "as in the scenario" };
         names.iter_mut().filter(|name| name.is_empty()).for_each(|name| *name = plain.into());
-        number_twins(&mut names);
+        number_duplicates(&mut names);
         names
     }
 
     /// Returns a setting in short, `method=pc`: with the whole path of its key only where another
     /// parameter ends like it.
-    fn word(&self, Setting { key, value }: &Setting) -> String {
+    fn short_setting(&self, Setting { key, value }: &Setting) -> String {
         let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
         let alike = self.parameters.iter().filter(|k| last(k) == last(key)).count();
         let key = if alike > 1 { key.clone() } else { last(key) };
@@ -164,21 +172,21 @@ impl Plan {
     /// When there are too many.
     pub fn check_size(variants: usize, replicates: u32, place: &str) -> Result<(), InputError> {
         let runs = variants as u64 * u64::from(replicates);
-        if runs <= MOST_RUNS {
+        if runs <= MAX_SWEEP_RUNS {
             return Ok(());
         }
-        let remedy = format!("sweep over less: up to {MOST_RUNS} runs, or several sweeps");
+        let remedy = format!("sweep over less: up to {MAX_SWEEP_RUNS} runs, or several sweeps");
         Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
     /// Returns the effect of seeds on the runs of a variant.
-    pub(super) fn seeds(&self, variant: u32) -> Seeds {
+    pub(super) fn seeds(&self, variant: u32) -> SeedEffect {
         self.variants[variant as usize].seeds
     }
 
     /// Returns the number of runs of a variant, at most: one where seeds change nothing.
     pub fn runs_of(&self, variant: u32) -> u32 {
-        if self.seeds(variant) == Seeds::Nothing { 1 } else { self.replicates }
+        if self.seeds(variant) == SeedEffect::Nothing { 1 } else { self.replicates }
     }
 
     /// Returns the number of runs, at most.
@@ -216,7 +224,7 @@ impl Plan {
     /// Returns the cells of a share, in the order in which they are run: every `count`-th cell,
     /// counted over variants and replicates alike, so that no share gets all the expensive
     /// variants.
-    pub fn share(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
+    pub fn shard_cells(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
         let (index, count) = (u64::from(shard.index), u64::from(shard.count));
         let variants = self.variants.len() as u32;
         let cells = (0..self.replicates)
@@ -238,7 +246,7 @@ pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
 }
 
 /// Numbers equal names from the second on, because samples of whole numbers may coincide.
-fn number_twins(names: &mut [String]) {
+fn number_duplicates(names: &mut [String]) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     for name in names {
         let count = seen.entry(name.clone()).or_default();
@@ -292,12 +300,12 @@ mod tests {
 
     fn plan(variants: usize, replicates: u32) -> Plan {
         let values = (0..variants).map(|n| n.to_string()).collect::<Vec<_>>().join(",");
-        let mut sweep = Sweep::of_scenario("s.toml");
+        let mut sweep = Sweep::from_scenario("s.toml");
         sweep.design.factors = vec![Factor::parse(&format!("n={values}")).expect("valid")];
         sweep.replicates = replicates;
         let variants = sweep.design.variants("test").expect("valid");
         let source = Source::new("s.toml", "", "");
-        let base = Base { world: "robots", seed: 7, source: &source };
+        let base = BaseScenario { world: "robots", seed: 7, source: &source };
         Plan::new(&sweep, variants, base).expect("valid")
     }
 
@@ -309,7 +317,7 @@ mod tests {
             let plan = plan(variants, replicates);
             let mut seen = BTreeSet::new();
             for index in 0..count {
-                for cell in plan.share(Shard { index, count }) {
+                for cell in plan.shard_cells(Shard { index, count }) {
                     prop_assert_eq!(plan.cell_of(cell.id), Some(cell));
                     prop_assert!(seen.insert(cell.id), "cell {} is in two shares", cell.id);
                 }
@@ -322,17 +330,17 @@ mod tests {
     #[test]
     fn replicates_of_all_variants_have_the_same_seeds() {
         let plan = plan(3, 4);
-        for cell in plan.share(Shard::ALL) {
+        for cell in plan.shard_cells(Shard::ALL) {
             assert_eq!(cell.seed, 7 + u64::from(cell.replicate));
         }
-        let first: Vec<u32> = plan.share(Shard::ALL).take(3).map(|c| c.replicate).collect();
+        let first: Vec<u32> = plan.shard_cells(Shard::ALL).take(3).map(|c| c.replicate).collect();
         assert_eq!(first, [0, 0, 0], "the first replicate of every variant comes first");
     }
 
     #[test]
     fn a_share_has_variants_and_replicates_of_all_kinds() {
         let plan = plan(2, 6);
-        let half: Vec<Cell> = plan.share(Shard { index: 0, count: 2 }).collect();
+        let half: Vec<Cell> = plan.shard_cells(Shard { index: 0, count: 2 }).collect();
         assert_eq!(half.iter().filter(|c| c.variant == 0).count(), 3);
         assert_eq!(half.len(), 6);
     }

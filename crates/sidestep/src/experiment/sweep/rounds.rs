@@ -1,10 +1,10 @@
 //! The next cells to run, if a requested precision decides when a variant has had enough runs.
 
 use super::cell::Outcome;
-use super::file::Until;
+use super::file::Precision;
 use super::plan::{Cell, Plan};
 use super::table::RunTable;
-use crate::statistics::{Next, Reason, StoppingRule};
+use crate::statistics::{StopDecision, StopReason, StoppingRule};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +18,7 @@ const MIN_RUNS: usize = 10;
 #[derive(Debug)]
 pub struct Rounds<'a> {
     plan: &'a Plan,
-    until: &'a Until,
+    until: &'a Precision,
     /// Values by replicate of each variant, by metric.
     values: Vec<BTreeMap<String, Values>>,
     /// Replicates of each variant that have an outcome.
@@ -27,32 +27,32 @@ pub struct Rounds<'a> {
 
 /// The reason why a variant is no longer run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Stopped {
+pub struct VariantStop {
     /// Number of the variant.
     pub variant: u32,
     /// Number of its runs.
     pub runs: usize,
     /// The reason why they are enough.
-    pub reason: Reason,
+    pub reason: StopReason,
 }
 
 /// Returns the reasons why the variants of a plan stopped, if a precision ended them.
-pub fn stopped(plan: &Plan, runs: &RunTable) -> Vec<Stopped> {
+pub fn variant_stops(plan: &Plan, runs: &RunTable) -> Vec<VariantStop> {
     let Some(until) = &plan.until else { return Vec::new() };
     let mut rounds = Rounds::new(plan, until);
-    runs.outcomes(|outcome| rounds.note(&outcome));
-    rounds.stopped()
+    runs.for_each_outcome(|outcome| rounds.add(&outcome));
+    rounds.variant_stops()
 }
 
 impl<'a> Rounds<'a> {
     /// Returns the rounds before any run.
-    pub fn new(plan: &'a Plan, until: &'a Until) -> Self {
+    pub fn new(plan: &'a Plan, until: &'a Precision) -> Self {
         let n = plan.variants.len();
         Self { plan, until, values: vec![BTreeMap::new(); n], done: vec![BTreeSet::new(); n] }
     }
 
     /// Adds an outcome.
-    pub fn note(&mut self, outcome: &Outcome) {
+    pub fn add(&mut self, outcome: &Outcome) {
         let Some(cell) = self.plan.cell_of(outcome.cell) else { return };
         let variant = cell.variant as usize;
         self.done[variant].insert(cell.replicate);
@@ -67,10 +67,10 @@ impl<'a> Rounds<'a> {
 
     /// Returns the cells of the next round that have no outcome yet; empty if all variants are
     /// done.
-    pub fn next(&self) -> Vec<Cell> {
+    pub fn next_cells(&self) -> Vec<Cell> {
         let mut cells = Vec::new();
         for variant in 0..self.plan.variants.len() as u32 {
-            if let Next::Run(total) = self.ask(variant) {
+            if let StopDecision::Run(total) = self.decide(variant) {
                 let done = &self.done[variant as usize];
                 let open = (0..total as u32).filter(|replicate| !done.contains(replicate));
                 cells.extend(open.map(|replicate| self.plan.cell(variant, replicate)));
@@ -81,17 +81,17 @@ impl<'a> Rounds<'a> {
     }
 
     /// Returns the reasons why variants are done.
-    pub fn stopped(&self) -> Vec<Stopped> {
-        let of = |variant: u32| match self.ask(variant) {
-            Next::Enough(runs, reason) => Some(Stopped { variant, runs, reason }),
-            Next::Run(_) => None,
+    pub fn variant_stops(&self) -> Vec<VariantStop> {
+        let of = |variant: u32| match self.decide(variant) {
+            StopDecision::Enough(runs, reason) => Some(VariantStop { variant, runs, reason }),
+            StopDecision::Run(_) => None,
         };
         (0..self.plan.variants.len() as u32).filter_map(of).collect()
     }
 
-    fn ask(&self, variant: u32) -> Next {
+    fn decide(&self, variant: u32) -> StopDecision {
         if self.plan.runs_of(variant) == 1 && !self.done[variant as usize].is_empty() {
-            return Next::Enough(1, Reason::Seedless);
+            return StopDecision::Enough(1, StopReason::Seedless);
         }
         let rule = StoppingRule {
             half_width: self.until.half_width,
@@ -107,8 +107,10 @@ impl<'a> Rounds<'a> {
         };
         let of_variant = &self.values[variant as usize];
         let named = !self.until.metrics.is_empty();
-        let there: Vec<_> =
-            of_variant.iter().filter(|(_, values)| named || first(values).any(is_there)).collect();
+        let there: Vec<_> = of_variant
+            .iter()
+            .filter(|(_, values)| named || first_round(values).any(is_present))
+            .collect();
         let asks = |name: &str| named || self.varies(name);
         // If nothing varies, it takes as many runs to believe that as for a single metric.
         let any_asks = there.iter().any(|(name, _)| asks(name));
@@ -117,19 +119,19 @@ impl<'a> Rounds<'a> {
         if columns.is_empty() {
             let first = MIN_RUNS.min(rule.max_runs);
             return match whole >= first {
-                true => Next::Enough(first, Reason::NoValues),
-                false => Next::Run(first),
+                true => StopDecision::Enough(first, StopReason::NoValues),
+                false => StopDecision::Run(first),
             };
         }
         let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
-        rule.next_of(&columns)
+        rule.decide_columns(&columns)
     }
 
     /// Returns whether a metric differs between two runs of a variant's first round, for any variant: a
     /// rare event is then looked for also in variants that have not had it.
     fn varies(&self, name: &str) -> bool {
         let differ = |values: &Values| {
-            let mut all = first(values);
+            let mut all = first_round(values);
             let one = all.next();
             all.any(|value| Some(value) != one)
         };
@@ -141,28 +143,28 @@ impl<'a> Rounds<'a> {
 type Values = BTreeMap<u32, Option<f64>>;
 
 /// Returns the values of the first round.
-fn first(values: &Values) -> impl Iterator<Item = &Option<f64>> {
+fn first_round(values: &Values) -> impl Iterator<Item = &Option<f64>> {
     (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
 }
 
-fn is_there(value: &Option<f64>) -> bool {
+fn is_present(value: &Option<f64>) -> bool {
     value.is_some()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{Base, Factor, Sweep};
+    use crate::experiment::sweep::{BaseScenario, Factor, Sweep};
     use crate::scenario::Source;
     use serde_json::json;
 
     fn plan(max_runs: u32) -> Plan {
-        let mut sweep = Sweep::of_scenario("s.toml");
+        let mut sweep = Sweep::from_scenario("s.toml");
         sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
         sweep.replicates = max_runs;
         let variants = sweep.design.variants("test").expect("valid");
         let source = Source::new("s.toml", "", "");
-        let base = Base { world: "robots", seed: 1, source: &source };
+        let base = BaseScenario { world: "robots", seed: 1, source: &source };
         Plan::new(&sweep, variants, base).expect("valid")
     }
 
@@ -170,29 +172,29 @@ mod tests {
     fn outcome(cell: Cell) -> Outcome {
         let wave = f64::from(cell.replicate * 7 % 10) - 4.5;
         let value = 100.0 + if cell.variant == 0 { 0.1 } else { 10.0 } * wave;
-        let mut outcome = Outcome::failed(cell, "");
+        let mut outcome = Outcome::from_failure(cell, "");
         outcome.metrics.insert("m".into(), json!(value));
         outcome.metrics.insert("constant".into(), json!(3));
         outcome
     }
 
-    fn until(metrics: &[&str]) -> Until {
+    fn until(metrics: &[&str]) -> Precision {
         let metrics = metrics.iter().map(ToString::to_string).collect();
-        Until { metrics, ..("ci=0.05".parse().expect("valid")) }
+        Precision { metrics, ..("ci=0.05".parse().expect("valid")) }
     }
 
     /// Runs rounds until none is left; how many runs each variant had.
-    fn all(plan: &Plan, until: &Until, order: impl Fn(&mut Vec<Cell>)) -> [usize; 2] {
+    fn all(plan: &Plan, until: &Precision, order: impl Fn(&mut Vec<Cell>)) -> [usize; 2] {
         let mut rounds = Rounds::new(plan, until);
         loop {
-            let mut cells = rounds.next();
+            let mut cells = rounds.next_cells();
             if cells.is_empty() {
-                let stopped = rounds.stopped();
+                let stopped = rounds.variant_stops();
                 assert_eq!(stopped.len(), 2);
                 return [stopped[0].runs, stopped[1].runs];
             }
             order(&mut cells);
-            cells.iter().for_each(|c| rounds.note(&outcome(*c)));
+            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
         }
     }
 
@@ -207,21 +209,21 @@ mod tests {
     #[test]
     fn what_one_variant_has_seen_is_looked_for_in_the_others_too() {
         let plan = plan(1000);
-        let until = Until { half_width: 0.3, ..until(&[]) };
+        let until = Precision { half_width: 0.3, ..until(&[]) };
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next()
+        while let cells = rounds.next_cells()
             && !cells.is_empty()
         {
             for cell in cells {
                 let rare = u32::from(cell.variant == 1 && cell.replicate % 2 == 0);
-                let mut outcome = Outcome::failed(cell, "");
+                let mut outcome = Outcome::from_failure(cell, "");
                 outcome.metrics.insert("rare".into(), json!(rare));
-                rounds.note(&outcome);
+                rounds.add(&outcome);
             }
         }
-        let told = rounds.stopped();
-        assert_eq!((told[0].runs, told[0].reason), (60, Reason::Constant), "0 of 10 is not 0");
-        assert_eq!(told[1].reason, Reason::Reached);
+        let told = rounds.variant_stops();
+        assert_eq!((told[0].runs, told[0].reason), (60, StopReason::Constant), "0 of 10 is not 0");
+        assert_eq!(told[1].reason, StopReason::Reached);
     }
 
     #[test]
@@ -229,13 +231,13 @@ mod tests {
         let plan = plan(1000);
         let until = until(&[]);
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next()
+        while let cells = rounds.next_cells()
             && !cells.is_empty()
         {
-            cells.iter().for_each(|c| rounds.note(&Outcome::failed(*c, "no start")));
+            cells.iter().for_each(|c| rounds.add(&Outcome::from_failure(*c, "no start")));
         }
-        let told = rounds.stopped();
-        assert_eq!((told[0].runs, told[0].reason), (MIN_RUNS, Reason::NoValues));
+        let told = rounds.variant_stops();
+        assert_eq!((told[0].runs, told[0].reason), (MIN_RUNS, StopReason::NoValues));
     }
 
     #[test]
@@ -257,12 +259,12 @@ mod tests {
         let plan = plan(20);
         let until = until(&["m"]);
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next()
+        while let cells = rounds.next_cells()
             && !cells.is_empty()
         {
-            cells.iter().for_each(|c| rounds.note(&outcome(*c)));
+            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
         }
-        let told = rounds.stopped();
-        assert_eq!((told[1].runs, told[1].reason), (20, Reason::Maximum));
+        let told = rounds.variant_stops();
+        assert_eq!((told[1].runs, told[1].reason), (20, StopReason::Maximum));
     }
 }

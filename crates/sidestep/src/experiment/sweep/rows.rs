@@ -1,9 +1,12 @@
 //! Outcomes -> a table of runs, the same for any order of arrival.
 
 use super::cell::Outcome;
+use super::column_schema::{
+    CYCLES, ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text,
+    widened,
+};
 use super::plan::{Plan, Shard};
-use super::seeds::Trials;
-use super::shape::{CYCLES, FAILURE, First, Shape, each_field, type_of, widened, wider, words};
+use super::seeds::PilotRuns;
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::Variant;
 use serde_json::Value;
@@ -14,21 +17,21 @@ use std::collections::BTreeMap;
 /// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
 /// into less than half a gigabyte.
 #[derive(Debug, Default)]
-pub struct Rows {
+pub struct RunTableBuilder {
     cells: Vec<u64>,
-    columns: Vec<Growing>,
+    columns: Vec<ColumnBuilder>,
     /// Indices of the columns, by role and name.
     index: BTreeMap<(Role, String), usize>,
 }
 
 /// A column, filled up to some row.
 #[derive(Debug)]
-struct Growing {
+struct ColumnBuilder {
     column: RunColumn,
-    first: First,
+    first: ColumnOrder,
 }
 
-impl Rows {
+impl RunTableBuilder {
     /// Returns the number of outcomes.
     pub fn len(&self) -> usize {
         self.cells.len()
@@ -42,7 +45,7 @@ impl Rows {
     /// Adds an outcome.
     pub fn push(&mut self, outcome: &Outcome) {
         self.cells.push(outcome.cell);
-        each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
+        for_each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
     }
 
     /// Sets a field of the last row.
@@ -53,15 +56,15 @@ impl Rows {
         let k = *self.index.entry(key).or_insert_with(|| {
             let values = Values::empty(ColumnType::F64);
             let column = RunColumn { name: name.into(), role, values };
-            let first = First { cell: u64::MAX, place: usize::MAX };
-            self.columns.push(Growing { column, first });
+            let first = ColumnOrder { cell: u64::MAX, place: usize::MAX };
+            self.columns.push(ColumnBuilder { column, first });
             self.columns.len() - 1
         });
         let growing = &mut self.columns[k];
         let cell = if value.is_null() { u64::MAX } else { cell };
-        growing.first = growing.first.min(First { cell, place });
+        growing.first = growing.first.min(ColumnOrder { cell, place });
         growing.column.values.resize(row);
-        add(&mut growing.column.values, value);
+        push_value(&mut growing.column.values, value);
     }
 
     /// Returns the table of all runs, sorted by cell: numbers of cell, variant and replicate, seed,
@@ -70,23 +73,23 @@ impl Rows {
     /// # Errors
     /// When a cell has two outcomes that differ, because they come from different programs or
     /// machines.
-    pub fn table(self, plan: &Plan) -> Result<RunTable, InputError> {
-        let (shape, mut trials) = (self.shape(), Trials::new(plan));
+    pub fn build(self, plan: &Plan) -> Result<RunTable, InputError> {
+        let (shape, mut trials) = (self.schema(), PilotRuns::new(plan));
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         for (row, cell) in self.cells.iter().enumerate() {
             let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
-            trials.end(Some(*cell), end);
+            trials.add_digest(Some(*cell), end);
         }
-        self.block(plan, &shape, &trials)
+        self.build_block(plan, &shape, &trials)
     }
 
     /// Returns the columns of these outcomes alone.
-    fn shape(&self) -> Shape {
-        let mut shape = Shape::default();
-        for Growing { column, first } in &self.columns {
+    fn schema(&self) -> ColumnSchema {
+        let mut shape = ColumnSchema::default();
+        for ColumnBuilder { column, first } in &self.columns {
             let values = &column.values;
             let has_values = (0..values.len()).any(|row| !values.is_missing(row));
-            shape.see(column.role, &column.name, has_values.then(|| values.ty()), *first);
+            shape.add_column(column.role, &column.name, has_values.then(|| values.ty()), *first);
         }
         shape
     }
@@ -96,22 +99,22 @@ impl Rows {
     /// variant.
     ///
     /// # Errors
-    /// See [`Rows::table`].
-    pub fn block(
+    /// See [`RunTableBuilder::build`].
+    pub fn build_block(
         mut self,
         plan: &Plan,
-        shape: &Shape,
-        trials: &Trials<'_>,
+        shape: &ColumnSchema,
+        trials: &PilotRuns<'_>,
     ) -> Result<RunTable, InputError> {
         let rows = self.cells.len();
         self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
         let mut order: Vec<usize> = (0..rows).collect();
         order.retain(|&row| plan.cell_of(self.cells[row]).is_some());
         order.sort_by_key(|&row| (self.cells[row], row));
-        self.check_twins(&order)?;
+        self.check_duplicates(&order)?;
         order.dedup_by_key(|row| self.cells[*row]);
-        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.asks_for(&c)));
-        let mut columns = identity(plan, order.iter().map(|&row| self.cells[row]));
+        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.needs(&c)));
+        let mut columns = identity_columns(plan, order.iter().map(|&row| self.cells[row]));
         for (role, name, ty) in shape.columns() {
             let mut values = match self.index.get(&(role, name.to_string())) {
                 // Let go of at once, so that no value stands in the memory twice.
@@ -129,7 +132,7 @@ impl Rows {
     }
 
     /// Checks that cells that were run twice have the same outcome.
-    fn check_twins(&self, order: &[usize]) -> Result<(), InputError> {
+    fn check_duplicates(&self, order: &[usize]) -> Result<(), InputError> {
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         let Some(digest) = digest else { return Ok(()) };
         let text = |row: usize| digest.column.values.text(row);
@@ -157,19 +160,19 @@ impl RunTable {
     }
 
     /// Passes on the outcomes that the rows of a share's table stand for.
-    pub fn outcomes(&self, mut each: impl FnMut(Outcome)) {
+    pub fn for_each_outcome(&self, mut each: impl FnMut(Outcome)) {
         let number = |row: usize, column: Option<&RunColumn>| match column.map(|c| &c.values) {
             Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
             _ => None,
         };
-        let cell = self.of_role(Role::Cell).next();
-        let digest = self.of_role(Role::Digest).next();
+        let cell = self.columns_with_role(Role::Cell).next();
+        let digest = self.columns_with_role(Role::Digest).next();
         let failure = self.column(FAILURE);
         for row in 0..self.runs() {
             let Some(cell) = number(row, cell) else { continue };
             let fields = |role: Role| {
                 let own = |c: &&RunColumn| ![CYCLES, FAILURE].contains(&c.name.as_str());
-                let columns = self.of_role(role).filter(own);
+                let columns = self.columns_with_role(role).filter(own);
                 columns.map(|c| (c.name.clone(), c.values.json(row))).collect()
             };
             each(Outcome {
@@ -185,14 +188,14 @@ impl RunTable {
 }
 
 /// Returns the table of all cells of a plan: one row for each future run.
-pub fn cells(plan: &Plan) -> RunTable {
-    let mut cells: Vec<u64> = plan.share(Shard::ALL).map(|cell| cell.id).collect();
+pub fn cell_table(plan: &Plan) -> RunTable {
+    let mut cells: Vec<u64> = plan.shard_cells(Shard::ALL).map(|cell| cell.id).collect();
     cells.sort_unstable();
-    RunTable { columns: identity(plan, cells.into_iter()) }
+    RunTable { columns: identity_columns(plan, cells.into_iter()) }
 }
 
 /// Returns the identity of runs: the columns that follow from their cells.
-fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
+fn identity_columns(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     let cells: Vec<_> = cells.filter_map(|id| plan.cell_of(id)).collect();
     let ints = |name: &str, role, value: fn(&super::Cell) -> u64| RunColumn {
         name: name.into(),
@@ -207,9 +210,9 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     ];
     for name in &plan.parameters {
         let levels = levels(plan, name);
-        let ty = levels.iter().map(type_of).fold(None, wider).unwrap_or(ColumnType::F64);
+        let ty = levels.iter().map(type_of).fold(None, common_type).unwrap_or(ColumnType::F64);
         let mut values = Values::empty(ColumnType::F64);
-        cells.iter().for_each(|cell| add(&mut values, &levels[cell.variant as usize]));
+        cells.iter().for_each(|cell| push_value(&mut values, &levels[cell.variant as usize]));
         let values = widened(values, ty);
         columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
     }
@@ -221,7 +224,7 @@ fn levels(plan: &Plan, name: &str) -> Vec<Value> {
     let of = |variant: &Variant| variant.value(name).map_or(Value::Null, json);
     let levels: Vec<Value> = plan.variants.iter().map(of).collect();
     let has_words = levels.iter().any(Value::is_string);
-    let level = |v: Value| if has_words && !v.is_null() { words(&v).into() } else { v };
+    let level = |v: Value| if has_words && !v.is_null() { value_text(&v).into() } else { v };
     levels.into_iter().map(level).collect()
 }
 
@@ -237,7 +240,7 @@ fn json(value: &toml::Value) -> Value {
 }
 
 /// Appends a value; the column gets a wider type if necessary.
-fn add(values: &mut Values, value: &Value) {
+fn push_value(values: &mut Values, value: &Value) {
     if value.is_null() {
         return values.resize(values.len() + 1);
     }
@@ -246,7 +249,7 @@ fn add(values: &mut Values, value: &Value) {
         Values::I64(v) => v.push(value.as_i64()),
         Values::F64(v) => v.push(value.as_f64()),
         Values::Bool(v) => v.push(value.as_bool()),
-        Values::Text(v) => v.push(Some(&words(value))),
+        Values::Text(v) => v.push(Some(&value_text(value))),
         _ => unreachable!("`widen` makes columns of these four types"),
     }
 }
@@ -258,7 +261,7 @@ fn widen(values: &mut Values, value: &Value) {
     }
     let has_values = (0..values.len()).any(|row| !values.is_missing(row));
     let own = has_values.then(|| values.ty());
-    let ty = wider(own, type_of(value)).unwrap_or(ColumnType::F64);
+    let ty = common_type(own, type_of(value)).unwrap_or(ColumnType::F64);
     if ty != values.ty() {
         *values = widened(std::mem::replace(values, Values::empty(ty)), ty);
     }
@@ -267,18 +270,18 @@ fn widen(values: &mut Values, value: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{Base, Factor, Sweep};
+    use crate::experiment::sweep::{BaseScenario, Factor, Sweep};
     use crate::scenario::Source;
     use proptest::prelude::*;
     use serde_json::json;
 
     fn plan() -> Plan {
-        let mut sweep = Sweep::of_scenario("s.toml");
+        let mut sweep = Sweep::from_scenario("s.toml");
         sweep.design.factors = vec![Factor::parse("n=1,2.5,word").expect("valid")];
         sweep.replicates = 4;
         let variants = sweep.design.variants("test").expect("valid");
         let source = Source::new("s.toml", "", "");
-        let base = Base { world: "robots", seed: 7, source: &source };
+        let base = BaseScenario { world: "robots", seed: 7, source: &source };
         Plan::new(&sweep, variants, base).expect("valid")
     }
 
@@ -297,9 +300,9 @@ mod tests {
     }
 
     fn table(cells: impl IntoIterator<Item = u64>) -> RunTable {
-        let mut rows = Rows::default();
+        let mut rows = RunTableBuilder::default();
         cells.into_iter().for_each(|cell| rows.push(&outcome(cell)));
-        rows.table(&plan()).expect("no twins that differ")
+        rows.build(&plan()).expect("no twins that differ")
     }
 
     #[test]
@@ -345,38 +348,38 @@ mod tests {
     #[test]
     fn outcomes_survive_the_table_of_their_share() {
         let whole = table(0..12);
-        let mut rows = Rows::default();
-        whole.outcomes(|outcome| rows.push(&outcome));
-        assert_eq!(rows.table(&plan()), Ok(whole));
+        let mut rows = RunTableBuilder::default();
+        whole.for_each_outcome(|outcome| rows.push(&outcome));
+        assert_eq!(rows.build(&plan()), Ok(whole));
     }
 
     proptest! {
         #[test]
         fn shares_join_to_the_table_of_one_process(count in 1u64..7) {
-            let mut rows = Rows::default();
+            let mut rows = RunTableBuilder::default();
             for index in (0..count).rev() {
                 let share = table((0..12).filter(|cell| cell % count == index));
-                share.outcomes(|outcome| rows.push(&outcome));
+                share.for_each_outcome(|outcome| rows.push(&outcome));
             }
-            prop_assert_eq!(rows.table(&plan()), Ok(table(0..12)));
+            prop_assert_eq!(rows.build(&plan()), Ok(table(0..12)));
         }
     }
 
     proptest! {
         #[test]
         fn blocks_one_below_the_other_are_the_table(size in 1u64..9, step in 1u64..12) {
-            let (plan, mut shape) = (plan(), Shape::default());
+            let (plan, mut shape) = (plan(), ColumnSchema::default());
             let arrived: Vec<Outcome> = (0..12).map(|k| outcome((k * step + k / 3) % 12)).collect();
-            let mut trials = Trials::new(&plan);
+            let mut trials = PilotRuns::new(&plan);
             for outcome in &arrived {
-                shape.note(outcome);
-                trials.note(outcome);
+                shape.add(outcome);
+                trials.add(outcome);
             }
             let mut joined: Option<RunTable> = None;
             for first in (0..12).step_by(size as usize) {
-                let mut rows = Rows::default();
+                let mut rows = RunTableBuilder::default();
                 arrived.iter().filter(|o| (first..first + size).contains(&o.cell)).for_each(|o| rows.push(o));
-                let block = rows.block(&plan, &shape, &trials).expect("no twins that differ");
+                let block = rows.build_block(&plan, &shape, &trials).expect("no twins that differ");
                 match &mut joined {
                     None => joined = Some(block),
                     Some(table) => for (column, more) in table.columns.iter_mut().zip(&block.columns) {
@@ -392,18 +395,18 @@ mod tests {
     #[test]
     fn a_cell_that_was_run_twice_counts_once_and_must_agree() {
         assert_eq!(table([3, 1, 3]), table([1, 3]));
-        let mut rows = Rows::default();
+        let mut rows = RunTableBuilder::default();
         rows.push(&outcome(3));
         rows.push(&Outcome { digest: "another".into(), ..outcome(3) });
-        assert!(rows.table(&plan()).expect_err("they differ").cause().contains("cell 3"));
+        assert!(rows.build(&plan()).expect_err("they differ").cause().contains("cell 3"));
     }
 
     #[test]
     fn a_failed_run_has_a_row_that_says_why() {
-        let mut rows = Rows::default();
+        let mut rows = RunTableBuilder::default();
         rows.push(&outcome(0));
-        rows.push(&Outcome::failed(plan().cell(0, 1), "index out of bounds"));
-        let table = rows.table(&plan()).expect("no twins");
+        rows.push(&Outcome::from_failure(plan().cell(0, 1), "index out of bounds"));
+        let table = rows.build(&plan()).expect("no twins");
         let text = |name: &str, row| table.column(name).expect(name).values.text(row);
         assert_eq!(
             (text("failure", 0), text("failure", 1)),

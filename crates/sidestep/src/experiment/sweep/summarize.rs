@@ -10,15 +10,15 @@
 //! each. Metrics beyond [`SummaryOptions::max_metrics`] are left out. [`Summary::left_out`] lists
 //! every metric that is not shown, and why.
 use super::charts;
-use super::compare::{Reference, comparisons};
-use super::groups::{Groups, Level};
-use super::options::{Against, SummaryOptions};
+use super::compare::{BaselineIndex, comparisons};
+use super::groups::{Level, RunGroups};
+use super::options::{BaselineChoice, SummaryOptions};
 use super::summary::{
-    Described, Effect, EffectLevel, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, QUANTILES,
-    Quantile, Share, Summary, Trend, Variant, VariantMetric,
+    Effect, EffectLevel, MetricSummary, MetricValues, NOT_REQUESTED, NumericSummary, OmittedMetric,
+    Proportion, QUANTILES, Quantile, Summary, Trend, VariantMetric, VariantSummary,
 };
 use super::table::{Role, RunColumn, RunTable};
-use crate::scenario::nearest;
+use crate::scenario::suggestion;
 use crate::statistics::{
     Bootstrap, Sample, mean, mean_interval, percentile, quantile_interval, rank_correlation,
     runs_for_half_width, sample_sd, wilson,
@@ -38,8 +38,8 @@ impl Summary {
     /// # Errors
     /// When columns differ in length, a variant has a replicate twice, or a metric or the
     /// baseline does not exist.
-    pub fn of(table: &RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
-        Self::watched(table, options, &mut |_| ())
+    pub fn from_table(table: &RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
+        Self::from_table_with_progress(table, options, &mut |_| ())
     }
 
     /// Summarizes a table of runs like [`Summary::of`], and passes on the share of the work that is
@@ -47,17 +47,17 @@ impl Summary {
     ///
     /// # Errors
     /// The same.
-    pub fn watched(
+    pub fn from_table_with_progress(
         table: &RunTable,
         options: &SummaryOptions,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Self, InputError> {
-        let groups = Groups::of(table, options)?;
-        let (columns, left_out) = chosen(&groups, options)?;
-        let reference = reference(&groups, options)?;
+        let groups = RunGroups::from_table(table, options)?;
+        let (columns, left_out) = select_metrics(&groups, options)?;
+        let reference = baseline_index(&groups, options)?;
         let metric = |(k, c): (usize, &&RunColumn)| {
             let within = &mut |share| progress((k as f64 + share) / columns.len() as f64);
-            summed(&groups, c, reference.as_ref(), &options.bootstrap, within)
+            summarize_metric(&groups, c, reference.as_ref(), &options.bootstrap, within)
         };
         let metrics: Vec<MetricSummary> = columns.iter().enumerate().map(metric).collect();
         let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
@@ -67,11 +67,11 @@ impl Summary {
             .collect();
         let mut summary = Self {
             runs: table.runs(),
-            variants: (0..groups.variants.len()).map(|v| variant(&groups, v)).collect(),
+            variants: (0..groups.variants.len()).map(|v| variant_summary(&groups, v)).collect(),
             baseline: reference.map(|r| r.name),
             metrics,
             left_out,
-            trends: if charts::is_scattered(&groups) {
+            trends: if charts::is_sampled(&groups) {
                 trends(&groups, &columns)
             } else {
                 Vec::new()
@@ -86,8 +86,8 @@ impl Summary {
 }
 
 /// Returns how each metric goes with each parameter that is a number.
-fn trends(groups: &Groups<'_>, columns: &[&RunColumn]) -> Vec<Trend> {
-    let parameters = charts::numeric(groups);
+fn trends(groups: &RunGroups<'_>, columns: &[&RunColumn]) -> Vec<Trend> {
+    let parameters = charts::numeric_parameters(groups);
     let trend = |column: &&RunColumn, p: usize| {
         let parameter = &groups.parameters[p];
         let pair = |v: usize| match parameter.levels[parameter.of_variant[v]] {
@@ -105,27 +105,27 @@ fn trends(groups: &Groups<'_>, columns: &[&RunColumn]) -> Vec<Trend> {
     columns.iter().flat_map(|column| parameters.iter().map(move |p| trend(column, *p))).collect()
 }
 
-fn variant(groups: &Groups<'_>, variant: usize) -> Variant {
+fn variant_summary(groups: &RunGroups<'_>, variant: usize) -> VariantSummary {
     let levels = groups.parameters.iter().map(|p| p.levels[p.of_variant[variant]].clone());
-    Variant {
+    VariantSummary {
         name: groups.variants[variant].clone(),
         runs: groups.runs_of(variant),
         levels: levels.collect(),
     }
 }
 
-fn reference(
-    groups: &Groups<'_>,
+fn baseline_index(
+    groups: &RunGroups<'_>,
     options: &SummaryOptions,
-) -> Result<Option<Reference>, InputError> {
+) -> Result<Option<BaselineIndex>, InputError> {
     let variants = groups.variants.len();
-    let all_with = |one: usize| Reference {
+    let all_with = |one: usize| BaselineIndex {
         name: groups.variants[one].clone(),
         of: (0..variants).map(|v| (v != one).then_some(one)).collect(),
     };
     let Some(against) = &options.against else {
         let is_compared =
-            groups.paired && variants > 1 && !is_grid(groups) && !charts::is_scattered(groups);
+            groups.paired && variants > 1 && !is_grid(groups) && !charts::is_sampled(groups);
         return Ok(is_compared.then(|| all_with(0)));
     };
     if !groups.paired {
@@ -133,62 +133,68 @@ fn reference(
         return Err(InputError::new("baseline", cause, "leave out the baseline"));
     }
     match against {
-        Against::Variant(name) => {
+        BaselineChoice::Variant(name) => {
             let known: Vec<&str> = groups.variants.iter().map(String::as_str).collect();
             let found = known.iter().position(|v| v == name).ok_or_else(|| {
                 let cause = format!("there is no variant `{name}`");
-                InputError::new(format!("baseline {name}"), cause, nearest(name, &known))
+                InputError::new(format!("baseline {name}"), cause, suggestion(name, &known))
             })?;
             Ok(Some(all_with(found)))
         }
-        Against::Matched { name, of, .. } => {
+        BaselineChoice::Matched { name, of, .. } => {
             let places: BTreeMap<&String, usize> = groups.variants.iter().zip(0..).collect();
             // A sweep in progress may have no run of a baseline yet.
             let of_one = |variant| places.get(of.get(variant)?).copied();
             let of = groups.variants.iter().map(of_one).collect();
-            Ok(Some(Reference { name: name.clone(), of }))
+            Ok(Some(BaselineIndex { name: name.clone(), of }))
         }
     }
 }
 
 /// Returns whether several parameters are varied independently.
-fn is_grid(groups: &Groups<'_>) -> bool {
+fn is_grid(groups: &RunGroups<'_>) -> bool {
     let parameters = groups.parameters.len();
     parameters > 1 && (0..parameters).all(|p| groups.is_balanced(p))
 }
 
-type Chosen<'a> = (Vec<&'a RunColumn>, Vec<LeftOut>);
+type MetricSelection<'a> = (Vec<&'a RunColumn>, Vec<OmittedMetric>);
 
 /// Returns the metrics shown, and those that are not.
-fn chosen<'a>(groups: &Groups<'a>, options: &SummaryOptions) -> Result<Chosen<'a>, InputError> {
-    let all: Vec<&RunColumn> = groups.table.of_role(Role::Metric).collect();
+fn select_metrics<'a>(
+    groups: &RunGroups<'a>,
+    options: &SummaryOptions,
+) -> Result<MetricSelection<'a>, InputError> {
+    let all: Vec<&RunColumn> = groups.table.columns_with_role(Role::Metric).collect();
     if let Some(names) = &options.metrics {
-        return named(&all, names);
+        return metrics_by_name(&all, names);
     }
     let mut left_out = Vec::new();
     let mut shown: Vec<(f64, &RunColumn)> = Vec::new();
     for column in all {
-        match uninformative(column) {
-            Some(reason) => left_out.push(LeftOut { metric: column.name.clone(), reason }),
-            None => shown.push((explained(groups, column).unwrap_or(0.0), column)),
+        match omission_reason(column) {
+            Some(reason) => left_out.push(OmittedMetric { metric: column.name.clone(), reason }),
+            None => shown.push((explained_variance(groups, column).unwrap_or(0.0), column)),
         }
     }
     shown.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let beyond = shown.split_off(options.max_metrics.min(shown.len()));
     let reason = format!("beyond the {} most informative metrics", options.max_metrics);
     let beyond = beyond.into_iter().map(|(_, c)| c.name.clone());
-    left_out.extend(beyond.map(|metric| LeftOut { metric, reason: reason.clone() }));
+    left_out.extend(beyond.map(|metric| OmittedMetric { metric, reason: reason.clone() }));
     Ok((shown.into_iter().map(|(_, column)| column).collect(), left_out))
 }
 
-fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, InputError> {
+fn metrics_by_name<'a>(
+    all: &[&'a RunColumn],
+    names: &[String],
+) -> Result<MetricSelection<'a>, InputError> {
     let known: Vec<&str> = all.iter().map(|c| c.name.as_str()).collect();
     let mut shown: Vec<&RunColumn> = Vec::new();
     for name in names {
         let place = || format!("metrics {name}");
         let Some(column) = all.iter().find(|c| c.name == *name) else {
             let cause = format!("there is no metric `{name}`");
-            return Err(InputError::new(place(), cause, nearest(name, &known)));
+            return Err(InputError::new(place(), cause, suggestion(name, &known)));
         };
         if matches!(column.values, Values::Text(_)) {
             let cause = format!("the metric `{name}` is words, not numbers");
@@ -200,17 +206,17 @@ fn named<'a>(all: &[&'a RunColumn], names: &[String]) -> Result<Chosen<'a>, Inpu
     }
     let others = all.iter().filter(|c| !names.contains(&c.name));
     let left_out =
-        |c: &&RunColumn| LeftOut { metric: c.name.clone(), reason: NOT_ASKED_FOR.into() };
+        |c: &&RunColumn| OmittedMetric { metric: c.name.clone(), reason: NOT_REQUESTED.into() };
     Ok((shown, others.map(left_out).collect()))
 }
 
 /// Returns the reason why a metric is uninformative, if it is.
-fn uninformative(column: &RunColumn) -> Option<String> {
+fn omission_reason(column: &RunColumn) -> Option<String> {
     if matches!(column.values, Values::Text(_)) {
         return Some("words, not numbers".into());
     }
     let runs = column.values.len();
-    let sample = Sample::of((0..runs).map(|run| column.values.number(run)));
+    let sample = Sample::from_runs((0..runs).map(|run| column.values.number(run)));
     match sample.values.first() {
         None => Some(format!("no run has a value (n = {runs})")),
         // One run tells its own values, and nothing of their variation.
@@ -225,8 +231,8 @@ fn uninformative(column: &RunColumn) -> Option<String> {
 
 /// Returns epsilon squared of a metric over the variants, at least 0; `None` without degrees of
 /// freedom within.
-fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
-    let of = |variant| Sample::of(groups.values(column, variant)).values;
+fn explained_variance(groups: &RunGroups<'_>, column: &RunColumn) -> Option<f64> {
+    let of = |variant| Sample::from_runs(groups.values(column, variant)).values;
     let samples: Vec<Vec<f64>> = (0..groups.variants.len()).map(of).collect();
     let samples: Vec<&Vec<f64>> = samples.iter().filter(|s| !s.is_empty()).collect();
     let all: Vec<f64> = samples.iter().flat_map(|s| s.iter().copied()).collect();
@@ -241,10 +247,10 @@ fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
     Some((1.0 - mean_square_within).max(0.0))
 }
 
-fn summed(
-    groups: &Groups<'_>,
+fn summarize_metric(
+    groups: &RunGroups<'_>,
     column: &RunColumn,
-    reference: Option<&Reference>,
+    reference: Option<&BaselineIndex>,
     bootstrap: &Bootstrap,
     progress: &mut dyn FnMut(f64),
 ) -> MetricSummary {
@@ -254,31 +260,31 @@ fn summed(
     let bootstrap = (most <= BOOTSTRAP_RUNS).then_some(bootstrap);
     let describe = |v| {
         progress(v as f64 / count as f64);
-        described(groups, column, v, bootstrap)
+        metric_values(groups, column, v, bootstrap)
     };
     MetricSummary {
         name: column.name.clone(),
         label: groups.label(column),
         meaning: groups.meaning(column),
         is_share: matches!(column.values, Values::Bool(_)),
-        explained: explained(groups, column),
+        explained: explained_variance(groups, column),
         variants: variants.map(describe).collect(),
         comparisons: reference.map_or(Vec::new(), |r| comparisons(groups, column, r, bootstrap)),
         effects: effects(groups, column),
     }
 }
 
-fn described(
-    groups: &Groups<'_>,
+fn metric_values(
+    groups: &RunGroups<'_>,
     column: &RunColumn,
     variant: usize,
     bootstrap: Option<&Bootstrap>,
 ) -> VariantMetric {
-    let sample = Sample::of(groups.values(column, variant));
+    let sample = Sample::from_runs(groups.values(column, variant));
     let values = if matches!(column.values, Values::Bool(_)) {
-        Described::Share(share(&sample.values, groups.seedless[variant]))
+        MetricValues::Share(proportion(&sample.values, groups.seedless[variant]))
     } else {
-        Described::Numbers(numbers(&sample, bootstrap))
+        MetricValues::Numbers(numeric_summary(&sample, bootstrap))
     };
     VariantMetric {
         variant: groups.variants[variant].clone(),
@@ -290,13 +296,13 @@ fn described(
     }
 }
 
-fn share(values: &[f64], seedless: bool) -> Share {
+fn proportion(values: &[f64], seedless: bool) -> Proportion {
     let yes = values.iter().filter(|v| **v > 0.5).count();
     let interval = (!seedless).then(|| wilson(yes as f64, values.len() as f64));
-    Share { yes, share: mean(values), interval }
+    Proportion { yes, share: mean(values), interval }
 }
 
-fn numbers(sample: &Sample, bootstrap: Option<&Bootstrap>) -> Numbers {
+fn numeric_summary(sample: &Sample, bootstrap: Option<&Bootstrap>) -> NumericSummary {
     let values = &sample.values;
     let sorted = sample.sorted();
     let quantile = |q: &f64| {
@@ -304,7 +310,7 @@ fn numbers(sample: &Sample, bootstrap: Option<&Bootstrap>) -> Numbers {
         Some(Quantile { q: *q, value, interval: quantile_interval(&sorted, *q) })
     };
     let (center, sd) = (mean(values), sample_sd(values));
-    Numbers {
+    NumericSummary {
         mean: center,
         sd,
         interval: mean_interval(values),
@@ -319,7 +325,7 @@ fn numbers(sample: &Sample, bootstrap: Option<&Bootstrap>) -> Numbers {
 }
 
 /// Returns the main effects; with one parameter these are the variants themselves.
-fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
+fn effects(groups: &RunGroups<'_>, column: &RunColumn) -> Vec<Effect> {
     if groups.parameters.len() < 2 {
         return Vec::new();
     }
@@ -341,9 +347,9 @@ fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
 }
 
 /// Returns the note that a reader must know about the comparisons.
-fn note_on_baseline(groups: &Groups<'_>, against: Option<&Against>) -> Option<String> {
+fn baseline_note(groups: &RunGroups<'_>, against: Option<&BaselineChoice>) -> Option<String> {
     match against {
-        Some(Against::Matched { name, alone: alone @ 1.., .. }) => Some(format!(
+        Some(BaselineChoice::Matched { name, alone: alone @ 1.., .. }) => Some(format!(
             "No variant with {name} is equal to {alone} of the others in all else: these are not \
              compared."
         )),
@@ -358,10 +364,14 @@ fn note_on_baseline(groups: &Groups<'_>, against: Option<&Against>) -> Option<St
     }
 }
 
-fn notes(summary: &Summary, groups: &Groups<'_>, against: Option<&Against>) -> Vec<String> {
+fn notes(
+    summary: &Summary,
+    groups: &RunGroups<'_>,
+    against: Option<&BaselineChoice>,
+) -> Vec<String> {
     let mut notes = Vec::new();
-    notes.extend(note_on_baseline(groups, against));
-    let hidden: Vec<&LeftOut> =
+    notes.extend(baseline_note(groups, against));
+    let hidden: Vec<&OmittedMetric> =
         summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).collect();
     if !hidden.is_empty() {
         notes.push(format!("{} more metrics vary and are not shown.", hidden.len()));

@@ -11,11 +11,11 @@ use sidestep_document::{Estimate, Figure, Table};
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// The reason why a metric is not shown if others were requested.
-pub(super) const NOT_ASKED_FOR: &str = "not asked for";
+pub(super) const NOT_REQUESTED: &str = "not asked for";
 
 /// Runs that differ by their seeds alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Variant {
+pub struct VariantSummary {
     /// Its name.
     pub name: String,
     /// Number of its runs.
@@ -38,7 +38,7 @@ pub struct Quantile {
 
 /// A numeric metric of a variant.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Numbers {
+pub struct NumericSummary {
     /// Arithmetic mean.
     pub mean: Option<f64>,
     /// Standard deviation of the runs (divisor `n - 1`).
@@ -60,7 +60,7 @@ pub struct Numbers {
 
 /// A share of the runs of a variant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Share {
+pub struct Proportion {
     /// Number of runs for which it is true.
     pub yes: usize,
     /// Their share; absent without runs.
@@ -72,11 +72,11 @@ pub struct Share {
 /// The values of a metric, by kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Described {
+pub enum MetricValues {
     /// Numbers.
-    Numbers(Numbers),
+    Numbers(NumericSummary),
     /// Yes or no.
-    Share(Share),
+    Share(Proportion),
 }
 
 /// A metric in a variant.
@@ -93,7 +93,7 @@ pub struct VariantMetric {
     /// Whether seeds change nothing in the variant.
     pub seedless: bool,
     /// The description of the values.
-    pub values: Described,
+    pub values: MetricValues,
 }
 
 /// The marginal mean of a metric at one level of a parameter.
@@ -154,7 +154,7 @@ pub struct Trend {
 
 /// A metric that is not shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
+pub struct OmittedMetric {
     /// Its column.
     pub metric: String,
     /// The reason.
@@ -167,7 +167,7 @@ pub struct Summary {
     /// Number of runs.
     pub runs: usize,
     /// The variants.
-    pub variants: Vec<Variant>,
+    pub variants: Vec<VariantSummary>,
     /// The parameters that differ between variants.
     pub parameters: Vec<Parameter>,
     /// The name of the baseline of the variants; each comparison has the variant itself.
@@ -175,7 +175,7 @@ pub struct Summary {
     /// The metrics shown.
     pub metrics: Vec<MetricSummary>,
     /// The metrics that are not shown.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<OmittedMetric>,
     /// Correlations of metrics with parameters, if the variants are samples of a box of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trends: Vec<Trend>,
@@ -187,7 +187,7 @@ pub struct Summary {
 
 /// The part of the summary about one metric.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Section {
+pub struct MetricSection {
     /// Name of its column.
     pub name: String,
     /// The metric as text.

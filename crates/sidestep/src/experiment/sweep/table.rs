@@ -43,7 +43,7 @@ impl RunTable {
     }
 
     /// Returns the columns with this role, in order.
-    pub fn of_role(&self, role: Role) -> impl Iterator<Item = &RunColumn> {
+    pub fn columns_with_role(&self, role: Role) -> impl Iterator<Item = &RunColumn> {
         self.columns.iter().filter(move |c| c.role == role)
     }
 

@@ -1,6 +1,6 @@
 //! Guarantees of a summary, on tables with a known answer.
 
-use super::summary::Described;
+use super::summary::MetricValues;
 use super::*;
 use crate::statistics::Bootstrap;
 use proptest::prelude::*;
@@ -63,13 +63,13 @@ fn grid() -> RunTable {
 }
 
 fn summed(table: &RunTable) -> Summary {
-    Summary::of(table, &SummaryOptions::default()).unwrap()
+    Summary::from_table(table, &SummaryOptions::default()).unwrap()
 }
 
 /// The summary in which all are compared with the first variant.
 fn against_the_calmest(table: &RunTable) -> Summary {
-    let against = Some(Against::Variant("calm 10".into()));
-    Summary::of(table, &SummaryOptions { against, ..Default::default() }).unwrap()
+    let against = Some(BaselineChoice::Variant("calm 10".into()));
+    Summary::from_table(table, &SummaryOptions { against, ..Default::default() }).unwrap()
 }
 
 fn of<'a>(summary: &'a Summary, name: &str) -> &'a summary::MetricSummary {
@@ -85,12 +85,14 @@ fn what_parameters_move_comes_first_and_what_is_left_out_is_told() {
         summary.left_out.iter().map(|l| (l.metric.as_str(), l.reason.as_str())).collect();
     assert_eq!(left_out, [("lost", "0 in all runs (n = 120)"), ("reason", "words, not numbers")]);
     let one =
-        Summary::of(&grid(), &SummaryOptions { max_metrics: 1, ..Default::default() }).unwrap();
+        Summary::from_table(&grid(), &SummaryOptions { max_metrics: 1, ..Default::default() })
+            .unwrap();
     assert_eq!((one.metrics.len(), one.left_out.len()), (1, 4));
     let notes = ["Nothing is compared: several keys", "2 more metrics vary and are not shown."];
     assert!(one.notes.iter().zip(notes).all(|(note, begin)| note.starts_with(begin)), "{one:?}");
     let metrics = Some(vec!["lost".to_string(), "arrived".into()]);
-    let named = Summary::of(&grid(), &SummaryOptions { metrics, ..Default::default() }).unwrap();
+    let named =
+        Summary::from_table(&grid(), &SummaryOptions { metrics, ..Default::default() }).unwrap();
     assert_eq!(
         named.metrics.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
         ["lost", "arrived"]
@@ -102,7 +104,7 @@ fn pairs_cancel_what_replicates_have_in_common() {
     let summary = against_the_calmest(&grid());
     assert_eq!(summary.baseline.as_deref(), Some("calm 10"));
     let delay = of(&summary, "mean_delay_percent");
-    let Described::Numbers(alone) = &delay.variants[0].values else { panic!("numbers") };
+    let MetricValues::Numbers(alone) = &delay.variants[0].values else { panic!("numbers") };
     let rush = delay.comparisons.iter().find(|c| c.variant == "rush 10").unwrap();
     let interval = rush.interval.unwrap();
     assert!(interval.contains(3.0) && interval.half_width() < 0.25);
@@ -133,7 +135,7 @@ fn a_column_of_yes_and_no_is_a_share_with_wilsons_interval() {
     let summary = against_the_calmest(&grid());
     let arrived = of(&summary, "arrived");
     assert!(arrived.is_share);
-    let Described::Share(share) = &arrived.variants[0].values else { panic!("a share") };
+    let MetricValues::Share(share) = &arrived.variants[0].values else { panic!("a share") };
     assert_eq!(share.interval, Some(crate::statistics::wilson(share.yes as f64, 20.0)));
     let comparison = &arrived.comparisons[0];
     assert_eq!(comparison.p, comparison.p_sign, "McNemar's test");
@@ -285,8 +287,8 @@ fn the_order_of_rows_is_no_part_of_a_summary() {
 
 #[test]
 fn wrong_names_and_tables_are_refused_with_a_remedy() {
-    let refused = |options: SummaryOptions| Summary::of(&grid(), &options).unwrap_err();
-    let against = Some(Against::Variant("calm 11".into()));
+    let refused = |options: SummaryOptions| Summary::from_table(&grid(), &options).unwrap_err();
+    let against = Some(BaselineChoice::Variant("calm 11".into()));
     let error = refused(SummaryOptions { against, ..Default::default() });
     assert_eq!(error.cause(), "there is no variant `calm 11`");
     let metrics = Some(vec!["noise".to_string()]);
@@ -295,9 +297,9 @@ fn wrong_names_and_tables_are_refused_with_a_remedy() {
     let mut twice = grid();
     let replicate = twice.columns.iter_mut().find(|c| c.role == Role::Replicate).unwrap();
     replicate.values = Values::I64(vec![4; 120].into());
-    let error = Summary::of(&twice, &SummaryOptions::default()).unwrap_err();
+    let error = Summary::from_table(&twice, &SummaryOptions::default()).unwrap_err();
     assert_eq!(error.cause(), "variant `calm 10` has two runs of replicate 4");
-    let empty = Summary::of(&RunTable::default(), &SummaryOptions::default()).unwrap();
+    let empty = Summary::from_table(&RunTable::default(), &SummaryOptions::default()).unwrap();
     assert!(empty.tables().is_empty() && empty.figures().is_empty());
 }
 
@@ -335,7 +337,7 @@ proptest! {
         if replicate { columns.push(column("replicate", Role::Replicate, int(second.collect()))); }
         let bootstrap = Bootstrap { resamples: 60, ..Bootstrap::default() };
         let options = SummaryOptions { bootstrap, ..Default::default() };
-        if let Ok(summary) = Summary::of(&RunTable { columns }, &options) {
+        if let Ok(summary) = Summary::from_table(&RunTable { columns }, &options) {
             let _ = (summary.tables(), summary.figures());
         }
     }

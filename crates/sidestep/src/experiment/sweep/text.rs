@@ -2,10 +2,10 @@
 
 use super::Label;
 use super::compare::Comparison;
-use super::label::sentence;
+use super::label::capitalized;
 use super::summary::{
-    Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Section, Share, Summary,
-    VariantMetric,
+    MetricSection, MetricSummary, MetricValues, NOT_REQUESTED, NumericSummary, OmittedMetric,
+    Proportion, Quantile, Summary, VariantMetric,
 };
 use crate::statistics::Interval;
 use sidestep_document::{Estimate, Figure, Table};
@@ -37,10 +37,10 @@ impl Summary {
     }
 
     /// Returns the summary metric by metric.
-    pub fn sections(&self) -> Vec<Section> {
-        let section = |metric: &MetricSummary| Section {
+    pub fn sections(&self) -> Vec<MetricSection> {
+        let section = |metric: &MetricSummary| MetricSection {
             name: metric.name.clone(),
-            title: sentence(&metric.label),
+            title: capitalized(&metric.label),
             meaning: metric.meaning,
             figures: self
                 .figures
@@ -48,14 +48,14 @@ impl Summary {
                 .filter(|(of, _)| *of == metric.name)
                 .map(|(_, f)| f.clone())
                 .collect(),
-            tables: of_metric(self, metric).into_iter().map(Table::folded).collect(),
+            tables: metric_tables(self, metric).into_iter().map(Table::folded).collect(),
         };
         self.metrics.iter().map(section).collect()
     }
 
     /// Returns the metrics that are not shown, if there are any.
-    pub fn left_out(&self) -> Option<Table> {
-        left_out(self)
+    pub fn omitted_metrics(&self) -> Option<Table> {
+        omitted_metrics(self)
     }
 
     /// Returns the summary as figures: each metric over each parameter.
@@ -65,24 +65,24 @@ impl Summary {
 }
 
 fn tables(summary: &Summary) -> Vec<Table> {
-    let of_metrics = summary.metrics.iter().flat_map(|metric| of_metric(summary, metric));
-    of_metrics.chain(left_out(summary)).collect()
+    let of_metrics = summary.metrics.iter().flat_map(|metric| metric_tables(summary, metric));
+    of_metrics.chain(omitted_metrics(summary)).collect()
 }
 
 /// Returns a table per metric with the most important numbers: means and differences, each with its
 /// interval and number of runs.
 fn brief(summary: &Summary) -> Vec<Table> {
-    summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
+    summary.metrics.iter().map(|metric| brief_table(summary, metric)).collect()
 }
 
 /// Largest number of characters of a heading.
-const MOST_OF_HEADING: usize = 24;
+const MAX_HEADING_CHARS: usize = 24;
 
-fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
+fn brief_table(summary: &Summary, metric: &MetricSummary) -> Table {
     let minus = summary.baseline.as_ref().map(|name| format!("minus {name}"));
-    let titled = format!("{}: {}", sentence(&metric.label), metric.name);
+    let titled = format!("{}: {}", capitalized(&metric.label), metric.name);
     // A long name stands in the title.
-    let is_long = |words: &&String| words.chars().count() > MOST_OF_HEADING;
+    let is_long = |words: &&String| words.chars().count() > MAX_HEADING_CHARS;
     let (title, against) = match minus.as_ref().filter(is_long) {
         Some(words) => (format!("{titled}, difference: {words}"), Some("difference".into())),
         None => (titled, minus),
@@ -93,26 +93,27 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     columns.extend(against.as_ref().map(|_| "p (Holm)"));
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
-        let mut row = vec![variant.variant.clone(), variant.n.to_string(), center(variant)];
+        let mut row =
+            vec![variant.variant.clone(), variant.n.to_string(), center_with_interval(variant)];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
             let n = if c.seedless { String::new() } else { format!(" n={}", c.pairs) };
             row.push(difference(c) + &n);
-            row.push(c.p_holm.map_or("-".into(), p_value));
+            row.push(c.p_holm.map_or("-".into(), format_p_value));
         }
-        table.row(row);
+        table.push_row(row);
     }
     table
 }
 
 /// Returns the mean of a metric, or its share, with its interval.
-fn center(variant: &VariantMetric) -> String {
+fn center_with_interval(variant: &VariantMetric) -> String {
     let (value, interval) = match &variant.values {
-        Described::Numbers(numbers) => (numbers.mean, numbers.interval),
-        Described::Share(share) => (share.share, share.interval),
+        MetricValues::Numbers(numbers) => (numbers.mean, numbers.interval),
+        MetricValues::Share(share) => (share.share, share.interval),
     };
     match value {
         // A value that no seed changes has no spread.
-        Some(value) if variant.seedless => number(value, Some(0.0)),
+        Some(value) if variant.seedless => format_number(value, Some(0.0)),
         value => with_interval(value, interval),
     }
 }
@@ -131,29 +132,33 @@ fn overview(summary: &Summary) -> Table {
     let mut table = Table::new(title, "", &columns);
     for metric in &summary.metrics {
         for variant in &metric.variants {
-            let mut row = vec![sentence(&metric.label), variant.variant.clone(), center(variant)];
+            let mut row = vec![
+                capitalized(&metric.label),
+                variant.variant.clone(),
+                center_with_interval(variant),
+            ];
             if summary.baseline.is_some() {
-                row.extend(against(metric, &variant.variant));
+                row.extend(difference_cells(metric, &variant.variant));
             }
-            table.row(row.into_iter().chain([variant.n.to_string()]));
+            table.push_row(row.into_iter().chain([variant.n.to_string()]));
         }
     }
     table
 }
 
 /// Returns the difference of a variant from the baseline and its p; both empty for the baseline itself.
-fn against(metric: &MetricSummary, variant: &str) -> [String; 2] {
+fn difference_cells(metric: &MetricSummary, variant: &str) -> [String; 2] {
     let Some(found) = metric.comparisons.iter().find(|c| c.variant == variant) else {
         return [String::new(), String::new()];
     };
-    let p = found.p_holm.map_or("-".into(), p_value);
+    let p = found.p_holm.map_or("-".into(), format_p_value);
     [difference(found), p]
 }
 
 /// Returns the difference of a variant from its baseline; alone where seeds change nothing.
 fn difference(comparison: &Comparison) -> String {
     match comparison.difference {
-        Some(difference) if comparison.seedless => number(difference, Some(0.0)),
+        Some(difference) if comparison.seedless => format_number(difference, Some(0.0)),
         difference => with_interval(difference, comparison.interval),
     }
 }
@@ -166,13 +171,13 @@ fn trends(summary: &Summary) -> Table {
     let mut table = Table::new("What the metrics depend on", note, &columns);
     for trend in &summary.trends {
         let metric = summary.metrics.iter().find(|metric| metric.name == trend.metric);
-        let words = metric.map_or_else(|| trend.metric.clone(), |m| sentence(&m.label));
+        let words = metric.map_or_else(|| trend.metric.clone(), |m| capitalized(&m.label));
         let value = match trend.rank_correlation {
             Some(found) => with_interval(Some(found.value), found.interval),
             None => "-".into(),
         };
-        let over = Label::of(&trend.parameter).to_string();
-        table.row([words, over, value, trend.n.to_string()]);
+        let over = Label::from_name(&trend.parameter).to_string();
+        table.push_row([words, over, value, trend.n.to_string()]);
     }
     table
 }
@@ -182,30 +187,30 @@ fn footnotes(summary: &Summary) -> Vec<&'static str> {
     let mut notes = Vec::new();
     let has = |is_share: bool| summary.metrics.iter().any(|m| m.is_share == is_share);
     if has(false) {
-        notes.push(NUMBERS);
+        notes.push(INTERVALS_NOTE);
     }
     if has(true) {
-        notes.push(SHARES);
+        notes.push(PROPORTIONS_NOTE);
     }
     if summary.baseline.is_some() {
-        notes.push(DIFFERENCES);
+        notes.push(DIFFERENCES_NOTE);
     }
     if summary.metrics.iter().any(|metric| !metric.effects.is_empty()) {
-        notes.push(EFFECTS);
+        notes.push(EFFECTS_NOTE);
     }
     notes
 }
 
-const NUMBERS: &str = "95 % intervals stand in brackets: of a mean by Student's t and by the bootstrap \
+const INTERVALS_NOTE: &str = "95 % intervals stand in brackets: of a mean by Student's t and by the bootstrap \
                        (BCa), of quantiles by order statistics; `-` where n is too small for one. n: runs \
                        with a value. sd, min and max describe these very runs. `for ±5 %`: runs that would \
                        narrow Student's interval to 5 % of the mean to either side, if runs go on to vary by \
                        this sd.";
 
-const SHARES: &str = "Of a metric that is yes or no, the share of runs of which it is true, with Wilson's \
+const PROPORTIONS_NOTE: &str = "Of a metric that is yes or no, the share of runs of which it is true, with Wilson's \
                       95 % interval.";
 
-const DIFFERENCES: &str = "Differences are variant minus baseline, replicate by replicate on the same seeds; \
+const DIFFERENCES_NOTE: &str = "Differences are variant minus baseline, replicate by replicate on the same seeds; \
                            95 % intervals by Student's t, then by the bootstrap (BCa); of the ratio of means \
                            by Fieller's method, where no value is negative and the baseline's mean is well \
                            away from 0. `lower`, `higher`: pairs in which the variant is. p: of no difference \
@@ -213,12 +218,12 @@ const DIFFERENCES: &str = "Differences are variant minus baseline, replicate by 
                            Holm over the comparisons of one metric; over several metrics chances add up. `-`: \
                            the pairs do not give it.";
 
-const EFFECTS: &str = "Main effects are means over all variants that have the level; n: replicates of which all \
+const EFFECTS_NOTE: &str = "Main effects are means over all variants that have the level; n: replicates of which all \
                        these variants have a value. Each replicate counts as one, since its variants share \
                        their seeds.";
 
 /// Returns the tables of a metric.
-fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
+fn metric_tables(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
     let mut tables = vec![values(metric)];
     if let Some(baseline) = &summary.baseline {
         tables.push(differences(metric, baseline));
@@ -230,7 +235,7 @@ fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
 }
 
 fn values(metric: &MetricSummary) -> Table {
-    if metric.is_share { shares(metric) } else { numbers(metric) }
+    if metric.is_share { proportions(metric) } else { numbers(metric) }
 }
 
 fn numbers(metric: &MetricSummary) -> Table {
@@ -250,25 +255,26 @@ fn numbers(metric: &MetricSummary) -> Table {
         "missing",
         "for ±5 %",
     ];
-    let mut table = Table::new(format!("{}: all numbers", sentence(&metric.label)), "", &columns);
+    let mut table =
+        Table::new(format!("{}: all numbers", capitalized(&metric.label)), "", &columns);
     for variant in &metric.variants {
-        if let Described::Numbers(numbers) = &variant.values {
-            table.row(number_row(variant, numbers));
+        if let MetricValues::Numbers(numbers) = &variant.values {
+            table.push_row(number_row(variant, numbers));
         }
     }
     table
 }
 
-fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
+fn number_row(variant: &VariantMetric, numbers: &NumericSummary) -> Vec<String> {
     let width = numbers.interval.map(|i| i.half_width());
-    let plain = |value: Option<f64>| value.map_or("-".into(), |v| number(v, width));
+    let plain = |value: Option<f64>| value.map_or("-".into(), |v| format_number(v, width));
     let quantile = |k: usize| numbers.quantiles.get(k).map_or("-".into(), |q| quantile(q, width));
-    let bootstrap = numbers.bootstrap.map_or("-".into(), brackets);
+    let bootstrap = numbers.bootstrap.map_or("-".into(), format_interval);
     let needed = numbers.runs_for_5_percent.map_or("-".into(), |n| n.to_string());
     vec![
         variant.variant.clone(),
         variant.n.to_string(),
-        center(variant),
+        center_with_interval(variant),
         quantile(2),
         plain(numbers.sd),
         plain(numbers.min),
@@ -286,19 +292,25 @@ fn number_row(variant: &VariantMetric, numbers: &Numbers) -> Vec<String> {
 fn quantile(quantile: &Quantile, width: Option<f64>) -> String {
     match quantile.interval {
         Some(found) => with_interval(Some(quantile.value), Some(found.interval)),
-        None => format!("{} [-]", number(quantile.value, width)),
+        None => format!("{} [-]", format_number(quantile.value, width)),
     }
 }
 
-fn shares(metric: &MetricSummary) -> Table {
+fn proportions(metric: &MetricSummary) -> Table {
     let columns = ["variant", "n", "share", "runs", "missing"];
-    let title = format!("{}: all numbers", sentence(&metric.label));
+    let title = format!("{}: all numbers", capitalized(&metric.label));
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
-        if let Described::Share(Share { yes, .. }) = variant.values {
+        if let MetricValues::Share(Proportion { yes, .. }) = variant.values {
             let [n, yes, missing] =
                 [variant.n, yes, variant.missing].map(|count| count.to_string());
-            table.row([variant.variant.clone(), n, center(variant), yes, missing]);
+            table.push_row([
+                variant.variant.clone(),
+                n,
+                center_with_interval(variant),
+                yes,
+                missing,
+            ]);
         }
     }
     table
@@ -318,19 +330,19 @@ fn differences(metric: &MetricSummary, baseline: &str) -> Table {
         "incomplete",
     ];
     let mut table =
-        Table::new(format!("{}: against {baseline}", sentence(&metric.label)), "", &columns);
-    metric.comparisons.iter().for_each(|c| table.row(difference_row(c)));
+        Table::new(format!("{}: against {baseline}", capitalized(&metric.label)), "", &columns);
+    metric.comparisons.iter().for_each(|c| table.push_row(difference_row(c)));
     table
 }
 
 fn difference_row(comparison: &Comparison) -> Vec<String> {
-    let interval = |i: Option<Interval>| i.map_or("-".into(), brackets);
+    let interval = |i: Option<Interval>| i.map_or("-".into(), format_interval);
     let of_pairs = |count: usize| format!("{count} of {}", comparison.pairs);
     vec![
         comparison.variant.clone(),
         comparison.pairs.to_string(),
         difference(comparison),
-        comparison.p_holm.map_or("-".into(), p_value),
+        comparison.p_holm.map_or("-".into(), format_p_value),
         of_pairs(comparison.lower),
         of_pairs(comparison.higher),
         with_interval(comparison.ratio, comparison.ratio_interval),
@@ -342,26 +354,27 @@ fn difference_row(comparison: &Comparison) -> Vec<String> {
 
 fn effects(metric: &MetricSummary) -> Table {
     let columns = ["parameter", "level", "variants", "marginal mean", "n"];
-    let mut table = Table::new(format!("{}: main effects", sentence(&metric.label)), "", &columns);
+    let mut table =
+        Table::new(format!("{}: main effects", capitalized(&metric.label)), "", &columns);
     for effect in &metric.effects {
         for level in &effect.levels {
             let Estimate { mean, interval, n, .. } = level.estimate;
             let cells = [effect.parameter.clone(), level.level.name(), level.variants.to_string()];
-            table.row(cells.into_iter().chain([with_interval(mean, interval), n.to_string()]));
+            table.push_row(cells.into_iter().chain([with_interval(mean, interval), n.to_string()]));
         }
     }
     table
 }
 
 /// Returns the reasons why metrics are not shown, if there are such metrics.
-fn left_out(summary: &Summary) -> Option<Table> {
+fn omitted_metrics(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
-    let asked = |l: &&LeftOut| l.reason != NOT_ASKED_FOR;
+    let asked = |l: &&OmittedMetric| l.reason != NOT_REQUESTED;
     summary
         .left_out
         .iter()
         .filter(asked)
-        .for_each(|l| table.row([l.metric.clone(), l.reason.clone()]));
+        .for_each(|l| table.push_row([l.metric.clone(), l.reason.clone()]));
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -371,20 +384,20 @@ pub(super) fn with_interval(value: Option<f64>, interval: Option<Interval>) -> S
     match interval {
         Some(interval) => {
             let width = interval.half_width();
-            format!("{} {}", number(value, Some(width)), brackets(interval))
+            format!("{} {}", format_number(value, Some(width)), format_interval(interval))
         }
-        None => format!("{} [-]", number(value, None)),
+        None => format!("{} [-]", format_number(value, None)),
     }
 }
 
-fn brackets(interval: Interval) -> String {
-    let end = |value| number(value, Some(interval.half_width()));
+fn format_interval(interval: Interval) -> String {
+    let end = |value| format_number(value, Some(interval.half_width()));
     format!("[{}, {}]", end(interval.low), end(interval.high))
 }
 
 /// Formats a number with two digits of the half width of its interval: more would be noise, fewer
 /// would hide the interval. Without a width it has four digits.
-fn number(value: f64, half_width: Option<f64>) -> String {
+fn format_number(value: f64, half_width: Option<f64>) -> String {
     let width = half_width.filter(|w| *w > 0.0 && w.is_finite());
     let scale = width.unwrap_or(value.abs() * 0.01);
     if value == 0.0 && width.is_none() {
@@ -405,7 +418,7 @@ fn number(value: f64, half_width: Option<f64>) -> String {
     if text.trim_matches(['-', '0', '.']).is_empty() { text.replace('-', "") } else { text }
 }
 
-fn p_value(p: f64) -> String {
+fn format_p_value(p: f64) -> String {
     if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
 }
 
@@ -425,7 +438,7 @@ mod tests {
         assert_eq!(with_interval(Some(12.345), None), "12.35 [-]");
         assert_eq!(with_interval(None, None), "-");
         assert_eq!(shown(0.0, f64::NEG_INFINITY, f64::INFINITY), "0 [-inf, inf]");
-        assert_eq!(p_value(0.00001), "< 0.0001");
-        assert_eq!(p_value(0.0312), "0.0312");
+        assert_eq!(format_p_value(0.00001), "< 0.0001");
+        assert_eq!(format_p_value(0.0312), "0.0312");
     }
 }

@@ -1,17 +1,17 @@
 //! A scenario and its variants: settings, and perhaps a name.
 
-use crate::scenario::{Seeds, Source};
+use crate::scenario::{SeedEffect, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use std::fmt;
 use toml::Value;
 
 /// The value of a key that a variant does not set, as tables write it.
-pub(super) const DEFAULT: &str = "(default)";
+pub(super) const DEFAULT_LABEL: &str = "(default)";
 
 /// The scenario of which variants are run, before their settings.
 #[derive(Debug, Clone, Copy)]
-pub struct Base<'a> {
+pub struct BaseScenario<'a> {
     /// Name of its world.
     pub world: &'a str,
     /// Its seed.
@@ -70,7 +70,7 @@ pub struct Variant {
     pub named: usize,
     /// The effect of another seed on its runs.
     #[serde(default)]
-    pub seeds: Seeds,
+    pub seeds: SeedEffect,
     /// Its settings, beside those that all variants share.
     pub settings: Vec<Setting>,
 }
@@ -87,7 +87,7 @@ impl From<Vec<Setting>> for Variant {
 
 impl Variant {
     /// Returns a variant with a name that stands for its settings.
-    pub fn called(name: impl Into<String>, settings: Vec<Setting>) -> Self {
+    pub fn with_name(name: impl Into<String>, settings: Vec<Setting>) -> Self {
         Self { name: Some(name.into()), named: settings.len(), ..settings.into() }
     }
 
@@ -114,7 +114,7 @@ impl Variant {
     }
 
     /// Returns the variant with further settings, which its name does not stand for.
-    pub(super) fn and(&self, more: &Self) -> Self {
+    pub(super) fn with_settings_of(&self, more: &Self) -> Self {
         let settings = [self.settings.clone(), more.settings.clone()].concat();
         Self { settings, ..self.clone() }
     }

@@ -36,7 +36,7 @@ fn a_snake_in_space_has_the_same_bits_however_it_is_run() {
 #[test]
 fn broken_chains_and_changes_have_the_same_bits_however_they_are_run() {
     assert_d1::<2>(BROKEN, 120, &[9, 10, 11, 19, 20, 21, 40, 80]);
-    assert_d1::<2>(TOLD, 400, &[0, 39, 40, 41, 60, 61, 200]);
+    assert_d1::<2>(REPORTING, 400, &[0, 39, 40, 41, 60, 61, 200]);
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn assert_same_end<const D: usize>(seed: u64, one: &str, other: &str, cycles: u6
         let mut run = run::<D>(&source(seed, text), 1);
         advance_to(&mut run, cycles);
         let points: Vec<_> = run.state().body(0).chain.points().to_vec();
-        (points, run.world().metrics_of(run.state(), 0))
+        (points, run.world().chain_metrics(run.state(), 0))
     });
     assert_eq!(one.0, other.0, "{seed}");
     let counts =
@@ -110,7 +110,7 @@ fn the_golden_digests_of_chains_are_what_every_machine_gets() {
         + &digest::<2>("swarm", SWARM)
         + &digest::<3>("snake", SNAKE)
         + &digest::<2>("broken", BROKEN)
-        + &digest::<2>("told", TOLD);
+        + &digest::<2>("told", REPORTING);
     assert_eq!(found, include_str!("../golden/serpentine.txt"), "found:\n{found}");
 }
 
@@ -134,6 +134,6 @@ fn arms_of_joints_have_the_same_bits_however_they_are_run() {
     assert_d1::<3>(&text, 300, &[0, 1, 60, 120, 180, 240, 299]);
     let mut run = run::<3>(&source(1, &text), 1);
     advance_to(&mut run, 300);
-    let arms = [0, 1].map(|slot| run.world().metrics_of(run.state(), slot));
+    let arms = [0, 1].map(|slot| run.world().chain_metrics(run.state(), slot));
     assert!(arms.iter().any(|arm| arm.tally.rungs.planned > 0), "one plans");
 }

@@ -14,8 +14,8 @@ use std::ops::{Deref, DerefMut};
 mod arms;
 mod bits;
 mod recount;
+mod reports;
 mod team;
-mod told;
 mod wheels;
 
 /// Four chains that wander among pillars in a room of 5 m, and often come near each other.
@@ -179,7 +179,7 @@ lasts_s = 1.0
 ";
 
 /// Two tasks of an operator, one of targets, and connectors that break down.
-pub(crate) const TOLD: &str = "
+pub(crate) const REPORTING: &str = "
 [chain]
 dt_s = 0.05
 [[obstacles]]
@@ -291,9 +291,9 @@ pub(crate) fn source(seed: u64, text: &str) -> Source {
 
 /// A run with a state that tests look into. It stays behind the face of all worlds, so that the chain
 /// is not compiled once more for its tests.
-struct Running<const D: usize>(Box<dyn Simulation>);
+struct TestRun<const D: usize>(Box<dyn Simulation>);
 
-impl<const D: usize> Running<D> {
+impl<const D: usize> TestRun<D> {
     fn state(&self) -> &ChainState<D> {
         self.chains().state()
     }
@@ -312,7 +312,7 @@ impl<const D: usize> Running<D> {
     }
 }
 
-impl<const D: usize> Deref for Running<D> {
+impl<const D: usize> Deref for TestRun<D> {
     type Target = dyn Simulation;
 
     fn deref(&self) -> &dyn Simulation {
@@ -320,21 +320,21 @@ impl<const D: usize> Deref for Running<D> {
     }
 }
 
-impl<const D: usize> DerefMut for Running<D> {
+impl<const D: usize> DerefMut for TestRun<D> {
     fn deref_mut(&mut self) -> &mut dyn Simulation {
         &mut *self.0
     }
 }
 
-fn run<const D: usize>(source: &Source, workers: usize) -> Running<D> {
+fn run<const D: usize>(source: &Source, workers: usize) -> TestRun<D> {
     let mut run = chain_run(source, workers).unwrap_or_else(|e| panic!("{e}"));
     let chains: &mut dyn Any = &mut *run;
-    chains.downcast_mut::<ChainRun<D>>().expect("of that many dimensions").share_always();
-    Running(run)
+    chains.downcast_mut::<ChainRun<D>>().expect("of that many dimensions").force_parallel();
+    TestRun(run)
 }
 
 /// Advances the run to a cycle, or to the end of all tasks.
-fn advance_to<const D: usize>(run: &mut Running<D>, cycle: u64) {
+fn advance_to<const D: usize>(run: &mut TestRun<D>, cycle: u64) {
     while run.cycle() < cycle && !run.is_over() {
         let left = cycle - run.cycle();
         run.advance(left);
@@ -345,9 +345,9 @@ fn recorded<const D: usize>(
     source: &Source,
     workers: usize,
     cycles: u64,
-) -> (Running<D>, MemoryRecorder) {
+) -> (TestRun<D>, MemoryRecorder) {
     let mut run = run::<D>(source, workers);
-    run.begin_recording();
+    run.start_recording();
     let mut recorder = MemoryRecorder::new(&run.schemas());
     while run.cycle() < cycles && !run.is_over() {
         let left = cycles - run.cycle();
@@ -359,8 +359,8 @@ fn recorded<const D: usize>(
 }
 
 /// The outcome of each chain; nothing in it is about time that was spent.
-fn outcome<const D: usize>(run: &Running<D>) -> String {
-    let one = |slot| format!("{:?}", run.world().metrics_of(run.state(), slot));
+fn outcome<const D: usize>(run: &TestRun<D>) -> String {
+    let one = |slot| format!("{:?}", run.world().chain_metrics(run.state(), slot));
     (0..run.state().len()).map(one).collect()
 }
 

@@ -41,7 +41,7 @@ fn are_far<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> bool {
 }
 
 /// Connectors and rods of a chain as capsules.
-fn parts<const D: usize>(run: &Running<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
+fn parts<const D: usize>(run: &TestRun<D>, slot: usize) -> Vec<([[f64; D]; 2], f64)> {
     let body = run.state().body(slot);
     let (points, chain) = (body.chain.points(), &body.chain);
     let balls = points.iter().zip(chain.connectors()).map(|(p, c)| ([*p; 2], c.radius_m));
@@ -50,7 +50,7 @@ fn parts<const D: usize>(run: &Running<D>, slot: usize) -> Vec<([[f64; D]; 2], f
 }
 
 /// The least distance of a chain from balls.
-fn clearance<const D: usize>(run: &Running<D>, slot: usize, balls: &[([f64; D], f64)]) -> f64 {
+fn clearance<const D: usize>(run: &TestRun<D>, slot: usize, balls: &[([f64; D], f64)]) -> f64 {
     let least = |(ends, radius_m): ([[f64; D]; 2], f64)| {
         let to = |(at, r): &([f64; D], f64)| to_segment(*at, ends) - r - radius_m;
         balls.iter().map(to).fold(f64::INFINITY, f64::min)
@@ -59,10 +59,10 @@ fn clearance<const D: usize>(run: &Running<D>, slot: usize, balls: &[([f64; D], 
 }
 
 /// All balls of a world at a cycle.
-pub(super) fn balls<const D: usize>(run: &Running<D>, cycle: u64) -> Vec<([f64; D], f64)> {
+pub(super) fn balls<const D: usize>(run: &TestRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
     use sidestep::worlds::chain::geometry::Core;
     let world = run.world();
-    let moving: Vec<_> = world.movers.at(world.starts_s(cycle)).collect();
+    let moving: Vec<_> = world.movers.at(world.start_time_s(cycle)).collect();
     let all = world.obstacles.still().iter().chain(&moving);
     let ball = |core: &Core<D>, radius_m: f64| match core {
         Core::Point(at) => (*at, radius_m),

@@ -1,83 +1,94 @@
 //! Closest approaches of pairs of airplanes, whether the method flies them or not.
 
-use super::flight::{Flight, Moment};
+use super::flight::{AircraftMotion, SubStep};
 use crate::Scratch;
 use crate::events::{Event, EventKind};
-use crate::flight::{Approach, Leg, Zone, distance_m, is_lost};
+use crate::flight::{Approach, Leg, Zone, distance_m, is_separation_lost};
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
 
 /// Pairs farther apart than this many separations are not recorded.
-const WORTH_NOTING: f64 = 4.0;
+const MAX_RECORDED_SEPARATIONS: f64 = 4.0;
 /// Part of a step below which two times count as the same.
 const ROUNDING: f64 = 1e-6;
 
 /// Records the distances of all pairs during a step.
-pub(super) fn book(
+pub(super) fn record_distances(
     world: &AirspaceWorld,
-    flights: &[Flight<'_>],
-    moment: Moment,
+    flights: &[AircraftMotion<'_>],
+    moment: SubStep,
     scratch: &mut Scratch,
 ) {
-    let flying = flights.iter().enumerate().filter(|(_, flight)| flight.ended.is_none());
+    let flying = flights.iter().enumerate().filter(|(_, flight)| flight.end.is_none());
     // Sorted from west to east, so that only neighbors have to be compared.
     let mut by_x: Vec<(f64, usize)> = flying.map(|(k, flight)| (flight.pose.at[0], k)).collect();
     by_x.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let most_m = most_worth_noting_m(world, flights);
+    let most_m = max_recorded_m(world, flights);
     for (k, &(x_m, i)) in by_x.iter().enumerate() {
         for &(_, j) in by_x[k + 1..].iter().take_while(|(other_m, _)| other_m - x_m <= most_m) {
             let (a, b) = (&flights[i.min(j)], &flights[i.max(j)]);
-            if is_worth_noting(world, a, b) {
-                note(a, b, closest(world, a, b, moment), moment, scratch);
+            if is_recorded(world, a, b) {
+                record_pair(a, b, closest_approach(world, a, b, moment), moment, scratch);
             }
         }
     }
 }
 
 /// Stores the record of a pair in one step.
-fn note(a: &Flight<'_>, b: &Flight<'_>, record: PairRecord, moment: Moment, scratch: &mut Scratch) {
+fn record_pair(
+    a: &AircraftMotion<'_>,
+    b: &AircraftMotion<'_>,
+    record: PairRecord,
+    moment: SubStep,
+    scratch: &mut Scratch,
+) {
     if record.nearest_m.is_infinite() {
         return;
     }
     if record.losses > 0 {
-        let event = Event::of_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
-        scratch.events.push(event.with(record.nearest_m));
+        let event = Event::new_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
+        scratch.events.push(event.with_value(record.nearest_m));
     }
     scratch.pairs.entry((a.slot, b.slot)).and_modify(|r| r.add(record)).or_insert(record);
 }
 
 /// Returns a distance in meters beyond which no two airplanes are worth noting.
-fn most_worth_noting_m(world: &AirspaceWorld, flights: &[Flight<'_>]) -> f64 {
+fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftMotion<'_>]) -> f64 {
     let most = |of: &dyn Fn(usize) -> f64| {
         flights.iter().map(|flight| of(flight.slot as usize)).fold(0.0, f64::max)
     };
     let gap_m = most(&|slot| world.airplanes[slot].model.separation_m);
     let step_m = 2.0 * most(&|slot| world.top_m_s[slot]) * world.timing.dtau_s;
-    WORTH_NOTING * gap_m + step_m
+    MAX_RECORDED_SEPARATIONS * gap_m + step_m
 }
 
 /// Returns whether two airplanes may come so near within a step that it is to be recorded.
-fn is_worth_noting(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> bool {
+fn is_recorded(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> bool {
     let dtau_s = world.timing.dtau_s;
     let step_m = (world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize]) * dtau_s;
-    distance_m(a.pose.at, b.pose.at) <= WORTH_NOTING * gap_m(world, a, b) + step_m
-        && a.levels(dtau_s).meets(&b.levels(dtau_s), world.vertical_m)
+    distance_m(a.pose.at, b.pose.at) <= MAX_RECORDED_SEPARATIONS * gap_m(world, a, b) + step_m
+        && a.levels(dtau_s).overlaps(&b.levels(dtau_s), world.vertical_m)
 }
 
 /// Returns the separation of a pair in meters.
-fn gap_m(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>) -> f64 {
-    let own_m = |f: &Flight<'_>| world.airplanes[f.slot as usize].model.separation_m;
+fn gap_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> f64 {
+    let own_m = |f: &AircraftMotion<'_>| world.airplanes[f.slot as usize].model.separation_m;
     own_m(a).max(own_m(b))
 }
 
 /// Returns the record of a pair in one step.
-fn closest(world: &AirspaceWorld, a: &Flight<'_>, b: &Flight<'_>, moment: Moment) -> PairRecord {
+fn closest_approach(
+    world: &AirspaceWorld,
+    a: &AircraftMotion<'_>,
+    b: &AircraftMotion<'_>,
+    moment: SubStep,
+) -> PairRecord {
     let zone = Zone { gap_m: gap_m(world, a, b), vertical_m: world.vertical_m };
     // A loss continues from the end of the step before; there is no step before when one of the two
     // has just come into the air.
     let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
     let firsts = a.legs.first().zip(b.legs.first());
-    let goes_on = !begins && firsts.is_some_and(|(a, b)| is_lost(a, b, 0.0, zone));
+    let goes_on = !begins && firsts.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, zone));
     let mut approach = Approach::new(goes_on.then_some(0.0));
     for one in &a.legs {
         let meets = |other: &&Leg| one.from_s < other.until_s && other.from_s < one.until_s;

@@ -1,105 +1,121 @@
 //! One process that decides for all airplanes of a group.
 
-use crate::Turn;
-use crate::avoid::Beset;
-use crate::decide::{Considered, Manner, alone, as_decided, by_velocity, direct};
+use crate::PhaseContext;
+use crate::avoid::NonCooperativeAvoidance;
+use crate::decide::{
+    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_choice,
+    candidates_by_velocity, decide_centrally,
+};
 use crate::events::{Event, EventKind};
-use crate::flight::Known;
-use crate::intruder::Intruder;
-use crate::pilot::{Control, Course, Memory, Optimized, Own};
-use crate::shield::{Certainty, Flyer, Way, filter};
+use crate::flight::KnownAircraft;
+use crate::non_cooperative::NonCooperative;
+use crate::pilot::{Control, Maneuver, Memory, OptimizerStats, OwnshipState};
+use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Slot;
 
 /// Decides for the airplanes of a group. Returns the control of each, and the ways that it has considered.
-pub(super) fn decided(
-    turn: &mut Turn<'_>,
-    own: &[Own],
-    intruders: &[Intruder],
-) -> Vec<(Control, Considered)> {
+pub(super) fn decide(
+    turn: &mut PhaseContext<'_>,
+    own: &[OwnshipState],
+    intruders: &[NonCooperative],
+) -> Vec<(Control, ManeuverCandidates)> {
     let (world, clock) = (turn.world, turn.clock);
     let began_ns = clock.thread_cpu_ns();
-    let mut all = wanted(turn, own, intruders);
+    let mut all = decide_wishes(turn, own, intruders);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
     let courses = match world.shield {
-        true => shielded(world, own, intruders, &all),
-        false => own.iter().zip(&all).map(|(own, (_, one))| unshielded(own, one)).collect(),
+        true => shielded_maneuvers(world, own, intruders, &all),
+        false => {
+            own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
+        }
     };
     all.iter_mut().zip(courses).for_each(|((control, _), course)| control.course = course);
     all
 }
 
 /// Returns the wishes of the airplanes of a group, and controls that lack only the course.
-fn wanted(turn: &mut Turn<'_>, own: &[Own], intruders: &[Intruder]) -> Vec<(Control, Considered)> {
-    let Turn { world, state, now, .. } = *turn;
+fn decide_wishes(
+    turn: &mut PhaseContext<'_>,
+    own: &[OwnshipState],
+    intruders: &[NonCooperative],
+) -> Vec<(Control, ManeuverCandidates)> {
+    let PhaseContext { world, state, now, .. } = *turn;
     let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
-    let group: Vec<Known> = own.iter().map(Own::known).collect();
+    let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::known_aircraft).collect();
     let mut memories = state.take_memories(&slots);
-    let manner = Manner::of(world, &group, intruders.len());
-    let considered: Vec<Considered> = match manner {
-        Manner::Alone | Manner::TooMany => {
-            own.iter().map(|own| alone(world, own.known(), own.wish.as_ref())).collect()
-        }
-        Manner::Reacting => reacting(world, &group, intruders, &mut memories),
-        Manner::Optimizing => {
-            let decided = direct(world, &group, intruders, now);
+    let manner = DecisionStrategy::for_group(world, &group, intruders.len());
+    let considered: Vec<ManeuverCandidates> = match manner {
+        DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => own
+            .iter()
+            .map(|own| candidates_alone(world, own.known_aircraft(), own.wish.as_ref()))
+            .collect(),
+        DecisionStrategy::Reactive => decide_reactively(world, &group, intruders, &mut memories),
+        DecisionStrategy::Joint => {
+            let decided = decide_centrally(world, &group, intruders, now);
             let all = group.iter().zip(decided);
-            all.map(|(known, decided)| as_decided(world, *known, decided)).collect()
+            all.map(|(known, decided)| candidates_by_choice(world, *known, decided)).collect()
         }
     };
-    let control = |(slot, memory)| Control::orbit(slot, now, memory);
+    let control = |(slot, memory)| Control::stay_on_orbit(slot, now, memory);
     let mut controls: Vec<Control> = slots.into_iter().zip(memories).map(control).collect();
-    if manner == Manner::Optimizing {
+    if manner == DecisionStrategy::Joint {
         for (control, considered) in controls.iter_mut().zip(&considered) {
-            control.optimized = Some(Optimized::of(considered.decided.as_ref()));
+            control.optimized = Some(OptimizerStats::from_choice(considered.decided.as_ref()));
         }
     }
-    if let Some(first) = controls.first_mut().filter(|_| manner == Manner::TooMany) {
-        let event = Event::of(now, EventKind::GroupTooLarge, first.id);
-        first.events.push(event.with(own.len() as f64));
+    if let Some(first) = controls.first_mut().filter(|_| manner == DecisionStrategy::GroupTooLarge)
+    {
+        let event = Event::new(now, EventKind::GroupTooLarge, first.id);
+        first.events.push(event.with_value(own.len() as f64));
     }
     controls.into_iter().zip(considered).collect()
 }
 
 /// Returns the wishes of the airplanes of a group by a method that gives them headings.
-fn reacting(
+fn decide_reactively(
     world: &AirspaceWorld,
-    group: &[Known],
-    intruders: &[Intruder],
+    group: &[KnownAircraft],
+    intruders: &[NonCooperative],
     memories: &mut [Memory],
-) -> Vec<Considered> {
+) -> Vec<ManeuverCandidates> {
     let take = |memory: &mut Memory| std::mem::take(&mut memory.resolving);
     let mut resolving: Vec<_> = memories.iter_mut().map(take).collect();
-    let considered = by_velocity(world, group, intruders, &mut resolving);
+    let considered = candidates_by_velocity(world, group, intruders, &mut resolving);
     memories.iter_mut().zip(resolving).for_each(|(memory, kept)| memory.resolving = kept);
     considered
 }
 
 /// Returns the course of an airplane that flies its first wish.
-fn unshielded(own: &Own, considered: &Considered) -> Course {
+fn unshielded_maneuver(own: &OwnshipState, considered: &ManeuverCandidates) -> Maneuver {
     let way = considered.ways.first().cloned().unwrap_or_default();
-    Course::Way { wish: 0, way, side: own.fallback }
+    Maneuver::Way { wish: 0, way, side: own.fallback }
 }
 
 /// Returns the courses that the shield allows to the airplanes of a group.
-fn shielded(
+fn shielded_maneuvers(
     world: &AirspaceWorld,
-    own: &[Own],
-    intruders: &[Intruder],
-    all: &[(Control, Considered)],
-) -> Vec<Course> {
-    let flyers: Vec<Flyer> = own.iter().map(|own| own.flyer(world)).collect();
+    own: &[OwnshipState],
+    intruders: &[NonCooperative],
+    all: &[(Control, ManeuverCandidates)],
+) -> Vec<Maneuver> {
+    let flyers: Vec<ShieldedAircraft> =
+        own.iter().map(|own| own.shielded_aircraft(world)).collect();
     let dtau_s = world.timing.dtau_s;
-    let allowed = |((own, flyer), (_, one)): ((&Own, &Flyer), &(Control, Considered))| {
-        Beset::new(flyer, intruders, dtau_s).allowed(&one.ways, || own.on_orbit(world))
+    let allowed = |((own, flyer), (_, one)): (
+        (&OwnshipState, &ShieldedAircraft),
+        &(Control, ManeuverCandidates),
+    )| {
+        NonCooperativeAvoidance::new(flyer, intruders, dtau_s)
+            .allowed_profiles(&one.ways, || own.orbit_profile(world))
     };
     let allowed: Vec<Vec<usize>> = own.iter().zip(&flyers).zip(all).map(allowed).collect();
-    let candidates = |(allowed, (_, one)): (&Vec<usize>, &(Control, Considered))| {
+    let candidates = |(allowed, (_, one)): (&Vec<usize>, &(Control, ManeuverCandidates))| {
         allowed.iter().map(|&k| one.ways[k].clone()).collect()
     };
-    let candidates: Vec<Vec<Way>> = allowed.iter().zip(all).map(candidates).collect();
+    let candidates: Vec<Vec<TurnProfile>> = allowed.iter().zip(all).map(candidates).collect();
     let steps = world.timing.points_per_dt();
-    let decisions = filter(&flyers, &candidates, steps, dtau_s, Certainty::Sure);
+    let decisions = filter(&flyers, &candidates, steps, dtau_s, PlanCertainty::Sure);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
-    decided.map(|((decision, allowed), (_, one))| one.course(decision, allowed)).collect()
+    decided.map(|((decision, allowed), (_, one))| one.maneuver(decision, allowed)).collect()
 }

@@ -1,14 +1,14 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::Turn;
-use crate::flight::{Leg, Levels, Point, Pose, Stage, Track};
-use crate::shield::Way;
+use crate::PhaseContext;
+use crate::flight::{FlightSegment, Leg, Levels, Point, Pose2, Track};
+use crate::shield::TurnProfile;
 use crate::state::End;
 use sidestep_kernel::{Cycle, Slot};
 
 /// One step of `dtau`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
+pub(super) struct SubStep {
     pub(super) now: Cycle,
     /// Number of the step in this `dt`.
     pub(super) k: usize,
@@ -19,10 +19,10 @@ pub(super) struct Moment {
 }
 
 /// One airplane in this `dt`.
-pub(super) struct Flight<'a> {
+pub(super) struct AircraftMotion<'a> {
     pub(super) slot: Slot,
-    pub(super) course: Course<'a>,
-    pub(super) pose: Pose,
+    pub(super) path: FlownPath<'a>,
+    pub(super) pose: Pose2,
     pub(super) altitude_m: f64,
     /// Time at which it came into the air, in seconds after the start of the run.
     pub(super) since_s: f64,
@@ -32,42 +32,42 @@ pub(super) struct Flight<'a> {
     /// Legs flown in this `dt`, with times after the start of the run.
     pub(super) flown: Vec<Leg>,
     /// End of its flight, if it has ended.
-    pub(super) ended: Option<End>,
+    pub(super) end: Option<End>,
 }
 
 /// The course of an airplane.
-pub(super) enum Course<'a> {
+pub(super) enum FlownPath<'a> {
     /// A way that was decided, and the stage of the flight.
-    Way(Way, Stage<'a>),
+    Profile(TurnProfile, FlightSegment<'a>),
     /// A recorded way.
     Track(&'a Track),
 }
 
-impl<'a> Flight<'a> {
+impl<'a> AircraftMotion<'a> {
     /// Returns an airplane as it is at the start of the cycle.
-    pub(super) fn new(turn: &Turn<'_>, slot: Slot, course: Course<'a>) -> Self {
-        let Turn { world, state, .. } = turn;
+    pub(super) fn new(turn: &PhaseContext<'_>, slot: Slot, course: FlownPath<'a>) -> Self {
+        let PhaseContext { world, state, .. } = turn;
         let cell = &state.airplanes[slot as usize];
         let track = &world.airplanes[slot as usize].track;
-        let recorded_s = track.as_ref().map_or(0.0, Track::begins_s);
-        let since_s = world.starts_s(world.appears_in(slot as usize)).max(recorded_s);
+        let recorded_s = track.as_ref().map_or(0.0, Track::start_s);
+        let since_s = world.cycle_start_s(world.first_cycle(slot as usize)).max(recorded_s);
         let (pose, altitude_m) = (cell.pose(), cell.altitude_m.get());
         let next = cell.next.get() as usize;
         let (legs, flown) = (Vec::new(), Vec::new());
-        Self { slot, course, pose, altitude_m, since_s, next, legs, flown, ended: None }
+        Self { slot, path: course, pose, altitude_m, since_s, next, legs, flown, end: None }
     }
 
     /// Returns its altitude in meters some seconds after `altitude_m`, on a decided way.
-    pub(super) fn altitude_after_m(&self, stage: &Stage<'_>, seconds: f64) -> f64 {
+    pub(super) fn altitude_after_m(&self, stage: &FlightSegment<'_>, seconds: f64) -> f64 {
         let most_m = stage.climb_m_s * seconds;
         self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
     }
 
     /// Finds the legs that it flies in one step.
-    pub(super) fn begin_step(&mut self, wind_m_s: Point, moment: Moment, dtau_s: f64) {
+    pub(super) fn start_step(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
-        match &self.course {
-            Course::Way(way, stage) => {
+        match &self.path {
+            FlownPath::Profile(way, stage) => {
                 let omega = way.omegas_rad_s[moment.k];
                 let whole = Leg::new(0.0, dtau_s, self.pose, stage.model.v_m_s, omega);
                 let to_climb_m = stage.altitude_m - self.altitude_m;
@@ -76,25 +76,25 @@ impl<'a> Flight<'a> {
                     _ => 0.0,
                 };
                 let climb_m_s = if climbs_s > 0.0 { to_climb_m / climbs_s } else { 0.0 };
-                let first = whole.climbing(self.altitude_m, climb_m_s).in_wind(wind_m_s);
-                self.legs.push(first.timed(0.0, dtau_s.min(climbs_s)));
+                let first = whole.with_climb(self.altitude_m, climb_m_s).in_wind(wind_m_s);
+                self.legs.push(first.with_times(0.0, dtau_s.min(climbs_s)));
                 if climbs_s < dtau_s {
-                    self.legs.push(first.rest(climbs_s).climbing(stage.altitude_m, 0.0));
+                    self.legs.push(first.remainder(climbs_s).with_climb(stage.altitude_m, 0.0));
                 }
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
-            Course::Track(track) => {
+            FlownPath::Track(track) => {
                 track.legs(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
             }
         }
-        self.note_legs(moment.step_s);
+        self.record_legs(moment.step_s);
     }
 
     /// Adds the legs of a step to those flown in this `dt`.
-    fn note_legs(&mut self, step_s: f64) {
+    fn record_legs(&mut self, step_s: f64) {
         for leg in &self.legs {
-            let leg = leg.timed(step_s + leg.from_s, step_s + leg.until_s);
-            match self.flown.last_mut().filter(|last| last.continues_in(&leg)) {
+            let leg = leg.with_times(step_s + leg.from_s, step_s + leg.until_s);
+            match self.flown.last_mut().filter(|last| last.is_continued_by(&leg)) {
                 Some(last) => last.until_s = leg.until_s,
                 None => self.flown.push(leg),
             }
@@ -103,11 +103,11 @@ impl<'a> Flight<'a> {
 
     /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> Levels {
-        match &self.course {
-            Course::Way(_, stage) => {
+        match &self.path {
+            FlownPath::Profile(_, stage) => {
                 Levels::between(self.altitude_m, self.altitude_after_m(stage, dtau_s))
             }
-            Course::Track(_) => Levels::ALL,
+            FlownPath::Track(_) => Levels::ALL,
         }
     }
 }

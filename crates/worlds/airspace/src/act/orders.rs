@@ -5,19 +5,21 @@
 //! waits, and those after it wait with it. While it changes its level, an airplane occupies the old
 //! one, the new one and all between.
 
-use super::protect::flyer;
-use crate::Turn;
-use crate::flight::{FlightOrder, Levels, Task};
-use crate::shield::{Flyer, Side, side_apart};
+use super::protect::shielded_aircraft;
+use crate::PhaseContext;
+use crate::flight::{FlightOrder, FlightTask, Levels};
+use crate::shield::{ShieldedAircraft, Side, safe_side};
 use sidestep_kernel::Slot;
 
 /// Carries out the orders of a group that are due and, with the shield, may be; the others
 /// wait. `flown` are the group's airplanes that the method flies, by id.
-pub(super) fn carry_out(turn: &Turn<'_>, group: &[Slot], flown: &[Slot]) {
-    let Turn { world, state, now, .. } = turn;
+pub(super) fn carry_out(turn: &PhaseContext<'_>, group: &[Slot], flown: &[Slot]) {
+    let PhaseContext { world, state, now, .. } = turn;
     for &slot in group.iter().filter(|&&slot| !world.is_replayed(slot, *now)) {
         let (airplane, cell) = (&world.airplanes[slot as usize], &state.airplanes[slot as usize]);
-        while let Some(order) = airplane.due(cell.orders.get().into(), world.starts_s(*now)) {
+        while let Some(order) =
+            airplane.due_order(cell.orders.get().into(), world.cycle_start_s(*now))
+        {
             let Some(side) = fallback_after(turn, flown, slot, order) else {
                 cell.waits.set(cell.waits.get().saturating_add(1));
                 break;
@@ -32,23 +34,23 @@ pub(super) fn carry_out(turn: &Turn<'_>, group: &[Slot], flown: &[Slot]) {
 
 /// Returns the fallback that an airplane has when it carries out its next order, if it may.
 fn fallback_after(
-    turn: &Turn<'_>,
+    turn: &PhaseContext<'_>,
     flown: &[Slot],
     slot: Slot,
     order: &FlightOrder,
 ) -> Option<Side> {
-    let Turn { world, state, now, .. } = turn;
+    let PhaseContext { world, state, now, .. } = turn;
     let cell = &state.airplanes[slot as usize];
-    let changes_safety = matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
-    if !world.shield || !changes_safety || world.is_intruder(slot, *now) {
+    let changes_safety = matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. });
+    if !world.shield || !changes_safety || world.is_non_cooperative(slot, *now) {
         return Some(cell.fallback.get());
     }
-    let stage = world.stage(slot, u32::from(cell.orders.get()) + 1);
-    let changed = Flyer {
+    let stage = world.segment(slot, u32::from(cell.orders.get()) + 1);
+    let changed = ShieldedAircraft {
         v_m_s: stage.model.v_m_s,
         levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
-        ..flyer(turn, slot)
+        ..shielded_aircraft(turn, slot)
     };
     let others = flown.iter().filter(|&&other| other != slot);
-    side_apart(&changed, others.map(|&other| flyer(turn, other)))
+    safe_side(&changed, others.map(|&other| shielded_aircraft(turn, other)))
 }

@@ -1,10 +1,10 @@
 //! The steps of one `dt`: all airplanes fly, and the results are stored.
 
 use super::approaches;
-use super::flight::{Course, Flight, Moment};
-use crate::Turn;
+use super::flight::{AircraftMotion, FlownPath, SubStep};
+use crate::PhaseContext;
 use crate::events::{Event, EventKind};
-use crate::flight::{Leg, Pose};
+use crate::flight::{Leg, Pose2};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
@@ -16,78 +16,81 @@ use sidestep_kernel::interrupt;
 use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
-pub(super) fn step_all(turn: &mut Turn<'_>, mut flights: Vec<Flight<'_>>) {
+pub(super) fn step_all(turn: &mut PhaseContext<'_>, mut flights: Vec<AircraftMotion<'_>>) {
     let (world, now) = (turn.world, turn.now);
     let steps = world.timing.points_per_dt();
     for k in 0..steps {
-        interrupt::look();
+        interrupt::check();
         let step = now * steps as u64 + k as u64;
-        let moment = Moment { now, k, step, step_s: step as f64 * world.timing.dtau_s };
-        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+        let moment = SubStep { now, k, step, step_s: step as f64 * world.timing.dtau_s };
+        for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
-            flight.ended = (leaves_s <= moment.step_s).then_some(End::Left(step));
+            flight.end = (leaves_s <= moment.step_s).then_some(End::Left(step));
         }
-        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
-            flight.begin_step(world.wind_m_s, moment, world.timing.dtau_s);
+        for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
+            flight.start_step(world.wind_m_s, moment, world.timing.dtau_s);
         }
-        approaches::book(world, &flights, moment, turn.scratch);
-        for flight in flights.iter_mut().filter(|f| f.ended.is_none()) {
+        approaches::record_distances(world, &flights, moment, turn.scratch);
+        for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             fly(world, flight, moment);
         }
     }
     flights.into_iter().for_each(|flight| store(turn, flight));
 }
 
-fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: Moment) {
+fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step, .. }: SubStep) {
     let (air, dtau_s) = (world.air(), world.timing.dtau_s);
-    let is_at_end = match &flight.course {
-        Course::Way(way, stage) => {
+    let is_at_end = match &flight.path {
+        FlownPath::Profile(way, stage) => {
             let omega = way.omegas_rad_s[k];
             let altitude_m = flight.altitude_after_m(stage, dtau_s);
             flight.altitude_m = altitude_m;
             let before = flight.pose;
-            flight.pose = air.blown(before.step(stage.model.v_m_s, omega, dtau_s));
-            let pilot = air.pilot(stage.model, stage.mission);
-            flight.next = pilot.next((before, flight.pose), flight.next);
+            flight.pose = air.after_wind_step(before.step(stage.model.v_m_s, omega, dtau_s));
+            let pilot = air.autopilot(stage.model, stage.mission);
+            flight.next = pilot.next_way_point((before, flight.pose), flight.next);
             flight.next == stage.mission.len()
         }
-        Course::Track(track) => {
+        FlownPath::Track(track) => {
             let after_s = (step + 1) as f64 * dtau_s;
             flight.pose = track.pose_at(after_s);
             flight.altitude_m = track.altitude_at_m(after_s);
-            track.ends_s() <= after_s
+            track.end_s() <= after_s
         }
     };
-    flight.ended = is_at_end.then_some(End::Arrived(step + 1));
+    flight.end = is_at_end.then_some(End::Arrived(step + 1));
 }
 
 /// Returns the rows of an airplane: its legs, and the place where its flight ended.
-fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &Flight<'_>) -> Vec<FlownLeg> {
+fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec<FlownLeg> {
     let airplane = flight.slot;
     let mut rows: Vec<FlownLeg> =
         flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
-    if let Some(End::Arrived(step) | End::Left(step)) = flight.ended {
+    if let Some(End::Arrived(step) | End::Left(step)) = flight.end {
         let at_s = step as f64 * world.timing.dtau_s;
-        let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).climbing(flight.altitude_m, 0.0);
+        let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).with_climb(flight.altitude_m, 0.0);
         rows.push(FlownLeg { cycle, airplane, leg: end });
     }
     rows
 }
 
-fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
-    let &mut Turn { world, state, now, ref mut scratch, .. } = turn;
+fn store(turn: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
+    let &mut PhaseContext { world, state, now, ref mut scratch, .. } = turn;
     let cell = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
     scratch.flown.extend(rows(world, now, &flight));
-    let is_disturbed = matches!(flight.course, Course::Way(..));
-    let turn_rate_rad_s = match &flight.course {
-        Course::Way(way, _) => way.omegas_rad_s.last().copied().unwrap_or_default(),
-        Course::Track(_) => 0.0,
+    let is_disturbed = matches!(flight.path, FlownPath::Profile(..));
+    let turn_rate_rad_s = match &flight.path {
+        FlownPath::Profile(way, _) => way.omegas_rad_s.last().copied().unwrap_or_default(),
+        FlownPath::Track(_) => 0.0,
     };
     state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
     // On its orbit it has moved the pose there already.
     if cell.orbiting.get() == 0 {
-        state.set_held(flight.slot, Pose { heading_rad: wrap_angle(pose.heading_rad), ..pose });
+        state.set_orbit_pose(
+            flight.slot,
+            Pose2 { heading_rad: wrap_angle(pose.heading_rad), ..pose },
+        );
     }
     if is_disturbed && world.disturbance.heading_rad > 0.0 {
         let mut draws = world.streams.draws(flight.slot, now, purpose::HEADING);
@@ -97,11 +100,11 @@ fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     cell.set_pose(pose);
     cell.altitude_m.set(flight.altitude_m);
     cell.next.set(flight.next as u32);
-    if let Some(end) = flight.ended {
+    if let Some(end) = flight.end {
         cell.set_end(end);
         if let Some(delay_s) = airplane_metrics(world, state, flight.slot).delay_s() {
-            let event = Event::of(now, EventKind::Arrival, flight.slot);
-            scratch.events.push(event.with(delay_s));
+            let event = Event::new(now, EventKind::Arrival, flight.slot);
+            scratch.events.push(event.with_value(delay_s));
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! On a network that loses nothing, all airplanes send all others their place, their stored
 //! fallback and the ways they would fly; all know the same, filter the same, and compute the same
-//! plans, to the bit ([`Certainty::Sure`]). No other messages are sent.
+//! plans, to the bit ([`PlanCertainty::Sure`]). No other messages are sent.
 //!
 //! On one that loses messages no airplane can be sure of the others' knowledge. So plans must stay
 //! safe whichever of them are flown, and no airplane flies one that others may not know:
@@ -13,7 +13,7 @@
 //!    was not heard is taken to be on any orbit it may be on. Each sends its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
 //!    and sends the list of those it accepts.
-//! 4. Of two airplanes one *goes first* (`Scene::goes_first`). An airplane flies its plan if all
+//! 4. Of two airplanes one *goes first* (`ExchangeSetup::has_priority`). An airplane flies its plan if all
 //!    those that go before it have accepted it, else its fallback. It does not ask those that it
 //!    goes before, nor those from which its plan keeps apart in any case.
 //!
@@ -44,26 +44,31 @@
 //! just come in. No airplane has to tell one from the other, and none waits for an answer forever,
 //! because two airplanes go first in turn.
 
-mod scene;
+mod setup;
 
-use super::contact::{Beacon, Contact, Contacts, Orbiting, Planned, note};
-use super::link::{self, Most};
-use super::party::Unsound;
-use crate::flight::Pose;
-use crate::shield::{Certainty, Decision, Flyer, Named, Plan, Side, Way, filter};
-pub use scene::{Scene, Seen};
+use super::link::{self, MessageLimits};
+use super::participant::InvalidMessage;
+use super::traffic_state::{
+    OrbitState, PlanEnd, StateBeacon, TrafficPicture, TrafficState, record_beacon,
+};
+use crate::flight::Pose2;
+use crate::shield::{
+    ExemptIds, PlanCertainty, SafeManeuver, ShieldDecision, ShieldedAircraft, Side, TurnProfile,
+    filter,
+};
 use serde::{Deserialize, Serialize};
+pub use setup::{ExchangeSetup, ObservedAircraft};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// Messages between airplanes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum Message {
+pub enum ExchangeMessage {
     /// Place of the sender, and the ways it would fly.
     Proposal(Proposal),
     /// The way it will fly if all agree, and the side to which it turns then; `None` for its
     /// fallback.
-    Plan(Option<(Way, Side)>),
+    Plan(Option<(TurnProfile, Side)>),
     /// Ids of the airplanes whose plans it accepts, rising.
     Accepts(Vec<EntityId>),
 }
@@ -71,23 +76,23 @@ pub enum Message {
 /// Place of an airplane, and the ways it would fly.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Proposal {
-    beacon: Beacon,
+    beacon: StateBeacon,
     /// Its pose on the stored orbit, as all see it.
-    held: Pose,
+    held: Pose2,
     fallback: Side,
     named: Vec<EntityId>,
     rank: u64,
-    ways: Vec<Way>,
+    ways: Vec<TurnProfile>,
 }
 
 impl Proposal {
     /// Returns the proposal of an airplane: the ways that it may fly, the wanted one first.
-    pub fn new(flyer: &Flyer, ways: &[Way]) -> Self {
+    pub fn new(flyer: &ShieldedAircraft, ways: &[TurnProfile]) -> Self {
         Self {
-            beacon: Beacon::of(flyer),
-            held: flyer.held,
+            beacon: StateBeacon::from_aircraft(flyer),
+            held: flyer.orbit_pose,
             fallback: flyer.fallback,
-            named: flyer.named.to_vec(),
+            named: flyer.exempt.to_vec(),
             rank: flyer.rank,
             ways: ways.to_vec(),
         }
@@ -96,34 +101,34 @@ impl Proposal {
 
 /// Another member of the group.
 #[derive(Debug, Default)]
-struct Member {
+struct ExchangeMember {
     proposal: Option<Proposal>,
     /// Its plan, when it is known; `Some(None)` stands for its fallback.
-    plan: Option<Option<(Way, Side)>>,
+    plan: Option<Option<(TurnProfile, Side)>>,
     accepts: Option<Vec<EntityId>>,
     gone: bool,
 }
 
-impl Member {
-    fn new(seen: &Seen) -> Self {
+impl ExchangeMember {
+    fn new(seen: &ObservedAircraft) -> Self {
         Self { gone: !seen.takes_part, ..Self::default() }
     }
 }
 
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Agreed {
+pub struct ExchangeResult {
     /// Decision of the shield for the airplane.
-    pub decision: Decision,
+    pub decision: ShieldDecision,
     /// Whether it would have flown another way if all had agreed.
     pub held_back: bool,
     /// Its knowledge of others after the exchange.
-    pub contacts: Contacts,
+    pub contacts: TrafficPicture,
 }
 
 /// The messages that an agent waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
+enum ExchangePhase {
     Proposals,
     Plans,
     Consent,
@@ -132,34 +137,39 @@ enum Stage {
 
 /// The shield's agent of one airplane.
 #[derive(Debug)]
-pub struct Agent {
-    scene: Arc<Scene>,
+pub struct ExchangeAgent {
+    scene: Arc<ExchangeSetup>,
     me: usize,
-    flyer: Flyer,
+    flyer: ShieldedAircraft,
     own: Proposal,
-    contacts: Contacts,
-    members: Vec<Member>,
-    decision: Option<Decision>,
+    contacts: TrafficPicture,
+    members: Vec<ExchangeMember>,
+    decision: Option<ShieldDecision>,
     /// Places of the members whose consent it needs to fly its plan.
     asked: Vec<usize>,
-    agreed: Option<Agreed>,
+    result: Option<ExchangeResult>,
 }
 
-impl Agent {
+impl ExchangeAgent {
     /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
     /// fly `ways`.
-    pub fn new(scene: Arc<Scene>, me: usize, ways: &[Way], contacts: Contacts) -> Self {
-        let flyer = scene.seen[me].flyer.clone();
+    pub fn new(
+        scene: Arc<ExchangeSetup>,
+        me: usize,
+        ways: &[TurnProfile],
+        contacts: TrafficPicture,
+    ) -> Self {
+        let flyer = scene.aircraft[me].aircraft.clone();
         Self {
             me,
             own: Proposal::new(&flyer, ways),
             flyer,
             contacts,
-            members: scene.seen.iter().map(Member::new).collect(),
+            members: scene.aircraft.iter().map(ExchangeMember::new).collect(),
             scene,
             decision: None,
             asked: Vec::new(),
-            agreed: None,
+            result: None,
         }
     }
 
@@ -172,84 +182,87 @@ impl Agent {
     }
 
     fn size(&self) -> usize {
-        self.scene.seen.len()
+        self.scene.aircraft.len()
     }
 
     fn id(&self, place: usize) -> EntityId {
-        self.scene.seen[place].flyer.id
+        self.scene.aircraft[place].aircraft.id
     }
 
-    fn fallback(&self, flyer: Flyer) -> Plan {
-        Plan::fallback(flyer, self.steps(), self.dtau_s())
+    fn fallback(&self, flyer: ShieldedAircraft) -> SafeManeuver {
+        SafeManeuver::fallback(flyer, self.steps(), self.dtau_s())
     }
 
-    fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
+    fn aircraft_from_proposal(&self, place: usize, proposal: &Proposal) -> ShieldedAircraft {
         let Proposal { beacon, held, fallback, named, rank, .. } = proposal;
-        Flyer {
+        ShieldedAircraft {
             id: self.id(place),
             pose: beacon.pose,
-            held: *held,
+            orbit_pose: *held,
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             orbit_rad_s: beacon.orbit_rad_s,
             separation_m: beacon.separation_m,
-            error_m: self.scene.seen[place].flyer.error_m,
+            error_m: self.scene.aircraft[place].aircraft.error_m,
             levels: beacon.levels,
             vertical_m: self.scene.vertical_m,
             fallback: *fallback,
-            named: named.as_slice().into(),
+            exempt: named.as_slice().into(),
             rank: *rank,
         }
     }
 
     /// Returns all orbits that an unheard airplane may be on.
-    fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits, .. } = &self.scene.seen[place];
+    fn possible_orbits(&self, place: usize) -> Vec<ShieldedAircraft> {
+        let ObservedAircraft { aircraft: flyer, is_on_orbit: orbits, .. } =
+            &self.scene.aircraft[place];
         if *orbits {
             return vec![flyer.clone()];
         }
         let told = self.contacts.get(&flyer.id).and_then(|contact| contact.planned);
         let sides = match told.filter(|planned| planned.as_of == self.scene.now) {
-            Some(Planned { side, .. }) => vec![side],
+            Some(PlanEnd { side, .. }) => vec![side],
             None => Side::BOTH.to_vec(),
         };
-        sides.into_iter().map(|fallback| Flyer { fallback, ..flyer.clone() }).collect()
+        sides.into_iter().map(|fallback| ShieldedAircraft { fallback, ..flyer.clone() }).collect()
     }
 
-    fn stage(&self) -> Stage {
-        match (&self.decision, &self.members[self.me].accepts, &self.agreed) {
-            (_, _, Some(_)) => Stage::Over,
-            (None, ..) => Stage::Proposals,
-            (Some(_), None, _) => Stage::Plans,
-            (Some(_), Some(_), None) => Stage::Consent,
+    fn phase(&self) -> ExchangePhase {
+        match (&self.decision, &self.members[self.me].accepts, &self.result) {
+            (_, _, Some(_)) => ExchangePhase::Over,
+            (None, ..) => ExchangePhase::Proposals,
+            (Some(_), None, _) => ExchangePhase::Plans,
+            (Some(_), Some(_), None) => ExchangePhase::Consent,
         }
     }
 
     /// Continues as far as the messages heard allow.
-    fn go_on(&mut self) -> Vec<Message> {
+    fn advance(&mut self) -> Vec<ExchangeMessage> {
         let mut said = Vec::new();
-        while link::Agent::awaits(self).is_empty() {
-            match self.stage() {
-                Stage::Proposals if self.scene.certainty == Certainty::Sure => self.be_sure(),
-                Stage::Proposals => said.push(self.plan()),
-                Stage::Plans => said.push(self.accept()),
-                Stage::Consent => self.agree(),
-                Stage::Over => break,
+        while link::Agent::awaited_members(self).is_empty() {
+            match self.phase() {
+                ExchangePhase::Proposals if self.scene.certainty == PlanCertainty::Sure => {
+                    self.commit_plan()
+                }
+                ExchangePhase::Proposals => said.push(self.send_plan()),
+                ExchangePhase::Plans => said.push(self.accept()),
+                ExchangePhase::Consent => self.conclude(),
+                ExchangePhase::Over => break,
             }
         }
         said
     }
 
     /// Computes plans for all, as all others do from the same proposals, and will fly its own.
-    fn be_sure(&mut self) {
-        let decision = self.filtered();
+    fn commit_plan(&mut self) {
+        let decision = self.filter_plans();
         self.decision = Some(decision);
         let contacts = self.contacts.clone();
-        self.agreed = Some(Agreed { decision, held_back: false, contacts });
+        self.result = Some(ExchangeResult { decision, held_back: false, contacts });
     }
 
     /// Computes plans for all, and returns its own.
-    fn filtered(&self) -> Decision {
+    fn filter_plans(&self) -> ShieldDecision {
         let mut flyers = Vec::new();
         let mut candidates = Vec::new();
         let mut mine = 0;
@@ -259,13 +272,13 @@ impl Agent {
                 flyers.push(self.flyer.clone());
                 candidates.push(self.own.ways.clone());
             } else if let Some(proposal) = &self.members[place].proposal {
-                flyers.push(self.flyer_of(place, proposal));
+                flyers.push(self.aircraft_from_proposal(place, proposal));
                 candidates.push(proposal.ways.clone());
             } else {
                 // An unheard airplane takes part on every orbit it may be on, without a choice.
-                let mut possible = self.possible(place);
-                let named = self.named_with(place);
-                possible.iter_mut().for_each(|flyer| flyer.named = named.clone());
+                let mut possible = self.possible_orbits(place);
+                let named = self.exempt_with(place);
+                possible.iter_mut().for_each(|flyer| flyer.exempt = named.clone());
                 candidates.extend(possible.iter().map(|_| Vec::new()));
                 flyers.extend(possible);
             }
@@ -275,10 +288,10 @@ impl Agent {
     }
 
     /// Returns the members with which an unheard airplane is named, as far as they say so themselves.
-    fn named_with(&self, place: usize) -> Named {
+    fn exempt_with(&self, place: usize) -> ExemptIds {
         let id = self.id(place);
         let names = |other: &usize| match &self.members[*other].proposal {
-            _ if *other == self.me => self.flyer.named.contains(&id),
+            _ if *other == self.me => self.flyer.exempt.contains(&id),
             Some(proposal) => proposal.named.contains(&id),
             None => false,
         };
@@ -286,61 +299,62 @@ impl Agent {
     }
 
     /// Computes its plan, and sends it.
-    fn plan(&mut self) -> Message {
-        let decision = self.filtered();
+    fn send_plan(&mut self) -> ExchangeMessage {
+        let decision = self.filter_plans();
         self.decision = Some(decision);
         let way = decision.candidate.map(|k| (self.own.ways[k].clone(), decision.fallback));
         // Its fallback needs no consent, because all others keep apart from it anyway.
         self.asked = match way.is_some() {
-            true => self.to_ask(&self.plan_of(self.flyer.clone(), &way)),
+            true => self.consent_members(&self.plan_of(self.flyer.clone(), &way)),
             false => Vec::new(),
         };
         self.members[self.me].plan = Some(way.clone());
-        Message::Plan(way)
+        ExchangeMessage::Plan(way)
     }
 
     /// Returns the plan of a member, from its message.
-    fn plan_of(&self, flyer: Flyer, way: &Option<(Way, Side)>) -> Plan {
+    fn plan_of(&self, flyer: ShieldedAircraft, way: &Option<(TurnProfile, Side)>) -> SafeManeuver {
         match way {
-            Some((way, side)) => Plan::new(flyer, way, self.dtau_s(), *side),
+            Some((way, side)) => SafeManeuver::new(flyer, way, self.dtau_s(), *side),
             None => self.fallback(flyer),
         }
     }
 
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
-    fn accept(&mut self) -> Message {
+    fn accept(&mut self) -> ExchangeMessage {
         let own = self.members[self.me].plan.clone().flatten();
         let mine = [self.plan_of(self.flyer.clone(), &own), self.fallback(self.flyer.clone())];
         let mut accepts = Vec::new();
         for place in (0..self.size()).filter(|&place| place != self.me) {
-            let Member { proposal: Some(proposal), plan: Some(plan), .. } = &self.members[place]
+            let ExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
+                &self.members[place]
             else {
                 continue;
             };
             // A member whose plan was not among its proposals is not to be believed.
             let is_proposed = plan.as_ref().is_none_or(|(way, _)| proposal.ways.contains(way));
-            let theirs = self.plan_of(self.flyer_of(place, proposal), plan);
+            let theirs = self.plan_of(self.aircraft_from_proposal(place, proposal), plan);
             if is_proposed && mine.iter().all(|plan| plan.is_compatible(&theirs)) {
                 accepts.push(self.id(place));
             }
         }
         self.members[self.me].accepts = Some(accepts.clone());
-        Message::Accepts(accepts)
+        ExchangeMessage::Accepts(accepts)
     }
 
     /// Returns the members whose consent a plan of this airplane needs.
-    fn to_ask(&self, plan: &Plan) -> Vec<usize> {
+    fn consent_members(&self, plan: &SafeManeuver) -> Vec<usize> {
         let needs = |&place: &usize| {
-            let other = &self.scene.seen[place].flyer;
-            self.flyer.minds(other)
-                && self.scene.goes_first(place, self.me)
+            let other = &self.scene.aircraft[place].aircraft;
+            self.flyer.is_protected_from(other)
+                && self.scene.has_priority(place, self.me)
                 && !plan.is_clear_of(other)
         };
         (0..self.size()).filter(|&place| place != self.me).filter(needs).collect()
     }
 
     /// Returns whether a member has agreed to this airplane's plan.
-    fn agrees(&self, place: usize) -> bool {
+    fn has_agreed(&self, place: usize) -> bool {
         let accepts = self.members[place].accepts.as_ref();
         accepts.is_some_and(|accepted| accepted.contains(&self.id(self.me)))
     }
@@ -353,136 +367,141 @@ impl Agent {
     }
 
     /// Ends the exchange: the airplane flies its plan, or its fallback.
-    fn agree(&mut self) {
-        let fallback = Decision { candidate: None, fallback: self.flyer.fallback };
+    fn conclude(&mut self) {
+        let fallback = ShieldDecision { candidate: None, fallback: self.flyer.fallback };
         let wanted = self.decision.unwrap_or(fallback);
-        let all_agree = self.asked.iter().all(|&place| self.agrees(place));
-        self.agreed = Some(Agreed {
+        let all_agree = self.asked.iter().all(|&place| self.has_agreed(place));
+        self.result = Some(ExchangeResult {
             decision: if all_agree { wanted } else { fallback },
             held_back: !all_agree,
-            contacts: self.known_now(),
+            contacts: self.traffic_picture(),
         });
     }
 
     /// Returns its knowledge of others after this `dt`.
-    fn known_now(&self) -> Contacts {
+    fn traffic_picture(&self) -> TrafficPicture {
         let now = self.scene.now;
         let mut contacts = self.contacts.clone();
         for (place, member) in self.members.iter().enumerate().filter(|(k, _)| *k != self.me) {
             let id = self.id(place);
             let flyer = match &member.proposal {
                 Some(proposal) => {
-                    note(&mut contacts, id, proposal.beacon.clone(), now);
-                    self.flyer_of(place, proposal)
+                    record_beacon(&mut contacts, id, proposal.beacon.clone(), now);
+                    self.aircraft_from_proposal(place, proposal)
                 }
-                None => self.possible(place).swap_remove(0),
+                None => self.possible_orbits(place).swap_remove(0),
             };
             // Use the sighting, if it was never heard.
-            let sighted = || Contact::heard(Beacon::of(&self.scene.seen[place].flyer), now);
+            let sighted = || {
+                TrafficState::from_beacon(
+                    StateBeacon::from_aircraft(&self.scene.aircraft[place].aircraft),
+                    now,
+                )
+            };
             let contact = contacts.entry(id).or_insert_with(sighted);
             let is_heard = member.proposal.is_some();
             // Where it is seen to fly a way, it has flown the plan that it has told.
             let planned = member.plan.as_ref().and_then(Option::as_ref);
-            contact.planned = planned.map(|(_, side)| Planned { as_of: now + 1, side: *side });
-            contact.presumed = Some(self.orbiting(&self.fallback(flyer)));
+            contact.planned = planned.map(|(_, side)| PlanEnd { as_of: now + 1, side: *side });
+            contact.presumed = Some(self.orbit_state(&self.fallback(flyer)));
             contact.unheard_in = (!is_heard).then_some(now);
         }
         contacts
     }
 
     /// Returns the orbit at the end of a plan.
-    fn orbiting(&self, plan: &Plan) -> Orbiting {
+    fn orbit_state(&self, plan: &SafeManeuver) -> OrbitState {
         let [wx, wy] = self.scene.air.wind_m_s.map(|w| w * self.scene.air.timing.dt_s);
         let mut pose = plan.end();
         pose.at = [pose.at[0] + wx, pose.at[1] + wy];
-        Orbiting { pose, as_of: self.scene.now + 1, side: plan.side() }
+        OrbitState { pose, as_of: self.scene.now + 1, side: plan.side() }
     }
 }
 
-impl link::Agent for Agent {
-    type Message = Message;
-    type Outcome = Agreed;
+impl link::Agent for ExchangeAgent {
+    type Message = ExchangeMessage;
+    type Outcome = ExchangeResult;
 
-    fn start(&mut self) -> Vec<Message> {
-        let mut said = vec![Message::Proposal(self.own.clone())];
-        said.extend(self.go_on());
+    fn start(&mut self) -> Vec<ExchangeMessage> {
+        let mut said = vec![ExchangeMessage::Proposal(self.own.clone())];
+        said.extend(self.advance());
         said
     }
 
-    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+    fn check(&self, from: usize, message: &ExchangeMessage) -> Result<(), InvalidMessage> {
         match message {
-            Message::Proposal(proposal) => self.scene.admits(from, proposal),
-            Message::Plan(plan) => {
-                plan.iter().try_for_each(|(way, _)| self.scene.admits_way(from, way))
+            ExchangeMessage::Proposal(proposal) => self.scene.check_proposal(from, proposal),
+            ExchangeMessage::Plan(plan) => {
+                plan.iter().try_for_each(|(way, _)| self.scene.check_profile(from, way))
             }
-            Message::Accepts(accepted) => self.scene.admits_members(accepted),
+            ExchangeMessage::Accepts(accepted) => self.scene.check_members(accepted),
         }
     }
 
-    fn most(&self) -> Most {
-        Most { bytes: self.scene.most_bytes(), messages: 3 }
+    fn limits(&self) -> MessageLimits {
+        MessageLimits { bytes: self.scene.max_message_bytes(), messages: 3 }
     }
 
-    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+    fn on_message(&mut self, from: usize, message: ExchangeMessage) -> Vec<ExchangeMessage> {
         let has_planned = self.decision.is_some();
         let has_accepted = self.members[self.me].accepts.is_some();
         let member = &mut self.members[from];
         match message {
             // The proposal of a member that was given up is too late once plans are made.
-            Message::Proposal(proposal) if !has_planned => member.proposal = Some(proposal),
-            Message::Plan(plan) if !has_accepted => member.plan = Some(plan),
-            Message::Accepts(accepted) => member.accepts = Some(accepted),
+            ExchangeMessage::Proposal(proposal) if !has_planned => member.proposal = Some(proposal),
+            ExchangeMessage::Plan(plan) if !has_accepted => member.plan = Some(plan),
+            ExchangeMessage::Accepts(accepted) => member.accepts = Some(accepted),
             _ => {}
         }
-        self.go_on()
+        self.advance()
     }
 
-    fn expects(&self, other: usize) -> bool {
+    fn is_expected(&self, other: usize) -> bool {
         !self.was_unheard(other)
     }
 
-    fn awaits(&self) -> Vec<usize> {
-        let stage = self.stage();
+    fn awaited_members(&self) -> Vec<usize> {
+        let stage = self.phase();
         let is_missing = |place: usize| {
             let member = &self.members[place];
             match stage {
-                Stage::Proposals => member.proposal.is_none(),
-                Stage::Plans => member.plan.is_none(),
-                Stage::Consent => member.accepts.is_none() && self.asked.contains(&place),
-                Stage::Over => false,
+                ExchangePhase::Proposals => member.proposal.is_none(),
+                ExchangePhase::Plans => member.plan.is_none(),
+                ExchangePhase::Consent => member.accepts.is_none() && self.asked.contains(&place),
+                ExchangePhase::Over => false,
             }
         };
         let others = (0..self.size()).filter(|&place| place != self.me);
         others.filter(|&place| !self.members[place].gone && is_missing(place)).collect()
     }
 
-    fn waits_until(&self) -> f64 {
-        match self.stage() {
-            Stage::Proposals => 0.5,
-            Stage::Plans => 0.75,
+    fn wait_fraction(&self) -> f64 {
+        match self.phase() {
+            ExchangePhase::Proposals => 0.5,
+            ExchangePhase::Plans => 0.75,
             // Some time is left for an orderly end.
-            Stage::Consent | Stage::Over => 0.95,
+            ExchangePhase::Consent | ExchangePhase::Over => 0.95,
         }
     }
 
-    fn without(&mut self, other: usize, _: bool) -> Vec<Message> {
+    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<ExchangeMessage> {
         self.members[other].gone = true;
-        self.go_on()
+        self.advance()
     }
 
     /// Ends the exchange because time is up. Without a decision, or without the consent of others,
     /// the airplane stays on its fallback.
-    fn at_deadline(&mut self) {
-        if self.agreed.is_none() {
-            self.agree();
+    fn on_deadline(&mut self) {
+        if self.result.is_none() {
+            self.conclude();
         }
     }
 
     fn is_done(&self) -> bool {
-        self.agreed.is_some()
+        self.result.is_some()
     }
 
-    fn outcome(&self) -> Option<Agreed> {
-        self.agreed.clone()
+    fn outcome(&self) -> Option<ExchangeResult> {
+        self.result.clone()
     }
 }

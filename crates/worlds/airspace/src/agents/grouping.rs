@@ -37,7 +37,7 @@
 //! to be unheard never accepts. So an airplane may be wrong about its group in any way at all, by losses, by links
 //! that work one way only, in a partition, or because another one lies, and the worst outcome is that it waits on its
 //! orbit. Where the network loses nothing there are no reports, because all near hear each other; no airplane goes on
-//! before it knows the whole group, and so all know the same one, as plans that are sure ([`Certainty::Sure`])
+//! before it knows the whole group, and so all know the same one, as plans that are sure ([`PlanCertainty::Sure`])
 //! require.
 
 mod beacon;
@@ -45,28 +45,28 @@ mod roster;
 #[cfg(test)]
 mod tests;
 
-use super::link::{self, Most};
-use super::party::Unsound;
+use super::link::{self, MessageLimits};
+use super::participant::InvalidMessage;
 use crate::flight::distance_m;
-use crate::intruder::Intruder;
-use crate::shield::Certainty;
-pub use beacon::{Beacon, Item, Sighted};
+use crate::non_cooperative::NonCooperative;
+use crate::shield::PlanCertainty;
+pub use beacon::{Beacon, Item, SurveillanceReport};
 use roster::Roster;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
 
 /// Largest number of items of a message.
-const MOST_ITEMS: usize = 64;
+const MAX_ITEMS: usize = 64;
 
 /// The knowledge of an agent at its start.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct GroupingInput {
     /// Place of its airplane among those near it.
     pub me: usize,
     /// Those near it, itself among them, by rising id.
-    pub near: Vec<Sighted>,
+    pub near: Vec<SurveillanceReport>,
     /// Airplanes near it that mind no other, by rising id.
-    pub intruders: Vec<Intruder>,
+    pub intruders: Vec<NonCooperative>,
     /// Whether each of those near was heard lately or is met for the first time.
     pub expected: Vec<bool>,
     /// Number of all airplanes.
@@ -74,67 +74,68 @@ pub struct Start {
     /// Distance in meters that messages reach.
     pub range_m: f64,
     /// Whether the network loses nothing.
-    pub certainty: Certainty,
+    pub certainty: PlanCertainty,
 }
 
 /// The group that an airplane has found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct GroupingResult {
     /// The airplanes that decide together, its own among them, by rising id.
-    pub members: Vec<Sighted>,
+    pub members: Vec<SurveillanceReport>,
     /// The airplanes near any of them that mind no other, by rising id.
-    pub intruders: Vec<Intruder>,
+    pub intruders: Vec<NonCooperative>,
 }
 
 /// The agent of one airplane that looks for its group.
 #[derive(Debug)]
-pub struct Agent {
-    start: Start,
+pub struct GroupingAgent {
+    input: GroupingInput,
     roster: Roster,
     /// The airplanes near it that have sent their beacons themselves.
     heard: BTreeSet<EntityId>,
     /// Whether nothing more will come from each of those near.
     gone: Vec<bool>,
     /// Items that have not been passed on: airplane, and whether it is the report.
-    kept: BTreeSet<(EntityId, bool)>,
+    unsent: BTreeSet<(EntityId, bool)>,
     has_reported: bool,
     /// Whether anything on which its going on depends has changed since it looked last.
     is_stale: bool,
-    found: Option<Found>,
+    result: Option<GroupingResult>,
 }
 
-impl Agent {
+impl GroupingAgent {
     /// Returns an agent that has not sent anything yet.
-    pub fn new(start: Start) -> Self {
+    pub fn new(start: GroupingInput) -> Self {
         let own = &start.near[start.me];
-        let is_beyond = |one: &Sighted| distance_m(own.pose.at, one.pose.at) > start.range_m;
+        let is_beyond =
+            |one: &SurveillanceReport| distance_m(own.pose.at, one.pose.at) > start.range_m;
         let near = start.near.iter().map(|one| one.id).filter(|&id| id != own.id).collect();
         let beacon = Beacon { own: *own, near, intruders: start.intruders.clone() };
-        let is_sure = start.certainty == Certainty::Sure;
+        let is_sure = start.certainty == PlanCertainty::Sure;
         Self {
             gone: start.near.iter().map(is_beyond).collect(),
             roster: Roster::new(beacon, is_sure),
-            start,
+            input: start,
             heard: BTreeSet::new(),
-            kept: BTreeSet::new(),
+            unsent: BTreeSet::new(),
             has_reported: is_sure,
             is_stale: true,
-            found: None,
+            result: None,
         }
     }
 
     fn id(&self) -> EntityId {
-        self.start.near[self.start.me].id
+        self.input.near[self.input.me].id
     }
 
     /// Returns the others near it, with their places.
     fn others(&self) -> impl Iterator<Item = (usize, EntityId)> {
-        let all = self.start.near.iter().map(|one| one.id).enumerate();
-        all.filter(|(place, _)| *place != self.start.me)
+        let all = self.input.near.iter().map(|one| one.id).enumerate();
+        all.filter(|(place, _)| *place != self.input.me)
     }
 
     /// Takes an item. Returns whether others may lack it now that did not before.
-    fn take(&mut self, from: EntityId, item: Item) -> bool {
+    fn receive_item(&mut self, from: EntityId, item: Item) -> bool {
         let id = item.about();
         if id == self.id() {
             return false;
@@ -142,9 +143,9 @@ impl Agent {
         match item {
             Item::Beacon(beacon) => {
                 let is_own = id == from;
-                let is_new = self.roster.note_beacon(beacon, is_own);
+                let is_new = self.roster.add_beacon(beacon, is_own);
                 if is_new {
-                    self.kept.insert((id, false));
+                    self.unsent.insert((id, false));
                 }
                 if is_own {
                     self.heard.insert(id);
@@ -153,9 +154,9 @@ impl Agent {
                 false
             }
             Item::Report { heard, .. } => {
-                let is_new = self.roster.note_report(id, heard);
+                let is_new = self.roster.add_report(id, heard);
                 if is_new {
-                    self.kept.insert((id, true));
+                    self.unsent.insert((id, true));
                 }
                 self.is_stale |= is_new;
                 is_new && self.others().any(|(_, other)| other == id)
@@ -164,39 +165,39 @@ impl Agent {
     }
 
     /// Returns whether another one near lacks the known items about an airplane.
-    fn is_lacked(&self, about: EntityId) -> bool {
-        self.others().any(|(_, id)| id != about && self.roster.lacks(id, about))
+    fn is_missing_nearby(&self, about: EntityId) -> bool {
+        self.others().any(|(_, id)| id != about && self.roster.is_missing(id, about))
     }
 
     /// Takes out the items that have to go on, of those `about` these airplanes.
-    fn passed_on(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
-        let due = |id: EntityId| self.roster.knows(id) && self.is_lacked(id);
+    fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
+        let due = |id: EntityId| self.roster.has_beacon(id) && self.is_missing_nearby(id);
         // Most incoming items have come before, and are no longer kept.
         let is_kept =
-            |id: &EntityId| [false, true].iter().any(|&of| self.kept.contains(&(*id, of)));
+            |id: &EntityId| [false, true].iter().any(|&of| self.unsent.contains(&(*id, of)));
         let due: Vec<(EntityId, bool)> = about
             .iter()
             .filter(|id| is_kept(id) && due(**id))
             .flat_map(|&id| [(id, false), (id, true)])
-            .filter(|key| self.kept.contains(key))
+            .filter(|key| self.unsent.contains(key))
             .collect();
         for key in &due {
-            self.kept.remove(key);
+            self.unsent.remove(key);
         }
         let items: Vec<Item> =
             due.iter().filter_map(|&(id, is_report)| self.roster.item(id, is_report)).collect();
-        items.chunks(MOST_ITEMS).map(<[Item]>::to_vec).collect()
+        items.chunks(MAX_ITEMS).map(<[Item]>::to_vec).collect()
     }
 
     /// Returns whether all near have been heard, or will not be.
-    fn has_listened(&self) -> bool {
+    fn has_heard_all(&self) -> bool {
         self.others().all(|(place, id)| self.gone[place] || self.heard.contains(&id))
     }
 
     /// Returns whether it has all that its group depends on, or can come to have.
     fn has_all(&mut self) -> bool {
         let present = self.present();
-        self.missing(&present).is_empty() && (present.is_empty() || self.roster.settle())
+        self.missing(&present).is_empty() && (present.is_empty() || self.roster.update_chain())
     }
 
     /// Returns the others near it from which something may come, with their places.
@@ -207,34 +208,34 @@ impl Agent {
     /// Returns the places of those from which an item is missing.
     fn missing(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
         // Where nothing is lost, an item may have come by way of any airplane.
-        let is_heard = |id| self.start.certainty == Certainty::Sure || self.heard.contains(&id);
-        let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_known(id);
+        let is_heard = |id| self.input.certainty == PlanCertainty::Sure || self.heard.contains(&id);
+        let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_fully_known(id);
         present.iter().filter(|(_, id)| lacks(*id)).map(|(place, _)| *place).collect()
     }
 
     /// Continues as far as the messages heard allow.
-    fn go_on(&mut self) -> Vec<Vec<Item>> {
+    fn advance(&mut self) -> Vec<Vec<Item>> {
         let mut said = Vec::new();
         if !std::mem::take(&mut self.is_stale) {
             return said;
         }
-        if !self.has_reported && self.has_listened() {
+        if !self.has_reported && self.has_heard_all() {
             self.has_reported = true;
             let (about, heard): (_, Vec<_>) = (self.id(), self.heard.iter().copied().collect());
-            self.roster.note_report(about, heard.clone());
+            self.roster.add_report(about, heard.clone());
             // An agent that has heard no other one reports too: those that hear it wait for the report.
             said.push(vec![Item::Report { about, heard }]);
         }
-        if self.found.is_none() && self.has_reported && self.has_all() {
-            self.find();
+        if self.result.is_none() && self.has_reported && self.has_all() {
+            self.find_group();
         }
         said
     }
 
     /// Finds its group from the known items.
-    fn find(&mut self) {
+    fn find_group(&mut self) {
         let members = self.roster.group(self.id());
-        let mut intruders = self.start.intruders.clone();
+        let mut intruders = self.input.intruders.clone();
         for beacon in members.iter().filter_map(|&id| self.roster.beacon(id)) {
             intruders.extend(beacon.intruders.iter().cloned());
         }
@@ -243,58 +244,58 @@ impl Agent {
         intruders.dedup_by_key(|one| one.slot);
         let sighted = |&id: &EntityId| self.roster.beacon(id).map(|beacon| beacon.own);
         let members = members.iter().filter_map(sighted).collect();
-        self.found = Some(Found { members, intruders });
+        self.result = Some(GroupingResult { members, intruders });
     }
 }
 
-impl link::Agent for Agent {
+impl link::Agent for GroupingAgent {
     type Message = Vec<Item>;
-    type Outcome = Found;
+    type Outcome = GroupingResult;
 
     fn start(&mut self) -> Vec<Vec<Item>> {
         let own = self.roster.item(self.id(), false);
         let mut said: Vec<Vec<Item>> = own.map(|item| vec![item]).into_iter().collect();
-        said.extend(self.go_on());
+        said.extend(self.advance());
         said
     }
 
-    fn check(&self, _: usize, items: &Vec<Item>) -> Result<(), Unsound> {
-        Unsound::Length.unless((1..=MOST_ITEMS).contains(&items.len()))?;
+    fn check(&self, _: usize, items: &Vec<Item>) -> Result<(), InvalidMessage> {
+        InvalidMessage::Length.unless((1..=MAX_ITEMS).contains(&items.len()))?;
         items.iter().try_for_each(|item| {
-            item.check(self.start.airplanes)?;
-            let seen = &self.start.near;
+            item.check(self.input.airplanes)?;
+            let seen = &self.input.near;
             let place = seen.binary_search_by_key(&item.about(), |one| one.id);
             match (item, place) {
                 // It must be where all see it.
-                (Item::Beacon(beacon), Ok(k)) => Unsound::Plan.unless(beacon.own == seen[k]),
+                (Item::Beacon(beacon), Ok(k)) => InvalidMessage::Plan.unless(beacon.own == seen[k]),
                 _ => Ok(()),
             }
         })
     }
 
-    fn most(&self) -> Most {
-        let n = self.start.airplanes;
+    fn limits(&self) -> MessageLimits {
+        let n = self.input.airplanes;
         // Two items of each airplane, and each comes only once from one sender.
-        Most { bytes: MOST_ITEMS * beacon::most_bytes(n), messages: 2 * n as u32 + 2 }
+        MessageLimits { bytes: MAX_ITEMS * beacon::max_item_bytes(n), messages: 2 * n as u32 + 2 }
     }
 
     fn on_message(&mut self, from: usize, items: Vec<Item>) -> Vec<Vec<Item>> {
-        let from = self.start.near[from].id;
+        let from = self.input.near[from].id;
         let mut about: BTreeSet<EntityId> = items.iter().map(Item::about).collect();
         let mut is_lacking = false;
         for item in items {
-            is_lacking |= self.take(from, item);
+            is_lacking |= self.receive_item(from, item);
         }
         if is_lacking {
-            about.extend(self.kept.iter().map(|(id, _)| *id));
+            about.extend(self.unsent.iter().map(|(id, _)| *id));
         }
-        let mut said = self.passed_on(&about);
-        said.extend(self.go_on());
+        let mut said = self.take_relay_items(&about);
+        said.extend(self.advance());
         said
     }
 
-    fn awaits(&self) -> Vec<usize> {
-        if self.found.is_some() {
+    fn awaited_members(&self) -> Vec<usize> {
+        if self.result.is_some() {
             return Vec::new();
         }
         let present = self.present();
@@ -306,30 +307,30 @@ impl link::Agent for Agent {
         present.into_iter().map(|(place, _)| place).collect()
     }
 
-    fn expects(&self, other: usize) -> bool {
-        self.start.expected[other]
+    fn is_expected(&self, other: usize) -> bool {
+        self.input.expected[other]
     }
 
-    fn waits_until(&self) -> f64 {
+    fn wait_fraction(&self) -> f64 {
         if self.has_reported { 0.95 } else { 0.5 }
     }
 
-    fn without(&mut self, other: usize, _: bool) -> Vec<Vec<Item>> {
+    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<Item>> {
         (self.gone[other], self.is_stale) = (true, true);
-        self.go_on()
+        self.advance()
     }
 
-    fn at_deadline(&mut self) {
-        if self.found.is_none() {
-            self.find();
+    fn on_deadline(&mut self) {
+        if self.result.is_none() {
+            self.find_group();
         }
     }
 
     fn is_done(&self) -> bool {
-        self.found.is_some()
+        self.result.is_some()
     }
 
-    fn outcome(&self) -> Option<Found> {
-        self.found.clone()
+    fn outcome(&self) -> Option<GroupingResult> {
+        self.result.clone()
     }
 }

@@ -3,31 +3,31 @@
 
 mod check;
 
-use super::contact::Beacon;
-use super::optimizer::{Optimizer, Step};
-use super::own_ship::OwnShip;
-use super::party::Unsound;
-use super::{Decided, Most};
-use crate::flight::{Known, Point, Prediction};
-use crate::objective::{Options, couple, own_costs};
+use super::optimizer::{Optimizer, OptimizerStep};
+use super::ownship::Ownship;
+use super::participant::InvalidMessage;
+use super::traffic_state::StateBeacon;
+use super::{ActionChoice, MessageLimits};
+use crate::flight::{KnownAircraft, Point, Prediction};
+use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, Game, Order, PairwiseGame, Player};
+use sidestep_collectives::{Estimator, Game, PairwiseGame, Player, UpdateOrder};
 use std::collections::BTreeMap;
 
 /// Messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum Message {
+pub enum InformedMessage {
     /// The ways of all the sender's actions.
     Ways {
         /// Beacon of the sender.
-        beacon: Beacon,
+        beacon: StateBeacon,
         /// The ways, by action.
         ways: Vec<Prediction>,
     },
     /// A model, from which the others predict the sender's ways themselves.
     Model {
         /// Beacon of the sender.
-        beacon: Beacon,
+        beacon: StateBeacon,
         /// Number of way-points done with.
         next: u32,
         /// Way-points that it is to reach.
@@ -61,9 +61,9 @@ pub enum Message {
 
 /// A member of the group, as an agent knows it.
 #[derive(Debug, Default)]
-struct Member {
-    beacon: Option<Beacon>,
-    options: Option<Options>,
+struct InformedMember {
+    beacon: Option<StateBeacon>,
+    options: Option<ActionPredictions>,
     /// Distributions after each round; round 0 is the start.
     q: BTreeMap<u32, Vec<f64>>,
     samples: BTreeMap<u32, Vec<usize>>,
@@ -72,9 +72,13 @@ struct Member {
     gone: bool,
 }
 
-impl Member {
+impl InformedMember {
     /// Returns its message that holds in a round, if that is known.
-    fn at<'a, T>(&self, of_rounds: &'a BTreeMap<u32, T>, round: u32) -> Option<&'a T> {
+    fn message_in_round<'a, T>(
+        &self,
+        of_rounds: &'a BTreeMap<u32, T>,
+        round: u32,
+    ) -> Option<&'a T> {
         match of_rounds.get(&round) {
             None if self.gone => of_rounds.range(..round).next_back().map(|(_, value)| value),
             known => known,
@@ -82,11 +86,11 @@ impl Member {
     }
 
     fn q(&self, round: u32) -> Option<&Vec<f64>> {
-        self.at(&self.q, round)
+        self.message_in_round(&self.q, round)
     }
 
     fn samples(&self, round: u32) -> Option<&Vec<usize>> {
-        self.at(&self.samples, round)
+        self.message_in_round(&self.samples, round)
     }
 
     /// Returns how far it has moved in a round.
@@ -105,10 +109,10 @@ impl Member {
 
 /// One agent.
 #[derive(Debug)]
-pub struct Agent {
-    own: OwnShip,
+pub struct InformedAgent {
+    own: Ownship,
     by_model: bool,
-    members: Vec<Member>,
+    members: Vec<InformedMember>,
     game: Option<PairwiseGame>,
     player: Player,
     /// Number of rounds made.
@@ -116,24 +120,31 @@ pub struct Agent {
     calm: u32,
 }
 
-impl Agent {
+impl InformedAgent {
     /// Returns one that has not sent anything yet.
-    pub(crate) fn new(own: OwnShip, by_model: bool) -> Self {
-        let mut members: Vec<Member> =
-            (0..own.briefing.ids.len()).map(|_| Member::default()).collect();
+    pub(crate) fn new(own: Ownship, by_model: bool) -> Self {
+        let mut members: Vec<InformedMember> =
+            (0..own.briefing.ids.len()).map(|_| InformedMember::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
         Self { own, by_model, members, game: None, player, round: 0, calm: 0 }
     }
 
-    fn announcement(&self) -> Message {
+    fn model_message(&self) -> InformedMessage {
         let beacon = self.own.beacon.clone();
         if !self.by_model {
-            return Message::Ways { beacon, ways: self.own.options.predictions.clone() };
+            return InformedMessage::Ways { beacon, ways: self.own.options.predictions.clone() };
         }
-        let Known { slot, next, orders, altitude_m, .. } = self.own.known;
+        let KnownAircraft { slot, next, orders, altitude_m, .. } = self.own.known;
         let mission = self.own.mission.clone();
-        Message::Model { beacon, next: next as u32, mission, airplane: slot, orders, altitude_m }
+        InformedMessage::Model {
+            beacon,
+            next: next as u32,
+            mission,
+            airplane: slot,
+            orders,
+            altitude_m,
+        }
     }
 
     fn is_exact(&self) -> bool {
@@ -141,15 +152,16 @@ impl Agent {
     }
 
     /// Sets up the game and the first distributions, once all options are known.
-    fn meet(&mut self) {
+    fn start_game(&mut self) {
         let objective = &self.own.briefing.objective;
-        let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
+        let all: Vec<&ActionPredictions> =
+            self.members.iter().filter_map(|m| m.options.as_ref()).collect();
         let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 // An exact player needs only the pairs that it is part of.
                 if !self.is_exact() || i == self.own.me || j == self.own.me {
-                    couple(&mut game, objective, [i, j], [all[i], all[j]]);
+                    add_pair_costs(&mut game, objective, [i, j], [all[i], all[j]]);
                 }
             }
         }
@@ -166,15 +178,18 @@ impl Agent {
     /// Returns the agents that owe a message for the next step. With exact expectations round `r`
     /// leads to the distributions `q_r`, and a step is the agent's own update or that of all;
     /// samples are those of the round after `round` rounds.
-    fn awaits_in_round(&self) -> Vec<usize> {
-        let (me, sequence) = (self.own.me, self.own.settings().order == Order::Sequence);
+    fn awaited_in_round(&self) -> Vec<usize> {
+        let (me, sequence) = (self.own.me, self.own.settings().order == UpdateOrder::Sequence);
         let (round, all) = (self.round, self.members.iter().enumerate());
         let has_drawn = self.members[me].samples.contains_key(&round);
-        let missing = |(j, member): (usize, &Member)| match (self.is_exact(), self.has_moved()) {
-            (false, _) => has_drawn && member.samples(round).is_none(),
-            (true, true) => member.q(round + 1).is_none(),
-            (true, false) => member.q(if sequence && j < me { round + 1 } else { round }).is_none(),
-        };
+        let missing =
+            |(j, member): (usize, &InformedMember)| match (self.is_exact(), self.has_moved()) {
+                (false, _) => has_drawn && member.samples(round).is_none(),
+                (true, true) => member.q(round + 1).is_none(),
+                (true, false) => {
+                    member.q(if sequence && j < me { round + 1 } else { round }).is_none()
+                }
+            };
         all.filter(|(j, member)| missing((*j, member))).map(|(j, _)| j).collect()
     }
 
@@ -183,69 +198,73 @@ impl Agent {
         self.members[self.own.me].q.contains_key(&(self.round + 1))
     }
 
-    fn exact_step(&mut self) -> Step<Message> {
+    fn exact_step(&mut self) -> OptimizerStep<InformedMessage> {
         let round = self.round + 1;
         if !self.has_moved() {
-            return Step::Say(self.exact_update(round));
+            return OptimizerStep::Send(self.exact_update(round));
         }
         let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
         let stop = self.own.settings().stop;
-        self.calm = stop.calm(self.calm, most);
+        self.calm = stop.count_calm_rounds(self.calm, most);
         self.round = round;
         self.members.iter_mut().for_each(|m| m.forget_before(round));
         let is_over = self.calm >= stop.calm_rounds || round >= stop.max_rounds;
-        if is_over { Step::Conclude } else { Step::Done }
+        if is_over { OptimizerStep::Conclude } else { OptimizerStep::Done }
     }
 
-    fn exact_update(&mut self, round: u32) -> Message {
+    fn exact_update(&mut self, round: u32) -> InformedMessage {
         let (me, settings) = (self.own.me, *self.own.settings());
-        let sequence = settings.order == Order::Sequence;
-        let seen = |(j, member): (usize, &Member)| {
+        let sequence = settings.order == UpdateOrder::Sequence;
+        let seen = |(j, member): (usize, &InformedMember)| {
             member.q(if sequence && j < me { round } else { round - 1 }).cloned()
         };
         let q: Vec<Vec<f64>> = self.members.iter().enumerate().filter_map(seen).collect();
         if let Some(game) = &self.game {
-            self.player.know(|expected| game.expect(me, &q, expected));
+            self.player.set_expected(|expected| game.expected_costs(me, &q, expected));
         }
         let change = self.player.update(settings.update, settings.cooling);
         let q = self.player.q.clone();
         self.members[me].q.insert(round, q.clone());
         self.members[me].changes.insert(round, change);
-        Message::Distribution { round, change, q }
+        InformedMessage::Distribution { round, change, q }
     }
 
     /// Draws samples, unless it has; else learns from the samples of all.
-    fn sampled_step(&mut self, block: usize, ageing: f64) -> Step<Message> {
+    fn sampled_step(&mut self, block: usize, ageing: f64) -> OptimizerStep<InformedMessage> {
         let (me, round) = (self.own.me, self.round);
         if !self.members[me].samples.contains_key(&round) {
-            return Step::Say(self.draw(block));
+            return OptimizerStep::Send(self.draw(block));
         }
         if round > 0 {
             let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
             let stop = self.own.settings().stop;
-            self.calm = stop.calm(self.calm, most);
+            self.calm = stop.count_calm_rounds(self.calm, most);
             if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
-                return Step::Conclude;
+                return OptimizerStep::Conclude;
             }
         }
         let change = self.learn(block, ageing);
         self.round += 1;
         self.members[me].changes.insert(self.round, change);
         self.members.iter_mut().for_each(|m| m.forget_before(round));
-        Step::Say(self.draw(block))
+        OptimizerStep::Send(self.draw(block))
     }
 
-    fn draw(&mut self, block: usize) -> Message {
+    fn draw(&mut self, block: usize) -> InformedMessage {
         let (me, round) = (self.own.me, self.round);
         let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
         let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
         self.members[me].samples.insert(round, samples.clone());
-        Message::Samples { round, change, samples: samples.iter().map(|&x| x as u16).collect() }
+        InformedMessage::Samples {
+            round,
+            change,
+            samples: samples.iter().map(|&x| x as u16).collect(),
+        }
     }
 
     fn learn(&mut self, block: usize, ageing: f64) -> f64 {
         let Some(game) = &self.game else { return 0.0 };
-        let of = |m: &Member, k: usize| {
+        let of = |m: &InformedMember, k: usize| {
             // A presumed member has nothing to choose from.
             m.samples(self.round).and_then(|all| all.get(k)).copied().unwrap_or(0)
         };
@@ -261,10 +280,10 @@ impl Agent {
     }
 }
 
-impl Optimizer for Agent {
-    type Message = Message;
+impl Optimizer for InformedAgent {
+    type Message = InformedMessage;
 
-    fn own(&self) -> &OwnShip {
+    fn ownship(&self) -> &Ownship {
         &self.own
     }
 
@@ -272,66 +291,67 @@ impl Optimizer for Agent {
         self.round
     }
 
-    fn opening(&mut self) -> Message {
-        self.announcement()
+    fn first_message(&mut self) -> InformedMessage {
+        self.model_message()
     }
 
-    fn admits(&self, from: usize, message: &Message) -> Result<(), Unsound> {
-        self.checked(from, message)
+    fn check_message(&self, from: usize, message: &InformedMessage) -> Result<(), InvalidMessage> {
+        self.validate(from, message)
     }
 
-    fn most(&self) -> Most {
+    fn limits(&self) -> MessageLimits {
         let briefing = &*self.own.briefing;
-        let (actions, rounds) = (briefing.most_actions(), self.own.settings().stop.max_rounds);
+        let (actions, rounds) = (briefing.max_actions(), self.own.settings().stop.max_rounds);
         let block = match self.own.settings().estimator {
             Estimator::Exact => 0,
             Estimator::Sampled { block, .. } => block,
         };
         let ways = if self.by_model { 0 } else { actions };
-        let bytes = briefing.most_bytes(ways) + 8 * actions + 3 * block;
+        let bytes = briefing.max_message_bytes(ways) + 8 * actions + 3 * block;
         // Its ways or its model, and a message for each round.
-        Most { bytes, messages: rounds.saturating_add(2) }
+        MessageLimits { bytes, messages: rounds.saturating_add(2) }
     }
 
-    fn hear(&mut self, from: usize, message: Message) {
+    fn receive(&mut self, from: usize, message: InformedMessage) {
         let member = &mut self.members[from];
         match message {
-            Message::Ways { beacon, ways } => {
-                let options = Options::new(ways, beacon.separation_m, beacon.levels);
+            InformedMessage::Ways { beacon, ways } => {
+                let options = ActionPredictions::new(ways, beacon.separation_m, beacon.levels);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            Message::Model { beacon, next, mission, .. } => {
-                let options = self.own.briefing.options(from, &beacon, &mission, next as usize);
+            InformedMessage::Model { beacon, next, mission, .. } => {
+                let options =
+                    self.own.briefing.action_predictions(from, &beacon, &mission, next as usize);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
             // Messages of one that was given up no longer matter.
             _ if member.gone => {}
-            Message::Samples { round, change, samples } => {
+            InformedMessage::Samples { round, change, samples } => {
                 let samples = samples.iter().map(|&x| usize::from(x)).collect();
                 member.samples.insert(round, samples);
                 member.changes.insert(round, change);
             }
-            Message::Distribution { round, change, q } => {
+            InformedMessage::Distribution { round, change, q } => {
                 member.q.insert(round, q);
                 member.changes.insert(round, change);
             }
         }
     }
 
-    fn missing(&self) -> Vec<usize> {
+    fn missing_members(&self) -> Vec<usize> {
         if self.game.is_some() {
-            return self.awaits_in_round();
+            return self.awaited_in_round();
         }
         let unknown = |j: &usize| self.members[*j].options.is_none();
         (0..self.members.len()).filter(unknown).collect()
     }
 
-    fn step(&mut self) -> Step<Message> {
+    fn step(&mut self) -> OptimizerStep<InformedMessage> {
         if self.game.is_none() {
-            self.meet();
-            return Step::Done;
+            self.start_game();
+            return OptimizerStep::Done;
         }
         match self.own.settings().estimator {
             Estimator::Exact => self.exact_step(),
@@ -339,13 +359,17 @@ impl Optimizer for Agent {
         }
     }
 
-    fn lose(&mut self, other: usize, _: bool) {
+    fn on_peer_gone(&mut self, other: usize, _: bool) {
         let member = &mut self.members[other];
         member.gone = true;
         if member.options.is_none() {
             // Samples are numbers of options, which are unknown here, so they mean nothing.
-            *member = Member { gone: true, beacon: member.beacon.take(), ..Member::default() };
-            member.options = Some(self.own.presumed(other));
+            *member = InformedMember {
+                gone: true,
+                beacon: member.beacon.take(),
+                ..InformedMember::default()
+            };
+            member.options = Some(self.own.presumed_predictions(other));
         }
         // One that was heard, but has not sent any samples yet.
         if self.game.is_some() && member.samples.is_empty() {
@@ -353,11 +377,11 @@ impl Optimizer for Agent {
         }
     }
 
-    fn decided(&self) -> Option<Decided> {
-        self.own.decided(&self.player, self.round, self.calm)
+    fn action_choice(&self) -> Option<ActionChoice> {
+        self.own.action_choice(&self.player, self.round, self.calm)
     }
 
-    fn take_beacons(&mut self) -> Vec<Option<Beacon>> {
+    fn take_beacons(&mut self) -> Vec<Option<StateBeacon>> {
         self.members.iter_mut().map(|m| m.beacon.take()).collect()
     }
 }

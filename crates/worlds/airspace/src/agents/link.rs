@@ -10,13 +10,13 @@
 //! Endpoints and agents are state machines without a clock or a network of their own: ticks and
 //! messages are handed in, and messages are taken out.
 
-pub(crate) use super::party::Ended;
-use super::party::{Concludes, Outgoing, Party, Progress, Unsound};
+pub(crate) use super::participant::ConversationEnd;
+use super::participant::{InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::Patience;
-use sidestep_kernel::network::{Draft, HEADER_BYTES};
+use sidestep_kernel::network::RetryPolicy;
+use sidestep_kernel::network::{HEADER_BYTES, PacketBuffer};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -35,10 +35,10 @@ pub trait Agent {
     ///
     /// # Errors
     /// When its content is impossible.
-    fn check(&self, from: usize, message: &Self::Message) -> Result<(), Unsound>;
+    fn check(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
     /// Returns the largest number of bytes of a message, and of messages of one agent in a talk.
-    fn most(&self) -> Most;
+    fn limits(&self) -> MessageLimits;
 
     /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
     /// any order, each once.
@@ -50,25 +50,25 @@ pub trait Agent {
     }
 
     /// Returns the places of the members from which it needs messages in order to go on.
-    fn awaits(&self) -> Vec<usize>;
+    fn awaited_members(&self) -> Vec<usize>;
 
     /// Returns whether an answer of agent `other` can be expected.
-    fn expects(&self, _other: usize) -> bool {
+    fn is_expected(&self, _other: usize) -> bool {
         true
     }
 
     /// Returns the part of the talk, from 0 to 1, after which it goes on without those that it
     /// waits for now.
-    fn waits_until(&self) -> f64 {
+    fn wait_fraction(&self) -> f64 {
         1.0
     }
 
     /// Goes on without agent `other`, from which nothing more will come. The other is settled if it
     /// has ended regularly, rather than fallen silent.
-    fn without(&mut self, other: usize, is_settled: bool) -> Vec<Self::Message>;
+    fn on_peer_gone(&mut self, other: usize, is_settled: bool) -> Vec<Self::Message>;
 
     /// Ends because time is up, with the best outcome that its knowledge allows.
-    fn at_deadline(&mut self);
+    fn on_deadline(&mut self);
 
     /// Returns whether it has come to its outcome.
     fn is_done(&self) -> bool;
@@ -79,7 +79,7 @@ pub trait Agent {
 
 /// Bounds on the messages that an agent may be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Most {
+pub struct MessageLimits {
     /// Largest number of bytes of a message.
     pub bytes: usize,
     /// Largest number of messages of one agent in a talk.
@@ -88,7 +88,7 @@ pub struct Most {
 
 /// A message on the wire.
 #[derive(Debug, Serialize, Deserialize)]
-enum Wired<M> {
+enum WireMessage<M> {
     /// A message, with its number among the sender's.
     Said(u32, M),
     /// "Send again all your messages from this number on."
@@ -101,13 +101,13 @@ enum Wired<M> {
 
 /// Settings of an endpoint.
 #[derive(Debug, Clone)]
-pub struct Radio {
+pub struct EndpointConfig {
     /// Ids of the group, rising.
     pub group: Arc<[EntityId]>,
     /// Place of its airplane in the group.
     pub me: usize,
     /// The time that it waits for others.
-    pub patience: Patience,
+    pub patience: RetryPolicy,
     /// Number of ticks after which the talk ends.
     pub ticks: u64,
     /// Whether the radio is dead: it sends nothing, hears nothing, and knows it.
@@ -118,15 +118,15 @@ pub struct Radio {
 #[derive(Debug)]
 pub struct Endpoint<A> {
     agent: A,
-    radio: Radio,
-    most: Most,
+    config: EndpointConfig,
+    limits: MessageLimits,
     /// Number of its messages so far.
     count: u32,
     /// These, serialized, by number; none where they are never asked for.
-    said: Vec<Draft>,
-    others: Vec<Other>,
+    sent: Vec<PacketBuffer>,
+    others: Vec<PeerState>,
     /// Messages that wait to be sent.
-    out: Vec<Outgoing>,
+    out: Vec<OutgoingMessage>,
     began: u64,
     quiet_since: u64,
     /// Size of the largest packet that it has sent or heard, in bytes.
@@ -136,7 +136,7 @@ pub struct Endpoint<A> {
 
 /// An endpoint's knowledge of another one.
 #[derive(Debug, Clone, Default)]
-struct Other {
+struct PeerState {
     /// All messages below this number have come.
     next: u32,
     /// Later messages that have come out of order.
@@ -148,9 +148,9 @@ struct Other {
     unheard: bool,
 }
 
-impl Other {
+impl PeerState {
     /// Returns whether a number is new.
-    fn takes(&mut self, number: u32) -> bool {
+    fn accept(&mut self, number: u32) -> bool {
         let is_new = number >= self.next && self.early.insert(number);
         while self.early.remove(&self.next) {
             self.next += 1;
@@ -160,20 +160,20 @@ impl Other {
 }
 
 /// Returns a message in the form in which it travels.
-pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
+pub(crate) fn to_bytes<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
 }
 
 impl<A: Agent> Endpoint<A> {
     /// Returns an endpoint with an agent that has not sent anything yet.
-    pub fn new(agent: A, radio: Radio) -> Self {
-        let others = vec![Other::default(); radio.group.len()];
+    pub fn new(agent: A, radio: EndpointConfig) -> Self {
+        let others = vec![PeerState::default(); radio.group.len()];
         Self {
-            most: agent.most(),
+            limits: agent.limits(),
             agent,
-            radio,
+            config: radio,
             count: 0,
-            said: Vec::new(),
+            sent: Vec::new(),
             others,
             out: Vec::new(),
             began: 0,
@@ -184,68 +184,71 @@ impl<A: Agent> Endpoint<A> {
     }
 
     /// Sends a message to one other.
-    fn tell(&mut self, to: usize, message: Draft) {
-        self.send(Some(self.radio.group[to]), message);
+    fn send_to(&mut self, to: usize, message: PacketBuffer) {
+        self.send(Some(self.config.group[to]), message);
     }
 
-    fn send(&mut self, to: Option<EntityId>, message: Draft) {
+    fn send(&mut self, to: Option<EntityId>, message: PacketBuffer) {
         self.largest = self.largest.max(message.len());
-        self.out.push(Outgoing { to, message });
+        self.out.push(OutgoingMessage { to, message });
     }
 
     /// Sends messages to all others.
-    fn say(&mut self, messages: Vec<A::Message>) {
+    fn broadcast(&mut self, messages: Vec<A::Message>) {
         for message in messages {
-            let message = Draft::of(&Wired::Said(self.count, message));
+            let message = PacketBuffer::from_message(&WireMessage::Said(self.count, message));
             self.count += 1;
-            if self.radio.patience.asks() {
-                self.said.push(message.clone());
+            if self.config.patience.is_enabled() {
+                self.sent.push(message.clone());
             }
             self.send(None, message);
         }
     }
 
     /// Reads a message of another one.
-    fn read(&self, from: usize, bytes: &[u8]) -> Result<Wired<A::Message>, Unsound> {
-        let read = postcard::take_from_bytes::<Wired<A::Message>>(bytes);
-        let (wired, rest) = read.map_err(|_| Unsound::Form)?;
-        Unsound::Form.unless(rest.is_empty())?;
-        if let Wired::Said(number, message) = &wired {
-            Unsound::Round.unless(*number < self.most.messages)?;
+    fn read(&self, from: usize, bytes: &[u8]) -> Result<WireMessage<A::Message>, InvalidMessage> {
+        let read = postcard::take_from_bytes::<WireMessage<A::Message>>(bytes);
+        let (wired, rest) = read.map_err(|_| InvalidMessage::Form)?;
+        InvalidMessage::Form.unless(rest.is_empty())?;
+        if let WireMessage::Said(number, message) = &wired {
+            InvalidMessage::Round.unless(*number < self.limits.messages)?;
             self.agent.check(from, message)?;
         }
         Ok(wired)
     }
 
-    fn answer(&mut self, to: usize, from_number: u32) {
-        let missing = self.said.get(from_number as usize..).unwrap_or_default().to_vec();
+    fn resend_from(&mut self, to: usize, from_number: u32) {
+        let missing = self.sent.get(from_number as usize..).unwrap_or_default().to_vec();
         if missing.is_empty() {
-            let nothing =
-                if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
-            self.tell(to, Draft::of(&nothing));
+            let nothing = if self.agent.is_done() {
+                WireMessage::<A::Message>::Done
+            } else {
+                WireMessage::Wait
+            };
+            self.send_to(to, PacketBuffer::from_message(&nothing));
         }
-        missing.into_iter().for_each(|message| self.tell(to, message));
+        missing.into_iter().for_each(|message| self.send_to(to, message));
     }
 
-    fn go_on_without(&mut self, other: usize, is_settled: bool) {
+    fn drop_peer(&mut self, other: usize, is_settled: bool) {
         if !self.others[other].gone {
             self.others[other].gone = true;
-            let said = self.agent.without(other, is_settled);
-            self.say(said);
+            let said = self.agent.on_peer_gone(other, is_settled);
+            self.broadcast(said);
         }
     }
 
     /// Ends the talk of an airplane that is not heard and hears no other.
-    fn is_alone(&mut self) {
-        let me = self.radio.me;
+    fn end_unheard(&mut self) {
+        let me = self.config.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {
             self.others[j].unheard = true;
-            self.go_on_without(j, false);
+            self.drop_peer(j, false);
         }
     }
 }
 
-impl<A: Agent + Send> Party for Endpoint<A> {
+impl<A: Agent + Send> Participant for Endpoint<A> {
     fn progress(&self) -> Progress {
         Progress { round: self.agent.round(), ..Progress::default() }
     }
@@ -253,28 +256,33 @@ impl<A: Agent + Send> Party for Endpoint<A> {
     fn start(&mut self, tick: u64) {
         (self.began, self.quiet_since) = (tick, tick);
         let first = self.agent.start();
-        self.say(first);
-        if self.radio.is_silent {
-            self.is_alone();
+        self.broadcast(first);
+        if self.config.is_silent {
+            self.end_unheard();
         }
     }
 
-    fn on_message(&mut self, from: EntityId, bytes: &[u8], tick: u64) -> Result<(), Unsound> {
-        let place = self.radio.group.binary_search(&from).map_err(|_| Unsound::Airplane)?;
-        Unsound::Airplane.unless(place != self.radio.me)?;
+    fn on_message(
+        &mut self,
+        from: EntityId,
+        bytes: &[u8],
+        tick: u64,
+    ) -> Result<(), InvalidMessage> {
+        let place = self.config.group.binary_search(&from).map_err(|_| InvalidMessage::Airplane)?;
+        InvalidMessage::Airplane.unless(place != self.config.me)?;
         let wired = self.read(place, bytes)?;
         (self.others[place].unanswered, self.others[place].is_there) = (0, true);
         self.largest = self.largest.max(HEADER_BYTES + bytes.len());
         match wired {
-            Wired::Said(number, message) if self.others[place].takes(number) => {
+            WireMessage::Said(number, message) if self.others[place].accept(number) => {
                 self.quiet_since = tick;
                 let said = self.agent.on_message(place, message);
-                self.say(said);
+                self.broadcast(said);
             }
-            Wired::Said(..) | Wired::Wait => {}
-            Wired::Ask(number) => self.answer(place, number),
+            WireMessage::Said(..) | WireMessage::Wait => {}
+            WireMessage::Ask(number) => self.resend_from(place, number),
             // This answers a question for missing messages, so all of them have come.
-            Wired::Done => self.go_on_without(place, true),
+            WireMessage::Done => self.drop_peer(place, true),
         }
         Ok(())
     }
@@ -287,26 +295,27 @@ impl<A: Agent + Send> Party for Endpoint<A> {
         }
         self.quiet_since = tick;
         let waited = tick.saturating_sub(self.began) as f64;
-        let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
-        for j in self.agent.awaits() {
-            let Patience { tries, first_tries, .. } = self.radio.patience;
-            let is_expected = self.others[j].is_there || self.agent.expects(j);
+        let has_time = waited < self.agent.wait_fraction() * self.config.ticks as f64;
+        for j in self.agent.awaited_members() {
+            let RetryPolicy { tries, first_tries, .. } = self.config.patience;
+            let is_expected = self.others[j].is_there || self.agent.is_expected(j);
             let tries = if is_expected { tries } else { first_tries };
             let other = &mut self.others[j];
             if other.unanswered < tries && has_time {
                 other.unanswered += 1;
-                let question = Draft::of(&Wired::<A::Message>::Ask(other.next));
-                self.tell(j, question);
+                let question =
+                    PacketBuffer::from_message(&WireMessage::<A::Message>::Ask(other.next));
+                self.send_to(j, question);
             } else {
                 other.unheard = true;
-                self.go_on_without(j, false);
+                self.drop_peer(j, false);
             }
         }
     }
 
     /// Returns the tick in which its patience ends.
     fn next_timer(&self) -> Option<u64> {
-        let ticks = self.radio.patience.ticks_for(self.largest);
+        let ticks = self.config.patience.timeout_ticks(self.largest);
         (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
     }
 
@@ -314,25 +323,25 @@ impl<A: Agent + Send> Party for Endpoint<A> {
         self.agent.is_done()
     }
 
-    fn take_messages(&mut self) -> Vec<Outgoing> {
+    fn take_messages(&mut self) -> Vec<OutgoingMessage> {
         std::mem::take(&mut self.out)
     }
 
-    fn most_bytes(&self) -> usize {
+    fn max_message_bytes(&self) -> usize {
         // Its number and kind come before it.
-        self.most.bytes + 16
+        self.limits.bytes + 16
     }
 }
 
-impl<A: Agent + Send> Concludes for Endpoint<A> {
+impl<A: Agent + Send> WithOutcome for Endpoint<A> {
     type Outcome = A::Outcome;
 
-    fn end(&mut self) -> Ended<A::Outcome> {
+    fn finish(&mut self) -> ConversationEnd<A::Outcome> {
         if !self.is_done() {
             self.late = true;
-            self.agent.at_deadline();
+            self.agent.on_deadline();
         }
         let unheard = (0..self.others.len()).filter(|&j| self.others[j].unheard).collect();
-        Ended { outcome: self.agent.outcome(), unheard, late: self.late }
+        ConversationEnd { outcome: self.agent.outcome(), unheard, late: self.late }
     }
 }

@@ -1,9 +1,9 @@
 //! Agents: the programs aboard the airplanes, each with its own data.
 //!
-//! An agent owns its knowledge of its airplane and of others ([`OwnShip`]), the knowledge that all
-//! share ([`Briefing`]), and its part of the optimization. It is a state machine: messages in,
-//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Party`] to a
-//! talk; a [`Talk`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
+//! An agent owns its knowledge of its airplane and of others ([`Ownship`]), the knowledge that all
+//! share ([`CommonKnowledge`]), and its part of the optimization. It is a state machine: messages in,
+//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Participant`] to a
+//! talk; a [`Conversation`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
 //! which network carries the packets, in memory or between processes.
 //!
 //! | Module | Task |
@@ -17,34 +17,36 @@
 //! | [`packet`] | the subjects of talks, and packets on their way out |
 //!
 //! No agent waits forever: one that is not heard is presumed where it was last heard
-//! ([`contact`]).
+//! ([`traffic_state`]).
 
-pub mod contact;
+mod conversation;
 pub mod coordinator;
 pub mod exchange;
 pub mod grouping;
 pub mod informed;
 pub mod intent;
 mod link;
+pub mod network_traffic;
 mod optimizer;
-mod own_ship;
+mod ownship;
 pub mod packet;
-mod party;
+mod participant;
 pub mod sampling;
-mod talk;
-pub mod traffic;
+pub mod traffic_state;
 
-use contact::Beacon;
-pub use link::{Agent, Endpoint, Most, Radio};
-pub(crate) use optimizer::Optimizing;
-pub use own_ship::{Briefing, Filed, OwnShip};
-pub use party::{Concludes, Ended, Outgoing, Party, Progress, Unsound};
+pub use conversation::{Conversation, ConversationInfo};
+pub use link::{Agent, Endpoint, EndpointConfig, MessageLimits};
+pub(crate) use optimizer::OptimizingAgent;
+pub use ownship::{CommonKnowledge, FiledFlight, Ownship};
+pub use participant::{
+    ConversationEnd, InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome,
+};
 use serde::{Deserialize, Serialize};
-pub use talk::{Frame, Talk};
+use traffic_state::StateBeacon;
 
 /// Outcome of the optimization for an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Decided {
+pub struct ActionChoice {
     /// Number of the chosen action.
     pub chosen: usize,
     /// The estimate of every action at the end.
@@ -61,9 +63,9 @@ pub struct Decided {
 
 /// Outcome of an agent.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Conclusion {
+pub struct OptimizationResult {
     /// The decision; none if time was up before the agent had learned anything.
-    pub decided: Option<Decided>,
+    pub decided: Option<ActionChoice>,
     /// Beacons of the others that were heard, by place.
-    pub beacons: Vec<Option<Beacon>>,
+    pub beacons: Vec<Option<StateBeacon>>,
 }

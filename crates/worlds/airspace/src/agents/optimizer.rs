@@ -1,19 +1,19 @@
 //! The part that agents have in common who optimize together: whatever they send each other, they go on step by
 //! step as far as the messages heard allow, until they conclude.
 
-use super::link::{self, Most};
-use super::own_ship::OwnShip;
-use super::party::Unsound;
-use super::{Beacon, Conclusion, Decided};
+use super::link::{self, MessageLimits};
+use super::ownship::Ownship;
+use super::participant::InvalidMessage;
+use super::{ActionChoice, OptimizationResult, StateBeacon};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// The result of a step.
-pub(crate) enum Step<M> {
+pub(crate) enum OptimizerStep<M> {
     /// It has only changed itself.
     Done,
     /// It has something to say.
-    Say(M),
+    Send(M),
     /// It is over.
     Conclude,
 }
@@ -24,120 +24,120 @@ pub(crate) trait Optimizer {
     type Message: Serialize + DeserializeOwned;
 
     /// Returns the knowledge of its own airplane.
-    fn own(&self) -> &OwnShip;
+    fn ownship(&self) -> &Ownship;
 
     /// Returns the number of rounds made.
     fn round(&self) -> u32;
 
     /// Returns its first message.
-    fn opening(&mut self) -> Self::Message;
+    fn first_message(&mut self) -> Self::Message;
 
     /// Checks a message of the airplane at a place, see [`link::Agent::check`].
     ///
     /// # Errors
     /// When it says what cannot be.
-    fn admits(&self, from: usize, message: &Self::Message) -> Result<(), Unsound>;
+    fn check_message(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
     /// Returns the bounds on what it may be sent.
-    fn most(&self) -> Most;
+    fn limits(&self) -> MessageLimits;
 
     /// Takes a message of the airplane at a place. Messages come in any order, each once.
-    fn hear(&mut self, from: usize, message: Self::Message);
+    fn receive(&mut self, from: usize, message: Self::Message);
 
     /// Returns the places of those whose messages it needs for its next step.
-    fn missing(&self) -> Vec<usize>;
+    fn missing_members(&self) -> Vec<usize>;
 
     /// Takes a step, for which no message is missing.
-    fn step(&mut self) -> Step<Self::Message>;
+    fn step(&mut self) -> OptimizerStep<Self::Message>;
 
-    /// Goes on without another one, see [`link::Agent::without`].
-    fn lose(&mut self, other: usize, is_settled: bool);
+    /// Goes on without another one, see [`link::Agent::on_peer_gone`].
+    fn on_peer_gone(&mut self, other: usize, is_settled: bool);
 
     /// Returns its decision from what it has learned; none, if that is nothing.
-    fn decided(&self) -> Option<Decided>;
+    fn action_choice(&self) -> Option<ActionChoice>;
 
     /// Hands over the beacons that it has heard, by place.
-    fn take_beacons(&mut self) -> Vec<Option<Beacon>>;
+    fn take_beacons(&mut self) -> Vec<Option<StateBeacon>>;
 }
 
 /// An agent that optimizes.
 #[derive(Debug)]
-pub(crate) struct Optimizing<O> {
+pub(crate) struct OptimizingAgent<O> {
     optimizer: O,
-    conclusion: Option<Conclusion>,
+    conclusion: Option<OptimizationResult>,
 }
 
-impl<O: Optimizer> Optimizing<O> {
+impl<O: Optimizer> OptimizingAgent<O> {
     /// Returns an agent that has not sent anything yet.
     pub(crate) fn new(optimizer: O) -> Self {
         Self { optimizer, conclusion: None }
     }
 
     /// Continues as far as the messages heard allow.
-    fn go_on(&mut self) -> Vec<O::Message> {
+    fn advance(&mut self) -> Vec<O::Message> {
         let mut said = Vec::new();
-        while self.conclusion.is_none() && self.optimizer.missing().is_empty() {
+        while self.conclusion.is_none() && self.optimizer.missing_members().is_empty() {
             match self.optimizer.step() {
-                Step::Done => {}
-                Step::Say(message) => said.push(message),
-                Step::Conclude => self.conclude(),
+                OptimizerStep::Done => {}
+                OptimizerStep::Send(message) => said.push(message),
+                OptimizerStep::Conclude => self.conclude(),
             }
         }
         said
     }
 
     fn conclude(&mut self) {
-        let (decided, beacons) = (self.optimizer.decided(), self.optimizer.take_beacons());
-        self.conclusion = Some(Conclusion { decided, beacons });
+        let (decided, beacons) = (self.optimizer.action_choice(), self.optimizer.take_beacons());
+        self.conclusion = Some(OptimizationResult { decided, beacons });
     }
 }
 
-impl<O: Optimizer> link::Agent for Optimizing<O> {
+impl<O: Optimizer> link::Agent for OptimizingAgent<O> {
     type Message = O::Message;
-    type Outcome = Conclusion;
+    type Outcome = OptimizationResult;
 
     fn start(&mut self) -> Vec<O::Message> {
-        let mut said = vec![self.optimizer.opening()];
-        said.extend(self.go_on());
+        let mut said = vec![self.optimizer.first_message()];
+        said.extend(self.advance());
         said
     }
 
-    fn check(&self, from: usize, message: &O::Message) -> Result<(), Unsound> {
-        self.optimizer.admits(from, message)
+    fn check(&self, from: usize, message: &O::Message) -> Result<(), InvalidMessage> {
+        self.optimizer.check_message(from, message)
     }
 
-    fn most(&self) -> Most {
-        self.optimizer.most()
+    fn limits(&self) -> MessageLimits {
+        self.optimizer.limits()
     }
 
     fn on_message(&mut self, from: usize, message: O::Message) -> Vec<O::Message> {
         if self.conclusion.is_none() {
-            self.optimizer.hear(from, message);
+            self.optimizer.receive(from, message);
         }
-        self.go_on()
+        self.advance()
     }
 
     fn round(&self) -> u32 {
         self.optimizer.round()
     }
 
-    fn awaits(&self) -> Vec<usize> {
+    fn awaited_members(&self) -> Vec<usize> {
         if self.conclusion.is_some() {
             return Vec::new();
         }
-        self.optimizer.missing()
+        self.optimizer.missing_members()
     }
 
-    fn expects(&self, other: usize) -> bool {
-        self.optimizer.own().expects(other)
+    fn is_expected(&self, other: usize) -> bool {
+        self.optimizer.ownship().is_expected(other)
     }
 
-    fn without(&mut self, other: usize, is_settled: bool) -> Vec<O::Message> {
-        self.optimizer.lose(other, is_settled);
-        self.go_on()
+    fn on_peer_gone(&mut self, other: usize, is_settled: bool) -> Vec<O::Message> {
+        self.optimizer.on_peer_gone(other, is_settled);
+        self.advance()
     }
 
-    fn at_deadline(&mut self) {
+    fn on_deadline(&mut self) {
         self.conclude();
     }
 
@@ -145,7 +145,7 @@ impl<O: Optimizer> link::Agent for Optimizing<O> {
         self.conclusion.is_some()
     }
 
-    fn outcome(&self) -> Option<Conclusion> {
+    fn outcome(&self) -> Option<OptimizationResult> {
         self.conclusion.clone()
     }
 }

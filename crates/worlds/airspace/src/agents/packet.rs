@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 /// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Topic {
+pub enum Protocol {
     /// The choice of the airplanes that decide together, where groups are not announced.
     Group,
     /// The choice of the action that each wants to fly.
@@ -15,12 +15,12 @@ pub enum Topic {
     Shield,
 }
 
-impl network::Topic for Topic {
+impl network::Protocol for Protocol {
     fn number(self) -> u8 {
         self as u8
     }
 
-    fn of_number(number: u8) -> Option<Self> {
+    fn from_number(number: u8) -> Option<Self> {
         match number {
             0 => Some(Self::Group),
             1 => Some(Self::Decision),
@@ -31,10 +31,10 @@ impl network::Topic for Topic {
 }
 
 /// The identity of a talk of airplanes.
-pub type TalkId = network::TalkId<Topic>;
+pub type ConversationId = network::ConversationId<Protocol>;
 
 /// The statements of an airplane's packet about its message.
-pub type Seal = network::Seal<Topic>;
+pub type PacketHeader = network::PacketHeader<Protocol>;
 
 /// A packet on its way out.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,19 +1,19 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
-use super::contact::Beacon;
-use super::optimizer::{Optimizer, Step};
-use super::own_ship::OwnShip;
-use super::party::Unsound;
-use super::{Decided, Most};
+use super::optimizer::{Optimizer, OptimizerStep};
+use super::ownship::Ownship;
+use super::participant::InvalidMessage;
+use super::traffic_state::StateBeacon;
+use super::{ActionChoice, MessageLimits};
 use crate::flight::{Levels, Prediction};
-use crate::objective::{Options, own_costs};
+use crate::objective::{ActionPredictions, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
 use std::collections::BTreeMap;
 
 /// The messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum Message {
+pub enum SamplingMessage {
     /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
     Predictions {
@@ -22,7 +22,7 @@ pub enum Message {
         /// Largest change of the probabilities.
         change: f64,
         /// Beacon of the sender.
-        beacon: Beacon,
+        beacon: StateBeacon,
         /// The ways, by sample.
         ways: Vec<Prediction>,
     },
@@ -37,8 +37,8 @@ pub enum Message {
 
 /// A member of the group, as an agent knows it.
 #[derive(Debug, Default)]
-struct Member {
-    beacon: Option<Beacon>,
+struct SamplingMember {
+    beacon: Option<StateBeacon>,
     /// The ways of its samples, by round.
     ways: BTreeMap<u32, Vec<Prediction>>,
     /// Its changes of probabilities in the round before, by round.
@@ -46,15 +46,15 @@ struct Member {
     /// Its part of the costs, by round.
     costs: BTreeMap<u32, Vec<f64>>,
     /// Predictions for it, once its messages have stopped.
-    presumed: Option<Options>,
+    presumed: Option<ActionPredictions>,
 }
 
-impl Member {
+impl SamplingMember {
     fn is_gone(&self) -> bool {
         self.presumed.is_some()
     }
 
-    fn way(&self, round: u32, k: usize) -> Option<&Prediction> {
+    fn prediction(&self, round: u32, k: usize) -> Option<&Prediction> {
         let presumed = || self.presumed.as_ref().and_then(|options| options.predictions.first());
         self.ways.get(&round).and_then(|ways| ways.get(k)).or_else(presumed)
     }
@@ -75,8 +75,8 @@ impl Member {
 
 /// One agent.
 #[derive(Debug)]
-pub struct Agent {
-    own: OwnShip,
+pub struct SamplingAgent {
+    own: Ownship,
     own_costs: Vec<f64>,
     player: Player,
     block: usize,
@@ -85,16 +85,16 @@ pub struct Agent {
     calm: u32,
     change: f64,
     samples: Vec<usize>,
-    members: Vec<Member>,
+    members: Vec<SamplingMember>,
 }
 
-impl Agent {
+impl SamplingAgent {
     /// Returns one that has not sent anything yet.
-    pub(crate) fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
+    pub(crate) fn new(own: Ownship, block: usize, ageing: f64) -> Self {
         Self {
             own_costs: own_costs(&own.briefing.objective, &own.options),
             player: Player::new(own.options.predictions.len()),
-            members: own.briefing.ids.iter().map(|_| Member::default()).collect(),
+            members: own.briefing.ids.iter().map(|_| SamplingMember::default()).collect(),
             own,
             block,
             ageing,
@@ -105,14 +105,14 @@ impl Agent {
         }
     }
 
-    fn drawn(&self) -> u64 {
+    fn sample_count(&self) -> u64 {
         u64::from(self.round) * self.block as u64
     }
 
-    fn predictions(&mut self) -> Message {
-        self.samples = self.own.samples(&self.player, self.drawn(), self.block);
+    fn predictions(&mut self) -> SamplingMessage {
+        self.samples = self.own.samples(&self.player, self.sample_count(), self.block);
         let ways = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
-        Message::Predictions {
+        SamplingMessage::Predictions {
             round: self.round,
             change: self.change,
             beacon: self.own.beacon.clone(),
@@ -120,46 +120,46 @@ impl Agent {
         }
     }
 
-    fn others(&self) -> impl Iterator<Item = (usize, &Member)> {
+    fn others(&self) -> impl Iterator<Item = (usize, &SamplingMember)> {
         self.members.iter().enumerate().filter(|(j, _)| *j != self.own.me)
     }
 
     /// Returns whether its own costs of this round are sent.
-    fn has_costed(&self) -> bool {
+    fn has_sent_costs(&self) -> bool {
         self.members[self.own.me].costs.contains_key(&self.round)
     }
 
     /// Returns whether the distributions have settled (line 25). All agents know how far each has
     /// moved, so all stop in the same round.
-    fn is_settled(&mut self) -> bool {
+    fn has_converged(&mut self) -> bool {
         let stop = self.own.settings().stop;
         if self.round > 0 {
             let heard = self.others().filter_map(|(_, m)| m.changes.get(&self.round).copied());
             let most = heard.fold(self.change, f64::max);
-            self.calm = stop.calm(self.calm, most);
+            self.calm = stop.count_calm_rounds(self.calm, most);
         }
         self.calm >= stop.calm_rounds || self.round >= stop.max_rounds
     }
 
     /// Computes its part of the costs (lines 10 to 15).
-    fn cost(&mut self) -> Message {
+    fn cost(&mut self) -> SamplingMessage {
         let costs: Vec<f64> = (0..self.block).map(|k| self.cost_of(k)).collect();
         self.members[self.own.me].costs.insert(self.round, costs.clone());
-        Message::Costs { round: self.round, costs }
+        SamplingMessage::Costs { round: self.round, costs }
     }
 
     /// Returns its part of the cost of joint sample `k`.
     fn cost_of(&self, k: usize) -> f64 {
         let objective = &self.own.briefing.objective;
-        let OwnShip { options, .. } = &self.own;
+        let Ownship { options, .. } = &self.own;
         let x = self.samples[k];
         let way = &options.predictions[x];
-        let on_level = |(_, member): &(usize, &Member)| {
+        let on_level = |(_, member): &(usize, &SamplingMember)| {
             let theirs = member.levels();
-            theirs.is_none_or(|levels| levels.meets(&options.levels, objective.vertical_m))
+            theirs.is_none_or(|levels| levels.overlaps(&options.levels, objective.vertical_m))
         };
         self.others().filter(on_level).fold(self.own_costs[x], |sum, (_, member)| {
-            let Some(theirs) = member.way(self.round, k) else { return sum };
+            let Some(theirs) = member.prediction(self.round, k) else { return sum };
             let wanted_m = member.presumed.as_ref().map_or(0.0, |options| options.separation_m);
             let r = options.separation_m.max(wanted_m);
             sum + objective.collision(way, theirs, [r, r])[0]
@@ -182,10 +182,10 @@ impl Agent {
     }
 }
 
-impl Optimizer for Agent {
-    type Message = Message;
+impl Optimizer for SamplingAgent {
+    type Message = SamplingMessage;
 
-    fn opening(&mut self) -> Message {
+    fn first_message(&mut self) -> SamplingMessage {
         self.predictions()
     }
 
@@ -193,86 +193,86 @@ impl Optimizer for Agent {
         self.round
     }
 
-    fn admits(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+    fn check_message(&self, from: usize, message: &SamplingMessage) -> Result<(), InvalidMessage> {
         let briefing = &*self.own.briefing;
         match message {
-            Message::Predictions { round, change, beacon, ways } => {
-                briefing.admits_round(*round, *change)?;
-                briefing.admits(from, beacon)?;
-                briefing.admits_ways(ways, self.block)
+            SamplingMessage::Predictions { round, change, beacon, ways } => {
+                briefing.check_round(*round, *change)?;
+                briefing.check_beacon(from, beacon)?;
+                briefing.check_predictions(ways, self.block)
             }
-            Message::Costs { round, costs } => {
-                briefing.admits_round(*round, 0.0)?;
-                Unsound::Length.unless(costs.len() == self.block)?;
+            SamplingMessage::Costs { round, costs } => {
+                briefing.check_round(*round, 0.0)?;
+                InvalidMessage::Length.unless(costs.len() == self.block)?;
                 // Large ones are taken, unless their sum would not be a number.
-                Unsound::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
+                InvalidMessage::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
             }
         }
     }
 
-    fn most(&self) -> Most {
-        let bytes = self.own.briefing.most_bytes(self.block) + 8 * self.block;
+    fn limits(&self) -> MessageLimits {
+        let bytes = self.own.briefing.max_message_bytes(self.block) + 8 * self.block;
         // The ways of its samples and their costs in each round.
         let rounds = self.own.settings().stop.max_rounds;
-        Most { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
+        MessageLimits { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
     }
 
-    fn hear(&mut self, from: usize, message: Message) {
+    fn receive(&mut self, from: usize, message: SamplingMessage) {
         let member = &mut self.members[from];
         match message {
-            Message::Predictions { round, change, beacon, ways } => {
+            SamplingMessage::Predictions { round, change, beacon, ways } => {
                 member.beacon = Some(beacon);
                 member.changes.insert(round, change);
                 member.ways.insert(round, ways);
             }
-            Message::Costs { round, costs } => {
+            SamplingMessage::Costs { round, costs } => {
                 member.costs.insert(round, costs);
             }
         }
     }
 
-    fn missing(&self) -> Vec<usize> {
-        let missing = |member: &Member| match self.has_costed() {
+    fn missing_members(&self) -> Vec<usize> {
+        let missing = |member: &SamplingMember| match self.has_sent_costs() {
             false => !member.ways.contains_key(&self.round),
             true => !member.costs.contains_key(&self.round),
         };
         self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
     }
 
-    fn step(&mut self) -> Step<Message> {
-        if self.has_costed() {
+    fn step(&mut self) -> OptimizerStep<SamplingMessage> {
+        if self.has_sent_costs() {
             self.learn();
-            Step::Say(self.predictions())
-        } else if self.is_settled() {
-            Step::Conclude
+            OptimizerStep::Send(self.predictions())
+        } else if self.has_converged() {
+            OptimizerStep::Conclude
         } else {
-            Step::Say(self.cost())
+            OptimizerStep::Send(self.cost())
         }
     }
 
     /// Leaves out the other's part of the costs from now on. A settled agent keeps its last
     /// message; a silent one is presumed where it was.
-    fn lose(&mut self, other: usize, is_settled: bool) {
+    fn on_peer_gone(&mut self, other: usize, is_settled: bool) {
         let member = &mut self.members[other];
         let last = member.ways.values().next_back().and_then(|ways| ways.first());
         member.presumed = Some(match (&member.beacon, last) {
             (Some(beacon), Some(way)) if is_settled => {
-                Options::new(vec![way.clone()], beacon.separation_m, beacon.levels)
+                ActionPredictions::new(vec![way.clone()], beacon.separation_m, beacon.levels)
             }
-            (Some(beacon), _) => self.own.presumed_from(beacon),
-            _ => self.own.presumed(other),
+            (Some(beacon), _) => self.own.predictions_from_beacon(beacon),
+            _ => self.own.presumed_predictions(other),
         });
     }
 
-    fn own(&self) -> &OwnShip {
+    fn ownship(&self) -> &Ownship {
         &self.own
     }
 
-    fn take_beacons(&mut self) -> Vec<Option<Beacon>> {
+    fn take_beacons(&mut self) -> Vec<Option<StateBeacon>> {
         self.members.iter_mut().map(|m| m.beacon.take()).collect()
     }
 
-    fn decided(&self) -> Option<Decided> {
-        self.own.decided(&self.player, self.round, self.calm)
+    fn action_choice(&self) -> Option<ActionChoice> {
+        self.own.action_choice(&self.player, self.round, self.calm)
     }
 }

@@ -9,7 +9,7 @@ use sidestep_kernel::{Slot, math};
 
 /// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Moving {
+pub(super) struct AircraftState {
     pub(super) slot: Slot,
     pub(super) at: Point,
     /// Heading in radians, counterclockwise from east.
@@ -26,16 +26,16 @@ pub(super) struct Moving {
 
 /// The settings of a method.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reactive {
+pub struct ReactiveSettings {
     /// Time in seconds within which losses of separation are avoided.
     pub look_ahead_s: f64,
     /// Factor on separations when avoiding.
     pub margin: f64,
 }
 
-impl Moving {
+impl AircraftState {
     /// Returns the distance in meters within which another airplane is to be avoided.
-    fn zone_m(&self, other: &Self, settings: Reactive) -> f64 {
+    fn zone_m(&self, other: &Self, settings: ReactiveSettings) -> f64 {
         self.separation_m.max(other.separation_m) * settings.margin
     }
 }
@@ -46,8 +46,8 @@ fn length(a: Point) -> f64 {
 
 /// Returns an airplane at 35 m/s that wants to keep its heading, as tests of all methods have it.
 #[cfg(test)]
-fn moving(slot: Slot, at: Point, heading_rad: f64) -> Moving {
-    Moving {
+fn moving(slot: Slot, at: Point, heading_rad: f64) -> AircraftState {
+    AircraftState {
         slot,
         at,
         heading_rad,

@@ -6,7 +6,7 @@
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::{Moving, Reactive, length};
+use super::{AircraftState, ReactiveSettings, length};
 use crate::flight::Point;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
@@ -14,27 +14,27 @@ use sidestep_kernel::{Slot, math};
 
 /// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
 /// left of the line of sight.
-const HEAD_ON_M: f64 = 10.0;
+const MAX_HEAD_ON_M: f64 = 10.0;
 /// Factor on the zone out of which the closest point is moved (`RFACH`), BlueSky's default.
-const RESOLVES: f64 = 1.05;
+const RESOLUTION_FACTOR: f64 = 1.05;
 /// Difference of headings in radians below which two airplanes near each other fly side by side: they
 /// would soon be in conflict again.
-const SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+const MAX_SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Squared speed in m²/s² below which two airplanes do not move against each other.
-const STILL: f64 = 1e-6;
+const MIN_SPEED_SQUARED: f64 = 1e-6;
 
 /// The conflicts that an airplane resolves, from one look to the next.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Resolving {
+pub struct ActiveResolutions {
     /// The others, by slot.
     with: Vec<Slot>,
     /// The heading that resolves them, in radians.
     heading_rad: f64,
 }
 
-impl Resolving {
+impl ActiveResolutions {
     /// The others, by rising slot.
-    pub(crate) fn with(&self) -> &[Slot] {
+    pub(crate) fn slots(&self) -> &[Slot] {
         &self.with
     }
 
@@ -45,7 +45,7 @@ impl Resolving {
 }
 
 /// A closest approach that two airplanes will have, or have had, if both fly straight on.
-struct Closest {
+struct ClosestApproach {
     /// The other's place then, seen from the airplane.
     at: Point,
     /// Seconds from now.
@@ -55,53 +55,57 @@ struct Closest {
 /// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
 /// `meets` says whether two are on one level.
 pub(in super::super) fn headings(
-    all: &[Moving],
-    resolving: &mut [Resolving],
-    settings: Reactive,
-    meets: impl Fn(&Moving, &Moving) -> bool,
+    all: &[AircraftState],
+    resolving: &mut [ActiveResolutions],
+    settings: ReactiveSettings,
+    meets: impl Fn(&AircraftState, &AircraftState) -> bool,
 ) -> Vec<Option<f64>> {
-    let conflicts = |own: &Moving| -> Vec<(usize, Closest)> {
+    let conflicts = |own: &AircraftState| -> Vec<(usize, ClosestApproach)> {
         let others = (0..all.len()).filter(|&j| all[j].slot != own.slot && meets(own, &all[j]));
-        let found = others.map(|j| (j, conflict(own, &all[j], settings)));
+        let found = others.map(|j| (j, find_conflict(own, &all[j], settings)));
         found.filter_map(|(j, closest)| Some((j, closest?))).collect()
     };
-    let found: Vec<Vec<(usize, Closest)>> = all.iter().map(conflicts).collect();
-    let by_slot = by_slot(all);
+    let found: Vec<Vec<(usize, ClosestApproach)>> = all.iter().map(conflicts).collect();
+    let by_slot = sorted_by_slot(all);
     // As in BlueSky, the headings are kept only while no airplane is in conflict.
     let is_anybody_in_conflict = found.iter().any(|conflicts| !conflicts.is_empty());
     for ((own, conflicts), memory) in all.iter().zip(&found).zip(&mut *resolving) {
         if is_anybody_in_conflict {
-            memory.heading_rad = resolved_rad(all, own, conflicts, settings);
+            memory.heading_rad = resolution_heading_rad(all, own, conflicts, settings);
         }
         memory.with.extend(conflicts.iter().map(|(j, _)| all[*j].slot));
         memory.with.sort_unstable();
         memory.with.dedup();
-        let is_on = |other: &Moving| meets(own, other) && is_on(own, other, settings);
-        memory.with.retain(|&slot| of_slot(&by_slot, slot).is_some_and(is_on));
+        let is_on = |other: &AircraftState| meets(own, other) && is_active(own, other, settings);
+        memory.with.retain(|&slot| find_slot(&by_slot, slot).is_some_and(is_on));
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
 }
 
 /// Returns all airplanes by rising slot, because each looks for many of the others among them.
-fn by_slot(all: &[Moving]) -> Vec<&Moving> {
-    let mut by_slot: Vec<&Moving> = all.iter().collect();
+fn sorted_by_slot(all: &[AircraftState]) -> Vec<&AircraftState> {
+    let mut by_slot: Vec<&AircraftState> = all.iter().collect();
     // A stable sort: of those with one slot the first one counts.
     by_slot.sort_by_key(|one| one.slot);
     by_slot
 }
 
 /// Returns the first airplane with a slot, if there is one.
-fn of_slot<'a>(by_slot: &[&'a Moving], slot: Slot) -> Option<&'a Moving> {
+fn find_slot<'a>(by_slot: &[&'a AircraftState], slot: Slot) -> Option<&'a AircraftState> {
     let first = by_slot.partition_point(|one| one.slot < slot);
     by_slot.get(first).copied().filter(|one| one.slot == slot)
 }
 
 /// Returns the closest approach of two airplanes if one enters the other's zone within the time of
 /// looking ahead, or has entered it.
-fn conflict(own: &Moving, other: &Moving, settings: Reactive) -> Option<Closest> {
+fn find_conflict(
+    own: &AircraftState,
+    other: &AircraftState,
+    settings: ReactiveSettings,
+) -> Option<ClosestApproach> {
     let (zone_m, apart) = (own.zone_m(other, settings), sub(other.at, own.at));
     let closing = sub(other.velocity, own.velocity);
-    let speed2 = dot(closing, closing).max(STILL);
+    let speed2 = dot(closing, closing).max(MIN_SPEED_SQUARED);
     let in_s = -dot(apart, closing) / speed2;
     let at = [apart[0] + closing[0] * in_s, apart[1] + closing[1] * in_s];
     let miss2 = dot(at, at);
@@ -109,18 +113,19 @@ fn conflict(own: &Moving, other: &Moving, settings: Reactive) -> Option<Closest>
         return None;
     }
     let half_s = (zone_m * zone_m - miss2).sqrt() / speed2.sqrt();
-    (in_s + half_s > 0.0 && in_s - half_s < settings.look_ahead_s).then_some(Closest { at, in_s })
+    (in_s + half_s > 0.0 && in_s - half_s < settings.look_ahead_s)
+        .then_some(ClosestApproach { at, in_s })
 }
 
 /// Returns the heading that resolves an airplane's conflicts; its present one without any.
-fn resolved_rad(
-    all: &[Moving],
-    own: &Moving,
-    conflicts: &[(usize, Closest)],
-    settings: Reactive,
+fn resolution_heading_rad(
+    all: &[AircraftState],
+    own: &AircraftState,
+    conflicts: &[(usize, ClosestApproach)],
+    settings: ReactiveSettings,
 ) -> f64 {
-    let change = |v: Point, (j, closest): &(usize, Closest)| {
-        let shift = shift(own, &all[*j], closest, settings);
+    let change = |v: Point, (j, closest): &(usize, ClosestApproach)| {
+        let shift = velocity_change(own, &all[*j], closest, settings);
         [v[0] - shift[0], v[1] - shift[1]]
     };
     let [vx, vy] = conflicts.iter().fold(own.velocity, change);
@@ -128,13 +133,18 @@ fn resolved_rad(
 }
 
 /// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
-fn shift(own: &Moving, other: &Moving, closest: &Closest, settings: Reactive) -> Point {
-    let zone_m = own.zone_m(other, settings) * RESOLVES;
+fn velocity_change(
+    own: &AircraftState,
+    other: &AircraftState,
+    closest: &ClosestApproach,
+    settings: ReactiveSettings,
+) -> Point {
+    let zone_m = own.zone_m(other, settings) * RESOLUTION_FACTOR;
     let apart = sub(other.at, own.at);
     let (distance_m, mut at) = (length(apart).max(1e-9), closest.at);
     let mut miss_m = length(at);
-    if miss_m <= HEAD_ON_M {
-        miss_m = HEAD_ON_M;
+    if miss_m <= MAX_HEAD_ON_M {
+        miss_m = MAX_HEAD_ON_M;
         at = [apart[1] / distance_m * miss_m, -apart[0] / distance_m * miss_m];
     }
     let mut reach_m = zone_m;
@@ -148,12 +158,12 @@ fn shift(own: &Moving, other: &Moving, closest: &Closest, settings: Reactive) ->
 }
 
 /// Returns whether a conflict that was found is still to be minded.
-fn is_on(own: &Moving, other: &Moving, settings: Reactive) -> bool {
+fn is_active(own: &AircraftState, other: &AircraftState, settings: ReactiveSettings) -> bool {
     let (apart, closing) = (sub(other.at, own.at), sub(other.velocity, own.velocity));
     let (distance_m, zone_m) = (length(apart), own.zone_m(other, settings));
     let is_past = dot(apart, closing) > 0.0;
     let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();
-    let is_beside = angle_rad < SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLVES;
+    let is_beside = angle_rad < MAX_SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLUTION_FACTOR;
     !is_past || distance_m < zone_m || is_beside
 }
 
@@ -162,9 +172,9 @@ mod tests {
     use super::super::moving;
     use super::*;
 
-    const SETTINGS: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.0 };
+    const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.0 };
 
-    fn looked(all: &[Moving], memory: &mut [Resolving]) -> Vec<Option<f64>> {
+    fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {
         headings(all, memory, SETTINGS, |_, _| true)
     }
 
@@ -187,8 +197,8 @@ mod tests {
         for (poses, expected_deg) in cases {
             let one =
                 |(slot, (at, deg)): (Slot, &(Point, f64))| moving(slot, *at, deg.to_radians());
-            let all: Vec<Moving> = (0..).zip(poses).map(one).collect();
-            let found = looked(&all, &mut vec![Resolving::default(); all.len()]);
+            let all: Vec<AircraftState> = (0..).zip(poses).map(one).collect();
+            let found = looked(&all, &mut vec![ActiveResolutions::default(); all.len()]);
             for (found, expected) in found.iter().zip(expected_deg) {
                 let found_deg = found.expect("a conflict").to_degrees();
                 assert!((found_deg - expected).abs() < 1e-3, "{found_deg} for {expected}");
@@ -199,17 +209,21 @@ mod tests {
     #[test]
     fn others_are_found_by_their_slots_in_whatever_order_they_come() {
         let all = [7, 2, 9, 2, 4].map(|slot| moving(slot, [f64::from(slot), 0.0], 0.0));
-        let by_slot = by_slot(&all);
+        let by_slot = sorted_by_slot(&all);
         for slot in 0..12 {
-            assert_eq!(of_slot(&by_slot, slot), all.iter().find(|one| one.slot == slot), "{slot}");
+            assert_eq!(
+                find_slot(&by_slot, slot),
+                all.iter().find(|one| one.slot == slot),
+                "{slot}"
+            );
         }
-        let first: *const Moving = of_slot(&by_slot, 2).expect("there are two");
+        let first: *const AircraftState = find_slot(&by_slot, 2).expect("there are two");
         assert!(std::ptr::eq(first, &all[1]));
     }
 
     #[test]
     fn a_conflict_is_minded_until_past_the_closest_point() {
-        let mut memory = [Resolving::default(), Resolving::default()];
+        let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
         let far = [moving(0, [0.0, 0.0], 0.0), moving(1, [4000.0, 0.0], std::f64::consts::PI)];
         assert!(looked(&far, &mut memory).iter().all(Option::is_some));
         // Both have turned away, so no conflict is predicted any more.
@@ -224,7 +238,7 @@ mod tests {
 
     #[test]
     fn two_that_have_lost_separation_and_fly_apart_still_resolve() {
-        let mut memory = [Resolving::default(), Resolving::default()];
+        let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
         let inside = [moving(0, [0.0, 0.0], 0.0), moving(1, [-300.0, 50.0], std::f64::consts::PI)];
         assert!(looked(&inside, &mut memory).iter().all(Option::is_some));
         let beyond =

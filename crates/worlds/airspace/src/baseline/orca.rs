@@ -8,7 +8,7 @@
 //! one that violates the half-planes least. The margin on separations allows for the time that
 //! turning takes.
 
-use super::{Moving, Reactive, length};
+use super::{AircraftState, ReactiveSettings, length};
 use crate::flight::Point;
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
@@ -17,7 +17,7 @@ use sidestep_kernel::math;
 const HEADINGS: u32 = 90;
 /// Weight in meters per second of a turn by one radian, beside violations: of headings that are
 /// equally bad, the nearest one is flown.
-const TURN_M_S: f64 = 1e-6;
+const TURN_WEIGHT_M_S: f64 = 1e-6;
 
 /// The velocities that one neighbor allows: those with at least `least` along `normal`.
 struct HalfPlane {
@@ -28,9 +28,9 @@ struct HalfPlane {
 /// Returns the heading in radians that an airplane should fly among the others; `None` if it may
 /// fly to its way-point. `step_s` is the time until it looks again.
 pub(in super::super) fn heading_rad<'a>(
-    own: &Moving,
-    others: impl Iterator<Item = &'a Moving>,
-    settings: Reactive,
+    own: &AircraftState,
+    others: impl Iterator<Item = &'a AircraftState>,
+    settings: ReactiveSettings,
     step_s: f64,
 ) -> Option<f64> {
     let planes: Vec<HalfPlane> =
@@ -46,7 +46,7 @@ pub(in super::super) fn heading_rad<'a>(
     // Prefers any allowed heading to all others, and then the nearest.
     let worth = |off_rad: f64| {
         let excess = excess(own.preferred_rad + off_rad);
-        (excess >= 0.0, excess.min(0.0) - TURN_M_S * off_rad.abs())
+        (excess >= 0.0, excess.min(0.0) - TURN_WEIGHT_M_S * off_rad.abs())
     };
     let one_rad = std::f64::consts::TAU / f64::from(HEADINGS);
     let offs = (0..HEADINGS).map(|k| math::wrap_angle(f64::from(k) * one_rad));
@@ -56,7 +56,12 @@ pub(in super::super) fn heading_rad<'a>(
 }
 
 /// Returns the velocities of `own` that avoid one neighbor: if that one yields, it does its half.
-fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> HalfPlane {
+fn half_plane(
+    own: &AircraftState,
+    other: &AircraftState,
+    settings: ReactiveSettings,
+    step_s: f64,
+) -> HalfPlane {
     let (apart, relative) = (sub(other.at, own.at), sub(own.velocity, other.velocity));
     let radius_m = own.zone_m(other, settings);
     let distance2 = dot(apart, apart);
@@ -93,12 +98,12 @@ mod tests {
     use proptest::prelude::*;
     use std::borrow::Cow;
 
-    const SETTINGS: Reactive = Reactive { look_ahead_s: 60.0, margin: 1.05 };
+    const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 60.0, margin: 1.05 };
 
     /// The velocity that another implementation chooses, without a limit of speed.
-    fn by_library(own: &Moving, other: &Moving) -> Point {
+    fn by_library(own: &AircraftState, other: &AircraftState) -> Point {
         let plain = |v: Point| Vec2::new(v[0] as f32, v[1] as f32);
-        let agent = |m: &Moving| Agent {
+        let agent = |m: &AircraftState| Agent {
             position: plain(m.at),
             velocity: plain(m.velocity),
             radius: (0.5 * 500.0 * SETTINGS.margin) as f32,

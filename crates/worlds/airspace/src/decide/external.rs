@@ -1,37 +1,45 @@
 //! Wishes that a caller has ordered.
 
-use super::Considered;
-use super::velocity::{beside, step};
-use super::wishes::straight;
-use crate::flight::Known;
-use crate::shield::Way;
-use crate::wish::Wish;
+use super::ManeuverCandidates;
+use super::preferences::rank_straight_first;
+use super::velocity::{rank_by_similarity, step};
+use crate::external_action::ExternalAction;
+use crate::flight::KnownAircraft;
+use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::math;
 
 /// Returns the ways that an airplane considers: the ordered one, and then the others by rank, or by how little they
 /// differ from it. Without an order it follows its flight plan.
-pub(super) fn as_ordered(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) -> Considered {
+pub(super) fn candidates_by_action(
+    world: &AirspaceWorld,
+    known: KnownAircraft,
+    wish: Option<&ExternalAction>,
+) -> ManeuverCandidates {
     match wish {
-        Some(&Wish::TurnRate(omega_rad_s)) => {
+        Some(&ExternalAction::TurnRate(omega_rad_s)) => {
             let omegas_rad_s = vec![omega_rad_s; world.timing.points_per_dt()];
-            Considered::of_ways(beside(world, known, Way { omegas_rad_s }))
+            ManeuverCandidates::from_profiles(rank_by_similarity(
+                world,
+                known,
+                TurnProfile { omegas_rad_s },
+            ))
         }
-        Some(&Wish::Velocity([vx, vy])) => {
-            let way = toward(world, known, math::atan2(vy, vx));
-            Considered::of_ways(beside(world, known, way))
+        Some(&ExternalAction::Velocity([vx, vy])) => {
+            let way = turn_toward(world, known, math::atan2(vy, vx));
+            ManeuverCandidates::from_profiles(rank_by_similarity(world, known, way))
         }
-        Some(Wish::Ranking(order)) => {
-            let actions = world.actions_of(known.slot);
+        Some(ExternalAction::Ranking(order)) => {
+            let actions = world.actions(known.slot);
             let ranked = order.iter().map(|&k| actions[usize::from(k)]).collect();
-            Considered::of(world, known, ranked)
+            ManeuverCandidates::from_actions(world, known, ranked)
         }
-        None => Considered::of(world, known, straight(world, known)),
+        None => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
 }
 
 /// Returns the way of one `dt` on which an airplane turns to a heading as fast as it can.
-fn toward(world: &AirspaceWorld, mut known: Known, heading_rad: f64) -> Way {
+fn turn_toward(world: &AirspaceWorld, mut known: KnownAircraft, heading_rad: f64) -> TurnProfile {
     let turn = |_| step(world, &mut known, Some(heading_rad));
-    Way { omegas_rad_s: (0..world.timing.points_per_dt()).map(turn).collect() }
+    TurnProfile { omegas_rad_s: (0..world.timing.points_per_dt()).map(turn).collect() }
 }

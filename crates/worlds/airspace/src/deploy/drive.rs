@@ -8,7 +8,7 @@ use sidestep_kernel::ports::{Envelope, Transport};
 use sidestep_kernel::{EntityId, interrupt};
 
 /// A program aboard an airplane, on a network that carries its packets.
-pub(super) trait Station {
+pub(super) trait NetworkAgent {
     /// Its airplane.
     fn id(&self) -> EntityId;
 
@@ -25,7 +25,7 @@ pub(super) trait Station {
     fn take_packets(&mut self) -> Vec<Packet>;
 }
 
-impl Station for Pilot {
+impl NetworkAgent for Pilot {
     fn id(&self) -> EntityId {
         Pilot::id(self)
     }
@@ -48,7 +48,7 @@ impl Station for Pilot {
 }
 
 /// Drives stations, which have started in tick `begin`, until all are done, or nothing more can happen.
-pub(super) fn drive<S: Station>(
+pub(super) fn drive<S: NetworkAgent>(
     transport: &mut impl Transport,
     stations: &mut [S],
     begin: u64,
@@ -56,8 +56,8 @@ pub(super) fn drive<S: Station>(
 ) {
     stations.iter_mut().for_each(|station| send(transport, station, begin));
     while !stations.iter().all(&is_done) {
-        interrupt::look();
-        let timers = stations.iter().filter_map(Station::next_timer);
+        interrupt::check();
+        let timers = stations.iter().filter_map(NetworkAgent::next_timer);
         let next = timers.chain(transport.next_arrival()).min();
         // A time that never comes is none.
         let Some(now) = next.filter(|now| *now < u64::MAX) else { return };
@@ -66,7 +66,7 @@ pub(super) fn drive<S: Station>(
 }
 
 /// Hands a station the packets that have reached it by a tick, and sends its answers.
-fn step<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
+fn step<S: NetworkAgent>(transport: &mut impl Transport, station: &mut S, now: u64) {
     for Envelope { sender, payload, .. } in transport.receive(station.id(), now) {
         station.on_packet(sender, &payload, now);
         send(transport, station, now);
@@ -76,7 +76,7 @@ fn step<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
 }
 
 /// Sends the packets that wait to be sent.
-fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
+fn send<S: NetworkAgent>(transport: &mut impl Transport, station: &mut S, now: u64) {
     let sender = station.id();
     for Packet { to, sequence, payload } in station.take_packets() {
         let mut to_one = |receiver: EntityId, payload: Vec<u8>| {
@@ -91,12 +91,15 @@ fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::agents::{Agent, Concludes, Ended, Endpoint, Frame, Most, Radio, Talk, Unsound};
-    use crate::pilot::{Schedule, TalkId, Topic, patience};
+    use crate::agents::{
+        Agent, Conversation, ConversationEnd, ConversationInfo, Endpoint, EndpointConfig,
+        InvalidMessage, MessageLimits, WithOutcome,
+    };
+    use crate::pilot::{ConversationId, Protocol, Schedule, retry_policy};
     use crate::purpose;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
-    use sidestep_kernel::network::{Carrier, Network, Silence, While};
+    use sidestep_kernel::network::{FaultyTransport, Network, RadioOutage, TimeWindow};
     use sidestep_kernel::stream::Streams;
     use std::sync::Arc;
 
@@ -123,7 +126,7 @@ mod tests {
 
         fn go_on(&mut self) -> Vec<(u32, u64)> {
             let mut said = Vec::new();
-            while self.round < self.rounds && self.awaits().is_empty() {
+            while self.round < self.rounds && self.awaited_members().is_empty() {
                 self.sum += self.told[self.round as usize].iter().flatten().sum::<u64>();
                 self.sum += self.number();
                 self.round += 1;
@@ -143,12 +146,12 @@ mod tests {
             vec![(0, self.number())]
         }
 
-        fn check(&self, _: usize, (round, _): &Self::Message) -> Result<(), Unsound> {
-            Unsound::Round.unless(*round < self.rounds)
+        fn check(&self, _: usize, (round, _): &Self::Message) -> Result<(), InvalidMessage> {
+            InvalidMessage::Round.unless(*round < self.rounds)
         }
 
-        fn most(&self) -> Most {
-            Most { bytes: 16, messages: self.rounds }
+        fn limits(&self) -> MessageLimits {
+            MessageLimits { bytes: 16, messages: self.rounds }
         }
 
         fn on_message(
@@ -162,20 +165,20 @@ mod tests {
             self.go_on()
         }
 
-        fn awaits(&self) -> Vec<usize> {
+        fn awaited_members(&self) -> Vec<usize> {
             let Some(told) = self.told.get(self.round as usize) else { return Vec::new() };
             let others = (0..told.len()).filter(|&j| j != self.me);
             others.filter(|&j| told[j].is_none()).collect()
         }
 
-        fn without(&mut self, other: usize, _: bool) -> Vec<Self::Message> {
+        fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Self::Message> {
             for told in &mut self.told[self.round as usize..] {
                 told[other].get_or_insert(1000);
             }
             self.go_on()
         }
 
-        fn at_deadline(&mut self) {
+        fn on_deadline(&mut self) {
             self.is_over = true;
         }
 
@@ -190,30 +193,30 @@ mod tests {
 
     /// An agent that talks until it is done.
     struct Alone {
-        talk: Talk<dyn Concludes<Outcome = u64>>,
+        talk: Conversation<dyn WithOutcome<Outcome = u64>>,
         out: Vec<Packet>,
-        ended: Option<Ended<u64>>,
+        ended: Option<ConversationEnd<u64>>,
     }
 
     impl Alone {
         fn settle(&mut self, tick: u64) {
-            if self.ended.is_none() && (self.talk.is_done() || tick >= self.talk.frame().ends) {
-                self.ended = Some(self.talk.end());
+            if self.ended.is_none() && (self.talk.is_done() || tick >= self.talk.info().end_tick) {
+                self.ended = Some(self.talk.finish());
             }
         }
     }
 
-    impl Station for Alone {
+    impl NetworkAgent for Alone {
         fn id(&self) -> EntityId {
-            self.talk.frame().me
+            self.talk.info().me
         }
 
         fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
             self.settle(tick);
-            if !self.talk.frame().is_silent {
+            if !self.talk.info().is_silent {
                 let (_, message) =
-                    sidestep_kernel::network::open::<Topic>(bytes, 0).expect("a packet");
-                self.talk.hear(from, message, tick, &mut self.out).expect("a message");
+                    sidestep_kernel::network::parse_packet::<Protocol>(bytes, 0).expect("a packet");
+                self.talk.receive(from, message, tick, &mut self.out).expect("a message");
             }
             self.settle(tick);
         }
@@ -227,7 +230,7 @@ mod tests {
         }
 
         fn next_timer(&self) -> Option<u64> {
-            let ends = self.talk.frame().ends;
+            let ends = self.talk.info().end_tick;
             self.ended.is_none().then(|| self.talk.next_timer().map_or(ends, |due| due.min(ends)))
         }
 
@@ -236,7 +239,7 @@ mod tests {
         }
     }
 
-    fn network(loss: f64, max_delay_s: f64, silences: Vec<Silence>) -> Network {
+    fn network(loss: f64, max_delay_s: f64, silences: Vec<RadioOutage>) -> Network {
         Network {
             loss,
             duplication: 0.2,
@@ -247,41 +250,47 @@ mod tests {
             deadline_s: 1000.0,
             range_m: f64::INFINITY,
             bursts: None,
-            silences,
+            radio_outages: silences,
             partitions: Vec::new(),
-            one_ways: Vec::new(),
+            unidirectional_links: Vec::new(),
         }
     }
 
     /// Lets agents talk in cycle 3.
-    fn sums(network: Option<&Network>, seed: u64, group: usize, rounds: u32) -> Vec<Ended<u64>> {
+    fn sums(
+        network: Option<&Network>,
+        seed: u64,
+        group: usize,
+        rounds: u32,
+    ) -> Vec<ConversationEnd<u64>> {
         let members: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
-        let (schedule, streams) = (Schedule::of_cycle(3, network), Streams::new(Seed(seed)));
-        let (begins, ends) = schedule.of(Topic::Decision, schedule.begins);
+        let (schedule, streams) = (Schedule::for_cycle(3, network), Streams::new(Seed(seed)));
+        let (begins, ends) = schedule.conversation_ticks(Protocol::Decision, schedule.begins);
         let station = |me: usize| {
             let id = members[me];
-            let is_silent = network.is_some_and(|network| network.is_silent(id, 15.0));
-            let (ticks, patience) = (ends - begins, patience(network, Topic::Decision));
-            let radio = Radio { group: members.clone(), me, patience, ticks, is_silent };
-            let frame = Frame {
-                id: TalkId::new(3, Topic::Decision, &members),
+            let is_silent = network.is_some_and(|network| network.is_radio_off(id, 15.0));
+            let (ticks, patience) = (ends - begins, retry_policy(network, Protocol::Decision));
+            let radio = EndpointConfig { group: members.clone(), me, patience, ticks, is_silent };
+            let frame = ConversationInfo {
+                id: ConversationId::new(3, Protocol::Decision, &members),
                 members: members.clone(),
                 me: id,
                 fingerprint: 0,
-                begins,
-                ends,
+                start_tick: begins,
+                end_tick: ends,
                 is_silent,
             };
             let party = Box::new(Endpoint::new(Adder::new(me, group, rounds), radio));
-            let mut talk: Talk<dyn Concludes<Outcome = u64>> = Talk::new(frame, party);
+            let mut talk: Conversation<dyn WithOutcome<Outcome = u64>> =
+                Conversation::new(frame, party);
             let mut out = Vec::new();
             talk.start(begins, &mut out);
             Alone { talk, out, ended: None }
         };
         let mut stations: Vec<Alone> = (0..group).map(station).collect();
         let talks = [(schedule.begins, 15.0)];
-        let draws = purpose::of_network(streams);
-        let mut faulty = Carrier::in_memory(network, draws, None, &talks);
+        let draws = purpose::network_fault_streams(streams);
+        let mut faulty = FaultyTransport::in_memory(network, draws, None, &talks);
         drive(&mut faulty, &mut stations, begins, |station| station.ended.is_some());
         stations.into_iter().map(|station| station.ended.expect("all end")).collect()
     }
@@ -306,8 +315,8 @@ mod tests {
 
     #[test]
     fn one_that_never_answers_is_given_up_and_named() {
-        let during = While { from_s: 10.0, until_s: f64::INFINITY };
-        let silences = vec![Silence { agent: 6, during }];
+        let window = TimeWindow { from_s: 10.0, until_s: f64::INFINITY };
+        let silences = vec![RadioOutage { agent: 6, window }];
         let network = network(0.1, 0.0, silences);
         let ends = sums(Some(&network), 5, 4, 3);
         // Places 0, 1, 3 and 1000 for the silent one, in rounds 0 to 2.

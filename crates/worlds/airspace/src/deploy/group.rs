@@ -1,61 +1,61 @@
 //! The pilots of a group, on a network in memory.
 
 use super::drive::drive;
-use crate::Turn;
-use crate::decide::Considered;
-use crate::intruder::Intruder;
-use crate::join::Flown;
-use crate::pilot::{Control, Memory, Pilot, Schedule, Sight};
+use crate::PhaseContext;
+use crate::decide::ManeuverCandidates;
+use crate::join::ControlledGroup;
+use crate::non_cooperative::NonCooperative;
+use crate::pilot::{Control, Memory, Percept, Pilot, Schedule};
 use crate::purpose;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::network::{Apart, Carrier, Ether, FaultStreams};
+use sidestep_kernel::network::{Distances, FaultInjector, FaultStreams, FaultyTransport};
 use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
 
 /// Lets the pilots of a group decide. Returns the control of each, and the ways that it has considered.
-pub(crate) fn flown(
-    turn: &mut Turn<'_>,
-    flown: &Flown,
-    intruders: &[Intruder],
-) -> Vec<(Control, Considered)> {
-    let Turn { world, state, now, clock, .. } = *turn;
+pub(crate) fn decide_group(
+    turn: &mut PhaseContext<'_>,
+    flown: &ControlledGroup,
+    intruders: &[NonCooperative],
+) -> Vec<(Control, ManeuverCandidates)> {
+    let PhaseContext { world, state, now, clock, .. } = *turn;
     let began_ns = clock.thread_cpu_ns();
-    let schedule = Schedule::of_cycle(now, world.network.as_ref());
-    let sights = Sight::all(turn, flown, intruders);
-    let talks = world.talks(now, schedule);
+    let schedule = Schedule::for_cycle(now, world.network.as_ref());
+    let sights = Percept::from_group(turn, flown, intruders);
+    let talks = world.conversation_times_on(now, schedule);
     let mut transport = network(world, state, &talks);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, sight) in pilots.iter_mut().zip(sights) {
-        pilot.begin_by(sight, schedule);
+        pilot.start_with_schedule(sight, schedule);
     }
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::is_done);
-    concluded(pilots)
+    outcomes(pilots)
 }
 
 /// Returns the outcome of the talks of a group. Where one waits for a message that never comes, all stay on their
 /// orbits, because plans that are sure are safe only if all fly them.
-fn concluded(pilots: Vec<Pilot>) -> Vec<(Control, Considered)> {
+fn outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
     let all_have_ended = pilots.iter().all(Pilot::is_done);
     let one = |pilot: Pilot| match all_have_ended {
         true => pilot.into_outcome().expect("it has come to an end"),
-        false => pilot.given_up(),
+        false => pilot.into_fallback(),
     };
     pilots.into_iter().map(one).collect()
 }
 
 /// Lets pilots that have begun a cycle talk until all have come to an end.
 #[cfg(test)]
-pub(crate) fn fly_all(
+pub(crate) fn run_pilots(
     world: &AirspaceWorld,
     state: &AirspaceState,
     (now, schedule): (Cycle, Schedule),
     pilots: &mut [Pilot],
 ) {
-    let talks = world.talks(now, schedule);
+    let talks = world.conversation_times_on(now, schedule);
     let mut transport = network(world, state, &talks);
     drive(&mut transport, pilots, schedule.begins, Pilot::is_done);
 }
@@ -65,46 +65,46 @@ fn network<'a>(
     world: &'a AirspaceWorld,
     state: &'a AirspaceState,
     talks: &'a [(u64, f64)],
-) -> Carrier<'a, MemoryTransport> {
-    Carrier::in_memory(world.network.as_ref(), world.draws(), Some(state), talks)
+) -> FaultyTransport<'a, MemoryTransport> {
+    FaultyTransport::in_memory(world.network.as_ref(), world.fault_streams(), Some(state), talks)
 }
 
-impl Apart for AirspaceState {
-    fn apart_m(&self, link: [EntityId; 2]) -> f64 {
-        AirspaceState::apart_m(self, link)
+impl Distances for AirspaceState {
+    fn distance_m(&self, link: [EntityId; 2]) -> f64 {
+        AirspaceState::distance_m(self, link)
     }
 }
 
 impl AirspaceWorld {
     /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run: the
     /// first talk starts with the cycle, and the shield's exchange when that has to be over.
-    fn talks(&self, now: Cycle, schedule: Schedule) -> [(u64, f64); 2] {
-        let starts_s = self.starts_s(now);
+    fn conversation_times_on(&self, now: Cycle, schedule: Schedule) -> [(u64, f64); 2] {
+        let starts_s = self.cycle_start_s(now);
         let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
         [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
     }
 
     /// Returns the faults of the packets that an airplane sends where each is flown by a process of its own; none
     /// where the network is reliable.
-    pub fn ether(&self) -> Option<Ether> {
-        Some(Ether::new(self.network.clone()?, self.draws()))
+    pub fn fault_injector(&self) -> Option<FaultInjector> {
+        Some(FaultInjector::new(self.network.clone()?, self.fault_streams()))
     }
 
     /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run.
-    pub fn talks_of(&self, now: Cycle) -> [(u64, f64); 2] {
-        self.talks(now, Schedule::of_cycle(now, self.network.as_ref()))
+    pub fn conversation_times(&self, now: Cycle) -> [(u64, f64); 2] {
+        self.conversation_times_on(now, Schedule::for_cycle(now, self.network.as_ref()))
     }
 
     /// Returns the streams and purposes from which faults are drawn.
-    fn draws(&self) -> FaultStreams {
-        purpose::of_network(self.streams)
+    fn fault_streams(&self) -> FaultStreams {
+        purpose::network_fault_streams(self.streams)
     }
 }
 
 fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
-    let pilot = |(&slot, memory)| Pilot::remembering(world.clone(), slot, memory);
+    let pilot = |(&slot, memory)| Pilot::with_memory(world.clone(), slot, memory);
     flown.iter().zip(memories).map(pilot).collect()
 }
 
@@ -112,7 +112,7 @@ fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<P
 mod tests {
     use super::*;
     use crate::events::EventKind;
-    use crate::pilot::{Course, Fleet};
+    use crate::pilot::{Fleet, Maneuver};
     use crate::{AirspaceRun, airspace_run};
     use sidestep_scenario::Source;
 
@@ -120,14 +120,14 @@ mod tests {
     /// in.
     fn begun(run: &AirspaceRun) -> Vec<Pilot> {
         let world = run.world();
-        let pilot = |sight: Sight| {
+        let pilot = |sight: Percept| {
             let build = if sight.own.id == 0 { "another" } else { "this" };
             let pilot = Pilot::new(world.clone(), sight.own.id, Default::default());
-            let mut pilot = pilot.of_build(build);
-            pilot.begin_by(sight, Schedule::of_cycle(0, None));
+            let mut pilot = pilot.with_build(build);
+            pilot.start_with_schedule(sight, Schedule::for_cycle(0, None));
             pilot
         };
-        run.sights().into_iter().map(pilot).collect()
+        run.percepts().into_iter().map(pilot).collect()
     }
 
     #[test]
@@ -136,10 +136,10 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n";
         let run = airspace_run(&Source::new("g", text, ""), 1).expect("a scenario");
         let mut pilots = begun(&run);
-        fly_all(run.world(), run.state(), (0, Schedule::of_cycle(0, None)), &mut pilots);
+        run_pilots(run.world(), run.state(), (0, Schedule::for_cycle(0, None)), &mut pilots);
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
-        for (control, _) in concluded(pilots) {
-            assert_eq!(control.course, Course::Orbit);
+        for (control, _) in outcomes(pilots) {
+            assert_eq!(control.course, Maneuver::Orbit);
             let told: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
             assert_eq!(told, [EventKind::Deadline]);
         }

@@ -15,19 +15,19 @@
 //! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
 //! faults of the scenario ([`sidestep_kernel::network`]), by a loop that knows neither (`drive.rs`).
 
+mod deployment;
 mod drive;
 mod group;
 #[cfg(test)]
-mod heard;
-mod kind;
+mod grouping_tests;
 #[cfg(test)]
-mod silence;
+mod outage_tests;
 
-pub(crate) use group::flown;
+pub use deployment::Deployment;
+pub(crate) use deployment::unsupported_reason;
+pub(crate) use group::decide_group;
 #[cfg(test)]
-pub(crate) use group::fly_all;
-pub use kind::Deployment;
-pub(crate) use kind::refuses;
+pub(crate) use group::run_pilots;
 
 #[cfg(test)]
 mod tests {

@@ -36,7 +36,7 @@ impl Action {
     /// Returns the turn rate of the action after `flown_s` seconds of it, unless it proceeds to the
     /// way-point by then.
     #[inline]
-    pub fn held_rad_s(self, flown_s: f64) -> Option<f64> {
+    pub fn turn_rate_rad_s(self, flown_s: f64) -> Option<f64> {
         // A tolerance, because rounding of step times must not decide.
         let before = |end_s: f64| flown_s < end_s - 1e-9;
         match self {
@@ -79,7 +79,7 @@ pub struct Legs {
 impl Legs {
     /// Returns the legs of the default preset: heading changes of 10 to 60 degrees at the paper's
     /// turn rates, held for as long as most conflicts take to pass.
-    pub fn usual() -> Self {
+    pub fn default_preset() -> Self {
         Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
     }
 
@@ -90,7 +90,7 @@ impl Legs {
 
     /// Returns the legs that start with a turn rate. For straight on there is one turning time
     /// only, because all of them lead the same way.
-    fn of(&self, omega_rad_s: f64) -> Vec<Action> {
+    fn actions_with_turn_rate(&self, omega_rad_s: f64) -> Vec<Action> {
         let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
         if omega_rad_s == 0.0 {
             return self.until_s.iter().map(straight).collect();
@@ -123,7 +123,7 @@ pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Ac
             all.push(Action::Then { omega_rad_s, hold_s: dt_s });
         }
         all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
-        all.extend(legs.of(omega_rad_s));
+        all.extend(legs.actions_with_turn_rate(omega_rad_s));
     }
     all.push(Action::Proceed);
     all
@@ -156,7 +156,7 @@ mod tests {
         assert_eq!(all[4], Action::Hold { omega_rad_s: 0.0 });
         assert_eq!(all[5], Action::Then { omega_rad_s: 0.0, hold_s: 60.0 });
         assert_eq!(all[10], Action::Proceed);
-        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].held_rad_s(t)).into();
+        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].turn_rate_rad_s(t)).into();
         assert_eq!(rates, [Some(omega_rad_s), Some(omega_rad_s), Some(0.0), Some(0.0), None]);
     }
 }

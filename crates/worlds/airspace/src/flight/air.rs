@@ -4,8 +4,8 @@
 //! is over the ground.
 
 use super::action::Action;
-use super::motion::{Model, Point, Pose, Timing, distance_m};
-use super::pilot::{After, Passing, Pilot, Prediction};
+use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
+use super::motion::{Model, Point, Pose2, Timing, distance_m};
 use sidestep_kernel::{interrupt, math};
 
 /// Difference of heading and bearing in radians below which an airplane no longer turns.
@@ -17,19 +17,19 @@ pub struct Air {
     /// The steps of time.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
-    pub passing: Passing,
+    pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
 }
 
 impl Air {
     /// Returns how an airplane flies through still air.
-    pub fn pilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Pilot<'a> {
-        Pilot {
+    pub fn autopilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Autopilot<'a> {
+        Autopilot {
             model,
             mission,
             passing: self.passing,
-            after: After::Straight,
+            after: AfterLastWaypoint::Straight,
             dtau_s: self.timing.dtau_s,
         }
     }
@@ -39,15 +39,15 @@ impl Air {
     }
 
     /// Returns the turn rate that leads to way-point `next` on the ground, corrected for the wind.
-    pub fn steer(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> f64 {
+    pub fn steer(&self, pilot: &Autopilot<'_>, pose: Pose2, next: usize) -> f64 {
         let Some(&goal) = pilot.mission.get(next) else { return 0.0 };
         let omega_max = pilot.model.omega_max_rad_s;
-        pose.steer(self.aim(pose.at, goal, pilot.model.v_m_s), omega_max, pilot.dtau_s)
+        pose.steer(self.aim_point(pose.at, goal, pilot.model.v_m_s), omega_max, pilot.dtau_s)
     }
 
     /// Returns the point to head for from `at` in order to reach `goal` on the ground: turned into
     /// the wind by the angle at which the airspeed cancels the wind's part across the way.
-    pub fn aim(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
+    pub fn aim_point(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
         if self.is_still() {
             return goal;
         }
@@ -64,14 +64,14 @@ impl Air {
 
     /// Returns a number of steps in which an airplane certainly flies straight on to way-point `next`
     /// without reaching it: none while it still turns there, or is near.
-    pub fn straight_steps(&self, pilot: &Pilot<'_>, pose: Pose, next: usize) -> usize {
+    pub fn straight_steps(&self, pilot: &Autopilot<'_>, pose: Pose2, next: usize) -> usize {
         let Some(&goal) = pilot.mission.get(next) else { return 0 };
-        let [x, y] = self.aim(pose.at, goal, pilot.model.v_m_s);
+        let [x, y] = self.aim_point(pose.at, goal, pilot.model.v_m_s);
         let bearing_rad = math::atan2(y - pose.at[1], x - pose.at[0]);
         if math::wrap_angle(bearing_rad - pose.heading_rad).abs() > ALIGNED_RAD {
             return 0;
         }
-        let step_m = distance_m(pose.at, self.glided(pose, pilot.model.v_m_s, 1).at);
+        let step_m = distance_m(pose.at, self.after_straight_steps(pose, pilot.model.v_m_s, 1).at);
         let near_m = self.passing.tolerance_m.max(2.0 * pilot.model.turn_radius_m()) + step_m;
         // Where the wind holds it in place, a step may be lost in rounding.
         if step_m <= 0.0 {
@@ -82,19 +82,19 @@ impl Air {
     }
 
     /// Returns a pose after some steps straight on.
-    pub fn glided(&self, pose: Pose, v_m_s: f64, steps: usize) -> Pose {
+    pub fn after_straight_steps(&self, pose: Pose2, v_m_s: f64, steps: usize) -> Pose2 {
         let flown_s = steps as f64 * self.timing.dtau_s;
         let [wx, wy] = self.wind_m_s;
         let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
         let [vx, vy] = [v_m_s * along[0] + wx, v_m_s * along[1] + wy];
-        Pose { at: [pose.at[0] + vx * flown_s, pose.at[1] + vy * flown_s], ..pose }
+        Pose2 { at: [pose.at[0] + vx * flown_s, pose.at[1] + vy * flown_s], ..pose }
     }
 
     /// Returns a pose after the wind has blown for one step.
-    pub fn blown(&self, pose: Pose) -> Pose {
+    pub fn after_wind_step(&self, pose: Pose2) -> Pose2 {
         let dtau_s = self.timing.dtau_s;
         let at = [pose.at[0] + self.wind_m_s[0] * dtau_s, pose.at[1] + self.wind_m_s[1] * dtau_s];
-        Pose { at, ..pose }
+        Pose2 { at, ..pose }
     }
 
     /// Returns where each action leads an airplane on its way to way-point `next`.
@@ -105,12 +105,12 @@ impl Air {
         model: &Model,
         actions: &[Action],
         mission: &[Point],
-        pose: Pose,
+        pose: Pose2,
         next: usize,
     ) -> Vec<Prediction> {
-        interrupt::look();
-        let mission = self.drifted(mission, pose.at, next, model.v_m_s);
-        let pilot = self.pilot(model, &mission);
+        interrupt::check();
+        let mission = self.mission_in_air(mission, pose.at, next, model.v_m_s);
+        let pilot = self.autopilot(model, &mission);
         actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()
     }
 
@@ -119,7 +119,7 @@ impl Air {
         if self.is_still() {
             return distance_m(at, goal) / v_m_s;
         }
-        let ([wx, wy], heading) = (self.wind_m_s, self.aim(at, goal, v_m_s));
+        let ([wx, wy], heading) = (self.wind_m_s, self.aim_point(at, goal, v_m_s));
         let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
         let speed_m_s = math::hypot(ground[0], ground[1]).max(1e-3);
         distance_m(at, goal) / speed_m_s
@@ -127,7 +127,13 @@ impl Air {
 
     /// Returns the mission as seen from the moving air: each way-point at its place when the
     /// airplane reaches it.
-    fn drifted(&self, mission: &[Point], mut at: Point, next: usize, v_m_s: f64) -> Vec<Point> {
+    fn mission_in_air(
+        &self,
+        mission: &[Point],
+        mut at: Point,
+        next: usize,
+        v_m_s: f64,
+    ) -> Vec<Point> {
         let mut drifted = mission.to_vec();
         if self.is_still() {
             return drifted;

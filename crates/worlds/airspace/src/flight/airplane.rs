@@ -1,7 +1,7 @@
 //! Airplanes as a scenario gives them, and as their group knows them.
 
-use super::motion::{Model, Point, Pose};
-use super::order::{FlightOrder, Task};
+use super::motion::{Model, Point, Pose2};
+use super::order::{FlightOrder, FlightTask};
 use super::track::Track;
 use sidestep_kernel::Slot;
 
@@ -13,7 +13,7 @@ pub struct Airplane {
     /// Its abilities.
     pub model: Model,
     /// Its first pose.
-    pub start: Pose,
+    pub start: Pose2,
     /// Way-points that it is to reach.
     pub mission: Vec<Point>,
     /// Altitude in meters of the level on which the method takes it over.
@@ -34,27 +34,30 @@ pub struct Airplane {
 impl Airplane {
     /// Returns whether, of its first `done` orders, the last one about its way leads to no
     /// way-point.
-    pub(crate) fn keeps_a_heading(&self, done: usize) -> bool {
+    pub(crate) fn has_fixed_heading(&self, done: usize) -> bool {
         let is_about_the_way = |order: &&FlightOrder| {
-            matches!(order.task, Task::Heading(_) | Task::Proceed | Task::WayPoints(_))
+            matches!(
+                order.task,
+                FlightTask::Heading(_) | FlightTask::Proceed | FlightTask::WayPoints(_)
+            )
         };
         let last = self.orders.iter().take(done).rev().find(is_about_the_way);
-        last.is_some_and(|order| matches!(order.task, Task::Heading(_)))
+        last.is_some_and(|order| matches!(order.task, FlightTask::Heading(_)))
     }
 
     /// Returns the order after the first `done` ones, if its time has come.
-    pub(crate) fn due(&self, done: usize, now_s: f64) -> Option<&FlightOrder> {
+    pub(crate) fn due_order(&self, done: usize, now_s: f64) -> Option<&FlightOrder> {
         self.orders.get(done).filter(|order| order.at_s <= now_s)
     }
 }
 
 /// An airplane of a group, as the group knows it.
 #[derive(Debug, Clone, Copy)]
-pub struct Known {
+pub struct KnownAircraft {
     /// Slot of the airplane.
     pub slot: Slot,
     /// Its assumed pose.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Number of way-points done with.
     pub next: usize,
     /// Number of orders carried out.

@@ -8,25 +8,25 @@
 //! a linear function has a closed form. The same holds for two legs of one turn rate, which need
 //! it: the distance in a formation never changes, so that no halving would show which way it turns.
 
-use super::motion::{Point, Pose, sinc};
+use super::motion::{Point, Pose2, sinc};
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
 /// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
 /// turn by less than a tenth of a microradian.
-const STRAIGHT_RAD_S: f64 = 1e-12;
+const MIN_TURN_RAD_S: f64 = 1e-12;
 /// Difference of headings in radians below which they count as the same.
-const SAME_RAD: f64 = 1e-9;
+const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 /// Length in seconds below which an interval is no longer halved.
-const FINEST_S: f64 = 1e-7;
+const MIN_INTERVAL_S: f64 = 1e-7;
 /// Length in seconds below which an interval may be given up because the distance hardly varies in it.
-const FLAT_S: f64 = 0.05;
+const MAX_FLAT_INTERVAL_S: f64 = 0.05;
 /// Meters by which the distance may vary in such an interval.
-const FLAT_M: f64 = 1e-7;
+const FLAT_TOLERANCE_M: f64 = 1e-7;
 /// Difference in seconds below which a moment is found.
-const FOUND_S: f64 = 1e-11;
+const ROOT_TOLERANCE_S: f64 = 1e-11;
 /// Meters by which two airplanes may seem too near because of rounding.
-const ROUNDED_M: f64 = 1e-6;
+const ROUNDING_M: f64 = 1e-6;
 
 /// A stretch of flight at one turn rate, airspeed and rate of climb.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ pub struct Leg {
     /// Its end, in seconds.
     pub until_s: f64,
     /// The pose at its start.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Cosine and sine of the heading at its start.
     along: Point,
     /// Altitude at its start, in meters.
@@ -68,8 +68,8 @@ struct Motion {
 
 impl Leg {
     /// Returns a level leg in still air.
-    pub fn new(from_s: f64, until_s: f64, pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
-        let omega_rad_s = if omega_rad_s.abs() < STRAIGHT_RAD_S { 0.0 } else { omega_rad_s };
+    pub fn new(from_s: f64, until_s: f64, pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Self {
+        let omega_rad_s = if omega_rad_s.abs() < MIN_TURN_RAD_S { 0.0 } else { omega_rad_s };
         let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
         let (altitude_m, climb_m_s, drift_m_s) = (0.0, 0.0, [0.0; 2]);
         Self { from_s, until_s, pose, along, altitude_m, v_m_s, omega_rad_s, climb_m_s, drift_m_s }
@@ -77,7 +77,7 @@ impl Leg {
 
     /// Returns the leg with another altitude and rate of climb.
     #[must_use]
-    pub fn climbing(self, altitude_m: f64, climb_m_s: f64) -> Self {
+    pub fn with_climb(self, altitude_m: f64, climb_m_s: f64) -> Self {
         Self { altitude_m, climb_m_s, ..self }
     }
 
@@ -94,26 +94,26 @@ impl Leg {
 
     /// Returns the same motion from its start, with other times.
     #[must_use]
-    pub fn timed(self, from_s: f64, until_s: f64) -> Self {
+    pub fn with_times(self, from_s: f64, until_s: f64) -> Self {
         Self { from_s, until_s, ..self }
     }
 
     /// Returns whether a leg that starts at the end of this one continues it without any change.
-    pub fn continues_in(&self, next: &Self) -> bool {
+    pub fn is_continued_by(&self, next: &Self) -> bool {
         let rates = |leg: &Self| (leg.v_m_s, leg.omega_rad_s, leg.climb_m_s, leg.drift_m_s);
         let turned_rad = self.omega_rad_s * (next.from_s - self.from_s);
         let off_rad = next.pose.heading_rad - self.pose.heading_rad - turned_rad;
-        rates(self) == rates(next) && math::wrap_angle(off_rad).abs() < SAME_RAD
+        rates(self) == rates(next) && math::wrap_angle(off_rad).abs() < HEADING_TOLERANCE_RAD
     }
 
     /// Returns the part of the leg from a time on.
     #[must_use]
-    pub fn rest(&self, from_s: f64) -> Self {
+    pub fn remainder(&self, from_s: f64) -> Self {
         let turned_rad = self.omega_rad_s * (from_s - self.from_s);
         let heading_rad = self.pose.heading_rad + turned_rad;
-        let pose = Pose { at: self.motion(from_s).at, heading_rad };
+        let pose = Pose2 { at: self.motion(from_s).at, heading_rad };
         Self::new(from_s, self.until_s.max(from_s), pose, self.v_m_s, self.omega_rad_s)
-            .climbing(self.altitude_at_m(from_s), self.climb_m_s)
+            .with_climb(self.altitude_at_m(from_s), self.climb_m_s)
             .in_wind(self.drift_m_s)
     }
 
@@ -171,28 +171,28 @@ impl Approach {
     /// Adds the time that two legs have in common; it must not lie before times that were added already.
     pub fn add(&mut self, a: &Leg, b: &Leg, zone: Zone) {
         let common = Span { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
-        let Some(level) = on_one_level(a, b, common, zone.vertical_m) else { return };
-        let pair = Pair { a, b };
+        let Some(level) = common_level_span(a, b, common, zone.vertical_m) else { return };
+        let pair = LegPair { a, b };
         let mut moments = vec![level.from_s];
-        pair.turning_points(level, &mut moments);
+        pair.find_extrema(level, &mut moments);
         moments.push(level.until_s);
-        let gap_m = zone.gap_m - ROUNDED_M;
+        let gap_m = zone.gap_m - ROUNDING_M;
         for ends in moments.windows(2) {
-            let (at_from, at_to) = (pair.apart_m(ends[0]), pair.apart_m(ends[1]));
+            let (at_from, at_to) = (pair.distance_m(ends[0]), pair.distance_m(ends[1]));
             self.nearest_m = self.nearest_m.min(at_from).min(at_to);
             // Between turning points the distance only grows or only shrinks.
             let between = Span { from_s: ends[0], until_s: ends[1] };
-            let edge = || pair.edge_s(between, at_from < at_to, gap_m);
+            let edge = || pair.crossing_s(between, at_from < at_to, gap_m);
             match (at_from < gap_m, at_to < gap_m) {
-                (true, true) => self.lose(ends[0], ends[1]),
-                (true, false) => self.lose(ends[0], edge()),
-                (false, true) => self.lose(edge(), ends[1]),
+                (true, true) => self.add_loss(ends[0], ends[1]),
+                (true, false) => self.add_loss(ends[0], edge()),
+                (false, true) => self.add_loss(edge(), ends[1]),
                 (false, false) => {}
             }
         }
     }
 
-    fn lose(&mut self, from_s: f64, until_s: f64) {
+    fn add_loss(&mut self, from_s: f64, until_s: f64) {
         self.losses += u32::from(from_s > self.lost_until_s);
         self.lost_s += until_s - from_s;
         self.lost_until_s = until_s;
@@ -200,13 +200,13 @@ impl Approach {
 }
 
 /// Returns whether two airplanes are too near each other at a time.
-pub fn is_lost(a: &Leg, b: &Leg, t_s: f64, zone: Zone) -> bool {
+pub fn is_separation_lost(a: &Leg, b: &Leg, t_s: f64, zone: Zone) -> bool {
     (a.altitude_at_m(t_s) - b.altitude_at_m(t_s)).abs() < zone.vertical_m
-        && (Pair { a, b }).apart_m(t_s) < zone.gap_m - ROUNDED_M
+        && (LegPair { a, b }).distance_m(t_s) < zone.gap_m - ROUNDING_M
 }
 
 /// Returns the part of an interval in which two legs are on one level.
-fn on_one_level(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<Span> {
+fn common_level_span(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<Span> {
     let Span { from_s, until_s } = within;
     let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
     let climb_m_s = a.climb_m_s - b.climb_m_s;
@@ -224,12 +224,12 @@ fn on_one_level(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<Span>
 
 /// Two legs, seen from the first.
 #[derive(Clone, Copy)]
-struct Pair<'a> {
+struct LegPair<'a> {
     a: &'a Leg,
     b: &'a Leg,
 }
 
-impl Pair<'_> {
+impl LegPair<'_> {
     fn motion(&self, t_s: f64) -> Motion {
         let (a, b) = (self.a.motion(t_s), self.b.motion(t_s));
         Motion {
@@ -239,7 +239,7 @@ impl Pair<'_> {
         }
     }
 
-    fn apart_m(&self, t_s: f64) -> f64 {
+    fn distance_m(&self, t_s: f64) -> f64 {
         let [x, y] = self.motion(t_s).at;
         math::hypot(x, y)
     }
@@ -252,18 +252,18 @@ impl Pair<'_> {
 
     /// Adds the moments within an interval at which the distance turns from shrinking to growing or
     /// back, in order. Returns the number of intervals that it took.
-    fn turning_points(&self, within: Span, found: &mut Vec<f64>) -> u64 {
-        if self.turns_as_one() {
-            self.alignments(within, found);
+    fn find_extrema(&self, within: Span, found: &mut Vec<f64>) -> u64 {
+        if self.is_corotating() {
+            self.find_alignments(within, found);
             return 1;
         }
         let ends = [self.slope(within.from_s).0, self.slope(within.until_s).0];
-        self.search(within, ends, self.most_bend(within), found)
+        self.find_zeros(within, ends, self.max_bend(within), found)
     }
 
     /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
-    fn turns_as_one(&self) -> bool {
-        let Pair { a, b } = self;
+    fn is_corotating(&self) -> bool {
+        let LegPair { a, b } = self;
         let rates = |leg: &Leg| (leg.omega_rad_s, leg.drift_m_s);
         rates(a) == rates(b) && a.omega_rad_s != 0.0
     }
@@ -274,7 +274,7 @@ impl Pair<'_> {
     /// The relative velocity `w` turns as both do, so that half of the first derivative of the squared distance
     /// from `d` is `d·w cos(ωs) + (d×w + w²/ω) sin(ωs)` (`d×w` with the normal that `w` turns to). Its zeros are
     /// computed without the center, which is far away where both fly almost straight.
-    fn alignments(&self, Span { from_s, until_s }: Span, found: &mut Vec<f64>) {
+    fn find_alignments(&self, Span { from_s, until_s }: Span, found: &mut Vec<f64>) {
         let (omega_rad_s, long_s) = (self.a.omega_rad_s, until_s - from_s);
         let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
         let cos_part = -omega_rad_s * dot(at, [vx, vy]);
@@ -294,10 +294,10 @@ impl Pair<'_> {
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
-    fn most_bend(&self, within: Span) -> f64 {
+    fn max_bend(&self, within: Span) -> f64 {
         let Span { from_s, until_s } = within;
         let s = until_s - from_s;
-        let [speed_m_s, pull, jerk] = self.most_apart(within);
+        let [speed_m_s, pull, jerk] = self.max_relative_motion(within);
         let start = self.motion(from_s);
         let speed_m_s = speed_m_s.min(math::hypot(start.velocity[0], start.velocity[1]) + pull * s);
         let apart_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * s;
@@ -307,8 +307,8 @@ impl Pair<'_> {
     /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
     /// two turning vectors, which are small where the vectors have almost one length and direction, as those of
     /// airplanes that fly almost in formation.
-    fn most_apart(&self, Span { from_s, until_s }: Span) -> [f64; 3] {
-        let Pair { a, b } = self;
+    fn max_relative_motion(&self, Span { from_s, until_s }: Span) -> [f64; 3] {
+        let LegPair { a, b } = self;
         let heading_rad =
             |leg: &Leg| leg.pose.heading_rad + leg.omega_rad_s * (from_s - leg.from_s);
         let between_rad = math::wrap_angle(heading_rad(b) - heading_rad(a)).abs()
@@ -328,10 +328,10 @@ impl Pair<'_> {
     }
 
     /// Adds the zeros of the slope. Returns the number of intervals that it took.
-    fn search(&self, within: Span, ends: [f64; 2], bend: f64, found: &mut Vec<f64>) -> u64 {
+    fn find_zeros(&self, within: Span, ends: [f64; 2], bend: f64, found: &mut Vec<f64>) -> u64 {
         let Span { from_s, until_s } = within;
         let half_s = 0.5 * (until_s - from_s);
-        if half_s < FINEST_S {
+        if half_s < MIN_INTERVAL_S {
             return 1;
         }
         let middle_s = from_s + half_s;
@@ -347,17 +347,17 @@ impl Pair<'_> {
         // Half the squared distance varies by no more than this. In a formation that is next to nothing long
         // before the interval is as short as can be.
         let varies_m2 = 2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
-        if half_s < FLAT_S && is_flat(varies_m2, self.apart_m(middle_s)) {
+        if half_s < MAX_FLAT_INTERVAL_S && is_flat(varies_m2, self.distance_m(middle_s)) {
             return 1;
         }
         let halves = [Span { from_s, until_s: middle_s }, Span { from_s: middle_s, until_s }];
-        let before = self.search(halves[0], [ends[0], at_middle], bend, found);
-        before + self.search(halves[1], [at_middle, ends[1]], bend, found)
+        let before = self.find_zeros(halves[0], [ends[0], at_middle], bend, found);
+        before + self.find_zeros(halves[1], [at_middle, ends[1]], bend, found)
     }
 
     /// Returns when the distance passes `gap_m` in an interval in which it only grows or only
     /// shrinks.
-    fn edge_s(&self, within: Span, grows: bool, gap_m: f64) -> f64 {
+    fn crossing_s(&self, within: Span, grows: bool, gap_m: f64) -> f64 {
         zero_s(within, grows, |t_s| {
             let Motion { at, velocity, .. } = self.motion(t_s);
             (0.5 * (dot(at, at) - gap_m * gap_m), dot(at, velocity))
@@ -367,7 +367,7 @@ impl Pair<'_> {
 
 /// Returns whether a distance is next to constant, by how much half its square varies.
 fn is_flat(varies_m2: f64, apart_m: f64) -> bool {
-    varies_m2 < FLAT_M * apart_m.max(0.5 * FLAT_M)
+    varies_m2 < FLAT_TOLERANCE_M * apart_m.max(0.5 * FLAT_TOLERANCE_M)
 }
 
 /// Returns the zero of a function that only rises, or only falls, from its values and slopes: by
@@ -385,7 +385,7 @@ fn zero_s(within: Span, rises: bool, of: impl Fn(f64) -> (f64, f64)) -> f64 {
         let newton_s = t_s - value / slope;
         let inside = from_s <= newton_s && newton_s <= until_s;
         let next_s = if inside { newton_s } else { 0.5 * (from_s + until_s) };
-        if (next_s - t_s).abs() <= FOUND_S {
+        if (next_s - t_s).abs() <= ROOT_TOLERANCE_S {
             return next_s;
         }
         t_s = next_s;
@@ -401,7 +401,7 @@ mod tests {
     const ZONE: Zone = Zone { gap_m: 500.0, vertical_m: 300.0 };
 
     fn leg(at: Point, heading_rad: f64, v_m_s: f64, omega_rad_s: f64) -> Leg {
-        Leg::new(0.0, 60.0, Pose { at, heading_rad }, v_m_s, omega_rad_s)
+        Leg::new(0.0, 60.0, Pose2 { at, heading_rad }, v_m_s, omega_rad_s)
     }
 
     fn approach(a: &Leg, b: &Leg, zone: Zone) -> Approach {
@@ -425,9 +425,9 @@ mod tests {
         let still = leg([0.0, 0.0], 0.0, 35.0, 0.0);
         let beside = leg([0.0, 100.0], 0.0, 35.0, 0.0);
         let mut found = Approach::new(None);
-        let climbs = beside.climbing(0.0, 10.0);
+        let climbs = beside.with_climb(0.0, 10.0);
         for (from_s, until_s) in [(0.0, 10.0), (10.0, 60.0)] {
-            let part = |leg: &Leg| Leg { until_s, ..leg.rest(from_s) };
+            let part = |leg: &Leg| Leg { until_s, ..leg.remainder(from_s) };
             found.add(&part(&still), &part(&climbs), ZONE);
         }
         assert_eq!((found.losses, found.nearest_m), (1, 100.0));
@@ -435,7 +435,7 @@ mod tests {
         let mut goes_on = Approach::new(Some(0.0));
         goes_on.add(&still, &beside, ZONE);
         assert_eq!((goes_on.losses, goes_on.lost_s), (0, 60.0));
-        assert_eq!(approach(&still, &beside.climbing(300.0, 0.0), ZONE).nearest_m, f64::INFINITY);
+        assert_eq!(approach(&still, &beside.with_climb(300.0, 0.0), ZONE).nearest_m, f64::INFINITY);
     }
 
     #[test]
@@ -458,9 +458,9 @@ mod tests {
                 for apart_m in [0.0, 1e-3, 40.0] {
                     let a = leg([0.0, 0.0], 0.3, 250.0, omega_rad_s);
                     let b = leg([apart_m, 0.0], 0.3 + off, 250.0, omega_rad_s * (1.0 + off));
-                    let pair = Pair { a: &a, b: &b };
+                    let pair = LegPair { a: &a, b: &b };
                     let looks =
-                        pair.turning_points(Span { from_s: 0.0, until_s: 60.0 }, &mut Vec::new());
+                        pair.find_extrema(Span { from_s: 0.0, until_s: 60.0 }, &mut Vec::new());
                     assert!(looks < 20_000, "{omega_rad_s} {off} {apart_m}: {looks} intervals");
                 }
             }

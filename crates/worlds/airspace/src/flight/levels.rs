@@ -27,13 +27,13 @@ impl Levels {
 
     /// Returns these levels, another, and all between.
     #[must_use]
-    pub fn with(self, altitude_m: f64) -> Self {
+    pub fn including(self, altitude_m: f64) -> Self {
         Self { low_m: self.low_m.min(altitude_m), high_m: self.high_m.max(altitude_m) }
     }
 
     /// Returns whether some level of one is less than `vertical_m` meters from some level of the
     /// other.
-    pub fn meets(&self, other: &Self, vertical_m: f64) -> bool {
+    pub fn overlaps(&self, other: &Self, vertical_m: f64) -> bool {
         self.low_m - other.high_m < vertical_m && other.low_m - self.high_m < vertical_m
     }
 }
@@ -53,9 +53,9 @@ mod tests {
             let nearest = (0..=50).flat_map(|i| (0..=50).map(move |j| (i, j)))
                 .map(|(i, j)| (at(one, i) - at(other, j)).abs()).fold(f64::INFINITY, f64::min);
             // The grid is at most 20 m too coarse.
-            prop_assert!(!one.meets(&other, 100.0) || nearest < 120.0);
-            prop_assert!(one.meets(&other, 100.0) || nearest >= 100.0);
-            prop_assert_eq!(one.meets(&other, 100.0), other.meets(&one, 100.0));
+            prop_assert!(!one.overlaps(&other, 100.0) || nearest < 120.0);
+            prop_assert!(one.overlaps(&other, 100.0) || nearest >= 100.0);
+            prop_assert_eq!(one.overlaps(&other, 100.0), other.overlaps(&one, 100.0));
         }
     }
 }

@@ -37,7 +37,7 @@ impl Model {
 
 /// Place and heading of an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
+pub struct Pose2 {
     /// Position in meters, x east and y north.
     pub at: Point,
     /// Heading in radians, counterclockwise from east.
@@ -45,7 +45,7 @@ pub struct Pose {
     pub heading_rad: f64,
 }
 
-impl Pose {
+impl Pose2 {
     /// Returns the pose after `dtau_s` seconds at the turn rate `omega_rad_s`: exactly, in chord
     /// form, because that form stays exact as the turn rate goes to 0.
     #[inline]

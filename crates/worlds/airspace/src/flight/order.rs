@@ -15,12 +15,12 @@ pub struct FlightOrder {
     /// Time at which it is given, in seconds after the start of the run.
     pub at_s: f64,
     /// The task.
-    pub task: Task,
+    pub task: FlightTask,
 }
 
 /// A task for an airplane.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Task {
+pub enum FlightTask {
     /// Keep a heading, radians counterclockwise from east, until sent to a way-point again.
     Heading(f64),
     /// Fly with this airspeed, m/s.

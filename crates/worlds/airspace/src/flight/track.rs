@@ -1,11 +1,11 @@
 //! Recorded ways: the place of an airplane at any time, and the rest of its way.
 
 use super::leg::Leg;
-use super::motion::{Point, Pose, distance_m};
+use super::motion::{Point, Pose2, distance_m};
 use sidestep_kernel::math;
 
 /// Seconds between two way-points along the rest of a track.
-const WAY_POINT_EVERY_S: f64 = 120.0;
+const WAY_POINT_INTERVAL_S: f64 = 120.0;
 
 /// Place of an airplane at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,31 +38,31 @@ impl Track {
     }
 
     /// Returns the time of its first point, in seconds after the start.
-    pub fn begins_s(&self) -> f64 {
+    pub fn start_s(&self) -> f64 {
         self.points[0].t_s
     }
 
     /// Returns the time of its last point, in seconds after the start.
-    pub fn ends_s(&self) -> f64 {
+    pub fn end_s(&self) -> f64 {
         self.points[self.points.len() - 1].t_s
     }
 
     /// Returns whether the airplane was there at a time.
     pub fn covers(&self, t_s: f64) -> bool {
-        (self.begins_s()..=self.ends_s()).contains(&t_s)
+        (self.start_s()..=self.end_s()).contains(&t_s)
     }
 
     /// Returns its pose at a time; before the first point and after the last one, the pose there.
-    pub fn pose_at(&self, t_s: f64) -> Pose {
-        let (k, part) = self.between(t_s);
+    pub fn pose_at(&self, t_s: f64) -> Pose2 {
+        let (k, part) = self.locate(t_s);
         let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
         let at = [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
-        Pose { at, heading_rad: self.headings_rad[k] }
+        Pose2 { at, heading_rad: self.headings_rad[k] }
     }
 
     /// Returns its altitude in meters.
     pub fn altitude_at_m(&self, t_s: f64) -> f64 {
-        let (k, part) = self.between(t_s);
+        let (k, part) = self.locate(t_s);
         let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);
         from_m + part * (to_m - from_m)
     }
@@ -81,14 +81,14 @@ impl Track {
             let lasts_s = pair[1].t_s - pair[0].t_s;
             let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / lasts_s;
             let v_m_s = distance_m(pair[0].at, pair[1].at) / lasts_s;
-            let pose = Pose { heading_rad: self.headings_rad[k], ..self.pose_at(begins_s) };
+            let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(begins_s) };
             let leg = Leg::new(begins_s - from_s, ends_s - from_s, pose, v_m_s, 0.0);
-            legs.push(leg.climbing(self.altitude_at_m(begins_s), climb_m_s));
+            legs.push(leg.with_climb(self.altitude_at_m(begins_s), climb_m_s));
         }
     }
 
     /// Returns the last point before a time that has a next one, and the part of the way to that.
-    fn between(&self, t_s: f64) -> (usize, f64) {
+    fn locate(&self, t_s: f64) -> (usize, f64) {
         let after = self.points.partition_point(|p| p.t_s <= t_s);
         let k = after.clamp(1, self.points.len() - 1) - 1;
         let (from_s, to_s) = (self.points[k].t_s, self.points[k + 1].t_s);
@@ -97,13 +97,13 @@ impl Track {
 
     /// Returns the way-points for flying on from its place at a time: one every two minutes, and
     /// the last point.
-    pub fn rest(&self, from_s: f64) -> Vec<Point> {
-        let mut due_s = from_s + WAY_POINT_EVERY_S;
+    pub fn remaining_way_points(&self, from_s: f64) -> Vec<Point> {
+        let mut due_s = from_s + WAY_POINT_INTERVAL_S;
         let mut way_points: Vec<Point> = Vec::new();
         for (k, point) in self.points.iter().enumerate() {
             if k + 1 == self.points.len() || point.t_s >= due_s {
                 way_points.push(point.at);
-                due_s = point.t_s + WAY_POINT_EVERY_S;
+                due_s = point.t_s + WAY_POINT_INTERVAL_S;
             }
         }
         way_points
@@ -113,25 +113,25 @@ impl Track {
     /// that.
     pub fn mean_speed_m_s(&self, from_s: f64) -> f64 {
         let from_s =
-            if from_s < self.ends_s() { from_s.max(self.begins_s()) } else { self.begins_s() };
+            if from_s < self.end_s() { from_s.max(self.start_s()) } else { self.start_s() };
         let mut at = self.pose_at(from_s).at;
         let mut length_m = 0.0;
         for point in self.points.iter().filter(|p| p.t_s > from_s) {
             length_m += distance_m(at, point.at);
             at = point.at;
         }
-        length_m / (self.ends_s() - from_s)
+        length_m / (self.end_s() - from_s)
     }
 
     /// Returns its speed over the ground at a time, in meters per second.
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
-        let (k, _) = self.between(t_s);
+        let (k, _) = self.locate(t_s);
         let (from, to) = (&self.points[k], &self.points[k + 1]);
         distance_m(from.at, to.at) / (to.t_s - from.t_s)
     }
 
     /// Returns its greatest rate of climb or descent, in meters per second.
-    pub fn top_climb_m_s(&self) -> f64 {
+    pub fn max_climb_m_s(&self) -> f64 {
         let climb = |pair: &[TrackPoint]| {
             (pair[1].altitude_m - pair[0].altitude_m).abs() / (pair[1].t_s - pair[0].t_s)
         };
@@ -139,7 +139,7 @@ impl Track {
     }
 
     /// Returns the greatest speed over the ground, in meters per second.
-    pub fn top_speed_m_s(&self) -> f64 {
+    pub fn max_speed_m_s(&self) -> f64 {
         let speed =
             |pair: &[TrackPoint]| distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s);
         self.points.windows(2).map(speed).fold(0.0, f64::max)
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(track.pose_at(13.0).heading_rad, std::f64::consts::FRAC_PI_2);
         assert_eq!((track.pose_at(0.0).at, track.pose_at(99.0).at), ([0.0, 0.0], [0.0, 1000.0]));
         assert!(track.covers(10.0) && track.covers(20.0) && !track.covers(20.1));
-        assert_eq!((track.top_speed_m_s(), track.mean_speed_m_s(15.0)), (100.0, 100.0));
+        assert_eq!((track.max_speed_m_s(), track.mean_speed_m_s(15.0)), (100.0, 100.0));
     }
 
     #[test]
@@ -191,8 +191,11 @@ mod tests {
         let points: Vec<[f64; 4]> =
             (0..40).map(|k| [f64::from(k) * 10.0, f64::from(k), 0.0, 0.0]).collect();
         let track = track(&points).expect("valid");
-        assert_eq!(track.rest(0.0), [[12.0, 0.0], [24.0, 0.0], [36.0, 0.0], [39.0, 0.0]]);
-        assert_eq!(track.rest(385.0), [[39.0, 0.0]]);
+        assert_eq!(
+            track.remaining_way_points(0.0),
+            [[12.0, 0.0], [24.0, 0.0], [36.0, 0.0], [39.0, 0.0]]
+        );
+        assert_eq!(track.remaining_way_points(385.0), [[39.0, 0.0]]);
     }
 
     #[test]

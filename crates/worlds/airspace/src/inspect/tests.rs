@@ -1,7 +1,7 @@
 use crate::flight::distance_m;
 use crate::{AirspaceRun, airspace_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Value, Who};
+use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole, MarkShape};
 use sidestep_scenario::Source;
 
 fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
@@ -12,15 +12,15 @@ fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
     airspace_run(&Source::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn told(run: &AirspaceRun, id: u32) -> Inspection {
-    run.inspect(Who::new(Kind::Airplane, id, None)).expect("it is in the air")
+fn inspect_airplane(run: &AirspaceRun, id: u32) -> Inspection {
+    run.inspect(BodyId::new(BodyKind::Airplane, id, None)).expect("it is in the air")
 }
 
 /// Returns the probabilities of the actions; none of an airplane that is alone.
 fn chances(told: &Inspection) -> Option<Vec<f64>> {
     let table = told.section("Decides").and_then(|s| s.table.as_ref())?;
-    let share = |value: &Value| match value {
-        Value::Share(p) => *p,
+    let share = |value: &FactValue| match value {
+        FactValue::Share(p) => *p,
         other => panic!("{other:?} is no probability"),
     };
     Some(table.column("probability").expect("a column").map(share).collect())
@@ -38,14 +38,19 @@ fn probabilities_of_the_actions_sum_to_1_and_the_chosen_one_is_flown_unless_the_
             run.advance(12);
             for _ in 0..4 {
                 run.advance(4);
-                let all: Vec<Inspection> = (0..4).map(|id| told(&run, id)).collect();
+                let all: Vec<Inspection> = (0..4).map(|id| inspect_airplane(&run, id)).collect();
                 run.advance(1);
                 for (id, told) in (0..).zip(&all) {
                     let Some(chances) = chances(told) else { continue };
                     let sum: f64 = chances.iter().sum();
                     assert!((sum - 1.0).abs() < 1e-9, "{deployment}, {preset}: {sum}");
-                    assert_eq!(told.marks_of(Role::Predicted).count() + 1, chances.len());
-                    let Some(chosen) = told.marks_of(Role::Chosen).next() else { panic!("none") };
+                    assert_eq!(
+                        told.marks_with_role(MarkRole::Predicted).count() + 1,
+                        chances.len()
+                    );
+                    let Some(chosen) = told.marks_with_role(MarkRole::Chosen).next() else {
+                        panic!("none")
+                    };
                     let MarkShape::Line { points_m } = &chosen.shape else { panic!("no way") };
                     let at = run.state().airplanes[id].pose().at;
                     // Chosen ways are drawn from where the airplane is, in steps of some seconds.
@@ -84,20 +89,29 @@ fn who_is_kept_from_its_wish_is_told_because_of_whom() {
     let mut kept = 0;
     while !run.is_over() && run.cycle() < 80 {
         for id in 0..6 {
-            let Some(told) = run.inspect(Who::new(Kind::Airplane, id, None)) else { continue };
-            assert_eq!(told.marks_of(Role::Orbit).count(), 1, "its stored orbit is drawn");
+            let Some(told) = run.inspect(BodyId::new(BodyKind::Airplane, id, None)) else {
+                continue;
+            };
+            assert_eq!(
+                told.marks_with_role(MarkRole::Orbit).count(),
+                1,
+                "its stored orbit is drawn"
+            );
             if told.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
-                assert_eq!(told.value("Shield", "because of"), Some(&Value::None));
+                assert_eq!(told.value("Shield", "because of"), Some(&FactValue::None));
                 continue;
             }
             kept += 1;
-            let Some(Value::Who(Who { kind: Kind::Airplane, number: other, part: None })) =
-                told.value("Shield", "because of")
+            let Some(FactValue::Who(BodyId {
+                kind: BodyKind::Airplane,
+                number: other,
+                part: None,
+            })) = told.value("Shield", "because of")
             else {
                 panic!("nobody is the reason: {told:?}")
             };
             assert!(*other != id && *other < 6);
-            assert_eq!(told.marks_of(Role::Refused).count(), 1);
+            assert_eq!(told.marks_with_role(MarkRole::Refused).count(), 1);
         }
         run.advance(1);
     }
@@ -109,20 +123,20 @@ fn on_a_bad_network_it_is_told_since_when_others_were_heard() {
     let network = "deployment = \"team\"\nnetwork = { loss = 0.3, silent = [{ airplane = 2, from_s = 80.0 }] }";
     let mut run = run(network, 1, 4);
     run.advance(20);
-    let told = told(&run, 0);
+    let told = inspect_airplane(&run, 0);
     let table =
         told.section("Knows of others").and_then(|s| s.table.as_ref()).expect("three others");
-    let heard: Vec<&Value> =
+    let heard: Vec<&FactValue> =
         table.column("heard or first seen in cycle").expect("a column").collect();
     assert_eq!(heard.len(), 3);
-    assert_eq!(heard[1], &Value::number(15.0, ""), "before its radio fell silent: {heard:?}");
-    assert_eq!(told.marks_of(Role::Known).count(), 3);
+    assert_eq!(heard[1], &FactValue::number(15.0, ""), "before its radio fell silent: {heard:?}");
+    assert_eq!(told.marks_with_role(MarkRole::Known).count(), 3);
     let Some(talk) = told.section("Talk of the group").and_then(|s| s.table.as_ref()) else {
         panic!()
     };
     let messages = talk.column("messages").expect("a column").cloned().collect::<Vec<_>>();
     assert!(
-        messages.iter().all(|n| matches!(n, Value::Number { value, .. } if *value > 0.0)),
+        messages.iter().all(|n| matches!(n, FactValue::Number { value, .. } if *value > 0.0)),
         "{messages:?}"
     );
 }

@@ -1,11 +1,11 @@
 //! Controls: the motion of an airplane in a cycle, and the outcome of its talks.
 
-use crate::agents::Decided;
-use crate::agents::contact::Contacts;
-use crate::agents::traffic::Traffic;
-use crate::baseline::mvp::Resolving;
+use crate::agents::ActionChoice;
+use crate::agents::network_traffic::NetworkTraffic;
+use crate::agents::traffic_state::TrafficPicture;
+use crate::baseline::mvp::ActiveResolutions;
 use crate::events::Event;
-use crate::shield::{Decision, Side, Way};
+use crate::shield::{ShieldDecision, Side, TurnProfile};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -17,15 +17,15 @@ pub struct Control {
     /// The cycle in which it flies so.
     pub cycle: Cycle,
     /// Its course.
-    pub course: Course,
+    pub course: Maneuver,
     /// Outcome of the optimization; none where there was nothing to optimize.
-    pub optimized: Option<Optimized>,
+    pub optimized: Option<OptimizerStats>,
     /// Packets of the talk that finds the group; none where groups are announced.
-    pub grouping: Traffic,
+    pub grouping: NetworkTraffic,
     /// Packets of the talk about the wishes of each.
-    pub deciding: Traffic,
+    pub deciding: NetworkTraffic,
     /// Packets of the shield's exchange.
-    pub shielding: Traffic,
+    pub shielding: NetworkTraffic,
     /// Others that it no longer hears, deadlines missed, and the like.
     pub events: Vec<Event>,
     /// Its memory.
@@ -34,13 +34,13 @@ pub struct Control {
 
 /// The course of an airplane for one `dt`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Course {
+pub enum Maneuver {
     /// A way of its choice.
     Way {
         /// Number of the way among its wishes: 0 for the wanted one.
         wish: u32,
         /// Turn rate in each step.
-        way: Way,
+        way: TurnProfile,
         /// Side of the fallback that it stores for the end of the way.
         side: Side,
     },
@@ -50,7 +50,7 @@ pub enum Course {
 
 /// Outcome of an optimization for an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Optimized {
+pub struct OptimizerStats {
     /// Whether a decision has reached it.
     pub is_decided: bool,
     /// Number of rounds.
@@ -63,27 +63,27 @@ pub struct Optimized {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Memory {
     /// Its knowledge of others; empty where the network is reliable.
-    pub contacts: Contacts,
+    pub contacts: TrafficPicture,
     /// The conflicts that it resolves; empty unless the method is MVP.
-    pub resolving: Resolving,
+    pub resolving: ActiveResolutions,
 }
 
-impl Course {
+impl Maneuver {
     /// Returns the course as a decision of the shield; `fallback` is the side of the stored orbit.
-    pub(crate) fn decision(&self, fallback: Side) -> Decision {
+    pub(crate) fn shield_decision(&self, fallback: Side) -> ShieldDecision {
         match *self {
             Self::Way { wish, side, .. } => {
-                Decision { candidate: Some(wish as usize), fallback: side }
+                ShieldDecision { candidate: Some(wish as usize), fallback: side }
             }
-            Self::Orbit => Decision { candidate: None, fallback },
+            Self::Orbit => ShieldDecision { candidate: None, fallback },
         }
     }
 }
 
-impl Optimized {
+impl OptimizerStats {
     /// Returns the outcome with a decision, or without one.
-    pub(crate) fn of(decided: Option<&Decided>) -> Self {
-        let of = |decided: &Decided| Self {
+    pub(crate) fn from_choice(decided: Option<&ActionChoice>) -> Self {
+        let of = |decided: &ActionChoice| Self {
             is_decided: true,
             rounds: decided.rounds,
             converged: decided.converged,
@@ -94,15 +94,15 @@ impl Optimized {
 
 impl Control {
     /// Returns a control by which an airplane stays on its orbit.
-    pub(crate) fn orbit(id: EntityId, cycle: Cycle, memory: Memory) -> Self {
+    pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: Memory) -> Self {
         Self {
             id,
             cycle,
-            course: Course::Orbit,
+            course: Maneuver::Orbit,
             optimized: None,
-            grouping: Traffic::default(),
-            deciding: Traffic::default(),
-            shielding: Traffic::default(),
+            grouping: NetworkTraffic::default(),
+            deciding: NetworkTraffic::default(),
+            shielding: NetworkTraffic::default(),
             events: Vec::new(),
             memory,
         }

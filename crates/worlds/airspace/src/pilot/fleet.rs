@@ -1,12 +1,12 @@
 //! Runs whose pilots are elsewhere: each cycle they receive their perceptions, and return their controls.
 
-use super::control::{Control, Course};
-use super::sight::Sight;
+use super::control::{Control, Maneuver};
+use super::percept::Percept;
 use crate::AirspaceRun;
-use crate::decide::possible;
+use crate::decide::possible_profiles;
 use crate::deploy::Deployment;
 use crate::events::EventKind;
-use crate::shield::Way;
+use crate::shield::TurnProfile;
 use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Method};
 use sidestep_kernel::control::OrderError;
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub trait Fleet {
     /// Returns the perceptions of each airplane that decides in the cycle to come, by rising id. No result depends on
     /// it.
-    fn sights(&self) -> Vec<Sight>;
+    fn percepts(&self) -> Vec<Percept>;
 
     /// Hands over the controls of airplanes for the cycle to come. An airplane without one stays on its stored orbit;
     /// unless a network is given that may lose messages, so does its whole group, because then plans are safe only if
@@ -26,30 +26,30 @@ pub trait Fleet {
     /// # Errors
     /// When one of them is of another airplane or cycle, or cannot be flown; none is taken then. When the run is
     /// recorded without its controls, or one process decides for all.
-    fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
+    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
 
     /// Returns the controls, each serialized, that cannot be flown in the cycle to come, with the reasons.
-    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
+    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
 
     /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
     /// not reach, both by rising id.
-    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)>;
+    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)>;
 }
 
 impl Fleet for AirspaceRun {
-    fn sights(&self) -> Vec<Sight> {
-        self.world().sights(self.state(), self.cycle())
+    fn percepts(&self) -> Vec<Percept> {
+        self.world().percepts(self.state(), self.cycle())
     }
 
-    fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
+    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
         let bytes =
             |control: &Control| postcard::to_stdvec(control).expect("controls are plain data");
         let controls: Vec<_> = controls.iter().map(|one| (one.id, bytes(one))).collect();
-        self.hand_over(&controls)
+        self.submit_controls(&controls)
     }
 
-    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
-        let sights = self.sights();
+    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
+        let sights = self.percepts();
         let sight = |id| sights.iter().find(|sight| sight.own.id == id);
         let why = |(id, bytes): &(EntityId, Vec<u8>)| {
             Some((*id, self.world().read_control(*id, bytes, sight(*id)).err()?))
@@ -57,32 +57,32 @@ impl Fleet for AirspaceRun {
         controls.iter().filter_map(why).collect()
     }
 
-    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)> {
-        self.world().beyond(self.state(), self.cycle())
+    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+        self.world().out_of_range(self.state(), self.cycle())
     }
 }
 
 impl AirspaceWorld {
     /// Returns the perceptions of each airplane that decides in cycle `now`.
-    pub(crate) fn sights(&self, state: &AirspaceState, now: Cycle) -> Vec<Sight> {
+    pub(crate) fn percepts(&self, state: &AirspaceState, now: Cycle) -> Vec<Percept> {
         let mut all = Vec::new();
-        self.perceived(state, now, |turn, flown, intruders| {
-            all.extend(Sight::all(turn, flown, intruders));
+        self.for_each_group(state, now, |turn, flown, intruders| {
+            all.extend(Percept::from_group(turn, flown, intruders));
         });
         all.sort_unstable_by_key(|sight| sight.own.id);
         all
     }
 
     /// Returns the others of its group that each airplane does not reach in cycle `now`.
-    fn beyond(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
+    fn out_of_range(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
         let range_m = self.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
         let mut all = Vec::new();
         if range_m == f64::INFINITY {
             return all;
         }
-        self.perceived(state, now, |turn, flown, _| {
+        self.for_each_group(state, now, |turn, flown, _| {
             for &own in &flown.ids {
-                let is_beyond = |other: &EntityId| turn.state.apart_m([own, *other]) > range_m;
+                let is_beyond = |other: &EntityId| turn.state.distance_m([own, *other]) > range_m;
                 let others = flown.ids.iter().copied().filter(|&id| id != own);
                 all.push((own, others.filter(is_beyond).collect()));
             }
@@ -92,7 +92,7 @@ impl AirspaceWorld {
     }
 
     /// Notes the controls of airplanes, once all are found to be right.
-    pub(crate) fn note_controls(
+    pub(crate) fn store_controls(
         &self,
         state: &AirspaceState,
         now: Cycle,
@@ -101,14 +101,14 @@ impl AirspaceWorld {
         if self.deployment == Deployment::Direct {
             let cause = "one process decides for all (deployment = \"direct\"); set deployment to team, \
                          compact-team, pim or hierarchical-pim";
-            return Err(OrderError::NobodyOutside { cause: cause.into() });
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
         }
-        let sights = self.sights(state, now);
+        let sights = self.percepts(state, now);
         let sights: BTreeMap<_, _> = sights.iter().map(|sight| (sight.own.id, sight)).collect();
         let mut read = BTreeMap::new();
         for (id, bytes) in controls {
             let refused = |cause: String| {
-                let who = format!("airplane {}", self.called_if_known(*id));
+                let who = format!("airplane {}", self.display_name_or_id(*id));
                 OrderError::Control { who, cause }
             };
             let control =
@@ -117,12 +117,12 @@ impl AirspaceWorld {
                 return Err(refused("there are two of it; give one for each airplane".into()));
             }
         }
-        state.hand_over(now, read.into_values().collect());
+        state.set_controls(now, read.into_values().collect());
         Ok(())
     }
 
     /// Returns the name that people use for an airplane, or else the id.
-    fn called_if_known(&self, id: EntityId) -> String {
+    fn display_name_or_id(&self, id: EntityId) -> String {
         self.callsign(id).unwrap_or_else(|| id.to_string())
     }
 
@@ -131,7 +131,7 @@ impl AirspaceWorld {
         &self,
         id: EntityId,
         bytes: &[u8],
-        sight: Option<&Sight>,
+        sight: Option<&Percept>,
     ) -> Result<Control, String> {
         let Some(sight) = sight else {
             let cause =
@@ -148,20 +148,22 @@ impl AirspaceWorld {
                 control.id, control.cycle, sight.cycle
             ));
         }
-        self.can_fly(sight, &control.course)?;
-        self.can_be_kept(&control)?;
+        self.check_maneuver(sight, &control.course)?;
+        self.check_control(&control)?;
         Ok(control)
     }
 
     /// Checks that an airplane can fly a course.
-    fn can_fly(&self, sight: &Sight, course: &Course) -> Result<(), String> {
-        let Course::Way { wish, way: Way { omegas_rad_s }, .. } = course else { return Ok(()) };
+    fn check_maneuver(&self, sight: &Percept, course: &Maneuver) -> Result<(), String> {
+        let Maneuver::Way { wish, way: TurnProfile { omegas_rad_s }, .. } = course else {
+            return Ok(());
+        };
         let (own, steps) = (&sight.own, self.timing.points_per_dt());
         if omegas_rad_s.len() != steps {
             let found = omegas_rad_s.len();
             return Err(format!("its way has {found} turn rates; give {steps}, one for each step"));
         }
-        let most_rad_s = self.stage(own.id, own.orders).model.omega_max_rad_s;
+        let most_rad_s = self.segment(own.id, own.orders).model.omega_max_rad_s;
         // Comparisons with NaN are false.
         let is_within = |omega: &&f64| omega.abs() <= most_rad_s;
         if let Some(omega) = omegas_rad_s.iter().find(|omega| !is_within(omega)) {
@@ -173,7 +175,7 @@ impl AirspaceWorld {
         let ways = match self.method {
             // Any heading may be ordered, or come of a method that looks at others.
             Method::Mvp | Method::Orca | Method::External => return Ok(()),
-            Method::Pc | Method::None => possible(self, own.known()),
+            Method::Pc | Method::None => possible_profiles(self, own.known_aircraft()),
         };
         match ways.iter().any(|way| way.omegas_rad_s == *omegas_rad_s) {
             true if (*wish as usize) < ways.len() => Ok(()),
@@ -182,7 +184,7 @@ impl AirspaceWorld {
     }
 
     /// Checks the parts of a control beside the course.
-    fn can_be_kept(&self, control: &Control) -> Result<(), String> {
+    fn check_control(&self, control: &Control) -> Result<(), String> {
         let is_told = |kind: EventKind| {
             use EventKind::{Deadline, GroupTooLarge, HeldBack, Unheard};
             matches!(kind, Deadline | GroupTooLarge | HeldBack | Unheard)

@@ -6,7 +6,7 @@
 //!              Packet  v   │  Packet               to and from the others of its group
 //! ```
 //!
-//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], finds its group where that is not
+//! A [`Pilot`] knows the filed flights (the world), perceives a [`Percept`], finds its group where that is not
 //! announced, talks with the others of its group first about the wishes of each and then about whether those are
 //! safe, and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator runs
 //! a group of them over a network in memory (`deploy/`); a process on a network runs one.
@@ -23,23 +23,23 @@
 //! fleet.rs                runs whose pilots are elsewhere
 //! ```
 
-mod aboard;
-mod briefing;
+mod common_knowledge;
 mod control;
-mod early;
+mod conversations;
+mod early_packets;
 mod fleet;
+mod percept;
+mod program;
 mod schedule;
-mod sight;
-mod talks;
 #[cfg(test)]
 mod tests;
 
-pub use crate::agents::packet::{Packet, TalkId, Topic};
-pub use aboard::Pilot;
-pub use control::{Control, Course, Memory, Optimized};
+pub use crate::agents::packet::{ConversationId, Packet, Protocol};
+pub use control::{Control, Maneuver, Memory, OptimizerStats};
 pub use fleet::Fleet;
+pub use percept::{OwnshipState, Percept, SurveillanceReport};
+pub use program::Pilot;
 pub(crate) use schedule::Schedule;
 #[cfg(test)]
-pub(crate) use schedule::patience;
-pub use sidestep_kernel::network::{Refusal, Refused};
-pub use sight::{Own, Sight, Sighted};
+pub(crate) use schedule::retry_policy;
+pub use sidestep_kernel::network::{DropCounts, DropReason};

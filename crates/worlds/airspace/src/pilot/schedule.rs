@@ -1,12 +1,12 @@
 //! The ticks in which the talks of a cycle start and end.
 
-use crate::agents::packet::Topic;
+use crate::agents::packet::Protocol;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::network::{Network, Patience};
+use sidestep_kernel::network::{Network, RetryPolicy};
 
 /// Patience of agents that wait for each other as long as it takes.
-const FOR_EVER: Patience =
-    Patience { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
+const NO_TIMEOUT: RetryPolicy =
+    RetryPolicy { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
 
 /// The ticks of a cycle's talks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(crate) struct Schedule {
 impl Schedule {
     /// Returns the ticks of talks that start in a tick: over a network that loses messages each has its time;
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
-    pub(crate) fn from(tick: u64, network: Option<&Network>) -> Self {
+    pub(crate) fn from_tick(tick: u64, network: Option<&Network>) -> Self {
         let Some(network) = network else {
             let (grouped_by, decided_by, ends) = (u64::MAX, u64::MAX, u64::MAX);
             return Self { begins: tick, grouped_by, decided_by, shield_from: tick, ends };
@@ -44,27 +44,27 @@ impl Schedule {
 
     /// Returns the ticks of a cycle where all cycles follow on each other without a gap, and no second talk starts
     /// before all have ended the first.
-    pub(crate) fn of_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
+    pub(crate) fn for_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
         let Some(network) = network else {
-            return Self { shield_from: u64::MAX / 2, ..Self::from(0, None) };
+            return Self { shield_from: u64::MAX / 2, ..Self::from_tick(0, None) };
         };
-        Self::from(2 * cycle * (network.deadline_ticks() + 1), Some(network))
+        Self::from_tick(2 * cycle * (network.deadline_ticks() + 1), Some(network))
     }
 
     /// Returns the first and the last tick of a talk that starts in `tick`.
-    pub(crate) fn of(&self, topic: Topic, tick: u64) -> (u64, u64) {
+    pub(crate) fn conversation_ticks(&self, topic: Protocol, tick: u64) -> (u64, u64) {
         match topic {
-            Topic::Group => (tick, self.grouped_by),
-            Topic::Decision => (tick, self.decided_by),
-            Topic::Shield => (tick.max(self.shield_from), self.ends),
+            Protocol::Group => (tick, self.grouped_by),
+            Protocol::Decision => (tick, self.decided_by),
+            Protocol::Shield => (tick.max(self.shield_from), self.ends),
         }
     }
 }
 
 /// Returns how agents that do not answer are asked again.
-pub(crate) fn patience(network: Option<&Network>, topic: Topic) -> Patience {
-    network.map_or(FOR_EVER, |network| match topic {
-        Topic::Group | Topic::Decision => network.short_patience(),
-        Topic::Shield => network.patience(),
+pub(crate) fn retry_policy(network: Option<&Network>, topic: Protocol) -> RetryPolicy {
+    network.map_or(NO_TIMEOUT, |network| match topic {
+        Protocol::Group | Protocol::Decision => network.short_retry_policy(),
+        Protocol::Shield => network.retry_policy(),
     })
 }

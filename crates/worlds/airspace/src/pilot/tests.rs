@@ -5,7 +5,7 @@ mod hostile;
 mod order;
 
 use super::*;
-use crate::deploy::fly_all;
+use crate::deploy::run_pilots;
 use crate::world::AirspaceWorld;
 use crate::{AirspaceRun, airspace_run};
 use sidestep_kernel::network::Network;
@@ -31,13 +31,13 @@ fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
 }
 
 /// A pilot for each airplane, outside of a run.
-struct Crew {
+struct TestPilots {
     world: Arc<AirspaceWorld>,
     pilots: Vec<Pilot>,
 }
 
-impl Crew {
-    fn of(run: &AirspaceRun) -> Self {
+impl TestPilots {
+    fn from_run(run: &AirspaceRun) -> Self {
         let world = run.world().clone();
         let all = 0..world.airplanes.len() as EntityId;
         let pilots = all.map(|id| Pilot::new(world.clone(), id, Default::default())).collect();
@@ -47,16 +47,16 @@ impl Crew {
     /// Lets the pilots that perceive something decide, over the network of the scenario.
     fn decide(&mut self, run: &AirspaceRun) -> Vec<Control> {
         let network: Option<&Network> = self.world.network.as_ref();
-        let (now, schedule) = (run.cycle(), Schedule::of_cycle(run.cycle(), network));
+        let (now, schedule) = (run.cycle(), Schedule::for_cycle(run.cycle(), network));
         // As they come off a network.
-        let sights: Vec<Sight> = run.sights().iter().map(over_the_wire).collect();
+        let sights: Vec<Percept> = run.percepts().iter().map(over_the_wire).collect();
         let is_due = |pilot: &Pilot| sights.iter().any(|sight| sight.own.id == pilot.id());
         let (mut due, rest): (Vec<Pilot>, Vec<Pilot>) =
             std::mem::take(&mut self.pilots).into_iter().partition(is_due);
         for (pilot, sight) in due.iter_mut().zip(sights) {
-            pilot.begin_by(sight, schedule);
+            pilot.start_with_schedule(sight, schedule);
         }
-        fly_all(&self.world, run.state(), (now, schedule), &mut due);
+        run_pilots(&self.world, run.state(), (now, schedule), &mut due);
         let controls = due.iter().map(|pilot| pilot.control().expect("all end")).collect();
         self.pilots = due.into_iter().chain(rest).collect();
         self.pilots.sort_unstable_by_key(Pilot::id);
@@ -78,11 +78,15 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     );
     run.advance(8);
     let (world, now) = (run.world().clone(), run.cycle());
-    let sights = run.sights();
+    let sights = run.percepts();
     assert_eq!(sights.len(), 5);
     assert!(sights.iter().all(|sight| sight.check(&world).is_ok()));
-    let lost = Sight { group: sights[0].group[1..].to_vec(), ..sights[0].clone() };
-    assert_eq!(lost.check(&world), Err(crate::agents::Unsound::Airplane), "it is not in its group");
+    let lost = Percept { group: sights[0].group[1..].to_vec(), ..sights[0].clone() };
+    assert_eq!(
+        lost.check(&world),
+        Err(crate::agents::InvalidMessage::Airplane),
+        "it is not in its group"
+    );
     let mut hidden = 0;
     for (own, sight) in sights.iter().enumerate() {
         let mut snapshot = run.state().snapshot(now);
@@ -95,10 +99,10 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
                 airplane.fallback = crate::shield::Side::BOTH[1 - airplane.fallback as usize];
                 hidden += 1;
             }
-            snapshot.resolving[id] = crate::baseline::mvp::Resolving::default();
+            snapshot.resolving[id] = crate::baseline::mvp::ActiveResolutions::default();
         }
         let changed = crate::state::AirspaceState::restore(&world, &snapshot);
-        assert_eq!(world.sights(&changed, now)[own], *sight, "airplane {own}");
+        assert_eq!(world.percepts(&changed, now)[own], *sight, "airplane {own}");
     }
     assert!(hidden > 10, "{hidden}");
 }

@@ -1,27 +1,27 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use super::values::{Measure, Speed, TurnRate, Turns};
+use super::values::{SeparationM, Speed, TurnRate, Turns};
 use crate::flight::Airplane;
-use crate::flight::{Model, Pose, Timing, Track};
+use crate::flight::{Model, Pose2, Timing, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::GeneratorKind;
-use crate::generate::{Order, generate};
+use crate::generate::{GeneratorParams, generate};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use sidestep_import::traffic::FASTEST_M_S;
+use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
-use sidestep_scenario::{AboveBelow, FromBelow, Number, Spanned, Whole};
+use sidestep_scenario::{Integer, Number, Open, RightOpen, Spanned};
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GeneratorSection {
     kind: GeneratorKind,
     /// Number of airplanes.
-    n: Whole<1, 1_000_000>,
-    radius_m: Option<Number<AboveBelow<0, 1_000_000_000>>>,
-    jitter_m: Option<Number<FromBelow<0, 1_000_000>>>,
+    n: Integer<1, 1_000_000>,
+    radius_m: Option<Number<Open<0, 1_000_000_000>>>,
+    jitter_m: Option<Number<RightOpen<0, 1_000_000>>>,
 }
 
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -32,7 +32,7 @@ pub(super) struct ModelSection {
     /// Greatest turn rate.
     omega_max_deg_s: Option<Number<TurnRate>>,
     /// Distance that all keep from each other.
-    separation_m: Option<Measure>,
+    separation_m: Option<SeparationM>,
     turns: Option<Turns>,
 }
 
@@ -74,18 +74,20 @@ impl Compiler<'_> {
     ) -> Result<Vec<Airplane>, InputError> {
         let common = self.file.airplane.clone().unwrap_or_default();
         let mut all = match &self.file.airspace.generator {
-            Some(generator) => self.generated(generator, &common.model(), streams)?,
+            Some(generator) => self.generate_airplanes(generator, &common.model(), streams)?,
             None => Vec::new(),
         };
         for section in &self.file.airplanes.0 {
             let own = common.with_own(section.get_ref());
             all.push(match section.get_ref().track(self.source)? {
-                Some(track) => self.recorded(section, own.model(), track, replay)?,
-                None => self.planned(section, own.model())?,
+                Some(track) => self.recorded_airplane(section, own.model(), track, replay)?,
+                None => self.planned_airplane(section, own.model())?,
             });
         }
         if self.file.airspace.replay_until_s.is_some() && all.iter().all(|a| a.track.is_none()) {
-            return Err(self.source.idle("airspace.replay_until_s", "without a recorded track"));
+            return Err(self
+                .source
+                .unused_key("airspace.replay_until_s", "without a recorded track"));
         }
         if all.is_empty() {
             let remedy = "add [airspace.generator] with kind and n, or [[airplanes]]";
@@ -94,7 +96,7 @@ impl Compiler<'_> {
         Ok(all)
     }
 
-    fn generated(
+    fn generate_airplanes(
         &self,
         section: &Spanned<GeneratorSection>,
         model: &Model,
@@ -103,7 +105,7 @@ impl Compiler<'_> {
         let s = section.get_ref();
         if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
             let because = "for kind = \"random\", whose places are all drawn";
-            return Err(self.source.idle("airspace.generator.jitter_m", because));
+            return Err(self.source.unused_key("airspace.generator.jitter_m", because));
         }
         let n = s.n.get() as usize;
         // By default, random traffic is as dense as ten airplanes in the paper's circle, for any
@@ -114,8 +116,8 @@ impl Compiler<'_> {
         };
         let radius_m = s.radius_m.map_or(usual_m, f64::from);
         let jitter_m = s.jitter_m.map_or(20.0, f64::from);
-        let errors_m = self.room_for_errors_m(model);
-        let order = Order { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
+        let errors_m = self.error_margin_m(model);
+        let order = GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
         generate(&order, streams).map_err(|placed| {
             let cause = format!("no place is left after {placed} of {n} airplanes");
             self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
@@ -124,16 +126,16 @@ impl Compiler<'_> {
 
     /// Returns how much farther from each other two airplanes of a model have to start, because of
     /// errors: they are seen elsewhere, and their orbits are wider.
-    fn room_for_errors_m(&self, model: &Model) -> f64 {
+    fn error_margin_m(&self, model: &Model) -> f64 {
         let bounds = self.bounds();
         let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
-        let Some(rate_rad_s) = bounds.holds_rad_s(model, dt_s) else { return 0.0 };
+        let Some(rate_rad_s) = bounds.max_orbit_rate_rad_s(model, dt_s) else { return 0.0 };
         let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();
         4.0 * wider_m + 2.0 * bounds.position_m + 2.0 * bounds.error_m(model.v_m_s, dt_s)
     }
 
     /// Returns an airplane with a flight plan of its own.
-    fn planned(
+    fn planned_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
         model: Model,
@@ -155,7 +157,7 @@ impl Compiler<'_> {
         Ok(Airplane {
             callsign: s.callsign(self.source)?,
             model,
-            start: Pose { at: at_m.get(), heading_rad },
+            start: Pose2 { at: at_m.get(), heading_rad },
             mission,
             altitude_m: s.altitude_m.map_or(0.0, f64::from),
             appears_s: s.appears_s.map_or(0.0, f64::from),
@@ -168,18 +170,18 @@ impl Compiler<'_> {
 
     /// Returns an airplane that follows its track, and then flies on along the rest of it, with the
     /// recorded speed unless another one is given.
-    fn recorded(
+    fn recorded_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
         mut model: Model,
         track: Track,
         replay: Replay,
     ) -> Result<Airplane, InputError> {
-        let top_m_s = track.top_speed_m_s();
-        if top_m_s >= FASTEST_M_S {
+        let top_m_s = track.max_speed_m_s();
+        if top_m_s >= MAX_SPEED_M_S {
             let cause = format!("a track with {top_m_s:e} m/s between two of its points");
             let remedy = format!(
-                "leave out points that nothing reaches: nothing is faster than {FASTEST_M_S:e} m/s"
+                "leave out points that nothing reaches: nothing is faster than {MAX_SPEED_M_S:e} m/s"
             );
             return Err(self.source.error(section.span(), cause, remedy));
         }
@@ -187,7 +189,7 @@ impl Compiler<'_> {
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
         }
         let callsign = section.get_ref().callsign(self.source)?;
-        let airplane = following(track, model, replay, section.get_ref().intruder);
+        let airplane = replayed_airplane(track, model, replay, section.get_ref().intruder);
         Ok(Airplane { callsign, ..airplane })
     }
 
@@ -200,8 +202,8 @@ impl Compiler<'_> {
     }
 }
 
-fn following(track: Track, model: Model, replay: Replay, is_intruder: bool) -> Airplane {
-    let begins_s = track.begins_s();
+fn replayed_airplane(track: Track, model: Model, replay: Replay, is_intruder: bool) -> Airplane {
+    let begins_s = track.start_s();
     // An airplane that appears later comes in at the start of a cycle.
     let appears_s = if is_intruder || (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
         begins_s
@@ -213,7 +215,7 @@ fn following(track: Track, model: Model, replay: Replay, is_intruder: bool) -> A
         callsign: None,
         model,
         start: track.pose_at(appears_s),
-        mission: track.rest(joins_s),
+        mission: track.remaining_way_points(joins_s),
         altitude_m: track.altitude_at_m(joins_s),
         appears_s,
         leaves_s: f64::INFINITY,

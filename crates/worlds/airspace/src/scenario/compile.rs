@@ -1,48 +1,48 @@
 //! Compilation of a scenario's sections to an immutable world.
 
-use super::{AirspaceFile, Compiled, Preset, Recipe};
-use crate::baseline::Reactive;
-use crate::deploy::{Deployment, refuses};
+use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
+use crate::baseline::ReactiveSettings;
+use crate::deploy::{Deployment, unsupported_reason};
 use crate::flight::Levels;
-use crate::flight::{Airplane, Task};
-use crate::flight::{Passing, Timing};
-use crate::memory::largest_at_start;
-use crate::perceive::seen;
-use crate::shield::{Bounds, Flyer, Named, Side, first_fallbacks};
+use crate::flight::{Airplane, FlightTask};
+use crate::flight::{Timing, WaypointRule};
+use crate::memory::largest_start_group;
+use crate::perceive::observed_pose;
+use crate::shield::{ErrorBounds, ExemptIds, ShieldedAircraft, Side, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Grouping, Method};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Seeds, Source, Spanned};
+use sidestep_scenario::{SeedEffect, Source, Spanned};
 use std::sync::Arc;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
-const ROUNDED_M: f64 = 1e-6;
+const ROUNDING_M: f64 = 1e-6;
 /// Smallest limit on the cycles of a run, unless its length is given.
-const FEWEST_CYCLES: u64 = 400;
+const MIN_CYCLE_LIMIT: u64 = 400;
 /// Factor on the time that the last airplane to come in would need alone, which gives a larger
 /// limit: there is room for detours and orbits.
-const TIMES_ALONE: f64 = 3.0;
+const CYCLE_LIMIT_FACTOR: f64 = 3.0;
 /// Largest number of steps of a horizon.
-const MOST_STEPS: f64 = 10_000.0;
+const MAX_HORIZON_STEPS: f64 = 10_000.0;
 /// Largest number of steps of a `dt`.
-const MOST_PARTS: f64 = 1000.0;
+const MAX_STEPS_PER_DT: f64 = 1000.0;
 /// Largest number of actions of an airplane.
-const MOST_ACTIONS: usize = 1000;
+const MAX_ACTIONS: usize = 1000;
 /// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.
-const MOST_PAIR_STEPS: usize = 100_000_000;
+const MAX_PAIR_STEPS: usize = 100_000_000;
 /// Settings with which MVP loses no separation in super-conflicts of up to 20 airplanes, at the
 /// smallest delay; the margin is BlueSky's own.
-const MVP: Reactive = Reactive { look_ahead_s: 90.0, margin: 1.05 };
+const MVP: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.05 };
 /// Settings with which ORCA loses no separation there, at the smallest delay.
-const ORCA: Reactive = Reactive { look_ahead_s: 45.0, margin: 1.05 };
+const ORCA: ReactiveSettings = ReactiveSettings { look_ahead_s: 45.0, margin: 1.05 };
 /// Standard deviations of errors for which the shield allows, unless told otherwise.
-const USUAL_SIGMAS: f64 = 5.0;
+const DEFAULT_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
-    recipe: &'a Arc<Recipe>,
+    recipe: &'a Arc<ScenarioSource>,
     pub(super) source: &'a Source,
     pub(super) file: &'a AirspaceFile,
     seed: u64,
@@ -52,31 +52,35 @@ pub(super) struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     /// Returns the compiler of a scenario, with its own seed.
-    pub(super) fn new(recipe: &'a Arc<Recipe>) -> Self {
-        let Recipe { source, head, file } = &**recipe;
+    pub(super) fn new(recipe: &'a Arc<ScenarioSource>) -> Self {
+        let ScenarioSource { source, head, file } = &**recipe;
         Self { recipe, source, file, seed: head.seed, known: None }
     }
 
     /// Returns the compiler of a scenario with another seed than that of a known world.
-    pub(super) fn again(recipe: &'a Arc<Recipe>, seed: u64, known: &'a AirspaceWorld) -> Self {
+    pub(super) fn with_seed(
+        recipe: &'a Arc<ScenarioSource>,
+        seed: u64,
+        known: &'a AirspaceWorld,
+    ) -> Self {
         Self { seed, known: Some(known), ..Self::new(recipe) }
     }
 
-    pub(super) fn compile(&self) -> Result<Compiled, InputError> {
+    pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
         let mut world = self.world()?;
-        self.fits_deployment(&world)?;
-        self.fits_a_pair(&world)?;
-        self.fits_errors(&world)?;
+        self.check_deployment(&world)?;
+        self.check_pair_steps(&world)?;
+        self.check_errors(&world)?;
         let (fallbacks, too_close) = match world.shield {
-            true => first(&world),
+            true => first_fallbacks_of(&world),
             false => (vec![Side::default(); world.airplanes.len()], Vec::new()),
         };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         let head = &self.recipe.head;
-        let cycles = head.cycles.unwrap_or_else(|| enough_cycles(&world));
-        let compiled = Compiled {
-            seeds: self.seeds(&world),
+        let cycles = head.cycles.unwrap_or_else(|| cycle_limit(&world));
+        let compiled = CompiledAirspace {
+            seeds: self.seed_effect(&world),
             world: Arc::new(world),
             name: head.name.clone(),
             seed: self.seed,
@@ -86,22 +90,24 @@ impl<'a> Compiler<'a> {
             too_close,
             recipe: Arc::clone(self.recipe),
         };
-        self.fits_memory(&compiled)?;
+        self.check_memory(&compiled)?;
         Ok(compiled)
     }
 
     /// Returns the effect of another seed: traffic, errors and faults of messages are drawn;
     /// samples of the optimizer only guide its search.
-    fn seeds(&self, world: &AirspaceWorld) -> Seeds {
+    fn seed_effect(&self, world: &AirspaceWorld) -> SeedEffect {
         let Disturbance { position_m, heading_rad } = world.disturbance;
         let is_drawn = self.file.airspace.generator.is_some()
             || position_m > 0.0
             || heading_rad > 0.0
             || world.network.is_some();
         match (is_drawn, world.method) {
-            (true, _) => Seeds::Decide,
-            (false, Method::Pc) => Seeds::Perhaps,
-            (false, Method::Mvp | Method::Orca | Method::None | Method::External) => Seeds::Nothing,
+            (true, _) => SeedEffect::Decide,
+            (false, Method::Pc) => SeedEffect::Perhaps,
+            (false, Method::Mvp | Method::Orca | Method::None | Method::External) => {
+                SeedEffect::Nothing
+            }
         }
     }
 
@@ -111,11 +117,11 @@ impl<'a> Compiler<'a> {
         let timing = self.timing()?;
         let replay = self.replay(&timing);
         let airplanes = self.airplanes(&streams, replay)?;
-        let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDED_M;
+        let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDING_M;
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
-            passing: self.passing(&airplanes),
+            passing: self.waypoint_rule(&airplanes),
             airplanes: Arc::new(airplanes),
             timing,
             objective: self.objective(vertical_m, timing.dtau_s),
@@ -123,8 +129,8 @@ impl<'a> Compiler<'a> {
             holds_s: section.holds_s.0.clone(),
             legs: self.legs()?,
             method: section.method,
-            mvp: section.mvp.or(MVP),
-            orca: section.orca.or(ORCA),
+            mvp: section.mvp.or_default(MVP),
+            orca: section.orca.or_default(ORCA),
             deployment: section.deployment,
             groups: section.groups.as_ref().map(|given| *given.get_ref()).unwrap_or_default(),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
@@ -145,15 +151,15 @@ impl<'a> Compiler<'a> {
             first_fallbacks: Arc::default(),
             teams: Arc::default(),
         };
-        Ok(world.prepared(self.known))
+        Ok(world.with_derived_fields(self.known))
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
-    fn passing(&self, airplanes: &[Airplane]) -> Passing {
+    fn waypoint_rule(&self, airplanes: &[Airplane]) -> WaypointRule {
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let given = self.file.airspace.tolerance_m;
         let tolerance_m = given.map_or((radius_m / 5.0).max(1.0), f64::from);
-        Passing { tolerance_m, passes: true }
+        WaypointRule { tolerance_m, passes: true }
     }
 
     fn disturbance(&self) -> Disturbance {
@@ -165,17 +171,18 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the bounds on errors for which the shield allows.
-    pub(super) fn bounds(&self) -> Bounds {
-        let sigmas = self.file.airspace.error_sigmas.map_or(USUAL_SIGMAS, f64::from);
+    pub(super) fn bounds(&self) -> ErrorBounds {
+        let sigmas = self.file.airspace.error_sigmas.map_or(DEFAULT_SIGMAS, f64::from);
         let Disturbance { position_m, heading_rad } = self.disturbance();
-        Bounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
+        ErrorBounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
     }
 
     /// Refuses errors of heading against which an airplane could not hold an orbit.
-    fn fits_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let turned_rad = world.bounds.heading_rad;
         let holds = |a: &Airplane| {
-            a.is_intruder || world.bounds.holds_rad_s(&a.model, world.timing.dt_s).is_some()
+            a.is_intruder
+                || world.bounds.max_orbit_rate_rad_s(&a.model, world.timing.dt_s).is_some()
         };
         if !world.shield || turned_rad == 0.0 {
             return Ok(());
@@ -213,7 +220,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Refuses settings that the deployment cannot compute.
-    fn fits_deployment(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_deployment(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         if let Some(given) = &self.file.airspace.groups
             && (world.groups, world.deployment) == (Grouping::Heard, Deployment::Direct)
         {
@@ -223,13 +230,13 @@ impl<'a> Compiler<'a> {
                           groups out";
             return Err(self.source.error(given.span(), cause, remedy));
         }
-        if let Some(reason) = refuses(world.deployment, &world.settings) {
+        if let Some(reason) = unsupported_reason(world.deployment, &world.settings) {
             let cause = format!("deployment {}: {reason}", world.deployment.name());
             let remedy = "set order = \"parallel\" and utility = \"joint\", or \
                           estimator = { kind = \"exact\" }";
             return Err(self.source.error(None, cause, remedy));
         }
-        if world.most_samples().is_none_or(|most| most > u64::from(u16::MAX) * 4) {
+        if world.max_samples().is_none_or(|most| most > u64::from(u16::MAX) * 4) {
             let cause = "more samples than a random stream holds";
             let remedy = "give smaller blocks or fewer rounds, or order = \"parallel\": in \
                           sequence each airplane draws a block anew after every other";
@@ -239,13 +246,13 @@ impl<'a> Compiler<'a> {
     }
 
     /// Refuses groups that need more memory at the start than allowed.
-    fn fits_memory(&self, compiled: &Compiled) -> Result<(), InputError> {
+    fn check_memory(&self, compiled: &CompiledAirspace) -> Result<(), InputError> {
         let world = &compiled.world;
         if world.method != Method::Pc {
             return Ok(());
         }
         let state = AirspaceState::restore(world, &compiled.start_snapshot());
-        let (airplanes, bytes) = largest_at_start(world, &state);
+        let (airplanes, bytes) = largest_start_group(world, &state);
         if bytes <= world.group_bytes {
             return Ok(());
         }
@@ -276,9 +283,10 @@ impl<'a> Compiler<'a> {
             let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
             return Err(self.source.error(span(), cause, "give a dtau_s that divides dt_s"));
         }
-        if parts > MOST_PARTS {
+        if parts > MAX_STEPS_PER_DT {
             let cause = format!("{parts} steps of dtau_s in each dt_s");
-            let remedy = format!("give up to {MOST_PARTS}: each is flown and watched by itself");
+            let remedy =
+                format!("give up to {MAX_STEPS_PER_DT}: each is flown and watched by itself");
             return Err(self.source.error(span(), cause, remedy));
         }
         Ok(Timing { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
@@ -300,11 +308,11 @@ impl<'a> Compiler<'a> {
         let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
         // A time that rounding puts behind a point ends at that point.
         let points = (horizon_s / dtau_s - 1e-9).ceil();
-        if horizon_s < dt_s || points > MOST_STEPS {
+        if horizon_s < dt_s || points > MAX_HORIZON_STEPS {
             let cause = format!("a horizon of {horizon_s} s, in steps of {dtau_s} s");
             let remedy = format!(
                 "give at least dt_s = {dt_s}, which is flown before the next look, and at most \
-                 {MOST_STEPS} steps of dtau_s, for every action is predicted in all of them"
+                 {MAX_HORIZON_STEPS} steps of dtau_s, for every action is predicted in all of them"
             );
             return Err(self.source.error(given.map(Spanned::span), cause, remedy));
         }
@@ -313,16 +321,16 @@ impl<'a> Compiler<'a> {
 
     /// Refuses sets of actions that are too large for one pair of airplanes: a run checks after
     /// every pair whether it is to stop.
-    fn fits_a_pair(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_pair_steps(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let actions = world.actions.iter().map(Vec::len).max().unwrap_or(0);
         let horizon = world.timing.horizon;
-        if actions <= MOST_ACTIONS && actions * actions * horizon <= MOST_PAIR_STEPS {
+        if actions <= MAX_ACTIONS && actions * actions * horizon <= MAX_PAIR_STEPS {
             return Ok(());
         }
         let cause = format!("{actions} actions of an airplane, in {horizon} steps each");
         let remedy = format!(
-            "give fewer turns, holds_s or legs, or a shorter horizon_s: up to {MOST_ACTIONS} \
-             actions, and {MOST_PAIR_STEPS} steps to compare all of two airplanes"
+            "give fewer turns, holds_s or legs, or a shorter horizon_s: up to {MAX_ACTIONS} \
+             actions, and {MAX_PAIR_STEPS} steps to compare all of two airplanes"
         );
         Err(self.source.error(None, cause, remedy))
     }
@@ -330,33 +338,34 @@ impl<'a> Compiler<'a> {
 
 /// Returns a number of cycles in which all should arrive. Of flights that never end it counts their start and their
 /// last order.
-fn enough_cycles(world: &AirspaceWorld) -> u64 {
-    let ends_s = |i: usize| match world.ends_alone_s(i) {
+fn cycle_limit(world: &AirspaceWorld) -> u64 {
+    let ends_s = |i: usize| match world.solo_end_s(i) {
         s if s.is_finite() => s,
-        _ => told_until_s(world, i),
+        _ => last_change_s(world, i),
     };
     let longest_s = (0..world.airplanes.len()).map(ends_s).fold(0.0, f64::max);
-    FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
+    MIN_CYCLE_LIMIT.max((CYCLE_LIMIT_FACTOR * longest_s / world.timing.dt_s).ceil() as u64)
 }
 
 /// Returns the time of the last known change of an airplane that flies on forever.
-fn told_until_s(world: &AirspaceWorld, i: usize) -> f64 {
+fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
     let airplane = &world.airplanes[i];
     let last_s = airplane.orders.last().map_or(0.0, |order| order.at_s);
-    last_s.max(world.starts_s(world.appears_in(i)))
+    last_s.max(world.cycle_start_s(world.first_cycle(i)))
 }
 
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
-fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
+fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
     // Airplanes that come in at other times do not meet at the start.
-    let flown = |&i: &usize| world.joins_in(i) == 0 && !world.is_intruder(i as u32, 0);
+    let flown =
+        |&i: &usize| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0);
     let starts: Vec<usize> = (0..sides.len()).filter(flown).collect();
     let flyer = |(rank, &i): (usize, &usize)| {
         let airplane = &world.airplanes[i];
-        Flyer {
-            pose: seen(world, i as u32, 0, airplane.start),
-            held: seen(world, i as u32, 0, airplane.start),
+        ShieldedAircraft {
+            pose: observed_pose(world, i as u32, 0, airplane.start),
+            orbit_pose: observed_pose(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,
             omega_max_rad_s: airplane.model.omega_max_rad_s,
             orbit_rad_s: world.orbit_rad_s[i],
@@ -365,12 +374,12 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
             levels: Levels::at(airplane.altitude_m),
             vertical_m: world.vertical_m,
             fallback: Side::Left,
-            named: Named::default(),
+            exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,
         }
     };
-    let flyers: Vec<Flyer> = starts.iter().enumerate().map(flyer).collect();
+    let flyers: Vec<ShieldedAircraft> = starts.iter().enumerate().map(flyer).collect();
     let (chosen, pairs) = first_fallbacks(&flyers);
     starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
@@ -379,7 +388,7 @@ fn first(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
 /// All speeds that an airplane is to fly with.
 fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
     let told = airplane.orders.iter().filter_map(|order| match order.task {
-        Task::Speed(v_m_s) => Some(v_m_s),
+        FlightTask::Speed(v_m_s) => Some(v_m_s),
         _ => None,
     });
     told.chain([airplane.model.v_m_s])

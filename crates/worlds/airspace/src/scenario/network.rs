@@ -4,26 +4,28 @@ use super::compile::Compiler;
 use crate::deploy::Deployment;
 use crate::flight::Airplane;
 use crate::flight::Timing;
-use crate::flight::{FlightOrder, Task};
+use crate::flight::{FlightOrder, FlightTask};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::network::{Names, Wrong, check_once, check_sides, during, for_ever};
+use sidestep_scenario::network::{
+    AgentNaming, SectionError, check_sides, check_unique, endless_s, time_window,
+};
 
-pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Airplanes>;
+pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<AirplaneNaming>;
 
 /// A period in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Silence {
+pub(super) struct RadioOutageSection {
     /// Id of the airplane.
     airplane: EntityId,
     /// Start of the silence, in seconds after the start of the run.
     #[serde(default)]
     from_s: f64,
     /// End of the silence, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
@@ -31,21 +33,21 @@ pub(super) struct Silence {
 /// are heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Partition {
+pub(super) struct PartitionSection {
     /// Ids of the airplanes on each side.
     sides: Vec<Vec<EntityId>>,
     /// Start of the partition, in seconds after the start of the run.
     #[serde(default)]
     from_s: f64,
     /// End of the partition, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
 /// A period in which a link works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct OneWay {
+pub(super) struct UnidirectionalLinkSection {
     /// Id of the airplane that is heard by the other.
     sender: EntityId,
     /// Id of the airplane that the other does not hear.
@@ -54,56 +56,59 @@ pub(super) struct OneWay {
     #[serde(default)]
     from_s: f64,
     /// End of the period, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
 /// The airplanes of a scenario, so many, with ids from 0 on.
 #[derive(Debug)]
-pub(super) struct Airplanes(usize);
+pub(super) struct AirplaneNaming(usize);
 
-impl Airplanes {
+impl AirplaneNaming {
     /// Checks that airplanes exist.
-    fn check(&self, ids: &[EntityId]) -> Result<(), Wrong> {
+    fn check(&self, ids: &[EntityId]) -> Result<(), SectionError> {
         match ids.iter().find(|&&id| id as usize >= self.0) {
             None => Ok(()),
             Some(id) => {
                 let remedy = format!("give ids from 0 to {}", self.0 - 1);
-                Err(Wrong::new(format!("airplane {id} does not exist"), remedy))
+                Err(SectionError::new(format!("airplane {id} does not exist"), remedy))
             }
         }
     }
 }
 
-impl Names for Airplanes {
-    type Silence = Silence;
-    type Partition = Partition;
-    type OneWay = OneWay;
+impl AgentNaming for AirplaneNaming {
+    type RadioOutage = RadioOutageSection;
+    type Partition = PartitionSection;
+    type UnidirectionalLink = UnidirectionalLinkSection;
 
-    const LATENCY_S: f64 = 0.001;
-    const SHORTEST_LATENCY_S: f64 = 1e-6;
-    const TALKS: u32 = 2;
-    const LONGEST_DEADLINE: &str = "at most half of dt_s: it holds for the optimization and again for the \
+    const DEFAULT_LATENCY_S: f64 = 0.001;
+    const MIN_LATENCY_S: f64 = 1e-6;
+    const CONVERSATIONS_PER_CYCLE: u32 = 2;
+    const MAX_DEADLINE_TEXT: &str = "at most half of dt_s: it holds for the optimization and again for the \
                                     shield's exchange";
 
-    fn silence(&self, one: &Silence) -> Result<network::Silence, Wrong> {
+    fn radio_outage(&self, one: &RadioOutageSection) -> Result<network::RadioOutage, SectionError> {
         self.check(&[one.airplane])?;
-        let during = during(one.from_s, one.until_s)?;
-        Ok(network::Silence { agent: one.airplane, during })
+        let window = time_window(one.from_s, one.until_s)?;
+        Ok(network::RadioOutage { agent: one.airplane, window })
     }
 
-    fn partition(&self, one: &Partition) -> Result<network::Partition, Wrong> {
+    fn partition(&self, one: &PartitionSection) -> Result<network::Partition, SectionError> {
         self.check(&one.sides.concat())?;
         check_sides(&one.sides, "airplane")?;
-        let during = during(one.from_s, one.until_s)?;
-        Ok(network::Partition { sides: one.sides.clone(), during })
+        let window = time_window(one.from_s, one.until_s)?;
+        Ok(network::Partition { sides: one.sides.clone(), window })
     }
 
-    fn one_way(&self, one: &OneWay) -> Result<network::OneWay, Wrong> {
-        let OneWay { sender, receiver, from_s, until_s } = *one;
+    fn unidirectional_link(
+        &self,
+        one: &UnidirectionalLinkSection,
+    ) -> Result<network::UnidirectionalLink, SectionError> {
+        let UnidirectionalLinkSection { sender, receiver, from_s, until_s } = *one;
         self.check(&[sender, receiver])?;
-        check_once(vec![sender, receiver], "airplane")?;
-        Ok(network::OneWay { sender, receiver, during: during(from_s, until_s)? })
+        check_unique(vec![sender, receiver], "airplane")?;
+        Ok(network::UnidirectionalLink { sender, receiver, window: time_window(from_s, until_s)? })
     }
 }
 
@@ -123,8 +128,9 @@ impl Compiler<'_> {
                           or leave [airspace.network] out";
             return error(cause, remedy);
         }
-        let changes =
-            |order: &FlightOrder| matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
+        let changes = |order: &FlightOrder| {
+            matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. })
+        };
         let orders_change_safety = airplanes.iter().any(|a| a.orders.iter().any(changes));
         if self.file.airspace.shield.0 && orders_change_safety {
             let cause = "orders of speed or level, over a network that is not to be relied on";
@@ -132,8 +138,8 @@ impl Compiler<'_> {
                           [airspace.network], or set shield = \"off\"";
             return error(cause, remedy);
         }
-        let network = section.get_ref().network(timing.dt_s, &Airplanes(airplanes.len()));
-        network.map(Some).map_err(|Wrong { span, cause, remedy }| {
+        let network = section.get_ref().network(timing.dt_s, &AirplaneNaming(airplanes.len()));
+        network.map(Some).map_err(|SectionError { span, cause, remedy }| {
             self.source.error(span.unwrap_or_else(|| section.span()), cause, remedy)
         })
     }

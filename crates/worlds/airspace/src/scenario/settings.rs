@@ -2,20 +2,22 @@
 
 use super::compile::Compiler;
 use super::values::Held;
-use crate::baseline::Reactive;
+use crate::baseline::ReactiveSettings;
 use crate::flight::Legs;
 use crate::objective::Objective;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
-use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
+use sidestep_collectives::{
+    Choice, Estimator, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility,
+};
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{AboveTo, FromTo, Number, Rule as _, refused, schema_by_hand};
+use sidestep_scenario::{Closed, LeftOpen, Number, Rule as _, invalid_value, schema_by_hand};
 
 /// Largest number of samples of a block.
-const MOST_SAMPLES: usize = 10_000;
+const MAX_BLOCK_SAMPLES: usize = 10_000;
 /// Largest number of times in a list.
-const MOST_TIMES: usize = 20;
+const MAX_TIMES: usize = 20;
 
 /// A list of times.
 #[derive(Debug, Clone, Default)]
@@ -24,18 +26,18 @@ pub(super) struct Times(pub(super) Vec<f64>);
 impl<'de> Deserialize<'de> for Times {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let times_s = Vec::<f64>::deserialize(deserializer)?;
-        if times_s.iter().all(|t| Held::allows(*t)) && times_s.len() <= MOST_TIMES {
+        if times_s.iter().all(|t| Held::allows(*t)) && times_s.len() <= MAX_TIMES {
             return Ok(Self(times_s));
         }
-        let remedy = format!("give up to {MOST_TIMES} times, each {}", Held::words());
-        Err(refused(format_args!("{times_s:?}"), &remedy))
+        let remedy = format!("give up to {MAX_TIMES} times, each {}", Held::description());
+        Err(invalid_value(format_args!("{times_s:?}"), &remedy))
     }
 }
 
 schema_by_hand!(Times, {
     let mut time = Held::limits();
     time["type"] = "number".into();
-    json!({ "type": "array", "items": time, "maxItems": MOST_TIMES })
+    json!({ "type": "array", "items": time, "maxItems": MAX_TIMES })
 });
 
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -58,14 +60,14 @@ pub(super) struct ReactiveSection {
 }
 
 /// A time in which an airplane looks ahead.
-type LookAhead = AboveTo<0, 100_000>;
+type LookAhead = LeftOpen<0, 100_000>;
 /// A factor on separations.
-type Margin = FromTo<1, 10>;
+type Margin = Closed<1, 10>;
 
 impl ReactiveSection {
     /// Returns the settings, with other values where none are given.
-    pub(super) fn or(&self, usual: Reactive) -> Reactive {
-        Reactive {
+    pub(super) fn or_default(&self, usual: ReactiveSettings) -> ReactiveSettings {
+        ReactiveSettings {
             look_ahead_s: self.look_ahead_s.map_or(usual.look_ahead_s, f64::from),
             margin: self.margin.map_or(usual.margin, f64::from),
         }
@@ -88,7 +90,7 @@ impl<'de> Deserialize<'de> for Switch {
         match given.as_str() {
             Some("on") => Ok(Self(true)),
             Some("off") => Ok(Self(false)),
-            _ => Err(refused(given, "give \"on\" or \"off\"")),
+            _ => Err(invalid_value(given, "give \"on\" or \"off\"")),
         }
     }
 }
@@ -112,21 +114,21 @@ impl Compiler<'_> {
         }
     }
 
-    pub(super) fn settings(&self) -> Result<Settings, InputError> {
+    pub(super) fn settings(&self) -> Result<OptimizerConfig, InputError> {
         let section = &self.file.airspace;
         let paper = self.is_paper();
         let estimator =
             if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
         let estimator = self.estimator()?.unwrap_or(estimator);
         let choice = if paper { Choice::Draw } else { Choice::Argmax };
-        let order = if paper { Order::Parallel } else { Order::Sequence };
-        Ok(Settings {
+        let order = if paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
+        Ok(OptimizerConfig {
             estimator,
             update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: self.utility(estimator)?,
             cooling: section.cooling.map_or(if paper { 0.8 } else { 0.7 }, f64::from),
-            stop: Stop {
+            stop: StopCriterion {
                 threshold: 1e-3,
                 calm_rounds: 3,
                 max_rounds: section.max_rounds.map_or(200, |rounds| rounds.0),
@@ -138,10 +140,11 @@ impl Compiler<'_> {
     fn estimator(&self) -> Result<Option<Estimator>, InputError> {
         let Some(given) = &self.file.airspace.estimator else { return Ok(None) };
         if let Estimator::Sampled { block, ageing } = *given.get_ref()
-            && !((1..=MOST_SAMPLES).contains(&block) && (0.0..=1.0).contains(&ageing))
+            && !((1..=MAX_BLOCK_SAMPLES).contains(&block) && (0.0..=1.0).contains(&ageing))
         {
             let cause = format!("an estimator with block = {block}, ageing = {ageing}");
-            let remedy = format!("give a block of 1 to {MOST_SAMPLES} samples, ageing from 0 to 1");
+            let remedy =
+                format!("give a block of 1 to {MAX_BLOCK_SAMPLES} samples, ageing from 0 to 1");
             return Err(self.source.error(given.span(), cause, remedy));
         }
         Ok(Some(*given.get_ref()))
@@ -171,7 +174,7 @@ impl Compiler<'_> {
 
     pub(super) fn legs(&self) -> Result<Legs, InputError> {
         let Some(given) = &self.file.airspace.legs else {
-            return Ok(if self.is_paper() { Legs::default() } else { Legs::usual() });
+            return Ok(if self.is_paper() { Legs::default() } else { Legs::default_preset() });
         };
         let LegsSection { turns_s: Times(turns_s), until_s: Times(until_s) } = given.get_ref();
         let wrong = |cause: String, remedy: &str| self.source.error(given.span(), cause, remedy);

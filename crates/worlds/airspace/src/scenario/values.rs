@@ -2,11 +2,11 @@
 
 use serde::Deserialize;
 use serde_json::{Value, json};
-use sidestep_import::traffic::FASTEST_M_S;
-use sidestep_scenario::{AboveBelow, Number, Rule, refused, schema_by_hand};
+use sidestep_import::traffic::MAX_SPEED_M_S;
+use sidestep_scenario::{Number, Open, Rule, invalid_value, schema_by_hand};
 
 /// A separation.
-pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
+pub(crate) type SeparationM = Number<Open<0, 1_000_000>>;
 
 /// Defines rules for numbers with bounds, with errors that give the reason for the bounds.
 macro_rules! bounds {
@@ -20,7 +20,7 @@ macro_rules! bounds {
                 ($least..=$most).contains(&number)
             }
 
-            fn words() -> String {
+            fn description() -> String {
                 concat!($words, ": ", $reason).into()
             }
 
@@ -32,7 +32,7 @@ macro_rules! bounds {
 }
 
 bounds! {
-    Speed, 1e-3, FASTEST_M_S, "0.001 to 1e6 m/s", "slower steps are lost in rounding, and nothing is faster";
+    Speed, 1e-3, MAX_SPEED_M_S, "0.001 to 1e6 m/s", "slower steps are lost in rounding, and nothing is faster";
     TurnRate, 1e-3, 360.0, "0.001 to 360 degrees per second", "slower turns make orbits without end";
     Decision, 0.01, 3600.0, "0.01 to 3600 s", "nobody avoids others by one decision an hour";
     Step, 0.001, 3600.0, "0.001 to 3600 s", "a step is part of dt_s, and a run has many";
@@ -59,7 +59,7 @@ impl<'de> Deserialize<'de> for Rounds {
             return Ok(Self(rounds as u32));
         }
         let remedy = "give 1 or more rounds, up to 10000: temperatures are at rest long before";
-        Err(refused(rounds, remedy))
+        Err(invalid_value(rounds, remedy))
     }
 }
 
@@ -74,7 +74,7 @@ impl<'de> Deserialize<'de> for Turns {
         let turns = i64::deserialize(deserializer)?;
         if !(3..=99).contains(&turns) || turns % 2 == 0 {
             let remedy = "give an odd number from 3 to 99, so that straight flight is among them";
-            return Err(refused(turns, remedy));
+            return Err(invalid_value(turns, remedy));
         }
         Ok(Self(turns as usize))
     }

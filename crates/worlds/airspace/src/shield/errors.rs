@@ -12,7 +12,7 @@
 //!
 //! **Headings.** A way is flown for one `dt` from a heading that is seen, so no gust disturbs it.
 //! An orbit is flown forever. Airplanes orbit at less than their largest turn rate and have the
-//! rest, `a`, to correct ([`hold`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
+//! rest, `a`, to correct ([`turn_rates_rad_s`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
 //! on the orbit that was stored, moved along it. At the start of each `dt` on it
 //!
 //! - the airplane heads within `2 D` of `held`: at the end of a way by at most one gust of `D`;
@@ -26,44 +26,44 @@
 //! gaps wider by `W` on either side keep `R`.
 
 use super::orbit::Side;
-use crate::flight::{Model, Pose};
+use crate::flight::{Model, Pose2};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
 /// Part of the largest turn rate below which no airplane orbits.
-const SLOWEST_PART: f64 = 0.45;
+const MIN_RATE_FRACTION: f64 = 0.45;
 /// Airplanes orbit at one rate if none of them could turn this many times as fast as another. Were
 /// there no limit, a single airplane that hardly turns would put all others on circles that fill
 /// the sky.
-const ALIKE: f64 = 10.0;
+const MAX_RATE_RATIO: f64 = 10.0;
 /// Part of its sideways distance that an airplane aims to make good within a step.
 const GAIN: f64 = 0.5;
 
 /// Bounds on errors.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Bounds {
+pub struct ErrorBounds {
     /// Distance in meters within which an airplane is of where all see it.
     pub position_m: f64,
     /// Largest unwanted change of heading per `dt`, in radians.
     pub heading_rad: f64,
 }
 
-impl Bounds {
+impl ErrorBounds {
     /// Returns the distance in meters within which an airplane is of where it should be at the
     /// start of a `dt` on its orbit.
-    pub(crate) fn strays_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
+    pub(crate) fn max_deviation_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
         4.0 * v_m_s * dt_s * self.heading_rad
     }
 
     /// Returns how far an airplane may be from where its plans are seen.
     pub(crate) fn error_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
-        self.position_m + self.strays_m(v_m_s, dt_s) + 2.0 * v_m_s * dt_s * self.heading_rad
+        self.position_m + self.max_deviation_m(v_m_s, dt_s) + 2.0 * v_m_s * dt_s * self.heading_rad
     }
 
     /// Returns the largest turn rate at which an airplane can hold an orbit, if there is one.
-    pub(crate) fn holds_rad_s(&self, model: &Model, dt_s: f64) -> Option<f64> {
+    pub(crate) fn max_orbit_rate_rad_s(&self, model: &Model, dt_s: f64) -> Option<f64> {
         let part = 1.0 - 2.0 * self.heading_rad / (model.omega_max_rad_s * dt_s);
-        (part >= SLOWEST_PART).then_some(part * model.omega_max_rad_s)
+        (part >= MIN_RATE_FRACTION).then_some(part * model.omega_max_rad_s)
     }
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn common_rates(largest_rad_s: &[f64]) -> Vec<f64> {
     rising.sort_unstable_by(f64::total_cmp);
     let mut shared: Vec<f64> = Vec::new();
     for rate in rising {
-        if shared.last().is_none_or(|slowest| rate >= ALIKE * slowest) {
+        if shared.last().is_none_or(|slowest| rate >= MAX_RATE_RATIO * slowest) {
             shared.push(rate);
         }
     }
@@ -86,30 +86,36 @@ pub(crate) fn common_rates(largest_rad_s: &[f64]) -> Vec<f64> {
 
 /// An airplane on its orbit.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Holding {
+pub(crate) struct OrbitTracker {
     /// Its pose.
-    pub(crate) pose: Pose,
+    pub(crate) pose: Pose2,
     /// Its pose on the orbit, if it had made no errors.
-    pub(crate) held: Pose,
+    pub(crate) held: Pose2,
     pub(crate) v_m_s: f64,
     pub(crate) omega_max_rad_s: f64,
     /// Turn rate of the orbit, positive to the left.
     pub(crate) orbit_rad_s: f64,
 }
 
-impl Holding {
+impl OrbitTracker {
     /// Returns the orbiting airplane that flies with these abilities to a side.
-    pub(crate) fn new(pose: Pose, held: Pose, model: &Model, rate_rad_s: f64, side: Side) -> Self {
+    pub(crate) fn new(
+        pose: Pose2,
+        held: Pose2,
+        model: &Model,
+        rate_rad_s: f64,
+        side: Side,
+    ) -> Self {
         let Model { v_m_s, omega_max_rad_s, .. } = *model;
         Self { pose, held, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
     }
 
     /// Returns the turn rates by which it keeps to its orbit for some steps, in spite of gusts that
     /// turn it by up to `gust_rad`.
-    pub(crate) fn hold(mut self, steps: usize, dtau_s: f64, gust_rad: f64) -> Vec<f64> {
+    pub(crate) fn turn_rates_rad_s(mut self, steps: usize, dtau_s: f64, gust_rad: f64) -> Vec<f64> {
         let step = |_| {
             let off_rad = math::wrap_angle(self.pose.heading_rad - self.held.heading_rad);
-            let left = GAIN * self.left_m() / (self.v_m_s * dtau_s);
+            let left = GAIN * self.lateral_offset_m() / (self.v_m_s * dtau_s);
             let wanted_rad = (-left).clamp(-gust_rad, gust_rad);
             let omega = self.orbit_rad_s + (wanted_rad - off_rad) / dtau_s;
             let omega = omega.clamp(-self.omega_max_rad_s, self.omega_max_rad_s);
@@ -121,7 +127,7 @@ impl Holding {
     }
 
     /// Returns how far to the left of its orbit it is, in meters.
-    fn left_m(&self) -> f64 {
+    fn lateral_offset_m(&self) -> f64 {
         let [x, y] = [self.pose.at[0] - self.held.at[0], self.pose.at[1] - self.held.at[1]];
         let heading = self.held.heading_rad;
         y * math::cos(heading) - x * math::sin(heading)
@@ -152,15 +158,15 @@ mod tests {
             let (dt_s, v_m_s, omega_max_rad_s) = (5.0, 35.0, 4f64.to_radians());
             let model = Model { v_m_s, omega_max_rad_s, separation_m: 500.0, turns: 5 };
             let gust_rad = part * omega_max_rad_s * dt_s;
-            let bounds = Bounds { position_m: 0.0, heading_rad: gust_rad };
-            let rate = bounds.holds_rad_s(&model, dt_s).expect("within what can be held");
-            let start = Pose { at: [0.0, 0.0], heading_rad: 1.0 };
-            let mut now = Holding::new(start, start, &model, rate, Side::BOTH[usize::from(left)]);
+            let bounds = ErrorBounds { position_m: 0.0, heading_rad: gust_rad };
+            let rate = bounds.max_orbit_rate_rad_s(&model, dt_s).expect("within what can be held");
+            let start = Pose2 { at: [0.0, 0.0], heading_rad: 1.0 };
+            let mut now = OrbitTracker::new(start, start, &model, rate, Side::BOTH[usize::from(left)]);
             let steps = (dt_s / dtau) as usize;
             for (k, gust) in gusts.iter().enumerate() {
                 // Outward, by turns, always to one side, or by chance.
                 let gust = match worst {
-                    0 => now.left_m().signum(),
+                    0 => now.lateral_offset_m().signum(),
                     1 => if k / 9 % 2 == 0 { 1.0 } else { -1.0 },
                     2 => 1.0,
                     _ => *gust,
@@ -169,8 +175,8 @@ mod tests {
                 let off_rad = math::wrap_angle(now.pose.heading_rad - now.held.heading_rad);
                 prop_assert!(off_rad.abs() <= 2.0 * gust_rad + 1e-9, "{off_rad}");
                 let strays_m = distance_m(now.pose.at, now.held.at);
-                prop_assert!(strays_m <= bounds.strays_m(v_m_s, dt_s), "{strays_m} after {k}");
-                for omega in now.hold(steps, dtau, gust_rad) {
+                prop_assert!(strays_m <= bounds.max_deviation_m(v_m_s, dt_s), "{strays_m} after {k}");
+                for omega in now.turn_rates_rad_s(steps, dtau, gust_rad) {
                     prop_assert!(omega.abs() <= omega_max_rad_s);
                     now.pose = now.pose.step(v_m_s, omega, dtau);
                     now.held = now.held.step(v_m_s, now.orbit_rad_s, dtau);

@@ -45,26 +45,26 @@
 //! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
 //! more than `R` (by `SLACK_M`), so that rounding never adds up to a loss.
 
+#[cfg(test)]
+mod delay_tests;
 mod errors;
 mod fallback;
-mod flyer;
+#[cfg(test)]
+pub(crate) mod guarantee_tests;
 mod orbit;
-mod plan;
-#[cfg(test)]
-mod price;
-#[cfg(test)]
-pub(crate) mod promise;
+mod safe_maneuver;
 mod search;
+mod shielded_aircraft;
 #[cfg(test)]
 mod tests;
 
-pub use errors::Bounds;
-pub(crate) use errors::{Holding, common_rates};
-pub(crate) use fallback::{entry_fallbacks, first_fallbacks, side_apart};
-pub use flyer::Flyer;
-pub(crate) use flyer::Named;
+pub use errors::ErrorBounds;
+pub(crate) use errors::{OrbitTracker, common_rates};
+pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_side};
 pub use orbit::Side;
-pub(crate) use orbit::apart_for;
-pub(crate) use plan::Plan;
-pub use plan::Way;
-pub use search::{Certainty, Decision, filter};
+pub(crate) use orbit::stays_apart_for;
+pub(crate) use safe_maneuver::SafeManeuver;
+pub use safe_maneuver::TurnProfile;
+pub use search::{PlanCertainty, ShieldDecision, filter};
+pub(crate) use shielded_aircraft::ExemptIds;
+pub use shielded_aircraft::ShieldedAircraft;

@@ -1,20 +1,20 @@
 //! Orbits, which are the shield's fallbacks, and a test of whether motions stay apart.
 //!
 //! Ways are compared with a safe bound on how fast two airplanes can close in, halving intervals
-//! until the bound decides ([`apart_for`]); orbits of one turn rate have a closed form, of
+//! until the bound decides ([`stays_apart_for`]); orbits of one turn rate have a closed form, of
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
 
-use crate::flight::{Point, Pose, distance_m};
+use crate::flight::{Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::Coded;
+use sidestep_kernel::column::Packed;
 use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
-const FINEST_S: f64 = 1e-4;
+const MIN_INTERVAL_S: f64 = 1e-4;
 /// The same as a part of the whole interval, so that slow orbits, with periods of days, take no
 /// longer to compare: the number of distances looked at is at most twice its inverse.
-const FINEST_PART: f64 = 1e-6;
+const MIN_INTERVAL_FRACTION: f64 = 1e-6;
 
 /// The direction of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -40,16 +40,16 @@ impl Side {
     }
 }
 
-impl Coded for Side {
-    type Code = u8;
+impl Packed for Side {
+    type Bits = u8;
 
     #[inline(always)]
-    fn code(self) -> u8 {
+    fn to_bits(self) -> u8 {
         self as u8
     }
 
     #[inline(always)]
-    fn of_code(code: u8) -> Self {
+    fn from_bits(code: u8) -> Self {
         Self::BOTH[usize::from(code & 1)]
     }
 }
@@ -67,7 +67,7 @@ pub(crate) struct Orbit {
 
 impl Orbit {
     /// Returns the orbit that an airplane enters at `pose`.
-    pub(crate) fn from(pose: Pose, v_m_s: f64, omega_rad_s: f64) -> Self {
+    pub(crate) fn from_pose(pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Self {
         let radius_m = v_m_s / omega_rad_s.abs();
         // The center is at a right angle to the heading, on the side of the turn.
         let to_center = pose.heading_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
@@ -122,7 +122,7 @@ impl Orbit {
             let period_s = std::f64::consts::TAU / self.omega_rad_s.abs();
             let closing_m_s = self.speed_m_s() + other.speed_m_s();
             let apart = |t_s: f64| distance_m(self.at(t_s), other.at(t_s));
-            return apart_for(&apart, period_s, closing_m_s, gap_m);
+            return stays_apart_for(&apart, period_s, closing_m_s, gap_m);
         }
         false
     }
@@ -130,20 +130,20 @@ impl Orbit {
 
 /// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
 /// `gap_m` for some seconds. Found by halving; the answer is never wrongly yes.
-pub(crate) fn apart_for(
+pub(crate) fn stays_apart_for(
     distance_m: &impl Fn(f64) -> f64,
     seconds: f64,
     closing_m_s: f64,
     gap_m: f64,
 ) -> bool {
-    let finest_s = FINEST_S.max(FINEST_PART * seconds);
-    let halving = Halving { distance_m, closing_m_s, finest_s, gap_m };
-    let (from, to) = (halving.look(0.0), halving.look(seconds));
+    let finest_s = MIN_INTERVAL_S.max(MIN_INTERVAL_FRACTION * seconds);
+    let halving = Bisection { distance_m, closing_m_s, finest_s, gap_m };
+    let (from, to) = (halving.sample(0.0), halving.sample(seconds));
     from.far_m >= gap_m && to.far_m >= gap_m && halving.stays_apart(from, to)
 }
 
 /// A search for a moment at which a distance is less than `gap_m`.
-struct Halving<'a, F> {
+struct Bisection<'a, F> {
     distance_m: &'a F,
     closing_m_s: f64,
     /// Length in seconds below which an interval is no longer halved.
@@ -153,18 +153,18 @@ struct Halving<'a, F> {
 
 /// A distance at a moment.
 #[derive(Clone, Copy)]
-struct Look {
+struct DistanceSample {
     t_s: f64,
     far_m: f64,
 }
 
-impl<F: Fn(f64) -> f64> Halving<'_, F> {
-    fn look(&self, t_s: f64) -> Look {
-        Look { t_s, far_m: (self.distance_m)(t_s) }
+impl<F: Fn(f64) -> f64> Bisection<'_, F> {
+    fn sample(&self, t_s: f64) -> DistanceSample {
+        DistanceSample { t_s, far_m: (self.distance_m)(t_s) }
     }
 
     /// Returns whether the distance is large enough between two looks, at which it is.
-    fn stays_apart(&self, from: Look, to: Look) -> bool {
+    fn stays_apart(&self, from: DistanceSample, to: DistanceSample) -> bool {
         let long_s = to.t_s - from.t_s;
         // The smallest distance possible between the two ends.
         let nearest = 0.5 * (from.far_m + to.far_m - self.closing_m_s * long_s);
@@ -174,7 +174,7 @@ impl<F: Fn(f64) -> f64> Halving<'_, F> {
         if long_s < self.finest_s {
             return false;
         }
-        let middle = self.look(0.5 * (from.t_s + to.t_s));
+        let middle = self.sample(0.5 * (from.t_s + to.t_s));
         middle.far_m >= self.gap_m && self.stays_apart(from, middle) && self.stays_apart(middle, to)
     }
 }
@@ -194,7 +194,7 @@ mod tests {
                     looks.set(looks.get() + 1);
                     500.0 + above_m
                 };
-                let _ = apart_for(&distance, period_s, 70.0, 500.0);
+                let _ = stays_apart_for(&distance, period_s, 70.0, 500.0);
                 assert!(looks.get() <= 2_200_000, "{period_s} s, {above_m} m: {}", looks.get());
             }
         }
@@ -206,10 +206,10 @@ mod tests {
         fn an_orbit_is_the_motion_it_stands_for(
             x in -1e3f64..1e3, psi in -3.1f64..3.1, left in any::<bool>(), t_s in 0.0f64..300.0,
         ) {
-            let pose = Pose { at: [x, 0.0], heading_rad: psi };
+            let pose = Pose2 { at: [x, 0.0], heading_rad: psi };
             let omega = Side::BOTH[usize::from(left)].sign() * 4f64.to_radians();
             let flown = pose.step(35.0, omega, t_s).at;
-            prop_assert!(distance_m(flown, Orbit::from(pose, 35.0, omega).at(t_s)) < 1e-6);
+            prop_assert!(distance_m(flown, Orbit::from_pose(pose, 35.0, omega).at(t_s)) < 1e-6);
         }
 
         /// The search never wrongly says yes: dense sampling finds no nearer moment.
@@ -218,7 +218,7 @@ mod tests {
             base in 300.0f64..800.0, swing in 0.0f64..300.0, rate in 0.01f64..0.2, gap_m in 200.0f64..600.0,
         ) {
             let distance = |t_s: f64| base + swing * math::cos(rate * t_s);
-            let found = apart_for(&distance, 60.0, swing * rate + 1e-9, gap_m);
+            let found = stays_apart_for(&distance, 60.0, swing * rate + 1e-9, gap_m);
             let nearest = (0..6000).map(|k| distance(f64::from(k) / 100.0)).fold(f64::INFINITY, f64::min);
             if found {
                 prop_assert!(nearest >= gap_m - 1e-6);

@@ -2,18 +2,18 @@
 
 use super::orbit::Orbit;
 use super::*;
-use crate::flight::{Levels, Point, Pose, distance_m};
+use crate::flight::{Levels, Point, Pose2, distance_m};
 use proptest::prelude::*;
 
 const DTAU_S: f64 = 1.0;
 const STEPS: usize = 5;
 
-fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
-    let pose = Pose { at: [x, y], heading_rad };
-    Flyer {
+fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
+    let pose = Pose2 { at: [x, y], heading_rad };
+    ShieldedAircraft {
         id: rank as u32,
         pose,
-        held: pose,
+        orbit_pose: pose,
         v_m_s: 35.0,
         omega_max_rad_s: 4f64.to_radians(),
         orbit_rad_s: 4f64.to_radians(),
@@ -22,12 +22,12 @@ fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> Flyer {
         levels: Levels::at(0.0),
         vertical_m: 300.0,
         fallback: Side::Left,
-        named: Named::default(),
+        exempt: ExemptIds::default(),
         rank,
     }
 }
 
-fn some_flyers() -> impl Strategy<Value = Vec<Flyer>> {
+fn some_flyers() -> impl Strategy<Value = Vec<ShieldedAircraft>> {
     prop::collection::vec((-4000.0f64..4000.0, -4000.0f64..4000.0, -3.1f64..3.1, 0.5f64..1.0), 2..9)
         .prop_map(|all| {
             let build = |(i, (x, y, psi, slow)): (usize, (f64, f64, f64, f64))| {
@@ -44,7 +44,7 @@ fn some_flyers() -> impl Strategy<Value = Vec<Flyer>> {
 }
 
 /// Airplanes with fallbacks that are apart; those that clash are left out.
-fn with_fallbacks(mut flyers: Vec<Flyer>) -> Vec<Flyer> {
+fn with_fallbacks(mut flyers: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
     loop {
         let (sides, clashes) = first_fallbacks(&flyers);
         match clashes.first() {
@@ -57,11 +57,11 @@ fn with_fallbacks(mut flyers: Vec<Flyer>) -> Vec<Flyer> {
     }
 }
 
-fn orbit_of(flyer: &Flyer) -> Orbit {
-    Orbit::from(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.orbit_rad_s)
+fn orbit_of(flyer: &ShieldedAircraft) -> Orbit {
+    Orbit::from_pose(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.orbit_rad_s)
 }
 
-fn nearest_on_orbits(flyers: &[Flyer], seconds: usize) -> f64 {
+fn nearest_on_orbits(flyers: &[ShieldedAircraft], seconds: usize) -> f64 {
     let orbits: Vec<Orbit> = flyers.iter().map(orbit_of).collect();
     let mut nearest = f64::INFINITY;
     for t in 0..seconds * 4 {
@@ -93,16 +93,16 @@ proptest! {
         mixable in any::<bool>(),
     ) {
         let flyers = with_fallbacks(flyers);
-        let candidates: Vec<Vec<Way>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
-            let way = |part: &f64| Way { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
+        let candidates: Vec<Vec<TurnProfile>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
+            let way = |part: &f64| TurnProfile { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
             wishes.iter().map(way).collect()
         }).collect();
-        let certainty = if mixable { Certainty::Mixable } else { Certainty::Sure };
+        let certainty = if mixable { PlanCertainty::Mixable } else { PlanCertainty::Sure };
         let mut decisions = filter(&flyers, &candidates, STEPS, DTAU_S, certainty);
         if mixable {
             for ((decision, follows), flyer) in decisions.iter_mut().zip(follow).zip(&flyers) {
                 if !follows {
-                    *decision = Decision { candidate: None, fallback: flyer.fallback };
+                    *decision = ShieldDecision { candidate: None, fallback: flyer.fallback };
                 }
             }
         }
@@ -124,7 +124,7 @@ proptest! {
             }
             for (i, f) in now.iter_mut().enumerate() {
                 f.pose = f.pose.step(f.v_m_s, omega(i, k), DTAU_S);
-                f.held = f.pose;
+                f.orbit_pose = f.pose;
             }
         }
         now.iter_mut().zip(&decisions).for_each(|(f, d)| f.fallback = d.fallback);
@@ -140,11 +140,11 @@ proptest! {
         slow in 0.5f64..1.0, left in any::<bool>(), own_left in any::<bool>(),
     ) {
         let own = flyer(0.0, 0.0, 0.0, 0);
-        let at = Pose { at: [0.0; 2], heading_rad: bearing }.step(x, 0.0, 1.0).at;
-        let other = Flyer { orbit_rad_s: slow * own.omega_max_rad_s, ..flyer(at[0], at[1], psi, 1) };
-        let plan = |of: &Flyer, parts: &[f64], left: bool| {
+        let at = Pose2 { at: [0.0; 2], heading_rad: bearing }.step(x, 0.0, 1.0).at;
+        let other = ShieldedAircraft { orbit_rad_s: slow * own.omega_max_rad_s, ..flyer(at[0], at[1], psi, 1) };
+        let plan = |of: &ShieldedAircraft, parts: &[f64], left: bool| {
             let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
-            Plan::new(of.clone(), &Way { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
+            SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
         };
         let clear = plan(&own, &[part; STEPS], own_left);
         if clear.is_clear_of(&other) {
@@ -156,9 +156,9 @@ proptest! {
     #[test]
     fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
         let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
-        let way = || Way { omegas_rad_s: vec![part * flyers[0].orbit_rad_s; STEPS] };
+        let way = || TurnProfile { omegas_rad_s: vec![part * flyers[0].orbit_rad_s; STEPS] };
         let wishes = [vec![way()], vec![way()]];
-        let decisions = filter(&flyers, &wishes, STEPS, DTAU_S, Certainty::Sure);
+        let decisions = filter(&flyers, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }
 }
@@ -178,38 +178,40 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
 
 #[test]
 fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
-    let close =
-        |x: f64, rank: u64, named: u32| Flyer { named: [named].into(), ..flyer(x, 0.0, 0.0, rank) };
-    let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
+    let close = |x: f64, rank: u64, named: u32| ShieldedAircraft {
+        exempt: [named].into(),
+        ..flyer(x, 0.0, 0.0, rank)
+    };
+    let straight = || vec![TurnProfile { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
     let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
-    let wanted = filter(&of_each_other, &wishes, STEPS, DTAU_S, Certainty::Sure);
+    let wanted = filter(&of_each_other, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
     // In each other's way, and both are named with others.
     let mut of_others = [close(0.0, 0, 7), close(0.0, 1, 8)];
-    let pose = Pose { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
-    (of_others[1].pose, of_others[1].held) = (pose, pose);
+    let pose = Pose2 { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
+    (of_others[1].pose, of_others[1].orbit_pose) = (pose, pose);
     of_others.iter_mut().for_each(|f| f.fallback = Side::Right);
     assert!(nearest_on_orbits(&of_others, 400) > 500.0);
     assert!(of_others[0].is_safe_with(&of_others[1]));
-    let kept = filter(&of_others, &wishes, STEPS, DTAU_S, Certainty::Sure);
+    let kept = filter(&of_others, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
     assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
 }
 
 #[test]
 fn a_change_is_refused_when_neither_orbit_is_apart() {
     let quick_turns = 6f64.to_radians();
-    let other = Flyer { orbit_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
+    let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
     let slow = flyer(0.0, 0.0, 0.0, 1);
-    let beside = |changed: &Flyer| side_apart(changed, [other.clone()].into_iter());
-    let fast = Flyer { v_m_s: 150.0, ..slow.clone() };
+    let beside = |changed: &ShieldedAircraft| safe_side(changed, [other.clone()].into_iter());
+    let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
     assert_eq!((beside(&slow), beside(&fast)), (Some(Side::Left), None));
-    let above = Flyer { levels: Levels::at(1000.0), ..fast.clone() };
+    let above = ShieldedAircraft { levels: Levels::at(1000.0), ..fast.clone() };
     assert_eq!(beside(&above), Some(Side::Left));
     // Named with another one, and then with this one.
-    assert_eq!(beside(&Flyer { named: [7].into(), ..fast.clone() }), None);
-    assert_eq!(beside(&Flyer { named: [0, 7].into(), ..fast }), Some(Side::Left));
-    let climbing = Flyer { levels: Levels::between(0.0, 1000.0), ..above };
+    assert_eq!(beside(&ShieldedAircraft { exempt: [7].into(), ..fast.clone() }), None);
+    assert_eq!(beside(&ShieldedAircraft { exempt: [0, 7].into(), ..fast }), Some(Side::Left));
+    let climbing = ShieldedAircraft { levels: Levels::between(0.0, 1000.0), ..above };
     assert_eq!(beside(&climbing), None);
 }
 

@@ -1,7 +1,7 @@
 //! The end of a flight, and the number as which a state keeps it.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::Coded;
+use sidestep_kernel::column::Packed;
 
 /// The end of a flight, with its step of `dtau` since the run's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,49 +16,49 @@ pub enum End {
 /// highest bit set where the airplane was removed before it arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Ended(u64);
+pub struct PackedEnd(u64);
 
-impl Ended {
+impl PackedEnd {
     /// No end yet.
-    pub(crate) const NOT_YET: Self = Self(u64::MAX);
+    pub(crate) const NONE: Self = Self(u64::MAX);
     /// Flag set beside the step in which an airplane was removed.
-    const LEFT: u64 = 1 << 63;
+    const LEFT_FLAG: u64 = 1 << 63;
 
     /// Returns the end, if there was one.
     pub fn get(self) -> Option<End> {
         match self {
-            Self::NOT_YET => None,
-            Self(step) if step & Self::LEFT != 0 => Some(End::Left(step & !Self::LEFT)),
+            Self::NONE => None,
+            Self(step) if step & Self::LEFT_FLAG != 0 => Some(End::Left(step & !Self::LEFT_FLAG)),
             Self(step) => Some(End::Arrived(step)),
         }
     }
 }
 
-impl From<End> for Ended {
+impl From<End> for PackedEnd {
     fn from(end: End) -> Self {
         match end {
             End::Arrived(step) => Self(step),
-            End::Left(step) => Self(step | Self::LEFT),
+            End::Left(step) => Self(step | Self::LEFT_FLAG),
         }
     }
 }
 
-impl Default for Ended {
+impl Default for PackedEnd {
     fn default() -> Self {
-        Self::NOT_YET
+        Self::NONE
     }
 }
 
-impl Coded for Ended {
-    type Code = u64;
+impl Packed for PackedEnd {
+    type Bits = u64;
 
     #[inline(always)]
-    fn code(self) -> u64 {
+    fn to_bits(self) -> u64 {
         self.0
     }
 
     #[inline(always)]
-    fn of_code(code: u64) -> Self {
+    fn from_bits(code: u64) -> Self {
         Self(code)
     }
 }

@@ -4,7 +4,7 @@ use crate::flight::Point;
 use sidestep_kernel::{Column, Cycle, Slot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-const NOBODY: u32 = u32::MAX;
+const NO_SLOT: u32 = u32::MAX;
 
 /// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ impl Neighborhood {
         Self {
             side_m,
             first: (0..buckets).map(|_| AtomicU64::new(u64::MAX)).collect(),
-            next: Column::filled(n, NOBODY),
+            next: Column::filled(n, NO_SLOT),
         }
     }
 
@@ -38,21 +38,27 @@ impl Neighborhood {
     }
 
     /// Lists an airplane for this cycle.
-    pub(in super::super) fn enter(&self, slot: Slot, at: Point, now: Cycle) {
+    pub(in super::super) fn insert(&self, slot: Slot, at: Point, now: Cycle) {
         let stamp = u64::from(now as u32) << 32;
         let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
         let listed = before >> 32 == stamp >> 32;
-        self.next.set(slot as usize, if listed { before as u32 } else { NOBODY });
+        self.next.set(slot as usize, if listed { before as u32 } else { NO_SLOT });
     }
 
     /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
     /// possibly for others.
-    pub(in super::super) fn around(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
+    pub(in super::super) fn for_each_near(
+        &self,
+        at: Point,
+        now: Cycle,
+        mut meet: impl FnMut(Slot),
+    ) {
         let [x, y] = self.square(at);
         for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
             let first = self.bucket(square).load(Relaxed);
-            let mut slot = if first >> 32 == u64::from(now as u32) { first as u32 } else { NOBODY };
-            while slot != NOBODY {
+            let mut slot =
+                if first >> 32 == u64::from(now as u32) { first as u32 } else { NO_SLOT };
+            while slot != NO_SLOT {
                 meet(slot);
                 slot = self.next.get(slot as usize);
             }

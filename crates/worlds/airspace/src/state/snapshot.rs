@@ -1,14 +1,14 @@
 //! Snapshots of a state by id, and their digests.
 
-use super::end::Ended;
-use crate::agents::contact::Contacts;
-use crate::baseline::mvp::Resolving;
-use crate::flight::Pose;
+use super::end::PackedEnd;
+use crate::agents::traffic_state::TrafficPicture;
+use crate::baseline::mvp::ActiveResolutions;
+use crate::external_action::ExternalAction;
+use crate::flight::Pose2;
 use crate::pilot::Control;
 use crate::shield::Side;
-use crate::wish::Wish;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::Coded;
+use sidestep_kernel::column::Packed;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Cycle, Digest, EntityId};
 
@@ -16,9 +16,9 @@ use sidestep_kernel::{Cycle, Digest, EntityId};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
     /// Pose at the start of the cycle.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// See [`super::Cell::ended`].
-    pub ended: Ended,
+    pub ended: PackedEnd,
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
     /// Side of the stored fallback.
@@ -60,15 +60,15 @@ pub struct Snapshot {
     /// The airplanes by id.
     pub airplanes: Vec<AirplaneRecord>,
     /// Each airplane's knowledge of others; empty where the network is reliable.
-    pub contacts: Vec<Contacts>,
+    pub contacts: Vec<TrafficPicture>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
-    pub resolving: Vec<Resolving>,
+    pub resolving: Vec<ActiveResolutions>,
     /// The pairs for which the shield promises nothing now, by ids.
     pub named: Vec<(EntityId, EntityId)>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
-    pub held: Vec<Pose>,
+    pub held: Vec<Pose2>,
     /// The wish that was ordered for each airplane; empty unless airplanes are decided from outside.
-    pub wishes: Vec<Option<Wish>>,
+    pub wishes: Vec<Option<ExternalAction>>,
     /// Controls of airplanes for the next cycle, if pilots outside of the run have handed them over.
     pub handed: Option<Vec<Control>>,
 }
@@ -77,25 +77,25 @@ impl Snapshot {
     /// Returns the digest of this state (promise D1): every value by id.
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
-        hasher.u64(self.cycle);
-        hasher.u64(self.airplanes.len() as u64);
+        hasher.write_u64(self.cycle);
+        hasher.write_u64(self.airplanes.len() as u64);
         self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
         for airplane in &self.airplanes {
             hash_pose(&mut hasher, &airplane.pose);
-            hasher.u64(airplane.ended.code());
-            airplane.counts.iter().for_each(|&n| hasher.u32(n));
-            hasher.u8(airplane.fallback.code());
+            hasher.write_u64(airplane.ended.to_bits());
+            airplane.counts.iter().for_each(|&n| hasher.write_u32(n));
+            hasher.write_u8(airplane.fallback.to_bits());
             // Left out without orders, because the altitude then is the scenario's, or that of the
             // track.
             let [orders, waits] = airplane.orders;
             if orders > 0 || waits > 0 {
-                hasher.u64(airplane.altitude_m.to_bits());
-                hasher.u32(u32::from(orders) << 16 | u32::from(waits));
+                hasher.write_u64(airplane.altitude_m.to_bits());
+                hasher.write_u32(u32::from(orders) << 16 | u32::from(waits));
             }
         }
         for &(a, b) in &self.named {
-            hasher.u32(a);
-            hasher.u32(b);
+            hasher.write_u32(a);
+            hasher.write_u32(b);
         }
         if !self.contacts.is_empty() {
             hash_data(&mut hasher, &self.contacts);
@@ -105,7 +105,7 @@ impl Snapshot {
         }
         // Turn rates do not affect the future, unless a caller outside decides by them.
         if !self.wishes.is_empty() {
-            self.airplanes.iter().for_each(|a| hasher.u64(a.turn_rate_rad_s.to_bits()));
+            self.airplanes.iter().for_each(|a| hasher.write_u64(a.turn_rate_rad_s.to_bits()));
             hash_data(&mut hasher, &self.wishes);
         }
         if let Some(handed) = &self.handed {
@@ -115,13 +115,13 @@ impl Snapshot {
     }
 }
 
-fn hash_pose(hasher: &mut Hasher, pose: &Pose) {
-    let Pose { at: [x, y], heading_rad } = *pose;
-    [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+fn hash_pose(hasher: &mut Hasher, pose: &Pose2) {
+    let Pose2 { at: [x, y], heading_rad } = *pose;
+    [x, y, heading_rad].iter().for_each(|v| hasher.write_u64(v.to_bits()));
 }
 
 /// Adds the bytes of a value as a checkpoint has them.
 fn hash_data(hasher: &mut Hasher, value: &impl Serialize) {
     let bytes = postcard::to_stdvec(value).expect("parts of a state are plain data");
-    bytes.iter().for_each(|&byte| hasher.u8(byte));
+    bytes.iter().for_each(|&byte| hasher.write_u8(byte));
 }

@@ -1,4 +1,4 @@
-use crate::scenario::Compiled;
+use crate::scenario::CompiledAirspace;
 use proptest::prelude::*;
 use sidestep_kernel::math;
 use sidestep_scenario::Source;
@@ -15,15 +15,15 @@ proptest! {
             "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n[[airplanes]]\n\
              at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
         );
-        let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+        let world = CompiledAirspace::new(&Source::new("w", text, "")).expect("a scenario").world;
         let air = world.air();
-        let pilot = air.pilot(&world.airplanes[0].model, &world.airplanes[0].mission);
+        let pilot = air.autopilot(&world.airplanes[0].model, &world.airplanes[0].mission);
         let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
         while next < goals.len() {
             let omega = air.steer(&pilot, pose, next);
             let before = pose;
-            pose = air.blown(before.step(pilot.model.v_m_s, omega, 1.0));
-            next = pilot.next((before, pose), next);
+            pose = air.after_wind_step(before.step(pilot.model.v_m_s, omega, 1.0));
+            next = pilot.next_way_point((before, pose), next);
             steps += 1;
         }
         prop_assert_eq!(world.alone_s[0], f64::from(steps));
@@ -41,7 +41,7 @@ proptest! {
              tolerance_m = 20.0\n\
              [[airplanes]]\nat_m = [0, 0]\nheading_deg = 90\nway_points_m = [[{x}, {y}]]\n"
         );
-        let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+        let world = CompiledAirspace::new(&Source::new("w", text, "")).expect("a scenario").world;
         prop_assert!(world.alone_s[0] < 3000.0, "{wind:?}: {}", world.alone_s[0]);
     }
 }
@@ -49,7 +49,10 @@ proptest! {
 /// Returns the seconds of the flight alone of the first airplane of a scenario.
 fn alone_s(airspace: &str, airplanes: &str) -> f64 {
     let text = format!("format = 1\nworld = \"airspace\"\n[airspace]\n{airspace}\n{airplanes}");
-    Compiled::new(&Source::new("a", text, "")).unwrap_or_else(|e| panic!("{e}")).world.alone_s[0]
+    CompiledAirspace::new(&Source::new("a", text, ""))
+        .unwrap_or_else(|e| panic!("{e}"))
+        .world
+        .alone_s[0]
 }
 
 #[test]
@@ -93,7 +96,8 @@ fn speeds_that_rounding_would_swallow_are_refused_with_the_least_one() {
         slow("") + "v_m_s = 1e-300\n",
         slow("") + "orders = [{ at_s = 5, speed_m_s = 1e-5 }]\n",
     ] {
-        let error = Compiled::new(&Source::new("s", text, "")).expect_err("refused").to_string();
+        let error =
+            CompiledAirspace::new(&Source::new("s", text, "")).expect_err("refused").to_string();
         assert!(error.contains("give 0.001 to 1e6 m/s"), "{error}");
     }
 }
@@ -118,7 +122,7 @@ fn an_order_after_the_arrival_makes_no_flight_endless() {
              heading_deg = 0\nway_points_m = [[3500, 0]]\n\
              orders = [{{ at_s = {at_s:?}, heading_deg = 90.0 }}]\n"
         );
-        Compiled::new(&Source::new("o", text, "")).expect("a scenario").world.alone_s[0]
+        CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario").world.alone_s[0]
     };
     assert!((90.0..=100.0).contains(&alone_s(500.0)), "{}", alone_s(500.0));
     assert_eq!(alone_s(50.0), f64::INFINITY);
@@ -131,7 +135,7 @@ fn against_any_wind_an_airplane_tracks_its_way() {
             "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n\
              [[airplanes]]\nat_m = [0, 0]\nheading_deg = 90\nway_points_m = [[0, 9000]]\n"
         );
-        let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
+        let world = CompiledAirspace::new(&Source::new("w", text, "")).expect("a scenario").world;
         let along = 35f64 * 35.0 - wind[0] * wind[0];
         let expected_s = 8900.0 / (along.sqrt() + wind[1]);
         assert!((world.alone_s[0] - expected_s).abs() < 12.0, "{wind:?}: {}", world.alone_s[0]);

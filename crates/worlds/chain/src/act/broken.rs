@@ -1,27 +1,27 @@
 //! Changes to chains: parts that fail, and chains that break and are joined again (slides R8, R10,
 //! F3).
 
-use super::Setting;
-use super::told::Told;
+use super::ChainContext;
+use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, add, distance};
-use crate::rods::rebuild::{MayCome, Reformed, reform};
-use crate::state::{Body, Scattered, flat};
-use crate::world::{Change, FARTHEST_THROW, What, purpose};
+use crate::rods::rebuild::{MovableEnd, ReformResult, reform};
+use crate::state::{Body, ScatterState, flatten};
+use crate::world::{Change, ChangeKind, MAX_THROW_SIGMAS, purpose};
 use sidestep_kernel::distr::normal;
 use std::ops::RangeInclusive;
 
 /// Attempts to find a free place where a part may fall.
-const THROWS: usize = 100;
+const MAX_PLACEMENT_TRIES: usize = 100;
 
 /// Applies the changes at the start of a cycle.
-pub(super) fn change<const D: usize>(
-    setting: Setting<'_, D>,
+pub(super) fn apply_changes<const D: usize>(
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
 ) {
-    let Setting { spec, now, .. } = setting;
+    let ChainContext { spec, now, .. } = setting;
     for change in spec.changes.iter().filter(|change| change.cycle == now) {
         apply(change, setting, body, told);
     }
@@ -29,35 +29,37 @@ pub(super) fn change<const D: usize>(
 
 fn apply<const D: usize>(
     change: &Change<D>,
-    setting: Setting<'_, D>,
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
 ) {
     body.catch_up();
     body.plan = None;
     change.constrain(&mut body.chain);
     match &change.what {
-        What::Failed { connector, .. }
-        | What::Mobility { connector, .. }
-        | What::MaxBend { connector, .. } => {
-            told.tell(&body.chain, EventKind::Changed, *connector, 0.0);
+        ChangeKind::Failed { connector, .. }
+        | ChangeKind::Mobility { connector, .. }
+        | ChangeKind::MaxBend { connector, .. } => {
+            told.record(&body.chain, EventKind::Changed, *connector, 0.0);
         }
-        What::Scatter { connectors, by_m, apart_m } => {
+        ChangeKind::Scatter { connectors, by_m, apart_m } => {
             scatter(setting, body, connectors, *by_m);
             for point in &mut body.chain.points_mut()[connectors.end() + 1..] {
                 *point = add(*point, *apart_m);
             }
             let n = connectors.clone().count() as f64;
-            told.tell(&body.chain, EventKind::Broken, *connectors.start(), n);
+            told.record(&body.chain, EventKind::Broken, *connectors.start(), n);
         }
-        What::Reform { may_come, speed_m_s } => begin_reform(body, told, *may_come, *speed_m_s),
+        ChangeKind::Reform { may_come, speed_m_s } => {
+            start_reform(body, told, *may_come, *speed_m_s)
+        }
     }
 }
 
 /// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
 /// or have failed stay.
 fn scatter<const D: usize>(
-    setting: Setting<'_, D>,
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
     connectors: &RangeInclusive<usize>,
     by_m: f64,
@@ -69,13 +71,13 @@ fn scatter<const D: usize>(
             continue;
         }
         let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
-        let mut throw = || normal(draws).clamp(-FARTHEST_THROW, FARTHEST_THROW);
+        let mut throw = || normal(draws).clamp(-MAX_THROW_SIGMAS, MAX_THROW_SIGMAS);
         let mut place = || at.map(|x| x + by_m * throw());
         let is_free = |p: &Point<D>| setting.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
-        let free = (0..THROWS).map(|_| place()).find(is_free);
+        let free = (0..MAX_PLACEMENT_TRIES).map(|_| place()).find(is_free);
         chain.points_mut()[k] = free.unwrap_or(at);
     }
-    body.scattered = Some(Scattered {
+    body.scattered = Some(ScatterState {
         first: *connectors.start() as u32,
         last: *connectors.end() as u32,
         speed_m_s: 0.0,
@@ -85,34 +87,34 @@ fn scatter<const D: usize>(
 }
 
 /// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
-fn begin_reform<const D: usize>(
+fn start_reform<const D: usize>(
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
-    may_come: MayCome,
+    told: &mut EventSink<'_, D>,
+    may_come: MovableEnd,
     speed_m_s: f64,
 ) {
     let Some(scattered) = &mut body.scattered else { return };
     let (first, last) = (scattered.first as usize, scattered.last as usize);
-    let (whole, came) = reformed(&body.chain, first..=last, may_come);
+    let (whole, came) = reform_goals(&body.chain, first..=last, may_come);
     let (kind, value) = match came {
-        Reformed::Whole { double_passes } => {
-            (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
+        ReformResult::Whole { double_passes } => {
+            (scattered.goals_m, scattered.speed_m_s) = (flatten(&whole), speed_m_s);
             scattered.waited = 0;
             (EventKind::Reforming, double_passes as f64)
         }
-        Reformed::GapTooLong { have_m, need_m, missing } => {
-            return gap_is_too_long(body, told, first, need_m - have_m, missing);
+        ReformResult::GapTooLong { have_m, need_m, missing } => {
+            return report_gap(body, told, first, need_m - have_m, missing);
         }
-        Reformed::NotReached { off_m } => (EventKind::NotReformed, off_m),
+        ReformResult::NotReached { off_m } => (EventKind::NotReformed, off_m),
     };
     body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
-    told.tell(&body.chain, kind, first, value);
+    told.record(&body.chain, kind, first, value);
 }
 
 /// Tells the length and the number of parts that are wanting.
-fn gap_is_too_long<const D: usize>(
+fn report_gap<const D: usize>(
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
     first: usize,
     wanting_m: f64,
     missing: usize,
@@ -126,22 +128,22 @@ fn gap_is_too_long<const D: usize>(
 
 /// Returns where the connectors would be if the chain were whole, and whether it can be.
 /// Connectors that never move do not move for that either.
-fn reformed<const D: usize>(
+fn reform_goals<const D: usize>(
     chain: &Chain<D>,
     scattered: RangeInclusive<usize>,
-    may_come: MayCome,
-) -> (Vec<Point<D>>, Reformed) {
+    may_come: MovableEnd,
+) -> (Vec<Point<D>>, ReformResult) {
     let mut whole = chain.clone();
     // An end cannot come from outside the range of coordinates.
     let came = reform(&mut whole, scattered, may_come)
-        .unwrap_or(Reformed::NotReached { off_m: chain.max_rod_violation_m() });
+        .unwrap_or(ReformResult::NotReached { off_m: chain.max_rod_violation_m() });
     let stays = |k: &usize| chain.connectors()[*k].is_still();
     let would_move = |k: usize| whole.points()[k] != chain.points()[k];
     let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
         None => came,
         Some(k) => {
             let off_m = distance(whole.points()[k], chain.points()[k]);
-            Reformed::NotReached { off_m }
+            ReformResult::NotReached { off_m }
         }
     };
     (whole.points().to_vec(), came)

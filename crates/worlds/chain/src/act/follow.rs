@@ -1,22 +1,22 @@
 //! Robots on wheels that keep to the connectors of their chain: the link between the swarm's
 //! followers and this world (slides E2, K5 to K7).
 
-use super::wheels::SAME_RAD;
-use super::{Acting, Setting};
+use super::wheels::HEADING_TOLERANCE_RAD;
+use super::{ActState, ChainContext};
 use crate::events::EventKind;
 use crate::formation::{Robot, Robots};
-use crate::rods::geometry::{Point, distance, dot, in_dimensions, scaled, sub};
+use crate::rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
 use crate::rods::obstacle::Obstacles;
 use crate::state::Body;
-use crate::swarm::drive::Pose;
-use crate::swarm::follower::{Follower, Goal};
-use crate::swarm::laser::Body as Seen;
+use crate::swarm::drive::Pose2;
+use crate::swarm::follower::{Follower, TrackingTarget};
+use crate::swarm::laser::RobotBody as Seen;
 use sidestep_kernel::math::{atan2, wrap_angle};
 
 /// The circumstances in which the robots of a chain follow.
 #[derive(Clone, Copy)]
-struct Following<'a, const D: usize> {
-    setting: Setting<'a, D>,
+struct FollowContext<'a, const D: usize> {
+    setting: ChainContext<'a, D>,
     follower: &'a Follower,
     /// Obstacles that are solid to robots.
     solid: &'a Obstacles<D>,
@@ -27,66 +27,66 @@ struct Following<'a, const D: usize> {
 /// Moves the robots of a swarm toward their connectors. All perceive each other as they were
 /// before. Returns the least gap around a robot, meters. `seen` is a buffer.
 pub(super) fn follow<const D: usize>(
-    setting: Setting<'_, D>,
-    acting: &mut Acting<'_, D>,
+    setting: ChainContext<'_, D>,
+    acting: &mut ActState<'_, D>,
     solid: &Obstacles<D>,
     seen: &mut Vec<Seen>,
 ) -> f64 {
     let mut gap_m = f64::INFINITY;
     let Some(Robots { follower, .. }) = &setting.spec.robots else { return gap_m };
-    let leader = leader_on_wheels(setting, acting.body);
+    let leader = wheeled_leader(setting, acting.body);
     seen.clear();
-    seen.extend(acting.body.solids().map(|(_, solid)| solid.as_seen()));
-    let following = Following { setting, follower, solid, robots: seen };
+    seen.extend(acting.body.solids().map(|(_, solid)| solid.to_robot_body()));
+    let following = FollowContext { setting, follower, solid, robots: seen };
     for k in 0..acting.body.robots.len() {
         if Some(k) == leader {
-            carry(acting.body, k);
+            place_robot(acting.body, k);
         } else {
             gap_m = gap_m.min(following.follow(acting, k));
         }
     }
-    lead_from_its_robot(setting, acting.body);
+    lead_from_robot(setting, acting.body);
     gap_m
 }
 
 /// Returns the connector of a navigator that its own wheels have taken to where it is, or that stands.
 /// Whatever else moves a connector, its robot follows.
-fn leader_on_wheels<const D: usize>(setting: Setting<'_, D>, body: &Body<D>) -> Option<usize> {
+fn wheeled_leader<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> Option<usize> {
     let agent = setting.task(body)?.agent;
     let leader = body.driving.leader.as_ref()?;
-    (in_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
+    (with_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
 }
 
 /// Lets a navigator whose robot follows its connector go on from where the robot is.
-fn lead_from_its_robot<const D: usize>(setting: Setting<'_, D>, body: &mut Body<D>) {
+fn lead_from_robot<const D: usize>(setting: ChainContext<'_, D>, body: &mut Body<D>) {
     let Some(agent) = setting.task(body).map(|task| task.agent) else { return };
     let (at, robot) = (body.chain.points()[agent], &body.robots[agent]);
     if let Some(leader) = &mut body.driving.leader
-        && in_dimensions(at) != leader.pose.at
+        && with_dimensions(at) != leader.pose.at
     {
         leader.pose = robot.pose;
     }
 }
 
 /// Puts the robot of a navigator where its wheels have taken it.
-fn carry<const D: usize>(body: &mut Body<D>, k: usize) {
+fn place_robot<const D: usize>(body: &mut Body<D>, k: usize) {
     let Some(leader) = body.driving.leader else { return };
     let [x, y, _] = body.driving.ahead;
-    let at = in_dimensions(body.chain.points()[k]);
+    let at = with_dimensions(body.chain.points()[k]);
     let ahead_rad = atan2(y, x);
-    let turns = wrap_angle(ahead_rad - leader.pose.heading_rad).abs() > SAME_RAD;
+    let turns = wrap_angle(ahead_rad - leader.pose.heading_rad).abs() > HEADING_TOLERANCE_RAD;
     let heading_rad = if turns { leader.pose.heading_rad } else { ahead_rad };
-    body.robots[k].pose = Pose { at, heading_rad };
+    body.robots[k].pose = Pose2 { at, heading_rad };
 }
 
-impl<const D: usize> Following<'_, D> {
+impl<const D: usize> FollowContext<'_, D> {
     /// Moves one robot; returns the gap around it, meters.
-    fn follow(self, acting: &mut Acting<'_, D>, k: usize) -> f64 {
+    fn follow(self, acting: &mut ActState<'_, D>, k: usize) -> f64 {
         let Some(solid) = self.solid.in_plane() else { return f64::INFINITY };
-        let Acting { body, before, told, .. } = acting;
+        let ActState { body, before, told, .. } = acting;
         let dt_s = self.setting.world.dt_s;
-        let was: Point<2> = in_dimensions(before.points[k]);
-        let at: Point<2> = in_dimensions(body.chain.points()[k]);
+        let was: Point<2> = with_dimensions(before.points[k]);
+        let at: Point<2> = with_dimensions(body.chain.points()[k]);
         let mut velocity_m_s = scaled(sub(at, was), 1.0 / dt_s);
         let leads = self.setting.task(body).is_some_and(|task| task.agent == k);
         if leads && dot(velocity_m_s, sub(at, body.robots[k].pose.at)) < 0.0 {
@@ -94,13 +94,13 @@ impl<const D: usize> Following<'_, D> {
             velocity_m_s = [0.0; 2];
         }
         let others = self.robots.iter().enumerate().filter(move |(i, _)| *i != k).map(|(_, o)| *o);
-        let goal = Goal { at, velocity_m_s };
+        let goal = TrackingTarget { at, velocity_m_s };
         let followed = self.follower.follow(&body.robots[k].pose, &goal, solid, others, dt_s);
         let lag_m = distance(followed.pose.at, at);
-        body.tally.robots.count(&followed, lag_m);
+        body.tally.robots.record(&followed, lag_m);
         if followed.is_bumped && !body.robots[k].is_bumped {
             body.tally.robots.bumper_events += 1;
-            told.tell(&body.chain, EventKind::Bumper, k, lag_m);
+            told.record(&body.chain, EventKind::Bumper, k, lag_m);
         }
         body.robots[k] = Robot { pose: followed.pose, is_bumped: followed.is_bumped };
         followed.gap_m

@@ -1,32 +1,32 @@
 //! Scattered parts of a broken chain on their way to the places where they are joined again (slide F3).
 
-use super::Setting;
-use super::told::Told;
+use super::ChainContext;
+use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
 use crate::rods::TOLERANCE_M;
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, toward};
+use crate::rods::geometry::{Point, move_toward};
 use crate::rods::obstacle::Obstacles;
-use crate::rods::passage::in_the_way;
 use crate::rods::sweep::Sweep;
-use crate::state::{Body, Scattered};
+use crate::rods::tunneling::blocking_obstacle;
+use crate::state::{Body, ScatterState};
 use std::ops::Range;
 
 /// Parts of a step that are tried one after the other where something is in the way.
-const SHORTER: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+const STEP_FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// Time for which parts wait for what is in their way, s.
-const PATIENCE_S: f64 = 10.0;
+const GATHER_TIMEOUT_S: f64 = 10.0;
 
 /// A try to go on.
 #[derive(Debug, Default)]
-struct Tried {
+struct GatherAttempt {
     has_moved: bool,
     /// The obstacle that keeps a part from going on.
     blocked_by: Option<u32>,
 }
 
 /// The connectors of a broken chain, and the places where they are joined again.
-struct Parts<'a, const D: usize> {
+struct ScatteredParts<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     goals: Vec<Point<D>>,
     obstacles: &'a Obstacles<D>,
@@ -36,46 +36,46 @@ struct Parts<'a, const D: usize> {
 
 /// Moves scattered parts straight to the places where they are joined again, as far as nothing is in their way; the
 /// chain is whole when all are there and there is room for their rods.
-pub(super) fn come_together<const D: usize>(
-    setting: Setting<'_, D>,
+pub(super) fn gather_parts<const D: usize>(
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
 ) {
-    let going = |s: &&Scattered| !s.goals_m.is_empty();
+    let going = |s: &&ScatterState| !s.goals_m.is_empty();
     let Some(scattered) = body.scattered.as_ref().filter(going) else { return };
     let (first, last) = (scattered.first as usize, scattered.last as usize);
     let step_m = scattered.speed_m_s * setting.world.dt_s;
     let goals = scattered.goals_m.chunks_exact(D);
     let goals: Vec<Point<D>> = goals.map(|at| std::array::from_fn(|i| at[i])).collect();
     let obstacles = setting.obstacles;
-    let mut parts = Parts { chain: &mut body.chain, goals, obstacles, step_m };
-    let tried = parts.go_on(first, last);
-    if !parts.are_there() {
-        return wait_for(setting, body, told, &tried);
+    let mut parts = ScatteredParts { chain: &mut body.chain, goals, obstacles, step_m };
+    let tried = parts.advance(first, last);
+    if !parts.have_arrived() {
+        return wait_or_give_up(setting, body, told, &tried);
     }
-    match parts.in_a_new_rod(first - 1..last + 1) {
-        None => is_whole_again(body, told, first),
-        blocked_by => wait_for(setting, body, told, &Tried { blocked_by, ..tried }),
+    match parts.obstacle_in_new_rod(first - 1..last + 1) {
+        None => mark_whole(body, told, first),
+        blocked_by => wait_or_give_up(setting, body, told, &GatherAttempt { blocked_by, ..tried }),
     }
 }
 
 /// Ends the state of being broken.
-fn is_whole_again<const D: usize>(body: &mut Body<D>, told: &mut Told<'_, D>, first: usize) {
+fn mark_whole<const D: usize>(body: &mut Body<D>, told: &mut EventSink<'_, D>, first: usize) {
     body.scattered = None;
     body.tally.reformed += 1;
-    told.tell(&body.chain, EventKind::Reformed, first, 0.0);
+    told.record(&body.chain, EventKind::Reformed, first, 0.0);
 }
 
 /// Counts the time in which nothing went on, and gives up after too much of it.
-fn wait_for<const D: usize>(
-    setting: Setting<'_, D>,
+fn wait_or_give_up<const D: usize>(
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
-    tried: &Tried,
+    told: &mut EventSink<'_, D>,
+    tried: &GatherAttempt,
 ) {
     let Some(scattered) = &mut body.scattered else { return };
     scattered.waited = if tried.has_moved { 0 } else { scattered.waited.saturating_add(1) };
-    if setting.world.starts_s(scattered.waited) <= PATIENCE_S {
+    if setting.world.start_time_s(scattered.waited) <= GATHER_TIMEOUT_S {
         return;
     }
     (scattered.speed_m_s, scattered.goals_m, scattered.waited) = (0.0, Vec::new(), 0);
@@ -86,10 +86,10 @@ fn wait_for<const D: usize>(
     told.events.push(Event { obstacle: tried.blocked_by, ..event });
 }
 
-impl<const D: usize> Parts<'_, D> {
+impl<const D: usize> ScatteredParts<'_, D> {
     /// Moves the scattered connectors, from the first to the last, and the ends beside them.
-    fn go_on(&mut self, first: usize, last: usize) -> Tried {
-        let mut tried = Tried::default();
+    fn advance(&mut self, first: usize, last: usize) -> GatherAttempt {
+        let mut tried = GatherAttempt::default();
         // A whole end that comes along goes as one, because its rods hold.
         let ends = [0..first, last + 1..self.goals.len()];
         for part in (first..=last).map(|k| k..k + 1).chain(ends) {
@@ -100,25 +100,25 @@ impl<const D: usize> Parts<'_, D> {
         tried
     }
 
-    fn are_there(&self) -> bool {
+    fn have_arrived(&self) -> bool {
         self.chain.points() == self.goals
     }
 
     /// Moves connectors and the rods between them toward their places.
-    fn gather(&mut self, part: Range<usize>) -> Tried {
+    fn gather(&mut self, part: Range<usize>) -> GatherAttempt {
         let from = self.chain.points()[part.clone()].to_vec();
         let goals = &self.goals[part.clone()];
-        let mut tried = Tried::default();
+        let mut tried = GatherAttempt::default();
         if from == goals {
             return tried;
         }
-        for shorter in SHORTER {
+        for shorter in STEP_FRACTIONS {
             let (ways, step_m) = (from.iter().zip(goals), shorter * self.step_m);
-            let to: Vec<_> = ways.map(|(p, goal)| toward(*p, *goal, step_m)).collect();
-            match self.in_its_way(part.start, &from, &to) {
+            let to: Vec<_> = ways.map(|(p, goal)| move_toward(*p, *goal, step_m)).collect();
+            match self.blocking_obstacle(part.start, &from, &to) {
                 None => {
                     self.chain.points_mut()[part].copy_from_slice(&to);
-                    return Tried { has_moved: true, ..tried };
+                    return GatherAttempt { has_moved: true, ..tried };
                 }
                 by => tried.blocked_by = tried.blocked_by.or(by),
             }
@@ -127,25 +127,25 @@ impl<const D: usize> Parts<'_, D> {
     }
 
     /// Returns the obstacle in the way of connectors, the first of which is `k`, and of the rods between them.
-    fn in_its_way(&self, k: usize, from: &[Point<D>], to: &[Point<D>]) -> Option<u32> {
+    fn blocking_obstacle(&self, k: usize, from: &[Point<D>], to: &[Point<D>]) -> Option<u32> {
         let of_connector = |i: usize| {
             let sweep = Sweep { from: [from[i]; 2], to: [to[i]; 2] };
-            in_the_way(sweep, self.chain.connectors()[k + i].radius_m, self.obstacles)
+            blocking_obstacle(sweep, self.chain.connectors()[k + i].radius_m, self.obstacles)
         };
         let of_rod = |i: usize| {
             let sweep = Sweep { from: [from[i], from[i + 1]], to: [to[i], to[i + 1]] };
-            in_the_way(sweep, self.chain.rods()[k + i].radius_m, self.obstacles)
+            blocking_obstacle(sweep, self.chain.rods()[k + i].radius_m, self.obstacles)
         };
         let blocked = (0..from.len()).find_map(of_connector);
         blocked.or_else(|| (0..from.len().saturating_sub(1)).find_map(of_rod))
     }
 
     /// Returns an obstacle in which one of these rods would be, now that their ends are in place.
-    fn in_a_new_rod(&self, mut rods: Range<usize>) -> Option<u32> {
+    fn obstacle_in_new_rod(&self, mut rods: Range<usize>) -> Option<u32> {
         rods.find_map(|rod| {
             let ends = [self.chain.points()[rod], self.chain.points()[rod + 1]];
             let radius_m = self.chain.rods()[rod].radius_m - TOLERANCE_M;
-            self.obstacles.first_at(ends, radius_m)
+            self.obstacles.first_overlap(ends, radius_m)
         })
     }
 }

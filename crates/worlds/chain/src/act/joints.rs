@@ -5,56 +5,56 @@
 mod tests;
 
 use super::situation::is_held;
-use super::{Acting, Initiator, Setting};
+use super::{ActState, ChainContext, Initiator};
 use crate::arms::arm::Arm;
-use crate::arms::kinematics::Aim;
+use crate::arms::kinematics::ConnectorTarget;
 use crate::arms::plan::JointSpace;
-use crate::clearance::least_clearance;
-use crate::driver::errand::Errand;
-use crate::motion::go::TOLERANCE_M;
-use crate::motion::replan::Climbed;
+use crate::clearance::min_clearance;
+use crate::driver::step_motion::StepMotion;
+use crate::motion::recovery::RecoveryOutcome;
+use crate::motion::request::TOLERANCE_M;
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, between, distance};
-use crate::rods::passage::passed;
-use crate::rods::veto::{Motion, Moved, Outcome, Reason, Source, Veto};
-use crate::scratch::Places;
+use crate::rods::geometry::{Point, distance, lerp};
+use crate::rods::tunneling::find_tunneling;
+use crate::rods::veto::{CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason};
+use crate::scratch::PositionBuffer;
 use crate::state::Body;
 
 /// Parts of a motion that are tried, each half of the one before.
-const TRIES: usize = 6;
+const MAX_TRIES: usize = 6;
 /// Parts of a motion out of the way that are tried.
-const ESCAPES: usize = 3;
+const MAX_ESCAPE_TRIES: usize = 3;
 /// Part of its way that an initiator which only comes nearer must make good.
-const NEARER: f64 = 0.25;
+const MIN_APPROACH_FRACTION: f64 = 0.25;
 /// Relative tolerance for ways at exactly the greatest speed.
 const ROUNDING: f64 = 1e-9;
 
 /// A connector that leads, and where to.
 #[derive(Clone, Copy)]
-struct Led<const D: usize> {
+struct LeadTarget<const D: usize> {
     k: usize,
     to: Point<D>,
 }
 
 /// A posture of an arm: its joints, and where they put its connectors.
-struct Posed<const D: usize> {
+struct ArmPosture<const D: usize> {
     joints: Vec<f64>,
     points: Vec<Point<D>>,
     /// The connectors that it is to lead, and their targets.
-    led: Vec<Led<D>>,
+    led: Vec<LeadTarget<D>>,
 }
 
 /// The motion that joints are to follow.
-struct Wanted<'b, const D: usize> {
+struct ReferenceMotion<'b, const D: usize> {
     from: &'b [Point<D>],
     guide: Option<&'b [Point<D>]>,
-    led: &'b [Led<D>],
+    led: &'b [LeadTarget<D>],
 }
 
 /// An arm whose joints come along with its chain.
-pub(super) struct Jointed<'a, const D: usize> {
-    setting: Setting<'a, D>,
-    before: &'a Places<D>,
+pub(super) struct ArmFollower<'a, const D: usize> {
+    setting: ChainContext<'a, D>,
+    before: &'a PositionBuffer<D>,
     arm: &'a Arm,
     chain: &'a mut Chain<D>,
     joints: &'a mut Vec<f64>,
@@ -62,50 +62,55 @@ pub(super) struct Jointed<'a, const D: usize> {
 
 /// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
 /// passes bring it only so near.
-pub(super) fn there_m<const D: usize>(setting: Setting<'_, D>, chain: &Chain<D>) -> f64 {
+pub(super) fn arrival_tolerance_m<const D: usize>(
+    setting: ChainContext<'_, D>,
+    chain: &Chain<D>,
+) -> f64 {
     match setting.spec.arm.as_deref() {
-        Some(arm) => arm.follower.exact_m(),
+        Some(arm) => arm.follower.arrival_tolerance_m(),
         None if !chain.is_plain() && is_held(chain) => TOLERANCE_M,
-        None => chain.least_move_m(),
+        None => chain.min_move_m(),
     }
 }
 
 /// Lets the joints come along with an initiator's motion; what they cannot do is vetoed.
-pub(super) fn come_along<const D: usize>(
+pub(super) fn follow_initiator<const D: usize>(
     who: Initiator<'_, D>,
-    acting: &mut Acting<'_, D>,
+    acting: &mut ActState<'_, D>,
     to: Point<D>,
-    climbed: Climbed<D>,
-) -> Climbed<D> {
-    let Some(mut arm) = Jointed::of(who.setting, acting.before, acting.body) else {
+    climbed: RecoveryOutcome<D>,
+) -> RecoveryOutcome<D> {
+    let Some(mut arm) = ArmFollower::from_body(who.setting, acting.before, acting.body) else {
         return climbed;
     };
     let k = who.task.agent;
     let (has_moved, at) = match climbed {
         // The chain reaches a place to some tolerance, the joints exactly.
-        Climbed::Straight(_) => (true, to),
-        Climbed::Shorter { .. } | Climbed::Sideways { .. } => (true, arm.chain.points()[k]),
+        RecoveryOutcome::Straight(_) => (true, to),
+        RecoveryOutcome::Shorter { .. } | RecoveryOutcome::Sideways { .. } => {
+            (true, arm.chain.points()[k])
+        }
         _ => (false, to),
     };
-    let followed = arm.follow(&[Led { k, to: at }], TRIES).or_else(|veto| {
-        let decides = who.task.source() == Source::Autonomous;
-        if decides && arm.approach(Led { k, to }) { Ok(()) } else { Err(veto) }
+    let followed = arm.follow(&[LeadTarget { k, to: at }], MAX_TRIES).or_else(|veto| {
+        let decides = who.task.source() == RequestSource::Autonomous;
+        if decides && arm.approach(LeadTarget { k, to }) { Ok(()) } else { Err(veto) }
     });
     match followed {
         Ok(()) if has_moved => climbed,
-        Ok(()) => Climbed::Straight(alone(k)),
+        Ok(()) => RecoveryOutcome::Straight(initiator_only_motion(k)),
         Err(veto) => {
-            acting.vetoed(&veto);
-            if has_moved { Climbed::Vetoed(veto) } else { climbed }
+            acting.record_veto(&veto);
+            if has_moved { RecoveryOutcome::Vetoed(veto) } else { climbed }
         }
     }
 }
 
-impl<'a, const D: usize> Jointed<'a, D> {
+impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the arm that a chain represents, if it does.
-    pub(super) fn of(
-        setting: Setting<'a, D>,
-        before: &'a Places<D>,
+    pub(super) fn from_body(
+        setting: ChainContext<'a, D>,
+        before: &'a PositionBuffer<D>,
         body: &'a mut Body<D>,
     ) -> Option<Self> {
         let (arm, joints) = (setting.spec.arm.as_deref()?, body.joints.as_mut()?);
@@ -113,20 +118,20 @@ impl<'a, const D: usize> Jointed<'a, D> {
     }
 
     /// Lets the joints carry out an order: all of it, or nothing.
-    pub(super) fn obey(
+    pub(super) fn execute_order(
         &mut self,
-        errand: &Errand<D>,
+        errand: &StepMotion<D>,
         part: f64,
         outcome: Outcome<D>,
     ) -> Outcome<D> {
         let followed = match errand.motion(part) {
-            Motion::Connector { k, to } => self.follow(&[Led { k, to }], 1),
+            Motion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
             Motion::Rod { i, to: [to, next] } => {
-                self.follow(&[Led { k: i, to }, Led { k: i + 1, to: next }], 1)
+                self.follow(&[LeadTarget { k: i, to }, LeadTarget { k: i + 1, to: next }], 1)
             }
         };
         match (followed, outcome) {
-            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(alone(errand.first)),
+            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(errand.first)),
             (Ok(()), moved) => moved,
             // Where the chain itself objects, it says more than its joints do.
             (Err(_), vetoed @ Outcome::Vetoed(_)) => vetoed,
@@ -139,19 +144,19 @@ impl<'a, const D: usize> Jointed<'a, D> {
     ///
     /// # Errors
     /// When no part goes: the objection to the least. Then everything is as before the motion.
-    fn follow(&mut self, led: &[Led<D>], tries: usize) -> Result<(), Veto<D>> {
-        let (from, guide) = self.back_to_joints();
+    fn follow(&mut self, led: &[LeadTarget<D>], tries: usize) -> Result<(), Veto<D>> {
+        let (from, guide) = self.reset_to_joints();
         let guide = (guide != from).then_some(&guide[..]);
-        let guided = Wanted { from: &from, guide, led };
-        let free = Wanted { guide: None, ..guided };
+        let guided = ReferenceMotion { from: &from, guide, led };
+        let free = ReferenceMotion { guide: None, ..guided };
         let mut objection = None;
         let mut part = 1.0;
         for _ in 0..tries {
             for wanted in [&guided, &free] {
-                let posed = self.posed(wanted, part);
-                match self.objection(&from, &posed) {
+                let posed = self.solve_posture(wanted, part);
+                match self.find_veto(&from, &posed) {
                     None => {
-                        self.take(posed);
+                        self.adopt(posed);
                         return Ok(());
                     }
                     objects => objection = objects,
@@ -163,16 +168,17 @@ impl<'a, const D: usize> Jointed<'a, D> {
     }
 
     /// Brings an initiator nearer to a place to which its joints cannot take it straight; returns whether it came.
-    fn approach(&mut self, led: Led<D>) -> bool {
-        let Led { k, to } = led;
-        let (from, _) = self.back_to_joints();
-        let mut posed = self.posed(&Wanted { from: &from, guide: None, led: &[led] }, 1.0);
+    fn approach(&mut self, led: LeadTarget<D>) -> bool {
+        let LeadTarget { k, to } = led;
+        let (from, _) = self.reset_to_joints();
+        let mut posed =
+            self.solve_posture(&ReferenceMotion { from: &from, guide: None, led: &[led] }, 1.0);
         let left_m = distance(posed.points[k], to);
         posed.led[0].to = posed.points[k];
-        let comes = left_m <= (1.0 - NEARER) * distance(from[k], to)
-            && self.objection(&from, &posed).is_none();
+        let comes = left_m <= (1.0 - MIN_APPROACH_FRACTION) * distance(from[k], to)
+            && self.find_veto(&from, &posed).is_none();
         if comes {
-            self.take(posed);
+            self.adopt(posed);
         }
         comes
     }
@@ -180,80 +186,87 @@ impl<'a, const D: usize> Jointed<'a, D> {
     /// Brings the joints along a motion of the chain out of the way: to where nothing objects or, where parts are
     /// in something already, to where they are in it least.
     pub(super) fn escape(&mut self) {
-        let (from, guide) = self.back_to_joints();
+        let (from, guide) = self.reset_to_joints();
         if guide == from {
             return;
         }
-        let wanted = Wanted { from: &from, guide: Some(&guide), led: &[] };
-        let mut best: Option<Posed<D>> = None;
+        let wanted = ReferenceMotion { from: &from, guide: Some(&guide), led: &[] };
+        let mut best: Option<ArmPosture<D>> = None;
         let (mut least_m, mut part) = (self.clearance_m(&from), 1.0);
-        for _ in 0..ESCAPES {
-            let posed = self.posed(&wanted, part);
-            let Some(veto) = self.objection(&from, &posed) else {
+        for _ in 0..MAX_ESCAPE_TRIES {
+            let posed = self.solve_posture(&wanted, part);
+            let Some(veto) = self.find_veto(&from, &posed) else {
                 best = Some(posed);
                 break;
             };
             let clearance_m = self.clearance_m(&posed.points);
-            if veto.reason == Reason::BothSidesBlocked && clearance_m > least_m {
+            if veto.reason == VetoReason::BothSidesBlocked && clearance_m > least_m {
                 (least_m, best) = (clearance_m, Some(posed));
             }
             part *= 0.5;
         }
         if let Some(posed) = best {
-            self.take(posed);
+            self.adopt(posed);
         }
     }
 
     /// Puts the chain back to where its joints are; returns where that is, and where the chain was.
-    fn back_to_joints(&mut self) -> (Vec<Point<D>>, Vec<Point<D>>) {
-        let from: Vec<Point<D>> = self.arm.places(self.joints);
+    fn reset_to_joints(&mut self) -> (Vec<Point<D>>, Vec<Point<D>>) {
+        let from: Vec<Point<D>> = self.arm.connector_positions(self.joints);
         let guide = self.chain.points().to_vec();
         self.chain.points_mut().copy_from_slice(&from);
         (from, guide)
     }
 
     /// Returns the posture in which the joints follow a part of a motion.
-    fn posed(&self, wanted: &Wanted<'_, D>, part: f64) -> Posed<D> {
+    fn solve_posture(&self, wanted: &ReferenceMotion<'_, D>, part: f64) -> ArmPosture<D> {
         let arm = self.arm;
         let on_the_way = |k: usize, to: Point<D>| match part < 1.0 {
-            true => between(wanted.from[k], to, part),
+            true => lerp(wanted.from[k], to, part),
             false => to,
         };
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();
-            places.map(|(k, to)| arm.in_base(on_the_way(k, *to))).collect::<Vec<_>>()
+            places.map(|(k, to)| arm.to_base(on_the_way(k, *to))).collect::<Vec<_>>()
         });
-        let on_its_way = |&Led { k, to }: &Led<D>| Led { k, to: on_the_way(k, to) };
-        let led: Vec<Led<D>> = wanted.led.iter().map(on_its_way).collect();
-        let aim = |led: &Led<D>| Aim { connector: led.k, at_m: arm.in_base(led.to) };
-        let aims: Vec<Aim> = led.iter().map(aim).collect();
-        let room = arm.follower.room(&self.before.joints, self.setting.world.dt_s);
-        let joints = arm.follower.follow(self.joints, &room, guide.as_deref(), &aims);
-        let points = arm.places(&joints);
-        Posed { joints, points, led }
+        let on_its_way =
+            |&LeadTarget { k, to }: &LeadTarget<D>| LeadTarget { k, to: on_the_way(k, to) };
+        let led: Vec<LeadTarget<D>> = wanted.led.iter().map(on_its_way).collect();
+        let aim =
+            |led: &LeadTarget<D>| ConnectorTarget { connector: led.k, at_m: arm.to_base(led.to) };
+        let aims: Vec<ConnectorTarget> = led.iter().map(aim).collect();
+        let room = arm.follower.reachable_ranges(&self.before.joints, self.setting.world.dt_s);
+        let joints = arm.follower.track(self.joints, &room, guide.as_deref(), &aims);
+        let points = arm.connector_positions(&joints);
+        ArmPosture { joints, points, led }
     }
 
     /// Returns the objection to a posture: of the joints, that do not take a connector to where it is led; of speeds;
     /// of the chain and all that is around it.
-    fn objection(&mut self, from: &[Point<D>], posed: &Posed<D>) -> Option<Veto<D>> {
+    fn find_veto(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<Veto<D>> {
         let follower = &self.arm.follower;
         let k = posed.led.first().map_or(0, |led| led.k);
         let veto = |by, reason| Veto { by, from: k, reason, obstacle: None, reached: from[k] };
-        let is_off = |led: &Led<D>| distance(posed.points[led.k], led.to) > follower.exact_m();
+        let is_off = |led: &LeadTarget<D>| {
+            distance(posed.points[led.k], led.to) > follower.arrival_tolerance_m()
+        };
         if posed.led.iter().any(is_off) {
             let is_at_limit = follower.is_at_limit(&posed.joints);
-            return Some(veto(k, if is_at_limit { Reason::JointLimit } else { Reason::StepLimit }));
+            return Some(veto(
+                k,
+                if is_at_limit { VetoReason::JointLimit } else { VetoReason::StepLimit },
+            ));
         }
         let is_fast = |i: &usize| self.is_too_fast(*i, from[*i], posed.points[*i]);
         if let Some(by) = (0..from.len()).find(is_fast) {
-            return Some(veto(by, Reason::StepLimit));
+            return Some(veto(by, VetoReason::StepLimit));
         }
-        let Setting { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.setting;
         let is_solid = world.rules.self_collision;
         let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
-        let objection = space.objection(&posed.points);
-        let tunnels = |(by, id)| Veto { obstacle: Some(id), ..veto(by, Reason::WouldTunnel) };
-        objection.or_else(|| self.passes(from, posed).map(tunnels))
+        let objection = space.find_veto(&posed.points);
+        let tunnels = |(by, id)| Veto { obstacle: Some(id), ..veto(by, VetoReason::WouldTunnel) };
+        objection.or_else(|| self.find_tunneling(from, posed).map(tunnels))
     }
 
     /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
@@ -267,30 +280,36 @@ impl<'a, const D: usize> Jointed<'a, D> {
     }
 
     /// Returns the rod's outer connector and the obstacle that it would pass through on the way to a posture, if any.
-    fn passes(&mut self, from: &[Point<D>], posed: &Posed<D>) -> Option<(usize, u32)> {
+    fn find_tunneling(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<(usize, u32)> {
         self.chain.points_mut().copy_from_slice(&posed.points);
-        let passed = passed(self.chain, from, self.setting.obstacles, 0.0);
+        let passed = find_tunneling(self.chain, from, self.setting.obstacles, 0.0);
         self.chain.points_mut().copy_from_slice(from);
         passed.map(|passed| (passed.rod + 1, passed.obstacle))
     }
 
     /// Returns the least clearance that the chain has, or would have, at some places.
     fn clearance_m(&mut self, points: &[Point<D>]) -> f64 {
-        let Setting { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.setting;
         let was = self.chain.points().to_vec();
         self.chain.points_mut().copy_from_slice(points);
-        let (least_m, _) = least_clearance(self.chain, obstacles, world.look_m, true);
+        let (least_m, _) = min_clearance(self.chain, obstacles, world.look_m, true);
         self.chain.points_mut().copy_from_slice(&was);
         least_m
     }
 
-    fn take(&mut self, posed: Posed<D>) {
+    fn adopt(&mut self, posed: ArmPosture<D>) {
         self.chain.points_mut().copy_from_slice(&posed.points);
         *self.joints = posed.joints;
     }
 }
 
 /// Returns the motion of an initiator whose joints move it without the chain's help.
-fn alone<const D: usize>(k: usize) -> Moved<D> {
-    Moved { touched: k..k + 1, changed: 1, rotated: 0, max_slave_step_m: 0.0, cut_short: None }
+fn initiator_only_motion<const D: usize>(k: usize) -> CompletedMotion<D> {
+    CompletedMotion {
+        touched: k..k + 1,
+        changed: 1,
+        rotated: 0,
+        max_slave_step_m: 0.0,
+        cut_short: None,
+    }
 }

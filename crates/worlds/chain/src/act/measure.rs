@@ -1,25 +1,25 @@
 //! Measures of a chain at the end of each of its cycles.
 
-use super::{Acting, Setting};
-use crate::clearance::{least_clearance, own_gap_m};
+use super::{ActState, ChainContext};
+use crate::clearance::{min_clearance, self_gap_m};
 use crate::events::EventKind;
-use crate::metrics::PENETRATION_M;
+use crate::metrics::PENETRATION_THRESHOLD_M;
 use crate::rods::geometry::distance;
-use crate::rods::own_body::OwnBody;
+use crate::rods::rod_bvh::RodBvh;
 
 /// Most rods of a chain whose own parts are measured in each cycle.
-const MOST_LOOKED_AT: usize = 32;
+const MAX_MEASURED_RODS: usize = 32;
 /// Number of cycles between two measurements of longer ones.
-const LOOKS_EVERY: u64 = 16;
+const MEASURE_INTERVAL_CYCLES: u64 = 16;
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
 pub(super) fn measure<const D: usize>(
-    setting: Setting<'_, D>,
-    acting: &mut Acting<'_, D>,
-    own: &mut OwnBody<D>,
+    setting: ChainContext<'_, D>,
+    acting: &mut ActState<'_, D>,
+    own: &mut RodBvh<D>,
     robots_gap_m: f64,
 ) {
-    let Setting { world, now, obstacles, .. } = setting;
+    let ChainContext { world, now, obstacles, .. } = setting;
     let (look_m, dt_s) = (world.look_m, world.dt_s);
     let (chain, tally) = (&acting.body.chain, &mut acting.body.tally);
     tally.steps += 1;
@@ -32,19 +32,20 @@ pub(super) fn measure<const D: usize>(
         tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
     }
     // Parts that cross stay so for long, so a long chain need not look every time.
-    let looks = chain.rods().len() <= MOST_LOOKED_AT || now.is_multiple_of(LOOKS_EVERY);
+    let looks =
+        chain.rods().len() <= MAX_MEASURED_RODS || now.is_multiple_of(MEASURE_INTERVAL_CYCLES);
     if is_whole && looks && world.rules.self_collision {
         let within_m = tally.min_own_gap_m.min(look_m);
-        let gap_m = own_gap_m(chain, own, within_m);
+        let gap_m = self_gap_m(chain, own, within_m);
         tally.min_own_gap_m = if gap_m < within_m { gap_m } else { tally.min_own_gap_m };
     }
-    let (least_m, part) = least_clearance(chain, obstacles, look_m, is_whole);
+    let (least_m, part) = min_clearance(chain, obstacles, look_m, is_whole);
     if least_m < look_m {
         tally.min_clearance_m = tally.min_clearance_m.min(least_m);
     }
-    let is_inside = least_m.min(robots_gap_m) < -PENETRATION_M;
-    if tally.note_inside(is_inside) {
+    let is_inside = least_m.min(robots_gap_m) < -PENETRATION_THRESHOLD_M;
+    if tally.record_inside(is_inside) {
         let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
-        acting.told.tell(chain, kind, part, (-least_m).max(0.0));
+        acting.told.record(chain, kind, part, (-least_m).max(0.0));
     }
 }

@@ -1,7 +1,7 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
-//! Its inputs are in a [`Setting`], a small context that is copied and that nothing changes: the world, the chain's
-//! share of it, the cycle and the obstacles around. Everything that it changes is in [`Acting`]: the chain's body,
+//! Its inputs are in a [`ChainContext`], a small context that is copied and that nothing changes: the world, the chain's
+//! share of it, the cycle and the obstacles around. Everything that it changes is in [`ActState`]: the chain's body,
 //! beside the places from which it set out, and the books of events and notes. The parts are functions over these
 //! two, or over less where they need less; joints, robots on wheels, agents and escapes have small structs of their
 //! own. Decisions go one way, as values: an escape says whether the chain is pressed, a driver has a
@@ -20,46 +20,46 @@
 
 mod bounds;
 mod broken;
+mod defer;
+mod desired_move;
 mod drive;
+mod event_sink;
 mod follow;
-mod foresee;
 mod gather;
-mod go;
+mod initiator;
 mod joints;
-mod later;
+mod lookahead;
 mod measure;
-mod obey;
+mod negotiation;
+mod orders;
 mod outcome;
 mod plan;
 mod situation;
-mod talk;
 mod tasks;
 #[cfg(test)]
 mod tests;
-mod told;
 mod wheels;
-mod wish;
 
 use super::deploy::Deployment;
-use super::driver::{Objection, Task};
+use super::driver::{Task, VetoRecord};
 use super::events::{Event, EventKind};
 use super::rods::geometry::{Bounds, Point, distance};
 use super::rods::obstacle::Obstacles;
 use super::rods::propagate::Propagator;
 use super::rods::veto::Veto;
-use super::scratch::Places;
+use super::scratch::PositionBuffer;
 use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
-use bounds::Escaping;
+use bounds::EscapeContext;
+use desired_move::{CycleInputs, InitiatorContext};
+use event_sink::EventSink;
+use negotiation::Negotiation;
 use sidestep_kernel::stream::{Draws, Purpose};
-use sidestep_kernel::{Cycle, Slot, Turn};
-use talk::Talk;
-use told::Told;
-use wish::{Guide, Heard};
+use sidestep_kernel::{Cycle, PhaseContext, Slot};
 
 /// The setting in which a chain acts: nothing changes it during the cycle.
 #[derive(Clone, Copy)]
-struct Setting<'a, const D: usize> {
+struct ChainContext<'a, const D: usize> {
     world: &'a ChainWorld<D>,
     spec: &'a ChainSpec<D>,
     slot: Slot,
@@ -70,34 +70,34 @@ struct Setting<'a, const D: usize> {
 /// The initiator of a chain in a cycle.
 #[derive(Clone, Copy)]
 struct Initiator<'a, const D: usize> {
-    setting: Setting<'a, D>,
+    setting: ChainContext<'a, D>,
     task: &'a Task<D>,
-    follows: Follows,
+    follows: FollowMode,
 }
 
 /// Ways in which the rest of a chain follows its initiator.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Follows {
+enum FollowMode {
     /// At once, moved by one process.
     AtOnce,
     /// At once, each connector moved by its agent.
     AsTeam,
     /// Later, because nothing can object: only the initiator moves for now.
-    Later,
+    Deferred,
 }
 
 /// A chain as it acts: what its cycle changes.
-struct Acting<'a, const D: usize> {
+struct ActState<'a, const D: usize> {
     body: &'a mut Body<D>,
     /// The places where it was before the cycle.
-    before: &'a Places<D>,
+    before: &'a PositionBuffer<D>,
     propagator: &'a mut Propagator<D>,
-    talk: Talk<'a, D>,
-    told: Told<'a, D>,
+    talk: Negotiation<'a, D>,
+    told: EventSink<'a, D>,
 }
 
 /// Lets the chains of one conflict group act, one after the other.
-pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mut [Slot]) {
+pub(crate) fn act<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, group: &mut [Slot]) {
     group.sort_unstable();
     for &slot in &*group {
         act_one(turn, group, slot);
@@ -106,49 +106,54 @@ pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mu
 
 /// Lets one chain of a conflict group act.
 pub(crate) fn act_one<const D: usize>(
-    turn: &mut Turn<'_, ChainWorld<D>>,
+    turn: &mut PhaseContext<'_, ChainWorld<D>>,
     group: &[Slot],
     slot: Slot,
 ) {
-    let &mut Turn { world, state, now, .. } = turn;
+    let &mut PhaseContext { world, state, now, .. } = turn;
     let claim = state.claim(slot as usize);
     let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
     turn.scratch.around.gather(world, state, now + 1, group.iter().copied().filter(meets));
-    cycle(turn, slot, claim);
+    run_cycle(turn, slot, claim);
 }
 
 /// Makes one cycle of a chain, which stays in its claim.
-fn cycle<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: Slot, claim: Bounds<D>) {
-    let &mut Turn { world, state, now, .. } = turn;
+fn run_cycle<const D: usize>(
+    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    slot: Slot,
+    claim: Bounds<D>,
+) {
+    let &mut PhaseContext { world, state, now, .. } = turn;
     let scratch = &mut *turn.scratch;
     let spec = &world.chains[slot as usize];
-    let setting = Setting { world, spec, slot, now, obstacles: &scratch.around.all };
+    let setting = ChainContext { world, spec, slot, now, obstacles: &scratch.around.all };
     let notes = scratch.notes.as_deref_mut().filter(|notes| notes.slot == slot);
-    let mut told = Told { slot, now, events: &mut scratch.events, notes };
+    let mut told = EventSink { slot, now, events: &mut scratch.events, notes };
     let mut body = state.body_mut(slot as usize);
     let body = &mut *body;
-    broken::change(setting, body, &mut told);
-    let heard = Heard { decision: state.decision(slot as usize), orders: obey::taken(body) };
-    let follows = Follows::of(setting, body);
-    if follows != Follows::Later {
+    broken::apply_changes(setting, body, &mut told);
+    let heard =
+        CycleInputs { decision: state.decision(slot as usize), orders: orders::take_orders(body) };
+    let follows = FollowMode::choose(setting, body);
+    if follows != FollowMode::Deferred {
         body.catch_up();
-        scratch.before.note(body);
-        scratch.escaped.note(body);
+        scratch.before.record(body);
+        scratch.escaped.record(body);
     }
     let (escaper, escaped) = (scratch.escaper.as_mut(), &mut scratch.escaped);
-    let mut escaping = Escaping { escaper, escaped, claim };
+    let mut escaping = EscapeContext { escaper, escaped, claim };
     let (before, propagator) = (&scratch.before, &mut scratch.propagator);
-    let talk = Talk::new(scratch.shown.as_mut());
-    let mut acting = Acting { body, before, propagator, talk, told };
-    if follows == Follows::Later {
-        let guide = Guide { heard, follows, escaping: &escaping, is_pressed: false };
-        drive::drive(setting, &mut acting, &guide);
+    let talk = Negotiation::new(scratch.shown.as_mut());
+    let mut acting = ActState { body, before, propagator, talk, told };
+    if follows == FollowMode::Deferred {
+        let guide = InitiatorContext { heard, follows, escaping: &escaping, is_pressed: false };
+        drive::run_task(setting, &mut acting, &guide);
         acting.body.tally.steps += 1;
         return;
     }
     match acting.body.scattered {
-        Some(_) => gather::come_together(setting, acting.body, &mut acting.told),
-        None => carry_on(setting, &mut acting, &mut escaping, heard, follows),
+        Some(_) => gather::gather_parts(setting, acting.body, &mut acting.told),
+        None => act_whole_chain(setting, &mut acting, &mut escaping, heard, follows),
     }
     let (solid, seen) = (scratch.around.solid(), &mut scratch.seen);
     let robots_gap_m = follow::follow(setting, &mut acting, solid, seen);
@@ -156,31 +161,31 @@ fn cycle<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: Slot, claim: 
 }
 
 /// Lets a whole chain get out of the way, carry out its task, and stay in its claim.
-fn carry_on<const D: usize>(
-    setting: Setting<'_, D>,
-    acting: &mut Acting<'_, D>,
-    escaping: &mut Escaping<'_, D>,
-    heard: Heard,
-    follows: Follows,
+fn act_whole_chain<const D: usize>(
+    setting: ChainContext<'_, D>,
+    acting: &mut ActState<'_, D>,
+    escaping: &mut EscapeContext<'_, D>,
+    heard: CycleInputs,
+    follows: FollowMode,
 ) {
-    let is_pressed = escaping.get_out_of_the_way(setting, acting);
-    let guide = Guide { heard, follows, escaping, is_pressed };
-    let driven = drive::drive(setting, acting, &guide);
-    if follows == Follows::AsTeam {
-        talk::rest(setting, acting);
+    let is_pressed = escaping.escape(setting, acting);
+    let guide = InitiatorContext { heard, follows, escaping, is_pressed };
+    let driven = drive::run_task(setting, acting, &guide);
+    if follows == FollowMode::AsTeam {
+        negotiation::negotiate_rest(setting, acting);
     }
-    let veto = escaping.keep_to_bounds(setting, acting.body, acting.before);
+    let veto = escaping.enforce_claim(setting, acting.body, acting.before);
     if let Some(veto) = &veto {
-        acting.vetoed(veto);
+        acting.record_veto(veto);
     }
     let Some(errand) = driven.errand else { return };
     if let Some(veto) = &veto {
-        obey::is_told(acting.body, veto);
+        orders::record_result_veto(acting.body, veto);
     }
-    obey::answer(acting.body, &errand, driven.gives_way);
+    orders::complete_result(acting.body, &errand, driven.gives_way);
 }
 
-impl<'a, const D: usize> Setting<'a, D> {
+impl<'a, const D: usize> ChainContext<'a, D> {
     /// Returns the present task; none after the last.
     fn task(self, body: &Body<D>) -> Option<&'a Task<D>> {
         self.spec.tasks.get(body.driving.task as usize)
@@ -194,7 +199,7 @@ impl<'a, const D: usize> Setting<'a, D> {
 
 impl<const D: usize> Initiator<'_, D> {
     /// Returns the place of the initiator.
-    fn at(self, body: &Body<D>) -> Point<D> {
+    fn position(self, body: &Body<D>) -> Point<D> {
         body.chain.points()[self.task.agent]
     }
 
@@ -204,25 +209,25 @@ impl<const D: usize> Initiator<'_, D> {
     }
 }
 
-impl Follows {
+impl FollowMode {
     /// Returns how a chain follows its initiator in this cycle.
-    fn of<const D: usize>(setting: Setting<'_, D>, body: &Body<D>) -> Self {
+    fn choose<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> Self {
         match setting.world.deployment {
             Deployment::Team => Self::AsTeam,
-            Deployment::Direct if later::may_put_off(setting, body) => Self::Later,
+            Deployment::Direct if defer::may_defer(setting, body) => Self::Deferred,
             Deployment::Direct => Self::AtOnce,
         }
     }
 }
 
-impl<const D: usize> Acting<'_, D> {
+impl<const D: usize> ActState<'_, D> {
     /// Counts a veto; of several in a row by one connector for one reason only the first is an
     /// event.
-    fn vetoed(&mut self, veto: &Veto<D>) {
+    fn record_veto(&mut self, veto: &Veto<D>) {
         let Self { body, before, told, .. } = self;
         body.tally.add_veto(veto.reason);
-        told.note(|notes| notes.vetoes.push(*veto));
-        let objection = Some(Objection { by: veto.by as u32, reason: veto.reason });
+        told.trace(|notes| notes.vetoes.push(*veto));
+        let objection = Some(VetoRecord { by: veto.by as u32, reason: veto.reason });
         let driving = &mut body.driving;
         if driving.told.is_none() || driving.objection != objection {
             let way_m = distance(veto.reached, before.points[veto.from]);

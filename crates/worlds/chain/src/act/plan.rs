@@ -1,27 +1,29 @@
 //! Ways that are planned once local rules come no nearer to a target.
 
-use super::{Acting, Initiator, Setting};
-use crate::arms::plan::{Errand, JointSpace, Posture, Postures, RodSpace, plan, plan_joints};
+use super::{ActState, ChainContext, Initiator};
+use crate::arms::plan::{
+    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
+};
 use crate::driver::Targets;
 use crate::events::EventKind;
 use crate::rods::geometry::{Point, distance};
-use crate::rods::passage::passed;
-use crate::scratch::Places;
-use crate::state::{Body, Plan};
+use crate::rods::tunneling::find_tunneling;
+use crate::scratch::PositionBuffer;
+use crate::state::{Body, MotionPlan};
 use crate::world::purpose;
 use sidestep_kernel::InputError;
 use std::collections::VecDeque;
 
 /// Least part of a piece of the way that a cycle is worth.
-const LEAST_PART: f64 = 1e-6;
+const MIN_FRACTION: f64 = 1e-6;
 /// Part of the limit that a step along a plan aims at.
-const SLOWER: f64 = 0.99;
+const STEP_LIMIT_FRACTION: f64 = 0.99;
 
 /// Plans a way to the next target if local rules have come no nearer for long enough; if there
 /// was none, again after twice that time, because the search takes long where there is no way.
-pub(super) fn plan_if_late<const D: usize>(
+pub(super) fn plan_if_stuck<const D: usize>(
     who: Initiator<'_, D>,
-    acting: &mut Acting<'_, D>,
+    acting: &mut ActState<'_, D>,
     targets: &Targets<D>,
 ) {
     let Initiator { setting, task, .. } = who;
@@ -34,9 +36,9 @@ pub(super) fn plan_if_late<const D: usize>(
     }
     let next = body.driving.next;
     let (k, target) = (task.agent, targets.places[next as usize]);
-    let errand = Errand { k, target, tolerance_m: 0.5 * targets.tolerance_m };
+    let errand = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
     // A chain without a base, or a target out of range, has no plan.
-    let found = planned(setting, body, &errand).ok().flatten();
+    let found = find_path(setting, body, &errand).ok().flatten();
     let rungs = &mut body.tally.rungs;
     let (kind, value) = match &found {
         Some(plan) => {
@@ -48,38 +50,38 @@ pub(super) fn plan_if_late<const D: usize>(
             (EventKind::NotPlanned, f64::from(next))
         }
     };
-    acting.told.tell(&body.chain, kind, k, value);
+    acting.told.record(&body.chain, kind, k, value);
     body.plan = found;
 }
 
 /// Searches a way: of an arm's joints, else of rods.
-fn planned<const D: usize>(
-    setting: Setting<'_, D>,
+fn find_path<const D: usize>(
+    setting: ChainContext<'_, D>,
     body: &Body<D>,
-    errand: &Errand<D>,
-) -> Result<Option<Plan<D>>, InputError> {
+    errand: &PlanningQuery<D>,
+) -> Result<Option<MotionPlan<D>>, InputError> {
     let draws = &mut setting.draws(purpose::PLAN);
-    let Setting { world, spec, obstacles, .. } = setting;
+    let ChainContext { world, spec, obstacles, .. } = setting;
     let (chain, rules) = (&body.chain, world.rules);
     if let (Some(arm), Some(joints)) = (spec.arm.as_deref(), &body.joints) {
         let solid = rules.self_collision;
         let space = JointSpace::new(arm, joints, chain, obstacles, solid, errand.k);
         let way = plan_joints(&space, errand, draws)?;
-        return Ok(way.map(|way| Plan::Joints(way.into())));
+        return Ok(way.map(|way| MotionPlan::Joints(way.into())));
     }
     let way = plan(chain, obstacles, rules, errand, draws)?;
-    Ok(way.map(|way| Plan::Rods(way.into())))
+    Ok(way.map(|way| MotionPlan::Rods(way.into())))
 }
 
 /// Returns the next place of the initiator on its planned way.
-pub(super) fn planned_place<const D: usize>(
+pub(super) fn next_waypoint<const D: usize>(
     who: Initiator<'_, D>,
     body: &Body<D>,
 ) -> Option<Point<D>> {
     match body.plan.as_ref()? {
-        Plan::Rods(way) => Some(way.front()?[who.task.agent]),
-        Plan::Joints(way) => {
-            let places = who.setting.spec.arm.as_ref()?.places(way.front()?);
+        MotionPlan::Rods(way) => Some(way.front()?[who.task.agent]),
+        MotionPlan::Joints(way) => {
+            let places = who.setting.spec.arm.as_ref()?.connector_positions(way.front()?);
             places.get(who.task.agent).copied()
         }
     }
@@ -90,11 +92,13 @@ pub(super) fn planned_place<const D: usize>(
 pub(super) fn follow_plan<const D: usize>(
     who: Initiator<'_, D>,
     body: &mut Body<D>,
-    before: &Places<D>,
+    before: &PositionBuffer<D>,
 ) {
     body.plan = match body.plan.take() {
-        Some(Plan::Rods(way)) => follow_rods(who, body, way).map(Plan::Rods),
-        Some(Plan::Joints(way)) => follow_joints(who, body, &before.joints, way).map(Plan::Joints),
+        Some(MotionPlan::Rods(way)) => follow_rods(who, body, way).map(MotionPlan::Rods),
+        Some(MotionPlan::Joints(way)) => {
+            follow_joints(who, body, &before.joints, way).map(MotionPlan::Joints)
+        }
         None => None,
     };
 }
@@ -103,15 +107,15 @@ pub(super) fn follow_plan<const D: usize>(
 fn follow_rods<const D: usize>(
     who: Initiator<'_, D>,
     body: &mut Body<D>,
-    mut way: VecDeque<Posture<D>>,
-) -> Option<VecDeque<Posture<D>>> {
-    let Setting { world, obstacles, .. } = who.setting;
+    mut way: VecDeque<ChainPosture<D>>,
+) -> Option<VecDeque<ChainPosture<D>>> {
+    let ChainContext { world, obstacles, .. } = who.setting;
     let solid = world.rules.self_collision;
     let space = RodSpace::new(&body.chain, obstacles, solid, who.task.agent).ok()?;
     let (from, to) = (space.present(), way.front()?);
-    let at = |posture: &Posture<D>| posture.clone();
-    let (next, is_there) = Most::of(who).step(&space, &from, to, 1.0, at);
-    if !space.is_way_free(&from, &next) || !goes(who, body, &from, &next) {
+    let at = |posture: &ChainPosture<D>| posture.clone();
+    let (next, is_there) = StepLimits::from_initiator(who).step(&space, &from, to, 1.0, at);
+    if !space.is_path_free(&from, &next) || !move_along(who, body, &from, &next) {
         return None;
     }
     if is_there {
@@ -128,26 +132,28 @@ fn follow_joints<const D: usize>(
     joints_before: &[f64],
     mut way: VecDeque<Vec<f64>>,
 ) -> Option<VecDeque<Vec<f64>>> {
-    let Setting { world, spec, obstacles, .. } = who.setting;
+    let ChainContext { world, spec, obstacles, .. } = who.setting;
     let (arm, joints) = (spec.arm.as_deref()?, body.joints.clone()?);
     if joints != joints_before {
         return Some(way);
     }
     let (chain, solid) = (&body.chain, world.rules.self_collision);
     let space = JointSpace::new(arm, &joints, chain, obstacles, solid, who.task.agent);
-    let (dt_s, to, mut most_m) = (world.dt_s, way.front()?, Most::of(who));
+    let (dt_s, to, mut most_m) = (world.dt_s, way.front()?, StepLimits::from_initiator(who));
     if let Some(escape) = &world.escape {
         most_m.joint = most_m.joint.min(escape.speed_max_m_s * dt_s);
     }
-    let part = arm.follower.part_in(&joints, to, dt_s);
-    let at = |values: &Vec<f64>| -> Posture<D> { arm.places(values) };
+    let part = arm.follower.reachable_fraction(&joints, to, dt_s);
+    let at = |values: &Vec<f64>| -> ChainPosture<D> { arm.connector_positions(values) };
     let (mut next, is_there) = most_m.step(&space, &joints, to, part, at);
     // Ways of exactly the greatest speed are not longer by rounding.
-    for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.room(&joints, dt_s)) {
+    for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.reachable_ranges(&joints, dt_s)) {
         *x = x.clamp(lower, upper);
     }
     let from = chain.points().to_vec();
-    if !space.is_way_free(&joints, &next) || !goes(who, body, &from, &arm.places(&next)) {
+    if !space.is_path_free(&joints, &next)
+        || !move_along(who, body, &from, &arm.connector_positions(&next))
+    {
         return None;
     }
     body.joints = Some(next);
@@ -158,7 +164,7 @@ fn follow_joints<const D: usize>(
 }
 
 /// Moves the chain to the next places on a planned way, unless it would pass through something.
-fn goes<const D: usize>(
+fn move_along<const D: usize>(
     who: Initiator<'_, D>,
     body: &mut Body<D>,
     from: &[Point<D>],
@@ -166,7 +172,7 @@ fn goes<const D: usize>(
 ) -> bool {
     let (chain, agent) = (&mut body.chain, who.task.agent);
     chain.points_mut().copy_from_slice(next);
-    if passed(chain, from, who.setting.obstacles, 0.0).is_some() {
+    if find_tunneling(chain, from, who.setting.obstacles, 0.0).is_some() {
         chain.points_mut().copy_from_slice(from);
         return false;
     }
@@ -176,7 +182,7 @@ fn goes<const D: usize>(
 }
 
 /// Longest ways in a cycle, meters.
-struct Most {
+struct StepLimits {
     agent: usize,
     /// Longest way of the initiator.
     led: f64,
@@ -184,25 +190,25 @@ struct Most {
     joint: f64,
 }
 
-impl Most {
-    fn of<const D: usize>(who: Initiator<'_, D>) -> Self {
+impl StepLimits {
+    fn from_initiator<const D: usize>(who: Initiator<'_, D>) -> Self {
         let joint = who.setting.world.rules.joint_step_max_m;
         Self { agent: who.task.agent, led: who.step_m(), joint }
     }
 
     /// Returns the posture on the way from one to another that a cycle is enough for, at most a `part` of it, and
     /// whether it is that one. `at` tells where the connectors of a posture are.
-    fn step<const D: usize, S: Postures>(
+    fn step<const D: usize, S: ConfigurationSpace>(
         &self,
         space: &S,
         from: &S::Posture,
         to: &S::Posture,
         mut part: f64,
-        at: impl Fn(&S::Posture) -> Posture<D>,
+        at: impl Fn(&S::Posture) -> ChainPosture<D>,
     ) -> (S::Posture, bool) {
         let start = at(from);
-        let mut next = space.at(from, to, part);
-        while part >= LEAST_PART {
+        let mut next = space.interpolate(from, to, part);
+        while part >= MIN_FRACTION {
             let points = at(&next);
             let ways_m = start.iter().zip(&points).map(|(a, b)| distance(*a, *b));
             let led = distance(start[self.agent], points[self.agent]) / self.led;
@@ -210,8 +216,8 @@ impl Most {
             if excess <= 1.0 {
                 break;
             }
-            part *= SLOWER / excess;
-            next = space.at(from, to, part);
+            part *= STEP_LIMIT_FRACTION / excess;
+            next = space.interpolate(from, to, part);
         }
         (next, part >= 1.0)
     }

@@ -1,12 +1,12 @@
 //! An initiator's knowledge of where it is.
 
 use super::Initiator;
-use crate::driver::{Driver, Task};
-use crate::motion::replan::Situation;
+use crate::driver::{Task, TaskKind};
+use crate::motion::recovery::Situation;
 use crate::rods::chain::{Chain, Connector, Mobility};
 use crate::rods::geometry::distance;
 use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::{Reason, Veto};
+use crate::rods::veto::{Veto, VetoReason};
 use crate::state::Body;
 
 /// Extra distance, beyond a chain's own look, at which a moving obstacle may still come near,
@@ -15,12 +15,12 @@ const MOVER_NEAR_M: f64 = 1.0;
 
 /// Returns an initiator's knowledge beside its neighborhood.
 pub(super) fn situation<const D: usize>(who: Initiator<'_, D>, body: &Body<D>) -> Situation {
-    let at = who.at(body);
+    let at = who.position(body);
     let near_m = who.setting.world.look_m + MOVER_NEAR_M;
     let is_near = |o: &Obstacle<D>| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m;
     let goal_distance_m = goal_distance_m(who.task, body);
     let (can_turn, keeps_heading) = match &who.task.driver {
-        Driver::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
+        TaskKind::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
         _ => (false, false),
     };
     let movers_near = who.setting.obstacles.moving().iter().any(is_near);
@@ -29,15 +29,15 @@ pub(super) fn situation<const D: usize>(who: Initiator<'_, D>, body: &Body<D>) -
 
 /// Returns the distance of an initiator from its target, if it has one.
 pub(super) fn goal_distance_m<const D: usize>(task: &Task<D>, body: &Body<D>) -> Option<f64> {
-    let Driver::Targets(targets) = &task.driver else { return None };
+    let TaskKind::Targets(targets) = &task.driver else { return None };
     let place = targets.places.get(body.driving.next as usize);
     place.map(|place| distance(body.chain.points()[task.agent], *place))
 }
 
 /// Returns the objection of an initiator that would leave the range of coordinates.
-pub(super) fn beyond<const D: usize>(chain: &Chain<D>, by: usize) -> Veto<D> {
+pub(super) fn out_of_range_veto<const D: usize>(chain: &Chain<D>, by: usize) -> Veto<D> {
     let reached = chain.points()[by];
-    Veto { by, from: by, reason: Reason::Limit, obstacle: None, reached }
+    Veto { by, from: by, reason: VetoReason::Limit, obstacle: None, reached }
 }
 
 /// Returns whether a chain is held somewhere.

@@ -1,29 +1,29 @@
 //! The ends of tasks: done, over in time, or given up.
 
-use super::told::Told;
-use super::{Initiator, Setting};
-use crate::driver::{Driver, Task};
+use super::event_sink::EventSink;
+use super::{ChainContext, Initiator};
+use crate::driver::{Task, TaskKind};
 use crate::events::{Event, EventKind};
-use crate::metrics::GivenUp;
+use crate::metrics::AbandonedPart;
 use crate::state::Body;
 
 /// Returns how a task ends that has come to its end: a list of targets none of which was reached is not done.
-pub(super) fn ending<const D: usize>(task: &Task<D>, body: &Body<D>) -> EventKind {
-    if !matches!(task.driver, Driver::Targets(_)) {
+pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &Body<D>) -> EventKind {
+    if !matches!(task.driver, TaskKind::Targets(_)) {
         return EventKind::Done;
     }
     let driving = &body.driving;
-    let is_of_now = |what: &&GivenUp| what.task == driving.task;
+    let is_of_now = |what: &&AbandonedPart| what.task == driving.task;
     let given_up = body.tally.given_up.iter().filter(is_of_now).count();
     // Targets that time has cut off are neither.
     if driving.next as usize > given_up { EventKind::Done } else { EventKind::GivenUp }
 }
 
 /// Ends the present task, done or given up, and starts the next.
-pub(super) fn next_task<const D: usize>(
-    setting: Setting<'_, D>,
+pub(super) fn start_next_task<const D: usize>(
+    setting: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
     how: EventKind,
 ) {
     let Some(task) = setting.task(body) else { return };
@@ -32,32 +32,32 @@ pub(super) fn next_task<const D: usize>(
     let driving = &mut body.driving;
     let next = setting.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
     let ended = f64::from(driving.task);
-    driving.next_task(next.agent, body.chain.points());
+    driving.start_next_task(next.agent, body.chain.points());
     body.tally.done += u64::from(how == EventKind::Done);
     body.motions =
         setting.spec.motions(&body.driving).expect("scripts are tried when they are compiled");
-    told.tell(&body.chain, how, task.agent, ended);
+    told.record(&body.chain, how, task.agent, ended);
 }
 
 /// Gives up a task that made no progress for too long. Around a target there is always some way
 /// to go, so there the time counts in which none of them led nearer.
-pub(super) fn lose_patience<const D: usize>(
+pub(super) fn give_up_if_stuck<const D: usize>(
     who: Initiator<'_, D>,
     body: &mut Body<D>,
-    told: &mut Told<'_, D>,
+    told: &mut EventSink<'_, D>,
 ) {
     let Initiator { setting, task, .. } = who;
     let tried = body.driving.idle.max(body.driving.late);
-    if setting.world.starts_s(u64::from(tried)) <= task.patience_s {
+    if setting.world.start_time_s(u64::from(tried)) <= task.patience_s {
         return;
     }
     let objection = body.driving.objection;
     let reason = objection.map(|objection| objection.reason);
     let undone = match &task.driver {
-        Driver::Targets(targets) => 1.0 / targets.places.len() as f64,
-        _ => 1.0 - setting.world.part_done(body, task),
+        TaskKind::Targets(targets) => 1.0 / targets.places.len() as f64,
+        _ => 1.0 - setting.world.fraction_done(body, task),
     };
-    body.tally.given_up.push(GivenUp {
+    body.tally.given_up.push(AbandonedPart {
         task: body.driving.task,
         part: body.driving.next,
         nearest_m: body.driving.nearest_m,
@@ -66,14 +66,14 @@ pub(super) fn lose_patience<const D: usize>(
         reason: reason.map(|reason| reason.name().into()),
     });
     match task.driver {
-        Driver::Targets(_) => {
+        TaskKind::Targets(_) => {
             let by = objection.map_or(task.agent, |objection| objection.by as usize);
             let target = f64::from(body.driving.next);
             let event = told.event(&body.chain, EventKind::TargetGivenUp, by, target);
             told.events.push(Event { reason, ..event });
             body.plan = None;
-            body.driving.next_part();
+            body.driving.advance_part();
         }
-        _ => next_task(setting, body, told, EventKind::GivenUp),
+        _ => start_next_task(setting, body, told, EventKind::GivenUp),
     }
 }

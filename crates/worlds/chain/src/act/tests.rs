@@ -1,13 +1,13 @@
 //! Whole runs of small scenarios: what chains do to each other, and what is told of it.
 
 use crate::events::EventKind;
-use crate::metrics::Tally;
+use crate::metrics::ChainTally;
 use crate::rods::geometry::distance;
-use crate::scenario::Compiled;
+use crate::scenario::ChainScenario;
 use crate::state::Snapshot;
 use crate::{
-    Chain, ChainRun, ChainState, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request,
-    Rod, Source,
+    Chain, ChainRun, ChainState, Connector, Motion, Obstacle, Obstacles, Propagator, Request,
+    RequestSource, Rod, VetoEffect,
 };
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
@@ -19,12 +19,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Returns a run of a scenario in the plane.
 fn run(text: &str) -> ChainRun<2> {
     let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{text}"), root());
-    Compiled::new(&source).unwrap_or_else(|error| panic!("{error}")).start(&source, 1)
+    ChainScenario::new(&source).unwrap_or_else(|error| panic!("{error}")).start(&source, 1)
 }
 
 /// Advances a run; returns the names and values of its events.
 fn told(run: &mut ChainRun<2>, cycles: u64) -> Vec<(String, f64)> {
-    run.begin_recording();
+    run.start_recording();
     let mut rows = MemoryRecorder::new(&run.schemas());
     while run.cycle() < cycles && !run.is_over() {
         run.advance(1);
@@ -86,12 +86,12 @@ fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
     for (told, (kind, value)) in given_up.into_iter().zip(expected) {
         assert_eq!((told.0.as_str(), told.1), (kind, value), "{events:?}");
     }
-    let tally = none.world().metrics_of(none.state(), 0).tally;
+    let tally = none.world().chain_metrics(none.state(), 0).tally;
     assert!(none.is_over() && tally.done == 0 && count(&events, "done") == 0, "{events:?}");
 
     let mut some = run(&held("[[10.0, 0.0], [-0.5, 0.5]]"));
     let events = told(&mut some, 2000);
-    let tally = some.world().metrics_of(some.state(), 0).tally;
+    let tally = some.world().chain_metrics(some.state(), 0).tally;
     // The target and its task.
     assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
 }
@@ -112,7 +112,7 @@ fn a_task_whose_time_ends_before_it_reached_a_target_is_given_up_and_not_done() 
         let events = told(&mut run, 2000);
         assert_eq!(count(&events, "target"), reached, "{targets_m}: {events:?}");
         assert_eq!(events.last(), Some(&(ends.to_owned(), 0.0)), "{targets_m}: {events:?}");
-        let tally = run.world().metrics_of(run.state(), 0).tally;
+        let tally = run.world().chain_metrics(run.state(), 0).tally;
         let is_done = usize::from(ends == "done");
         assert_eq!(tally.done as usize, reached + is_done, "{targets_m}: {events:?}");
     }
@@ -266,7 +266,8 @@ fn the_time_for_which_scattered_parts_have_waited_is_a_part_of_the_state() {
 
     // Also without its counts a chain that is restored gives up when it would have.
     let world = run.world();
-    let state = ChainState::restore(world, &after, vec![Tally::default()]).expect("its own state");
+    let state =
+        ChainState::restore(world, &after, vec![ChainTally::default()]).expect("its own state");
     let waited = |state: &ChainState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
     assert!(waited(&state).is_some_and(|cycles| cycles > 100), "{:?}", waited(&state));
     assert_eq!(waited(&state), waited(run.state()));
@@ -301,13 +302,13 @@ const LIFT: &str = "<robot name='lift'><link name='base'/><link name='c'/><link 
     <limit lower='-2.5' upper='2.5' velocity='3'/></joint>\
     <joint name='tip' type='fixed'><parent link='b'/><child link='tool'/><origin xyz='0.3 0 0'/></joint></robot>";
 
-fn lift(target_m: &str, more: &str) -> Compiled<3> {
+fn lift(target_m: &str, more: &str) -> ChainScenario<3> {
     let text = format!(
         "format = 1\nworld = \"chain\"\nseed = 1\ncycles = 250\n[chain]\ndimensions = 3\n{more}\n[[chains]]\n\
          arm = {{ urdf_text = \"{LIFT}\", joints = [0.3, 0.5, 0.5] }}\nradius_m = 0.03\n[[chains.tasks]]\n\
          kind = \"targets\"\nconnector = 3\ntargets_m = [{target_m}]\nspeed_m_s = 0.3\n"
     );
-    Compiled::new(&Text::new("s.toml", text, "")).unwrap_or_else(|error| panic!("{error}"))
+    ChainScenario::new(&Text::new("s.toml", text, "")).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -323,7 +324,7 @@ fn an_arm_whose_rod_can_close_plans_like_any_other() {
     let compiled = lift("[0.35, -0.45, 0.3]", pole);
     let mut run = compiled.start(&Text::new("s.toml", "", ""), 1);
     run.advance(250);
-    let tally = run.world().metrics_of(run.state(), 0).tally;
+    let tally = run.world().chain_metrics(run.state(), 0).tally;
     assert!(tally.rungs.planned + tally.rungs.not_planned > 0, "{tally:?}");
 }
 
@@ -337,7 +338,7 @@ fn a_literal_escape_of_very_many_steps_is_refused() {
              [[chains]]\nconnectors = 3\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n"
         )
     };
-    let compiled = |text: String| Compiled::<2>::new(&Text::new("s.toml", text, ""));
+    let compiled = |text: String| ChainScenario::<2>::new(&Text::new("s.toml", text, ""));
     let error = compiled(text("1e5", "literal")).expect_err("too many steps");
     assert!(error.cause().contains("flee 2e3 m in a cycle"), "{error}");
     assert!(
@@ -355,15 +356,15 @@ fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
         Chain::straight([0.0; 2], [-1.0, 0.0], 3, rod, Connector::free(0.05)).expect("a chain");
     let ball = Obstacles::new(vec![Obstacle::ball(0, [0.0, 99.0], 0.1)], 1.0).expect("a ball");
     let motion = Motion::Connector { k: 0, to: [2.0, 0.0] };
-    let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
+    let request = Request { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
     let interrupt = Interrupt::default();
     interrupt.raise();
     let moved = || {
-        let _heeded = interrupt.heeded_here();
+        let _heeded = interrupt.attach();
         Propagator::default().propagate(&mut chain, &ball, &request)
     };
     let payload = catch_unwind(AssertUnwindSafe(moved)).expect_err("it unwinds");
-    assert!(interrupt.explains(payload.as_ref()));
+    assert!(interrupt.caused(payload.as_ref()));
 }
 
 /// Chains side by side, so many that they are sorted, which wander into each other.
@@ -374,9 +375,9 @@ const MANY: &str = "seed = 1\ncycles = 200\n[[chains]]\nconnectors = 3\ncount = 
 fn many_chains_join_the_same_groups_on_any_number_of_workers_and_never_overlap() {
     let digest = |workers: usize| {
         let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{MANY}"), "");
-        let compiled = Compiled::<2>::new(&source).expect("valid");
+        let compiled = ChainScenario::<2>::new(&source).expect("valid");
         let mut run = compiled.start(&source, workers);
-        run.share_always();
+        run.force_parallel();
         run.advance(200);
         assert_eq!(run.metrics().penetrations, 0, "{workers} workers");
         run.digest()

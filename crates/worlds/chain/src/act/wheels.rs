@@ -1,70 +1,70 @@
 //! An initiator on wheels: the link between the swarm's leader and this world (slides N1 to N6).
 
-use super::go::{give_way, go};
-use super::outcome::Went;
-use super::{Acting, Initiator};
-use crate::driver::Driver;
+use super::initiator::{move_initiator, wait_for_escape};
+use super::outcome::MoveResult;
+use super::{ActState, Initiator};
+use crate::driver::TaskKind;
 use crate::formation::Robot;
-use crate::navigate::{Goal, Navigator};
-use crate::rods::geometry::{Point, distance, in_dimensions, toward};
+use crate::navigate::{NavigationGoal, Navigator};
+use crate::rods::geometry::{Point, distance, move_toward, with_dimensions};
 use crate::state::Body;
-use crate::swarm::drive::{Pose, Wheels};
-use crate::swarm::follower::pace;
+use crate::swarm::drive::{Pose2, Wheels};
+use crate::swarm::follower::speed_fraction;
 use crate::swarm::leader::Decision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 
 /// Time for which a leader stands and waits for a robot that is late, s.
-const WAITS_S: f64 = 3.0;
+const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;
 /// Part of its speed at which it goes on after that, because a robot that is blocked by another one may get
 /// free only once their connectors are elsewhere.
-const GOES_ON: f64 = 0.25;
+const RESUME_SPEED_FRACTION: f64 = 0.25;
 /// Part of the gap to another robot that a leader leaves in a cycle: the other one may take a fifth of it.
-const LEFT_TO_OTHERS: f64 = 0.25;
+const SHARED_GAP_FRACTION: f64 = 0.25;
 
 /// Angle between two headings that differ by rounding at most.
-pub(super) const SAME_RAD: f64 = 1e-9;
+pub(super) const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 
 /// A step on wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Steered {
+pub(super) struct WheelStep {
     /// The pose to which it leads.
-    pub(super) pose: Pose,
+    pub(super) pose: Pose2,
     /// The navigator's decision on it, at full speed.
     wheels: Wheels,
 }
 
 /// A navigator and the chain that it leads.
-pub(super) struct Wheeled<'a, const D: usize> {
+pub(super) struct NavigatorContext<'a, const D: usize> {
     pub(super) who: Initiator<'a, D>,
     pub(super) navigator: &'a Navigator,
     pub(super) body: &'a mut Body<D>,
 }
 
 /// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
-pub(super) fn go_on_wheels<const D: usize>(
+pub(super) fn drive_on_wheels<const D: usize>(
     who: Initiator<'_, D>,
-    acting: &mut Acting<'_, D>,
-    steered: Steered,
+    acting: &mut ActState<'_, D>,
+    steered: WheelStep,
 ) {
-    let Driver::Navigate(navigator) = &who.task.driver else { return };
-    let Steered { pose, wheels } = steered;
+    let TaskKind::Navigate(navigator) = &who.task.driver else { return };
+    let WheelStep { pose, wheels } = steered;
     if comes_too_near(acting.body, who.task.agent, pose.at) {
-        give_way(who, acting);
-        return Wheeled { who, navigator, body: acting.body }.turn_where_blocked(wheels);
+        wait_for_escape(who, acting);
+        return NavigatorContext { who, navigator, body: acting.body }.turn_if_blocked(wheels);
     }
-    let was = who.at(acting.body);
-    let went = go(who, acting, in_dimensions(pose.at));
-    let mut wheeled = Wheeled { who, navigator, body: acting.body };
+    let was = who.position(acting.body);
+    let went = move_initiator(who, acting, with_dimensions(pose.at));
+    let mut wheeled = NavigatorContext { who, navigator, body: acting.body };
     match went {
-        Went::Ahead => wheeled.has_steered(pose.heading_rad),
+        MoveResult::Ahead => wheeled.update_heading(pose.heading_rad),
         // A robot whose connector was pulled away follows it on its wheels.
-        Went::Nowhere if wheeled.has_robots() && who.at(wheeled.body) != was => {}
-        Went::Nowhere => wheeled.turn_where_blocked(wheels),
+        MoveResult::Nowhere if wheeled.has_robots() && who.position(wheeled.body) != was => {}
+        MoveResult::Nowhere => wheeled.turn_if_blocked(wheels),
     }
 }
 
 /// Turns a navigator's robot on the spot.
-pub(super) fn face<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
+pub(super) fn turn_robot<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
     if let Some(leader) = &mut body.driving.leader {
         leader.pose.heading_rad = heading_rad;
     }
@@ -81,27 +81,27 @@ fn comes_too_near<const D: usize>(body: &Body<D>, agent: usize, to: Point<2>) ->
     others.any(|other| {
         let was_m = distance(robot.pose.at, other) - apart_m;
         let gap_m = distance(to, other) - apart_m;
-        gap_m < was_m && gap_m < LEFT_TO_OTHERS * was_m.max(0.0)
+        gap_m < was_m && gap_m < SHARED_GAP_FRACTION * was_m.max(0.0)
     })
 }
 
-impl<const D: usize> Wheeled<'_, D> {
+impl<const D: usize> NavigatorContext<'_, D> {
     fn has_robots(&self) -> bool {
         self.who.setting.spec.robots.is_some()
     }
 
     /// Returns whether a navigator has reached its goal.
     pub(super) fn has_arrived(&self) -> bool {
-        let at = in_dimensions(self.who.at(self.body));
+        let at = with_dimensions(self.who.position(self.body));
         let index = self.body.driving.next as usize;
         self.navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
     }
 
     /// Returns the step that a navigator's wheels would make as it has decided.
-    pub(super) fn steered(&mut self, decision: Decision) -> Steered {
+    pub(super) fn steer(&mut self, decision: Decision) -> WheelStep {
         let world = self.who.setting.world;
-        self.find_itself();
-        let pace = self.pace();
+        self.locate();
+        let pace = self.speed_fraction();
         let body = &mut *self.body;
         let driving = &mut body.driving;
         driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
@@ -111,37 +111,37 @@ impl<const D: usize> Wheeled<'_, D> {
             false if decision.is_mover_ahead => body.stood,
             false => 0,
         };
-        let mut leader = body.leader(self.who.task);
+        let mut leader = body.leader_state(self.who.task);
         leader.followed = decision.followed;
         body.driving.leader = Some(leader);
         body.tally.layers[decision.layer as usize - 1] += 1;
-        let waited_s = world.starts_s(u64::from(body.driving.rested));
-        let pace = if waited_s > WAITS_S { GOES_ON } else { pace };
-        let slowed = decision.wheels.slowed(pace);
+        let waited_s = world.start_time_s(u64::from(body.driving.rested));
+        let pace = if waited_s > LATE_ROBOT_TIMEOUT_S { RESUME_SPEED_FRACTION } else { pace };
+        let slowed = decision.wheels.scaled(pace);
         let pose = self.navigator.drive.step(leader.pose, slowed, world.dt_s);
-        Steered { pose, wheels: decision.wheels }
+        WheelStep { pose, wheels: decision.wheels }
     }
 
     /// Finds the place of a navigator whose task begins on the line to its goal.
-    fn find_itself(&mut self) {
+    fn locate(&mut self) {
         if let (None, Some(goal)) = (&self.body.driving.leader, &self.navigator.goal) {
-            let at = in_dimensions(self.who.at(self.body));
-            self.body.driving.next = goal.begins(at) as u32;
+            let at = with_dimensions(self.who.position(self.body));
+            self.body.driving.next = goal.start_index(at) as u32;
         }
     }
 
     /// Returns where the connector of a navigator has to go to be at its robot again, from which escapes or
     /// a pull by the other end have taken it; none while it is there. Where an escape has just moved it, it
     /// stays.
-    pub(super) fn back_at_its_robot(&self, has_fled: bool) -> Option<Point<D>> {
+    pub(super) fn robot_return_target(&self, has_fled: bool) -> Option<Point<D>> {
         let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
-        let (at, robot) = (self.who.at(self.body), in_dimensions(leader.pose.at));
-        (at != robot).then(|| if has_fled { at } else { toward(at, robot, self.who.step_m()) })
+        let (at, robot) = (self.who.position(self.body), with_dimensions(leader.pose.at));
+        (at != robot).then(|| if has_fled { at } else { move_toward(at, robot, self.who.step_m()) })
     }
 
     /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
     /// its own wheels led, because it followed its connector since.
-    pub(super) fn faces_elsewhere(&self) -> Option<f64> {
+    pub(super) fn turn_target_rad(&self) -> Option<f64> {
         let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
         let [x, y, _] = self.body.driving.ahead;
         let off_rad = wrap_angle(atan2(y, x) - leader.pose.heading_rad);
@@ -149,37 +149,39 @@ impl<const D: usize> Wheeled<'_, D> {
         let most = drive.max_wheel_m_s();
         let most_rad = drive.turn_rad_s(Wheels::new(-most, most)) * dt_s;
         let turn_rad = off_rad.clamp(-most_rad, most_rad);
-        (off_rad.abs() > SAME_RAD).then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
+        (off_rad.abs() > HEADING_TOLERANCE_RAD)
+            .then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
     }
 
     /// Updates a navigator that has moved, by a heading that the chain did not object to.
-    fn has_steered(&mut self, heading_rad: f64) {
-        let at: Point<2> = in_dimensions(self.who.at(self.body));
+    fn update_heading(&mut self, heading_rad: f64) {
+        let at: Point<2> = with_dimensions(self.who.position(self.body));
         let driving = &mut self.body.driving;
         let Some(leader) = &mut driving.leader else { return };
-        leader.pose = Pose { at, heading_rad };
+        leader.pose = Pose2 { at, heading_rad };
         driving.ahead = [cos(heading_rad), sin(heading_rad), 0.0];
         if let Some(goal) = &self.navigator.goal {
-            driving.next = goal.passed(at, driving.next as usize) as u32;
-            if let Goal::Target { at: target, .. } = goal {
+            driving.next = goal.reached_index(at, driving.next as usize) as u32;
+            if let NavigationGoal::Target { at: target, .. } = goal {
                 driving.nearest_m = driving.nearest_m.min(distance(at, *target));
             }
         }
     }
 
     /// Turns a navigator whose way is blocked on the spot, if it can.
-    fn turn_where_blocked(&mut self, wheels: Wheels) {
+    fn turn_if_blocked(&mut self, wheels: Wheels) {
         let Some(leader) = self.body.driving.leader else { return };
-        let wheels = self.navigator.leader.when_blocked(wheels);
+        let wheels = self.navigator.leader.blocked_wheels(wheels);
         let turned = self.navigator.drive.step(leader.pose, wheels, self.who.setting.world.dt_s);
-        self.has_steered(turned.heading_rad);
+        self.update_heading(turned.heading_rad);
     }
 
     /// Returns the part of its speed at which a leader may go, so that the latest robot keeps up.
-    fn pace(&self) -> f64 {
+    fn speed_fraction(&self) -> f64 {
         let Some(robots) = &self.who.setting.spec.robots else { return 1.0 };
-        let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, in_dimensions(*at));
+        let lag_m =
+            |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, with_dimensions(*at));
         let lags_m = self.body.robots.iter().zip(self.body.chain.points()).map(lag_m);
-        pace(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
+        speed_fraction(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
     }
 }

@@ -5,27 +5,29 @@ mod clock;
 mod follow;
 mod lead;
 
-use super::control::{Ended, Led};
+use super::control::{ExecutedMotion, LeaderOutcome};
 use super::link::Link;
-use super::message::{Message, Motion, Packet};
-use super::side::{Both, Side};
-use super::sight::{Role, Sight};
+use super::message::{Message, MotionProtocol, Packet};
+use super::percept::{ConnectorPercept, Role};
+use super::side::{PerSide, Side};
 use super::traffic::Traffic;
-use crate::motion::replan::Rungs;
+use crate::motion::recovery::RecoveryLimits;
 use crate::rods::chain::{Chain, Rod};
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::alone::Alone;
+use crate::rods::propagate::local_solver::LocalSolver;
 use crate::rods::rules::Rules;
 use crate::world::ChainWorld;
-use climb::Climbing;
-use follow::Following;
-use lead::Leading;
-use sidestep_kernel::network::{Patience, Refusal, Refused, Seal, TalkId, digest, open};
+use climb::RecoveryProgress;
+use follow::SlaveMotion;
+use lead::LeadState;
+use sidestep_kernel::network::{
+    ConversationId, DropCounts, DropReason, PacketHeader, RetryPolicy, digest, parse_packet,
+};
 use sidestep_kernel::{Cycle, EntityId, InputError};
 
 /// Most packets that wait for the beginning of their cycle.
-const MOST_HELD: usize = 64;
+const MAX_HELD_PACKETS: usize = 64;
 
 /// The program aboard one connector of a chain.
 ///
@@ -41,30 +43,30 @@ pub struct ConnectorAgent<const D: usize> {
     /// Digests of scenario and build, and of the ids of its chain's connectors.
     fingerprint: u64,
     members: u64,
-    radio: Option<Radio>,
-    rungs: Rungs,
+    radio: Option<RadioTimeouts>,
+    rungs: RecoveryLimits,
     /// The rods to its neighbors.
-    rods: Both<Option<Rod>>,
-    alone: Alone<D>,
+    rods: PerSide<Option<Rod>>,
+    alone: LocalSolver<D>,
     /// Obstacles that its sensors see in this cycle.
     obstacles: Obstacles<D>,
     /// The cycle; none before the first.
     cycle: Option<Cycle>,
     began: u64,
     now: u64,
-    place: Track<D>,
-    beside: Both<Option<Track<D>>>,
-    links: Both<Option<Link<Message<D>>>>,
-    missing: Both<Option<u32>>,
+    place: TentativePosition<D>,
+    beside: PerSide<Option<TentativePosition<D>>>,
+    links: PerSide<Option<Link<Message<D>>>>,
+    missing: PerSide<Option<u32>>,
     /// Packets of a cycle that has not begun here yet.
     held: Vec<(Side, Cycle, Packet<D>)>,
-    following: Option<Following>,
-    leading: Option<Leading<D>>,
-    climbing: Option<Climbing<D>>,
+    following: Option<SlaveMotion>,
+    leading: Option<LeadState<D>>,
+    climbing: Option<RecoveryProgress<D>>,
     /// Number of the motion that it makes in this cycle.
     goes_in: Option<u32>,
-    led: Option<Led>,
-    ended: Option<Ended<D>>,
+    led: Option<ExecutedMotion>,
+    ended: Option<LeaderOutcome<D>>,
     is_silent: bool,
     /// Whether the leader has finished, and whether time is up.
     is_over: bool,
@@ -72,20 +74,20 @@ pub struct ConnectorAgent<const D: usize> {
     is_late: bool,
     traffic: Traffic,
     /// Packets that it has dropped since it was started.
-    refused: Refused,
+    refused: DropCounts,
 }
 
 /// The time for which it waits for others, where messages may get lost.
 #[derive(Debug, Clone, Copy)]
-struct Radio {
-    patience: Patience,
+struct RadioTimeouts {
+    patience: RetryPolicy,
     /// Number of ticks after which the talk of a cycle ends.
     ticks: u64,
 }
 
 /// A packet on its way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Outgoing {
+pub struct OutgoingPacket {
     /// Id of the neighbor that it is for.
     pub to: EntityId,
     /// Its number among the sender's of the cycle.
@@ -96,7 +98,7 @@ pub struct Outgoing {
 
 /// A place while a motion is prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Track<const D: usize> {
+struct TentativePosition<const D: usize> {
     /// The place outside of motions,
     settled: Point<D>,
     /// after the sub-steps that are accepted,
@@ -105,14 +107,14 @@ struct Track<const D: usize> {
     now: Point<D>,
 }
 
-impl<const D: usize> Track<D> {
-    fn at(place: Point<D>) -> Self {
+impl<const D: usize> TentativePosition<D> {
+    fn new(place: Point<D>) -> Self {
         Self { settled: place, base: place, now: place }
     }
 
     /// Begins another motion.
-    fn begin(&mut self) {
-        *self = Self::at(self.settled);
+    fn start(&mut self) {
+        *self = Self::new(self.settled);
     }
 
     /// Accepts the present sub-step.
@@ -121,13 +123,13 @@ impl<const D: usize> Track<D> {
     }
 
     /// Takes the present sub-step back.
-    fn take_back(&mut self) {
+    fn revert(&mut self) {
         self.now = self.base;
     }
 
     /// Ends the motion.
-    fn settle(&mut self, goes: bool) {
-        *self = Self::at(if goes { self.now } else { self.settled });
+    fn finish(&mut self, goes: bool) {
+        *self = Self::new(if goes { self.now } else { self.settled });
     }
 }
 
@@ -139,46 +141,52 @@ impl<const D: usize> ConnectorAgent<D> {
     /// When the world has no such connector.
     pub fn new(world: &ChainWorld<D>, chain: EntityId, connector: u32) -> Self {
         let spec = &world.chains[chain as usize];
-        let mut agent = Self::of(&spec.start, connector, &world.rules, world.rungs);
+        let mut agent = Self::from_chain(&spec.start, connector, &world.rules, world.rungs);
         agent.first_id = world.first_id(chain);
         agent.fingerprint = world.fingerprint;
-        agent.members = members(agent.first_id, agent.n);
-        agent.radio = world
-            .network
-            .as_ref()
-            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
+        agent.members = member_digest(agent.first_id, agent.n);
+        agent.radio = world.network.as_ref().map(|network| RadioTimeouts {
+            patience: network.retry_policy(),
+            ticks: network.deadline_ticks(),
+        });
         agent
     }
 
     /// Returns the same agent, which talks only with agents of the same build.
     #[must_use]
-    pub fn of_build(self, build: &str) -> Self {
+    pub fn with_build(self, build: &str) -> Self {
         let fingerprint = digest([build.as_bytes(), &self.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
     }
 
     /// Returns the agent of connector `k` of a chain, on a network that loses nothing.
-    pub(crate) fn of(chain: &Chain<D>, k: u32, rules: &Rules, rungs: Rungs) -> Self {
+    pub(crate) fn from_chain(
+        chain: &Chain<D>,
+        k: u32,
+        rules: &Rules,
+        rungs: RecoveryLimits,
+    ) -> Self {
         let n = chain.points().len() as u32;
-        let rod = |side: Side| side.of(k, n).map(|j| chain.rod_between(k as usize, j as usize));
+        let rod =
+            |side: Side| side.neighbor(k, n).map(|j| chain.rod_between(k as usize, j as usize));
         Self {
             me: k,
             n,
             first_id: 0,
             fingerprint: 0,
-            members: members(0, n),
+            members: member_digest(0, n),
             radio: None,
             rungs,
-            rods: Both::of(rod),
-            alone: Alone::new(chain, k as usize, rules),
+            rods: PerSide::from_fn(rod),
+            alone: LocalSolver::new(chain, k as usize, rules),
             obstacles: Obstacles::default(),
             cycle: None,
             began: 0,
             now: 0,
-            place: Track::at(chain.points()[k as usize]),
-            beside: Both::default(),
-            links: Both::default(),
-            missing: Both::default(),
+            place: TentativePosition::new(chain.points()[k as usize]),
+            beside: PerSide::default(),
+            links: PerSide::default(),
+            missing: PerSide::default(),
             held: Vec::new(),
             following: None,
             leading: None,
@@ -191,15 +199,17 @@ impl<const D: usize> ConnectorAgent<D> {
             is_closed: false,
             is_late: false,
             traffic: Traffic::default(),
-            refused: Refused::default(),
+            refused: DropCounts::default(),
         }
     }
 
     /// Returns the same agent on a network that may lose messages.
     #[cfg(test)]
-    pub(crate) fn on(self, network: Option<&sidestep_kernel::network::Network>) -> Self {
-        let radio = network
-            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
+    pub(crate) fn with_network(self, network: Option<&sidestep_kernel::network::Network>) -> Self {
+        let radio = network.map(|network| RadioTimeouts {
+            patience: network.retry_policy(),
+            ticks: network.deadline_ticks(),
+        });
         Self { radio, ..self }
     }
 
@@ -209,7 +219,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Returns a word for its part in the present cycle, for people.
-    pub fn part(&self) -> &'static str {
+    pub fn role_name(&self) -> &'static str {
         match () {
             () if self.is_done() => "done",
             () if self.climbing.is_some() || self.leading.is_some() => "lead",
@@ -222,64 +232,65 @@ impl<const D: usize> ConnectorAgent<D> {
     ///
     /// # Errors
     /// When a number of the sight makes no sense; then the agent is as before.
-    pub fn begin(&mut self, sight: Sight<D>, tick: u64) -> Result<(), InputError> {
-        self.obstacles.set_moving(&sight.checked(self.me, self.n)?)?;
+    pub fn start(&mut self, sight: ConnectorPercept<D>, tick: u64) -> Result<(), InputError> {
+        self.obstacles.set_moving(&sight.validated_obstacles(self.me, self.n)?)?;
         self.alone.set_max_bend_rad(sight.max_bend_rad)?;
         (self.cycle, self.began, self.now) = (Some(sight.cycle), tick, tick);
-        self.place = Track::at(sight.at.0);
+        self.place = TentativePosition::new(sight.at.0);
         let [below, above] = sight.neighbors;
         let track = |side| if side == Side::Below { below } else { above };
-        self.beside = Both::of(|side| track(side).map(|place| Track::at(place.0)));
+        self.beside =
+            PerSide::from_fn(|side| track(side).map(|place| TentativePosition::new(place.0)));
         // Where messages never get lost no agent finds out that another is back: those that were gone are
         // there again.
         let [below, above] = self.radio.map_or([None; 2], |_| sight.missing);
-        self.missing = Both::of(|side| if side == Side::Below { below } else { above });
+        self.missing = PerSide::from_fn(|side| if side == Side::Below { below } else { above });
         (self.following, self.leading, self.climbing) = (None, None, None);
         (self.goes_in, self.led, self.ended) = (None, None, None);
         self.is_silent = sight.is_silent;
         (self.is_over, self.is_closed, self.is_late) = (false, sight.is_silent, false);
         self.traffic = Traffic::default();
-        self.begin_links();
-        self.play(sight.role);
-        self.take_held(sight.cycle);
+        self.start_links();
+        self.start_role(sight.role);
+        self.receive_held(sight.cycle);
         Ok(())
     }
 
-    fn begin_links(&mut self) {
+    fn start_links(&mut self) {
         let (me, n, missing) = (self.me, self.n, self.missing);
         let patience = self.radio.map(|radio| radio.patience);
-        self.links = Both::of(|side| {
-            let neighbor = side.of(me, n)?;
+        self.links = PerSide::from_fn(|side| {
+            let neighbor = side.neighbor(me, n)?;
             let mut link = Link::new(patience, missing[side] == Some(neighbor));
             // Where messages get lost, neighbors find out in every cycle whether they are in touch.
             if patience.is_some() {
-                link.say(Message::Here);
+                link.push(Message::Here);
             }
             Some(link)
         });
     }
 
     /// Takes up its part in this cycle.
-    fn play(&mut self, role: Role<D>) {
+    fn start_role(&mut self, role: Role<D>) {
         let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
         match (role, missing) {
             (Role::Follows, _) => return,
-            (Role::Rests, _) => self.ended = Some(Ended::Rested),
-            (Role::Leads(_), Some(missing)) => self.ended = Some(Ended::Stands { missing }),
+            (Role::Rests, _) => self.ended = Some(LeaderOutcome::Rested),
+            (Role::Leads(_), Some(missing)) => self.ended = Some(LeaderOutcome::Stands { missing }),
             (Role::Leads(wish), None) => {
-                self.climbing = Some(Climbing::new(wish, self.place.base));
-                return self.run();
+                self.climbing = Some(RecoveryProgress::new(wish, self.place.base));
+                return self.process();
             }
         }
         self.finish(None);
     }
 
     /// Takes the packets that came before the cycle had begun here.
-    fn take_held(&mut self, cycle: Cycle) {
+    fn receive_held(&mut self, cycle: Cycle) {
         let held = std::mem::take(&mut self.held);
         for (side, its, packet) in held {
             match its.checked_sub(cycle) {
-                Some(0) => self.take(side, packet),
+                Some(0) => self.accept_packet(side, packet),
                 Some(1) => self.held.push((side, its, packet)),
                 _ => {}
             }
@@ -291,50 +302,50 @@ impl<const D: usize> ConnectorAgent<D> {
     pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
         self.now = self.now.max(tick);
         let Err(why) = self.receive(from, bytes) else { return };
-        self.refused.count(why);
+        self.refused.record(why);
         // A packet that comes too late is of no use, and no sender's fault.
-        self.traffic.dropped += u64::from(why != Refusal::Stale);
+        self.traffic.dropped += u64::from(why != DropReason::Stale);
     }
 
-    fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), Refusal> {
-        let (seal, message) = open::<Motion>(bytes, self.fingerprint)?;
-        let Seal { talk: TalkId { cycle, members, .. }, sender, .. } = seal;
-        let neighbor = |side: &Side| side.of(self.me, self.n).map(|k| self.first_id + k);
+    fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), DropReason> {
+        let (seal, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
+        let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } = seal;
+        let neighbor = |side: &Side| side.neighbor(self.me, self.n).map(|k| self.first_id + k);
         let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
-        let side = side.filter(|_| sender == from).ok_or(Refusal::Sender)?;
+        let side = side.filter(|_| sender == from).ok_or(DropReason::Sender)?;
         if members != self.members {
-            return Err(Refusal::OtherGroup);
+            return Err(DropReason::OtherGroup);
         }
-        let packet = Packet::read(message, self.n)?;
+        let packet = Packet::decode(message, self.n)?;
         // Of later cycles only the next one may have begun elsewhere.
         match self.cycle.map(|now| cycle.checked_sub(now)) {
-            Some(Some(0)) => self.take(side, packet),
-            Some(None) => return Err(Refusal::Stale),
-            None | Some(Some(1)) if self.held.len() < MOST_HELD => {
+            Some(Some(0)) => self.accept_packet(side, packet),
+            Some(None) => return Err(DropReason::Stale),
+            None | Some(Some(1)) if self.held.len() < MAX_HELD_PACKETS => {
                 self.held.push((side, cycle, packet));
             }
-            _ => return Err(Refusal::NoRoom),
+            _ => return Err(DropReason::NoRoom),
         }
         Ok(())
     }
 
     /// Returns the counts of packets that it has dropped since it was started.
-    pub fn refused(&self) -> Refused {
+    pub fn drop_counts(&self) -> DropCounts {
         self.refused
     }
 
-    fn take(&mut self, side: Side, packet: Packet<D>) {
+    fn accept_packet(&mut self, side: Side, packet: Packet<D>) {
         if self.is_silent {
             return;
         }
         let Some(link) = &mut self.links[side] else { return };
-        let messages = link.take(packet.parcel);
+        let messages = link.receive(packet.parcel);
         let beyond = packet.missing.filter(|k| side.has(*k, self.me));
-        self.misses(side, beyond);
+        self.mark_missing(side, beyond);
         for message in messages {
             self.on_message(side, message);
         }
-        self.run();
+        self.process();
     }
 
     fn on_message(&mut self, from: Side, message: Message<D>) {
@@ -345,7 +356,7 @@ impl<const D: usize> ConnectorAgent<D> {
             Message::Here => {}
             Message::Prepare(prepare) => self.on_prepare(from, &prepare),
             Message::Consent(consent) => self.on_consent(from, &consent),
-            Message::Object(objection) => self.on_objection(from, objection),
+            Message::Object(objection) => self.on_veto(from, objection),
             Message::Settle { request, goes } => self.on_settle(from, request, goes),
             Message::Over => self.finish(Some(from)),
             Message::AskEnd | Message::Order(_) => self.on_order(from, message),
@@ -354,16 +365,16 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Notes the lost connector on one side, and tells the other side if that is news. A leader stops.
-    fn misses(&mut self, side: Side, missing: Option<u32>) {
+    fn mark_missing(&mut self, side: Side, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
         }
         self.missing[side] = missing;
-        self.say(side.other(), Message::Here);
+        self.send(side.other(), Message::Here);
         if let Some(missing) = missing {
             self.give_up_leading();
             if self.climbing.take().is_some() {
-                self.ended = Some(Ended::Stands { missing });
+                self.ended = Some(LeaderOutcome::Stands { missing });
                 self.finish(None);
             }
         }
@@ -375,9 +386,9 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Says something to a neighbor, if there is one.
-    fn say(&mut self, to: Side, message: Message<D>) {
+    fn send(&mut self, to: Side, message: Message<D>) {
         if let Some(link) = &mut self.links[to] {
-            link.say(message);
+            link.push(message);
         }
     }
 
@@ -386,18 +397,18 @@ impl<const D: usize> ConnectorAgent<D> {
         self.give_up_leading();
         self.is_over = true;
         for side in Side::ALL.into_iter().filter(|side| Some(*side) != from) {
-            self.say(side, Message::Over);
+            self.send(side, Message::Over);
         }
     }
 
     /// Does all that is possible before the next message.
-    fn run(&mut self) {
-        while self.go_on_leading() || self.climb_on() {}
+    fn process(&mut self) {
+        while self.advance_leading() || self.continue_climb() {}
     }
 }
 
 /// Returns the digest of the ids of a chain's connectors.
-fn members(first_id: EntityId, n: u32) -> u64 {
+fn member_digest(first_id: EntityId, n: u32) -> u64 {
     let ids: Vec<EntityId> = (first_id..first_id + n).collect();
-    TalkId::new(0, Motion, &ids).members
+    ConversationId::new(0, MotionProtocol, &ids).members
 }

@@ -1,7 +1,7 @@
 //! Decision of an agent at the end of a cycle.
 
 use super::traffic::Traffic;
-use crate::motion::replan::{Climbed, Memory};
+use crate::motion::recovery::{RecoveryMemory, RecoveryOutcome};
 use crate::rods::geometry::Point;
 use crate::rods::veto::Veto;
 use serde::{Deserialize, Serialize};
@@ -15,11 +15,11 @@ pub struct Control<const D: usize> {
     /// The cycle.
     pub cycle: Cycle,
     /// Its motion.
-    pub goes: Goes<D>,
+    pub goes: ConnectorMove<D>,
     /// The motion that it led and that is carried out, if there is one.
-    pub led: Option<Led>,
+    pub led: Option<ExecutedMotion>,
     /// The end of its wish, if it leads the chain; none where time was up before.
-    pub ended: Option<Ended<D>>,
+    pub ended: Option<LeaderOutcome<D>>,
     /// The nearest lost connectors below and above.
     pub missing: [Option<u32>; 2],
     /// Whether time was up before its leader had finished.
@@ -30,7 +30,7 @@ pub struct Control<const D: usize> {
 
 /// Motion of a connector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Goes<const D: usize> {
+pub enum ConnectorMove<const D: usize> {
     /// It stays.
     Stays,
     /// It goes, in the motion with a number.
@@ -38,7 +38,7 @@ pub enum Goes<const D: usize> {
         /// The number.
         request: u32,
         /// Its new place, meters.
-        #[serde(with = "crate::rods::wire")]
+        #[serde(with = "crate::rods::serde_point")]
         to: Point<D>,
     },
     /// It has consented to a motion and heard nothing further of it: it goes if its master goes.
@@ -46,14 +46,14 @@ pub enum Goes<const D: usize> {
         /// The number of the motion.
         request: u32,
         /// Its new place, meters.
-        #[serde(with = "crate::rods::wire")]
+        #[serde(with = "crate::rods::serde_point")]
         to: Point<D>,
     },
 }
 
 /// A motion that is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Led {
+pub struct ExecutedMotion {
     /// Its number.
     pub request: u32,
     /// The first connector that takes part,
@@ -64,15 +64,15 @@ pub struct Led {
 
 /// End of a leader's wish.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Ended<const D: usize> {
+pub enum LeaderOutcome<const D: usize> {
     /// It was carried out, or not, by the ladder.
     Climbed {
         /// The rung.
-        climbed: Climbed<D>,
+        climbed: RecoveryOutcome<D>,
         /// The objection to the wish itself, if there was one.
         objection: Option<Veto<D>>,
         /// Its memory after that.
-        memory: Memory,
+        memory: RecoveryMemory,
     },
     /// The chain stands, because a connector is lost.
     Stands {

@@ -6,20 +6,20 @@
 //! hardly be alive and in touch, counts as lost, until something comes from it.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::network::Patience;
+use sidestep_kernel::network::RetryPolicy;
 use std::collections::{BTreeMap, VecDeque};
 
 /// Most messages that are kept because an earlier one is missing.
-const MOST_EARLY: u32 = 256;
+const MAX_EARLY_MESSAGES: u32 = 256;
 /// Most messages that wait for a confirmation: far more than honest agents ever cause. A neighbor that
 /// makes an agent say more is no longer answered in the cycle.
-const MOST_SAID: usize = 4096;
+const MAX_UNCONFIRMED_MESSAGES: usize = 4096;
 
 /// One end of a link, for the time of a cycle.
 #[derive(Debug, Clone)]
 pub(super) struct Link<M> {
     /// None where nothing is ever lost: then nothing is confirmed or sent again either.
-    patience: Option<Patience>,
+    patience: Option<RetryPolicy>,
     /// Repetitions until the neighbor counts as lost.
     tries: u32,
     /// Messages that are not confirmed, the first of which has the number `first`.
@@ -57,7 +57,7 @@ pub(super) struct Parcel<M> {
 impl<M: Clone> Link<M> {
     /// Returns a link over which nothing has gone yet. A neighbor that was lost in the cycle before is
     /// given up sooner.
-    pub(super) fn new(patience: Option<Patience>, was_lost: bool) -> Self {
+    pub(super) fn new(patience: Option<RetryPolicy>, was_lost: bool) -> Self {
         let tries = patience.map_or(0, |p| if was_lost { p.first_tries } else { p.tries });
         Self {
             patience,
@@ -78,23 +78,23 @@ impl<M: Clone> Link<M> {
     }
 
     /// Says something, which the next parcel carries.
-    pub(super) fn say(&mut self, message: M) {
-        if self.said.len() < MOST_SAID {
+    pub(super) fn push(&mut self, message: M) {
+        if self.said.len() < MAX_UNCONFIRMED_MESSAGES {
             self.said.push_back(message);
         }
     }
 
     /// Takes a parcel; returns the messages that are new, in order.
-    pub(super) fn take(&mut self, parcel: Parcel<M>) -> Vec<M> {
+    pub(super) fn receive(&mut self, parcel: Parcel<M>) -> Vec<M> {
         (self.is_heard, self.is_lost, self.unanswered) = (true, false, 0);
         let confirmed = (parcel.next.saturating_sub(self.first) as usize).min(self.sent);
         self.said.drain(..confirmed);
         (self.first, self.sent) = (self.first + confirmed as u32, self.sent - confirmed);
         self.owes |= !parcel.messages.is_empty();
         let numbered = parcel.messages.into_iter().enumerate();
-        for (k, message) in numbered.take(MOST_EARLY as usize) {
+        for (k, message) in numbered.take(MAX_EARLY_MESSAGES as usize) {
             let number = parcel.first.saturating_add(k as u32);
-            if number >= self.next && number - self.next < MOST_EARLY {
+            if number >= self.next && number - self.next < MAX_EARLY_MESSAGES {
                 self.early.entry(number).or_insert(message);
             }
         }
@@ -107,19 +107,19 @@ impl<M: Clone> Link<M> {
     }
 
     /// Returns the tick in which its patience ends; none while it waits for nothing.
-    pub(super) fn due(&self) -> Option<u64> {
+    pub(super) fn next_retry(&self) -> Option<u64> {
         let patience = self.patience.filter(|_| self.sent > 0 && !self.is_lost)?;
-        Some(self.since.saturating_add(patience.ticks_for(self.largest)))
+        Some(self.since.saturating_add(patience.timeout_ticks(self.largest)))
     }
 
     /// Notes the size of a packet that goes over it: a large one takes its time on the way.
-    pub(super) fn note_size(&mut self, bytes: usize) {
+    pub(super) fn record_size(&mut self, bytes: usize) {
         self.largest = self.largest.max(bytes);
     }
 
     /// Looks at the clock; returns whether the neighbor is lost from now on.
     pub(super) fn on_timer(&mut self, tick: u64) -> bool {
-        if self.due().is_none_or(|due| due > tick) {
+        if self.next_retry().is_none_or(|due| due > tick) {
             return false;
         }
         self.is_lost = self.unanswered >= self.tries;
@@ -129,7 +129,7 @@ impl<M: Clone> Link<M> {
     }
 
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
-    pub(super) fn parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
+    pub(super) fn next_parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
         let from = if self.again { 0 } else { self.sent };
         let confirms = self.owes && self.patience.is_some();
         if from == self.said.len() && !confirms {

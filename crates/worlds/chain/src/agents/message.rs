@@ -4,30 +4,30 @@
 use super::link::Parcel;
 use crate::rods::chain::is_in_range;
 use crate::rods::geometry::Point;
-use crate::rods::veto::{Outcome, Reason, Source, Veto};
-use crate::rods::wire::Place;
+use crate::rods::serde_point::WirePoint;
+use crate::rods::veto::{Outcome, RequestSource, Veto, VetoReason};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::network::{self, Draft, Refusal};
+use sidestep_kernel::network::{self, DropReason, PacketBuffer};
 use std::f64::consts::PI;
 
 /// Largest packet that is read, bytes; the largest that is ever sent is a fraction of it.
-const MOST_BYTES: usize = 1 << 16;
+const MAX_PACKET_BYTES: usize = 1 << 16;
 
 /// The subject of all that connectors say to each other in a cycle: a motion of their chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Motion;
+pub struct MotionProtocol;
 
-impl Motion {
+impl MotionProtocol {
     // Those of other worlds are below.
     const NUMBER: u8 = 2;
 }
 
-impl network::Topic for Motion {
+impl network::Protocol for MotionProtocol {
     fn number(self) -> u8 {
         Self::NUMBER
     }
 
-    fn of_number(number: u8) -> Option<Self> {
+    fn from_number(number: u8) -> Option<Self> {
         (number == Self::NUMBER).then_some(Self)
     }
 }
@@ -50,7 +50,7 @@ pub(super) enum Message<const D: usize> {
     /// A slave's "I can, and so can all beyond me that have to."
     Consent(Consent<D>),
     /// A slave's "I cannot, or one beyond me cannot."
-    Object(Objection),
+    Object(VetoMessage),
     /// A master's "All of that motion is carried out", or none of it.
     Settle {
         /// Number of the motion.
@@ -61,9 +61,9 @@ pub(super) enum Message<const D: usize> {
     /// A leader's question to the far end: "Where are you, and where does your rod point?"
     AskEnd,
     /// The answer: place, and direction out of the chain.
-    End(Place<D>, Option<Place<D>>),
+    End(WirePoint<D>, Option<WirePoint<D>>),
     /// A leader's order to the far end: "Lead a motion."
-    Order(Order<D>),
+    Order(LeadOrder<D>),
     /// The answer: its outcome; none if the target is beyond all coordinates.
     Done(Option<Outcome<D>>),
     /// A leader's word to all: "I have finished this cycle."
@@ -78,13 +78,13 @@ pub(super) struct Prepare<const D: usize> {
     /// Number of the sub-step; the one before is accepted.
     pub(super) sub_step: u32,
     /// The master before the sub-step,
-    #[serde(with = "crate::rods::wire")]
+    #[serde(with = "crate::rods::serde_point")]
     pub(super) mo: Point<D>,
     /// and after.
-    #[serde(with = "crate::rods::wire")]
+    #[serde(with = "crate::rods::serde_point")]
     pub(super) mn: Point<D>,
     /// The connector on the master's other side, if its place is settled.
-    pub(super) prev: Option<Place<D>>,
+    pub(super) prev: Option<WirePoint<D>>,
     /// Bend limit of the master, rad.
     pub(super) max_bend_rad: f64,
     /// Whether nothing in the world can object.
@@ -97,7 +97,7 @@ pub(super) struct Prepare<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Consent<const D: usize> {
     /// The slave's place after the sub-step.
-    #[serde(with = "crate::rods::wire")]
+    #[serde(with = "crate::rods::serde_point")]
     pub(super) at: Point<D>,
     /// Number of connectors that react, from the slave outward; 0 if it need not move.
     pub(super) touched: u32,
@@ -111,10 +111,10 @@ pub(super) struct Consent<const D: usize> {
 
 /// An objection on its way to the initiator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Objection {
+pub(super) struct VetoMessage {
     /// The connector that objects.
     pub(super) by: u32,
-    pub(super) reason: Reason,
+    pub(super) reason: VetoReason,
     pub(super) obstacle: Option<u32>,
     /// Whether a rod before it has found a way by turning,
     pub(super) has_turned: bool,
@@ -124,13 +124,13 @@ pub(super) struct Objection {
 
 /// A motion that another connector is to lead.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Order<const D: usize> {
+pub(super) struct LeadOrder<const D: usize> {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     /// The target.
-    #[serde(with = "crate::rods::wire")]
+    #[serde(with = "crate::rods::serde_point")]
     pub(super) to: Point<D>,
-    pub(super) source: Source,
+    pub(super) source: RequestSource,
     /// Whether there is no obstacle anywhere, and whether nothing in the world can object.
     pub(super) is_empty: bool,
     pub(super) is_open: bool,
@@ -140,34 +140,35 @@ pub(super) struct Order<const D: usize> {
 
 impl<const D: usize> Packet<D> {
     /// Returns its form on the network.
-    pub(super) fn draft(&self) -> Draft {
-        Draft::of(self)
+    pub(super) fn encode(&self) -> PacketBuffer {
+        PacketBuffer::from_message(self)
     }
 
     /// Reads the message of a packet, in a chain of `n` connectors.
     ///
     /// # Errors
     /// When it is none, or one that no agent sends.
-    pub(super) fn read(message: &[u8], n: u32) -> Result<Self, Refusal> {
-        if message.len() > MOST_BYTES {
-            return Err(Refusal::TooLarge);
+    pub(super) fn decode(message: &[u8], n: u32) -> Result<Self, DropReason> {
+        if message.len() > MAX_PACKET_BYTES {
+            return Err(DropReason::TooLarge);
         }
         let read = postcard::take_from_bytes::<Self>(message).ok();
-        let (packet, _) = read.filter(|(_, rest)| rest.is_empty()).ok_or(Refusal::Unreadable)?;
+        let (packet, _) = read.filter(|(_, rest)| rest.is_empty()).ok_or(DropReason::Unreadable)?;
         let is_right = packet.missing.is_none_or(|k| k < n)
-            && packet.parcel.messages.iter().all(|message| message.is_right(n));
-        if is_right { Ok(packet) } else { Err(Refusal::Unsound) }
+            && packet.parcel.messages.iter().all(|message| message.is_valid(n));
+        if is_right { Ok(packet) } else { Err(DropReason::Unsound) }
     }
 }
 
-fn is_length(length_m: f64) -> bool {
+fn is_valid_length(length_m: f64) -> bool {
     length_m.is_finite() && length_m >= 0.0
 }
 
 impl<const D: usize> Message<D> {
     /// Returns whether its numbers make sense in a chain of `n` connectors.
-    fn is_right(&self, n: u32) -> bool {
-        let is_place = |place: &Option<Place<D>>| place.is_none_or(|Place(at)| is_in_range(&at));
+    fn is_valid(&self, n: u32) -> bool {
+        let is_place =
+            |place: &Option<WirePoint<D>>| place.is_none_or(|WirePoint(at)| is_in_range(&at));
         match self {
             Self::Here | Self::AskEnd | Self::Over | Self::Done(None) | Self::Settle { .. } => true,
             Self::Prepare(p) => {
@@ -176,23 +177,23 @@ impl<const D: usize> Message<D> {
             }
             Self::Consent(c) => {
                 let counts = [c.touched, c.changed, c.rotated];
-                counts.iter().all(|&k| k < n) && is_in_range(&c.at) && is_length(c.longest_m)
+                counts.iter().all(|&k| k < n) && is_in_range(&c.at) && is_valid_length(c.longest_m)
             }
             Self::Object(objection) => objection.by < n,
             Self::End(at, ahead) => is_in_range(&at.0) && is_place(ahead),
             Self::Order(order) => is_in_range(&order.to),
-            Self::Done(Some(Outcome::Vetoed(veto))) => is_veto(veto, n),
+            Self::Done(Some(Outcome::Vetoed(veto))) => is_valid_veto(veto, n),
             Self::Done(Some(Outcome::Moved(moved))) => {
                 let touched = &moved.touched;
                 touched.start <= touched.end
                     && touched.end <= n as usize
-                    && is_length(moved.max_slave_step_m)
-                    && moved.cut_short.as_ref().is_none_or(|veto| is_veto(veto, n))
+                    && is_valid_length(moved.max_slave_step_m)
+                    && moved.cut_short.as_ref().is_none_or(|veto| is_valid_veto(veto, n))
             }
         }
     }
 }
 
-fn is_veto<const D: usize>(veto: &Veto<D>, n: u32) -> bool {
+fn is_valid_veto<const D: usize>(veto: &Veto<D>, n: u32) -> bool {
     veto.by.max(veto.from) < n as usize && is_in_range(&veto.reached)
 }

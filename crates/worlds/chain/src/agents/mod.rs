@@ -1,7 +1,7 @@
 //! Agents: the programs aboard the connectors of a chain, each with its own data.
 //!
 //! An agent knows its own connector, its two neighbors' messages, and the perception of its own sensors
-//! ([`Sight`]). It is a state machine without a clock, a socket or a thread: packets and ticks in,
+//! ([`ConnectorPercept`]). It is a state machine without a clock, a socket or a thread: packets and ticks in,
 //! packets out, and at the end of a cycle the motion of its connector ([`Control`]).
 //!
 //! ```text
@@ -23,18 +23,18 @@
 //! "go", after a veto "stay". One that has consented and hears neither goes if its master goes: it
 //! feels the rod. So a vetoed motion leaves every connector where it was, whatever is lost.
 
+pub(crate) mod chain_controls;
 mod connector;
 pub(crate) mod control;
-pub(crate) mod handed;
 mod link;
 mod message;
+pub(crate) mod percept;
 pub(crate) mod side;
-pub(crate) mod sight;
 pub(crate) mod traffic;
 
-pub use connector::{ConnectorAgent, Outgoing};
-pub use control::{Control, Ended, Goes, Led};
-pub use handed::Handed;
-pub use message::Motion;
-pub use sight::{Role, Seen, Shown, Sight, Wish};
+pub use chain_controls::ChainControls;
+pub use connector::{ConnectorAgent, OutgoingPacket};
+pub use control::{ConnectorMove, Control, ExecutedMotion, LeaderOutcome};
+pub use message::MotionProtocol;
+pub use percept::{ChainPercepts, ConnectorPercept, Intention, Role, SensedObstacle};
 pub use traffic::Traffic;

@@ -24,7 +24,7 @@ impl Side {
     }
 
     /// Returns the neighbor there of connector `k` of `n`, if there is one.
-    pub(crate) fn of(self, k: u32, n: u32) -> Option<u32> {
+    pub(crate) fn neighbor(self, k: u32, n: u32) -> Option<u32> {
         match self {
             Self::Below => k.checked_sub(1),
             Self::Above => (k + 1 < n).then_some(k + 1),
@@ -42,25 +42,25 @@ impl Side {
 
 /// One thing for each side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Both<T> {
+pub(crate) struct PerSide<T> {
     below: T,
     above: T,
 }
 
-impl<T> Both<T> {
+impl<T> PerSide<T> {
     /// Returns something for each side.
-    pub(crate) fn of(mut make: impl FnMut(Side) -> T) -> Self {
+    pub(crate) fn from_fn(mut make: impl FnMut(Side) -> T) -> Self {
         Self { below: make(Side::Below), above: make(Side::Above) }
     }
 
     /// Visits both.
-    pub(crate) fn each(&mut self, mut visit: impl FnMut(Side, &mut T)) {
+    pub(crate) fn for_each(&mut self, mut visit: impl FnMut(Side, &mut T)) {
         visit(Side::Below, &mut self.below);
         visit(Side::Above, &mut self.above);
     }
 }
 
-impl<T> std::ops::Index<Side> for Both<T> {
+impl<T> std::ops::Index<Side> for PerSide<T> {
     type Output = T;
 
     fn index(&self, side: Side) -> &T {
@@ -71,7 +71,7 @@ impl<T> std::ops::Index<Side> for Both<T> {
     }
 }
 
-impl<T> std::ops::IndexMut<Side> for Both<T> {
+impl<T> std::ops::IndexMut<Side> for PerSide<T> {
     fn index_mut(&mut self, side: Side) -> &mut T {
         match side {
             Side::Below => &mut self.below,

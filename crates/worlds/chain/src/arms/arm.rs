@@ -1,15 +1,15 @@
 //! An arm of joints as a chain of this world (slides K1 to K4).
 
-use super::kinematics::{ArmGoal, Follower, SerialChain, Skeleton, Vector};
+use super::kinematics::{ArmGoal, JointTracker, SerialChain, Skeleton, Vector};
 use crate::rods::chain::{Chain, Connector, Mobility, Rod};
-use crate::rods::geometry::{Point, in_dimensions, sub};
+use crate::rods::geometry::{Point, sub, with_dimensions};
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
 /// Least length of rods with a joint that can bring their ends together.
-const LEAST_ROD_M: f64 = 1e-6;
+const MIN_ROD_M: f64 = 1e-6;
 /// Greatest length of rods with a joint without limits.
-const MOST_ROD_M: f64 = 1e6;
+const MAX_ROD_M: f64 = 1e6;
 
 /// An arm: its joints, its connectors, and the place of its base.
 #[derive(Debug)]
@@ -22,15 +22,15 @@ pub struct Arm {
     pub at_m: Vector,
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
-    pub(crate) follower: Follower,
+    pub(crate) follower: JointTracker,
 }
 
 impl Arm {
     /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
         let skeleton = serial.skeleton();
-        let follower = Follower::new(&serial, &skeleton);
-        Self { values: follower.inside(values), skeleton, serial, at_m, follower }
+        let follower = JointTracker::new(&serial, &skeleton);
+        Self { values: follower.clamp(values), skeleton, serial, at_m, follower }
     }
 
     /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if
@@ -39,7 +39,7 @@ impl Arm {
     /// # Errors
     /// When its connectors make no chain, e.g. because a rod has length 0.
     pub fn chain(&self, radius_m: f64, rod_radius_m: f64) -> Result<Chain<3>, InputError> {
-        let points: Vec<Vector> = self.places(&self.values);
+        let points: Vec<Vector> = self.connector_positions(&self.values);
         let limits = self.serial.bend_limits(&self.skeleton);
         let connector = |k: usize| {
             let exact = limits[k].as_ref().filter(|limit| limit.is_exact && k > 0);
@@ -48,22 +48,22 @@ impl Arm {
             Connector { mobility, max_bend_rad, ..Connector::free(radius_m) }
         };
         let rods = self.skeleton.rods.iter().map(|rod| Rod {
-            min_m: rod.min_m.max(LEAST_ROD_M),
-            max_m: rod.max_m.clamp(LEAST_ROD_M, MOST_ROD_M),
+            min_m: rod.min_m.max(MIN_ROD_M),
+            max_m: rod.max_m.clamp(MIN_ROD_M, MAX_ROD_M),
             radius_m: rod_radius_m,
         });
         Chain::new(points.clone(), (0..points.len()).map(connector).collect(), rods.collect())
     }
 
     /// Returns the places of the connectors in the world at these joint values.
-    pub(crate) fn places<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
-        let in_world = |p: &Vector| in_dimensions(self.in_world(*p));
-        self.follower.places(values).iter().map(in_world).collect()
+    pub(crate) fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
+        let in_world = |p: &Vector| with_dimensions(self.to_world(*p));
+        self.follower.connector_positions(values).iter().map(in_world).collect()
     }
 
     /// Returns a place of the world in the frame of the base.
-    pub(crate) fn in_base<const D: usize>(&self, p: Point<D>) -> Vector {
-        sub(in_dimensions(p), self.at_m)
+    pub(crate) fn to_base<const D: usize>(&self, p: Point<D>) -> Vector {
+        sub(with_dimensions(p), self.at_m)
     }
 
     /// Returns a goal for connector `k` at a place of the world, and the arm up to it.
@@ -73,11 +73,11 @@ impl Arm {
         at: Point<D>,
         tolerance_m: f64,
     ) -> (SerialChain, ArmGoal) {
-        let goal = ArmGoal { tolerance_m, ..ArmGoal::new(self.in_base(at)) };
+        let goal = ArmGoal { tolerance_m, ..ArmGoal::new(self.to_base(at)) };
         (self.serial.up_to(&self.skeleton, k), goal)
     }
 
-    fn in_world(&self, p: Vector) -> Vector {
+    fn to_world(&self, p: Vector) -> Vector {
         [0, 1, 2].map(|i| p[i] + self.at_m[i])
     }
 }

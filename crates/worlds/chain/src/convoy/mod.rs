@@ -3,26 +3,26 @@
 //! It is a world of one chain that is simulated as every other (`act/`); a tick is a cycle. This module
 //! holds its design, and measures of its run.
 
-mod measures;
+mod stats;
 #[cfg(test)]
 mod tests;
 
-pub use measures::Measures;
+pub use stats::ConvoyStats;
 
-use super::driver::{Driver, Task};
+use super::driver::{Task, TaskKind};
 use super::formation::Robots;
-use super::metrics::Tally;
-use super::motion::replan::Rungs;
-use super::navigate::{Goal, Navigator};
+use super::metrics::ChainTally;
+use super::motion::recovery::RecoveryLimits;
+use super::navigate::{NavigationGoal, Navigator};
 use super::rods::geometry::{Point, distance};
 use super::rods::{Chain, Connector, Obstacles, Rod, Rules};
-use super::run::ChainRun;
-use super::scenario::{Compiled, RecordSection};
-use super::swarm::follower::pace;
+use super::scenario::{ChainScenario, RecordSection};
+use super::swarm::follower::speed_fraction;
 use super::swarm::leader::{Layer, LeaderState};
-use super::swarm::{Drive, Follower, Leader, Pose};
+use super::swarm::{DifferentialDrive, Follower, Leader, Pose2};
 use super::world::{ChainSpec, ChainWorld};
-use crate::deploy::kind::Deployment;
+use super::world_impl::ChainRun;
+use crate::deploy::deployment::Deployment;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed, Simulation};
@@ -30,15 +30,15 @@ use sidestep_scenario::Source;
 use std::sync::Arc;
 
 /// Distance up to which gaps are measured, meters.
-const LOOK_M: f64 = 1.0;
+const SEARCH_RANGE_M: f64 = 1.0;
 
 /// The design of a convoy.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ConvoyConfig {
     /// Behavior of the first robot.
     pub leader: Leader,
     /// Its wheels.
-    pub drive: Drive,
+    pub drive: DifferentialDrive,
     /// Behavior of the others.
     pub follower: Follower,
     /// Number of the others.
@@ -56,7 +56,7 @@ pub struct Plan {
     pub dt_s: f64,
 }
 
-impl Plan {
+impl ConvoyConfig {
     /// Returns the convoy of the slides: robots of radius 0.25 m on wheels 0.4 m apart, 0.6 to 0.8
     /// m behind each other, connectors 0.08 m larger, wheels 20 % faster than the leader's.
     ///
@@ -65,8 +65,8 @@ impl Plan {
     pub fn new(followers: usize, speed_m_s: f64) -> Result<Self, InputError> {
         Ok(Self {
             leader: Leader::new(speed_m_s)?,
-            drive: Drive::new(0.4, speed_m_s)?,
-            follower: Follower::new(Drive::new(0.4, 1.2 * speed_m_s)?, 0.25)?,
+            drive: DifferentialDrive::new(0.4, speed_m_s)?,
+            follower: Follower::new(DifferentialDrive::new(0.4, 1.2 * speed_m_s)?, 0.25)?,
             followers,
             rod: Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 },
             margin_m: 0.08,
@@ -79,7 +79,7 @@ impl Plan {
 
 /// The surroundings of a convoy.
 #[derive(Debug, Clone, Default)]
-pub struct Surroundings {
+pub struct ConvoySurroundings {
     /// The obstacle in its way.
     pub obstacles: Obstacles<2>,
     /// The place that its leader goes to, if any.
@@ -91,19 +91,19 @@ pub struct Surroundings {
 /// A moving convoy.
 #[derive(Debug)]
 pub struct Convoy {
-    plan: Plan,
+    plan: ConvoyConfig,
     run: ChainRun<2>,
     /// The chain and its robots after the last tick, the leader first.
     chain: Chain<2>,
-    robots: Vec<Pose>,
+    robots: Vec<Pose2>,
     /// Connectors before the last tick, and the counts after it.
     before: Vec<Point<2>>,
-    tally: Tally,
+    tally: ChainTally,
 }
 
 /// Results of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tick {
+pub struct TickResult {
     /// The leader's layer that acted.
     pub layer: Layer,
     /// The part of its speed to which followers slow the leader down; 1 for all of it.
@@ -121,10 +121,14 @@ impl Convoy {
     ///
     /// # Errors
     /// As [`Chain::new`] and [`Leader::check`]; also when a tick is out of range.
-    pub fn new(plan: Plan, start: Pose, around: Surroundings) -> Result<Self, InputError> {
+    pub fn new(
+        plan: ConvoyConfig,
+        start: Pose2,
+        around: ConvoySurroundings,
+    ) -> Result<Self, InputError> {
         plan.check()?;
-        let chain = plan.line(start)?;
-        let compiled = Compiled {
+        let chain = plan.chain_behind(start)?;
+        let compiled = ChainScenario {
             world: Arc::new(plan.world(chain.clone(), around)),
             name: String::new(),
             seed: 0,
@@ -133,11 +137,11 @@ impl Convoy {
             recipe: None,
         };
         let run = compiled.start(&Source::new("convoy", "", ""), 1);
-        run.state().body_mut(0).driving.leader = Some(LeaderState::at(start));
+        run.state().body_mut(0).driving.leader = Some(LeaderState::new(start));
         let robots = vec![start; plan.followers + 1];
         let mut convoy =
-            Self { plan, run, chain, robots, before: Vec::new(), tally: Tally::default() };
-        convoy.look();
+            Self { plan, run, chain, robots, before: Vec::new(), tally: ChainTally::default() };
+        convoy.read_positions();
         Ok(convoy)
     }
 
@@ -147,36 +151,36 @@ impl Convoy {
     }
 
     /// Returns the pose of the first robot.
-    pub fn leader(&self) -> Pose {
+    pub fn leader(&self) -> Pose2 {
         self.robots[0]
     }
 
     /// Returns the other robots; robot `i` keeps to connector `i + 1`.
-    pub fn followers(&self) -> &[Pose] {
+    pub fn followers(&self) -> &[Pose2] {
         &self.robots[1..]
     }
 
     /// Returns the positions of the connectors before the last tick; empty before the first.
-    pub fn before(&self) -> &[Point<2>] {
+    pub fn previous_points(&self) -> &[Point<2>] {
         &self.before
     }
 
     /// Returns its design.
-    pub fn plan(&self) -> &Plan {
+    pub fn config(&self) -> &ConvoyConfig {
         &self.plan
     }
 
     /// Makes one tick.
-    pub fn tick(&mut self) -> Tick {
-        let (was, pace) = (self.tally.clone(), self.pace());
+    pub fn tick(&mut self) -> TickResult {
+        let (was, pace) = (self.tally.clone(), self.leader_speed_fraction());
         self.before.clear();
         self.before.extend_from_slice(self.chain.points());
         self.run.advance(1);
-        self.look();
+        self.read_positions();
         let is = &self.tally;
         let acted = is.layers.iter().zip(&was.layers).position(|(is, was)| is > was);
-        let vetoes = |tally: &Tally| tally.vetoes.iter().sum::<u64>();
-        Tick {
+        let vetoes = |tally: &ChainTally| tally.vetoes.iter().sum::<u64>();
+        TickResult {
             layer: Layer::ALL[acted.unwrap_or_default()],
             pace,
             is_vetoed: vetoes(is) > vetoes(&was),
@@ -186,7 +190,7 @@ impl Convoy {
     }
 
     /// Reads the places of all robots.
-    fn look(&mut self) {
+    fn read_positions(&mut self) {
         let body = self.run.state().body(0);
         self.chain.points_mut().copy_from_slice(body.chain.points());
         self.tally.clone_from(&body.tally);
@@ -199,14 +203,14 @@ impl Convoy {
     }
 
     /// Returns the part of its speed at which the leader may go in the next tick.
-    fn pace(&self) -> f64 {
+    fn leader_speed_fraction(&self) -> f64 {
         let lags_m = self.robots[1..].iter().zip(&self.chain.points()[1..]);
         let worst_m = lags_m.map(|(f, at)| distance(f.at, *at)).fold(0.0, f64::max);
-        pace(worst_m, self.plan.lag_limit_m)
+        speed_fraction(worst_m, self.plan.lag_limit_m)
     }
 }
 
-impl Plan {
+impl ConvoyConfig {
     fn check(&self) -> Result<(), InputError> {
         self.leader.check()?;
         if self.lag_limit_m.is_nan() || self.lag_limit_m <= 0.0 {
@@ -221,7 +225,7 @@ impl Plan {
     }
 
     /// Returns the chain behind a leader.
-    fn line(&self, start: Pose) -> Result<Chain<2>, InputError> {
+    fn chain_behind(&self, start: Pose2) -> Result<Chain<2>, InputError> {
         let radius_m = self.follower.ring.radius_m;
         // The leader is exactly at its connector, so that needs no margin.
         let mut connectors = vec![Connector::free(radius_m + self.margin_m); self.followers + 1];
@@ -239,14 +243,14 @@ impl Plan {
     }
 
     /// Returns the world of the convoy.
-    fn world(&self, start: Chain<2>, around: Surroundings) -> ChainWorld<2> {
+    fn world(&self, start: Chain<2>, around: ConvoySurroundings) -> ChainWorld<2> {
         // A target is never reached, because the tick says nothing of it.
-        let goal = around.target.map(|at| Goal::Target { at, tolerance_m: 0.0 });
+        let goal = around.target.map(|at| NavigationGoal::Target { at, tolerance_m: 0.0 });
         let navigator = Navigator { leader: self.leader.clone(), drive: self.drive, goal };
         let task = Task {
             agent: 0,
             speed_m_s: self.leader.speed_m_s,
-            driver: Driver::Navigate(Arc::new(navigator)),
+            driver: TaskKind::Navigate(Arc::new(navigator)),
             lasts_s: f64::INFINITY,
             patience_s: f64::INFINITY,
             plans_after_s: None,
@@ -267,8 +271,8 @@ impl Plan {
             cycles: u64::MAX,
             rules: self.rules,
             escape: None,
-            rungs: Rungs::default(),
-            look_m: LOOK_M,
+            rungs: RecoveryLimits::default(),
+            look_m: SEARCH_RANGE_M,
             streams: Streams::new(Seed(around.seed)),
             teams: Arc::default(),
             deployment: Deployment::Direct,

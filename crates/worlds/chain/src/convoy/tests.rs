@@ -1,10 +1,10 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
 use super::*;
+use crate::fixtures::{TestRng, corridor_line, corridor_walls};
 use crate::rods::Obstacle;
-use crate::scenes::{Numbers, corridor_line, corridor_walls};
 use crate::swarm::Laser;
-use crate::swarm::leader::{Leaving, Turning};
+use crate::swarm::leader::{TurnMode, WallLossRule};
 use std::f64::consts::PI;
 
 struct Course {
@@ -28,9 +28,9 @@ fn corridor(width_m: f64) -> Course {
 
 /// Discs of 0.2 to 0.5 m in 20 m x 20 m, away from start and target in opposite corners.
 fn field(seed: u64, discs: usize) -> Course {
-    let (mut numbers, mut all) = (Numbers::new(seed), Vec::new());
+    let (mut numbers, mut all) = (TestRng::new(seed), Vec::new());
     while all.len() < discs {
-        let (at, radius_m) = (numbers.point(10.0), numbers.within(0.2, 0.5));
+        let (at, radius_m) = (numbers.point(10.0), numbers.uniform(0.2, 0.5));
         if distance(at, [-8.5, -8.5]).min(distance(at, [8.5, 8.5])) > radius_m + 1.5 {
             all.push(Obstacle::ball(all.len() as u32, at, radius_m));
         }
@@ -46,19 +46,20 @@ fn field(seed: u64, discs: usize) -> Course {
 
 struct Run {
     arrived: bool,
-    measures: Measures,
+    measures: ConvoyStats,
     convoy: Convoy,
 }
 
-fn run(plan: Plan, start: Pose, course: &Course, seed: u64) -> Run {
+fn run(plan: ConvoyConfig, start: Pose2, course: &Course, seed: u64) -> Run {
     let dt_s = plan.dt_s;
     let (obstacles, target) = (course.obstacles.clone(), course.target);
-    let mut convoy = Convoy::new(plan, start, Surroundings { obstacles, target, seed }).unwrap();
-    let mut measures = Measures::default();
+    let mut convoy =
+        Convoy::new(plan, start, ConvoySurroundings { obstacles, target, seed }).unwrap();
+    let mut measures = ConvoyStats::default();
     let mut arrived = false;
     for _ in 0..(course.limit_s / dt_s) as u64 {
         let tick = convoy.tick();
-        measures.note(&convoy, &course.obstacles, &tick);
+        measures.record(&convoy, &course.obstacles, &tick);
         assert!(convoy.chain().max_rod_violation_m() <= 1e-9);
         arrived = distance(convoy.leader().at, course.finish) <= course.finish_radius_m;
         if arrived {
@@ -68,12 +69,12 @@ fn run(plan: Plan, start: Pose, course: &Course, seed: u64) -> Run {
     Run { arrived, measures, convoy }
 }
 
-fn at(x_m: f64, y_m: f64) -> Pose {
-    Pose { at: [x_m, y_m], heading_rad: 0.0 }
+fn at(x_m: f64, y_m: f64) -> Pose2 {
+    Pose2 { at: [x_m, y_m], heading_rad: 0.0 }
 }
 
-fn alone() -> Plan {
-    Plan::new(0, 0.5).unwrap()
+fn alone() -> ConvoyConfig {
+    ConvoyConfig::new(0, 0.5).unwrap()
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn a_leader_passes_the_pinned_corridor_and_touches_nothing() {
 
 #[test]
 fn in_a_corridor_as_wide_as_its_band_a_leader_hardly_slows_down() {
-    for leaving in [Leaving::Latched, Leaving::Range, Leaving::Level] {
+    for leaving in [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level] {
         let mut plan = alone();
         plan.leader.leaving = leaving;
         let Run { arrived, measures, .. } = run(plan, at(2.0, 0.0), &corridor(1.6), 1);
@@ -101,7 +102,7 @@ fn a_leader_with_a_nearer_band_passes_where_it_can_hardly_turn() {
     for (width_m, near_m, far_m) in [(1.0, 0.7, 0.9), (0.8, 0.45, 0.65)] {
         let mut plan = alone();
         (plan.leader.near_m, plan.leader.far_m) = (near_m, far_m);
-        plan.leader.turning = Turning::OnTheSpotWhereBlocked;
+        plan.leader.turning = TurnMode::OnTheSpotWhereBlocked;
         let Run { arrived, measures, .. } = run(plan, at(2.0, 0.0), &corridor(width_m), 1);
         assert!(arrived && measures.leader_clearance_m > 0.0, "{width_m}: {measures:?}");
     }
@@ -132,7 +133,7 @@ fn a_leader_turns_back_in_a_dead_end() {
 #[test]
 fn a_leader_reaches_its_target_among_25_discs_thirty_times_of_thirty() {
     for seed in 0..30 {
-        let start = Pose { at: [-8.5, -8.5], heading_rad: Numbers::new(seed).within(-PI, PI) };
+        let start = Pose2 { at: [-8.5, -8.5], heading_rad: TestRng::new(seed).uniform(-PI, PI) };
         let Run { arrived, measures, .. } = run(alone(), start, &field(seed, 25), 1);
         assert!(arrived && measures.leader_clearance_m > 0.0, "{seed}: {measures:?}");
     }
@@ -141,7 +142,7 @@ fn a_leader_reaches_its_target_among_25_discs_thirty_times_of_thirty() {
 #[test]
 fn a_leader_that_takes_leaving_literally_turns_for_ever_in_the_open() {
     let mut plan = alone();
-    (plan.leader.leaving, plan.leader.leave_rule) = (Leaving::Level, None);
+    (plan.leader.leaving, plan.leader.leave_rule) = (WallLossRule::Level, None);
     let course = Course { limit_s: 60.0, ..field(0, 0) };
     let Run { arrived, measures, .. } = run(plan, at(-8.5, -8.5), &course, 1);
     assert!(!arrived && measures.layers == [0, 0, 0, measures.ticks, 0, 0]);
@@ -150,7 +151,7 @@ fn a_leader_that_takes_leaving_literally_turns_for_ever_in_the_open() {
 #[test]
 fn fifteen_followers_pass_the_corridor_and_no_bumper_is_pressed() {
     for width_m in [1.2, 2.0, 3.0] {
-        let plan = Plan::new(15, 0.5).unwrap();
+        let plan = ConvoyConfig::new(15, 0.5).unwrap();
         let Run { arrived, measures, .. } = run(plan, at(12.3, 0.0), &corridor(width_m), 1);
         assert!(arrived && measures.vetoes == 0, "{width_m}: {measures:?}");
         assert!(measures.connector_clearance_m >= -1e-9, "{width_m}: {measures:?}");
@@ -165,9 +166,9 @@ fn fifteen_followers_pass_the_corridor_and_no_bumper_is_pressed() {
 /// times as fast as the leader goes.
 #[test]
 fn a_leader_waits_for_late_followers_and_would_lose_them_otherwise() {
-    let mut cared = Plan::new(15, 0.5).unwrap();
+    let mut cared = ConvoyConfig::new(15, 0.5).unwrap();
     cared.follower.slide_m = 0.0;
-    let careless = Plan { lag_limit_m: f64::INFINITY, ..cared.clone() };
+    let careless = ConvoyConfig { lag_limit_m: f64::INFINITY, ..cared.clone() };
     let [cared, careless] =
         [cared, careless].map(|plan| run(plan, at(12.3, 0.0), &corridor(3.0), 1).measures);
     assert!(cared.fastest > 2.0 && cared.slowed > 0 && cared.bumped == 0, "{cared:?}");
@@ -177,16 +178,19 @@ fn a_leader_waits_for_late_followers_and_would_lose_them_otherwise() {
 
 #[test]
 fn wheels_as_fast_as_the_leaders_are_enough_for_a_leader_that_waits() {
-    let mut plan = Plan::new(15, 0.5).unwrap();
-    plan.follower.drive = Drive::new(0.4, 0.5).unwrap();
+    let mut plan = ConvoyConfig::new(15, 0.5).unwrap();
+    plan.follower.drive = DifferentialDrive::new(0.4, 0.5).unwrap();
     let Run { arrived, measures, .. } = run(plan, at(12.3, 0.0), &corridor(2.5), 1);
     assert!(arrived && measures.bumped == 0 && measures.max_lag_m < 0.15, "{measures:?}");
 }
 
 #[test]
 fn followers_that_only_stop_hang_on_walls_that_they_shall_graze() {
-    let mut plan =
-        Plan { margin_m: 0.0, lag_limit_m: f64::INFINITY, ..Plan::new(15, 0.5).unwrap() };
+    let mut plan = ConvoyConfig {
+        margin_m: 0.0,
+        lag_limit_m: f64::INFINITY,
+        ..ConvoyConfig::new(15, 0.5).unwrap()
+    };
     plan.follower.slide_m = 0.0;
     let Run { measures, .. } = run(plan, at(12.3, 0.0), &corridor(2.0), 1);
     assert!(measures.bumped > measures.ticks, "{measures:?}");
@@ -197,7 +201,7 @@ fn followers_that_only_stop_hang_on_walls_that_they_shall_graze() {
 #[test]
 fn followers_that_slide_graze_walls_and_arrive() {
     for width_m in [1.2, 2.0, 2.5] {
-        let plan = Plan { margin_m: 0.0, ..Plan::new(15, 0.5).unwrap() };
+        let plan = ConvoyConfig { margin_m: 0.0, ..ConvoyConfig::new(15, 0.5).unwrap() };
         let Run { arrived, measures, .. } = run(plan, at(12.3, 0.0), &corridor(width_m), 1);
         assert!(arrived && measures.max_lag_m < 0.15, "{width_m}: {measures:?}");
         assert!(
@@ -209,7 +213,7 @@ fn followers_that_slide_graze_walls_and_arrive() {
 
 #[test]
 fn a_laser_that_errs_by_two_centimeters_finds_the_way_too() {
-    let mut plan = Plan::new(5, 0.5).unwrap();
+    let mut plan = ConvoyConfig::new(5, 0.5).unwrap();
     plan.leader.laser = Laser::new(180, 3.2, PI, 0.02).unwrap();
     let Run { arrived, measures, .. } = run(plan, at(6.0, 0.0), &corridor(1.6), 7);
     assert!(arrived && measures.bumped == 0, "{measures:?}");
@@ -219,7 +223,7 @@ fn a_laser_that_errs_by_two_centimeters_finds_the_way_too() {
 #[test]
 fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
     let end = |seed| {
-        let mut plan = Plan::new(3, 0.5).unwrap();
+        let mut plan = ConvoyConfig::new(3, 0.5).unwrap();
         plan.leader.laser = Laser::new(180, 3.2, PI, 0.02).unwrap();
         let course = Course { limit_s: 20.0, ..corridor(1.6) };
         let convoy = run(plan, at(6.0, 0.0), &course, seed).convoy;
@@ -241,7 +245,8 @@ fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
         finish_radius_m: 0.1,
         limit_s: 10.0,
     };
-    for (turning, turns) in [(Turning::AboutAWheel, false), (Turning::OnTheSpotWhereBlocked, true)]
+    for (turning, turns) in
+        [(TurnMode::AboutAWheel, false), (TurnMode::OnTheSpotWhereBlocked, true)]
     {
         let mut plan = alone();
         plan.leader.turning = turning;

@@ -9,29 +9,38 @@
 //! A deployment gives the connectors of a chain their perception (`sense.rs`), lets their agents talk over a network
 //! in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions out (`outcome.rs`).
 
-mod drive;
-pub(crate) mod kind;
+pub(crate) mod deployment;
+mod negotiation;
 mod outcome;
 mod sense;
 #[cfg(test)]
 mod tests;
 
-use crate::agents::{ConnectorAgent, Handed, Sight};
+use crate::agents::{ChainControls, ConnectorAgent, ConnectorPercept};
 use crate::world::ChainWorld;
-pub use kind::Deployment;
-pub(crate) use outcome::settled;
-pub(crate) use sense::Sensed;
+pub use deployment::Deployment;
+pub(crate) use outcome::final_positions;
+pub(crate) use sense::SensingContext;
 use sidestep_kernel::{Cycle, EntityId};
 
 impl<const D: usize> ChainWorld<D> {
     /// Lets the agents of a chain talk in a cycle; returns their decisions.
-    pub(crate) fn talked(&self, chain: EntityId, now: Cycle, sights: Vec<Sight<D>>) -> Handed<D> {
-        let mut agents = self.agents_of(chain);
-        let controls = drive::run(drive::Talk::new(self, chain, now), &mut agents, sights);
-        Handed { cycle: now, controls, gone: Vec::new() }
+    pub(crate) fn negotiate(
+        &self,
+        chain: EntityId,
+        now: Cycle,
+        sights: Vec<ConnectorPercept<D>>,
+    ) -> ChainControls<D> {
+        let mut agents = self.chain_agents(chain);
+        let controls = negotiation::run_agents(
+            negotiation::NegotiationContext::new(self, chain, now),
+            &mut agents,
+            sights,
+        );
+        ChainControls { cycle: now, controls, gone: Vec::new() }
     }
 
-    fn agents_of(&self, chain: EntityId) -> Vec<ConnectorAgent<D>> {
+    fn chain_agents(&self, chain: EntityId) -> Vec<ConnectorAgent<D>> {
         let n = self.chains[chain as usize].start.points().len() as u32;
         (0..n).map(|k| ConnectorAgent::new(self, chain, k)).collect()
     }

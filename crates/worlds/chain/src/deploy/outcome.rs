@@ -1,23 +1,25 @@
 //! The outcome of the decisions of a chain's connectors.
 
-use crate::agents::{Control, Goes, Led};
+use crate::agents::{ConnectorMove, Control, ExecutedMotion};
 use crate::rods::chain::{Chain, is_in_range};
 use crate::rods::geometry::{Point, distance};
-use crate::rods::scene::fits;
+use crate::rods::motion_context::is_length_allowed;
 
 /// Returns the new places of a chain's connectors. At most one motion is carried out, all of it: where
 /// a participant's decision is missing, is another one, or would tear a rod, no connector moves.
-pub(crate) fn settled<const D: usize>(
+pub(crate) fn final_positions<const D: usize>(
     chain: &Chain<D>,
     controls: &[Option<Control<D>>],
 ) -> Option<Vec<Point<D>>> {
     let mut led = controls.iter().flatten().filter_map(|control| control.led);
-    let (Led { request, first, last }, None) = (led.next()?, led.next()) else { return None };
+    let (ExecutedMotion { request, first, last }, None) = (led.next()?, led.next()) else {
+        return None;
+    };
     let mut points = chain.points().to_vec();
     for k in first..=last {
         let control = controls.get(k as usize)?.as_ref().filter(|c| c.connector == k)?;
-        let (Goes::To { request: its, to } | Goes::WithItsMaster { request: its, to }) =
-            control.goes
+        let (ConnectorMove::To { request: its, to }
+        | ConnectorMove::WithItsMaster { request: its, to }) = control.goes
         else {
             return None;
         };
@@ -28,7 +30,8 @@ pub(crate) fn settled<const D: usize>(
     }
     let rods = chain.rods().iter().zip(points.windows(2).zip(chain.points().windows(2)));
     // A rod that was out of its limits before, as in a chain that was broken, may stay so.
-    let mut torn =
-        rods.filter(|(rod, (new, old))| new != old && !fits(**rod, distance(new[0], new[1])));
+    let mut torn = rods.filter(|(rod, (new, old))| {
+        new != old && !is_length_allowed(**rod, distance(new[0], new[1]))
+    });
     torn.next().is_none().then_some(points)
 }

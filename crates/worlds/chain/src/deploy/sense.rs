@@ -1,21 +1,21 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
 use crate::agents::side::Side;
-use crate::agents::{Role, Seen, Sight};
+use crate::agents::{ConnectorPercept, Role, SensedObstacle};
 use crate::driver::Task;
-use crate::rods::obstacle::{Obstacles, around};
-use crate::rods::wire::Place;
+use crate::rods::obstacle::{Obstacles, bounds_around};
+use crate::rods::serde_point::WirePoint;
 use crate::state::Body;
 use crate::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Distance beyond that needed by any motion, meters: far more than tolerances and rounding.
-const SPARE_M: f64 = 1e-3;
+const MARGIN_M: f64 = 1e-3;
 
 /// A chain in a cycle, and what is around it.
 #[derive(Clone, Copy)]
-pub(crate) struct Sensed<'a, const D: usize> {
+pub(crate) struct SensingContext<'a, const D: usize> {
     pub(crate) chain: EntityId,
     pub(crate) now: Cycle,
     pub(crate) body: &'a Body<D>,
@@ -30,28 +30,30 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns what the connectors of a chain perceive; `leader` has the part `role`, the others follow.
-    pub(crate) fn sights(
+    pub(crate) fn percepts(
         &self,
-        sensed: Sensed<'_, D>,
+        sensed: SensingContext<'_, D>,
         leader: usize,
         role: &Role<D>,
-    ) -> Vec<Sight<D>> {
-        let Sensed { chain, now, body, obstacles } = sensed;
+    ) -> Vec<ConnectorPercept<D>> {
+        let SensingContext { chain, now, body, obstacles } = sensed;
         let points = body.chain.points();
         let n = points.len() as u32;
-        let (first_id, at_s) = (self.first_id(chain), self.starts_s(now));
-        let sees_m = self.sees_m(&self.chains[chain as usize]);
+        let (first_id, at_s) = (self.first_id(chain), self.start_time_s(now));
+        let sees_m = self.sensor_range_m(&self.chains[chain as usize]);
         let sight = |k: u32| {
             let connector = body.chain.connectors()[k as usize];
             let at = points[k as usize];
             let mut seen = Vec::new();
             let half_m = sees_m + connector.radius_m;
-            obstacles.visit(&around(at, half_m), |obstacle| seen.push(Seen::of(obstacle)));
-            let neighbor = |side: Side| side.of(k, n).map(|j| Place(points[j as usize]));
-            let is_silent = |network: &Network| network.is_silent(first_id + k, at_s);
-            Sight {
+            obstacles.visit(&bounds_around(at, half_m), |obstacle| {
+                seen.push(SensedObstacle::from_obstacle(obstacle))
+            });
+            let neighbor = |side: Side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]));
+            let is_silent = |network: &Network| network.is_radio_off(first_id + k, at_s);
+            ConnectorPercept {
                 cycle: now,
-                at: Place(at),
+                at: WirePoint(at),
                 neighbors: Side::ALL.map(neighbor),
                 max_bend_rad: connector.max_bend_rad,
                 seen,
@@ -66,13 +68,13 @@ impl<const D: usize> ChainWorld<D> {
     /// Returns the distance in which a connector's sensors see everything to which a motion of a cycle
     /// may bring its rods near, meters. Its master is at most a rod's length away, its own place at
     /// most another one, and both go on for as many sub-steps as the initiator makes.
-    fn sees_m(&self, spec: &ChainSpec<D>) -> f64 {
+    fn sensor_range_m(&self, spec: &ChainSpec<D>) -> f64 {
         let chain = &spec.start;
         let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
         let way_m = |task: &Task<D>| task.speed_m_s * self.dt_s;
         let led_m = spec.tasks.iter().map(way_m).fold(0.0, f64::max);
         let step_m = self.rules.step_m.unwrap_or(chain.step_m());
         let steps = (led_m / step_m).ceil() + 1.0;
-        2.0 * longest_m + 2.0 * led_m.max(steps * self.rules.slave_step_max_m) + SPARE_M
+        2.0 * longest_m + 2.0 * led_m.max(steps * self.rules.slave_step_max_m) + MARGIN_M
     }
 }

@@ -4,19 +4,21 @@ mod hostile;
 mod scenarios;
 mod silence;
 
-use super::drive::{Talk, first_tick, run};
-use super::settled;
+use super::final_positions;
+use super::negotiation::{NegotiationContext, first_tick, run_agents};
 use crate::agents::side::Side;
-use crate::agents::{ConnectorAgent, Control, Ended, Role, Seen, Sight, Wish};
-use crate::motion::replan::{Climbed, Memory, Rungs, Situation};
+use crate::agents::{
+    ConnectorAgent, ConnectorPercept, Control, Intention, LeaderOutcome, Role, SensedObstacle,
+};
+use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, RecoveryOutcome, Situation};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
 use crate::rods::propagate::Propagator;
 use crate::rods::propagate::tests::random_worlds::AnyWorld;
 use crate::rods::rules::Rules;
-use crate::rods::veto::{Mode, Motion, Outcome, Request, Source};
-use crate::rods::wire::Place;
+use crate::rods::serde_point::WirePoint;
+use crate::rods::veto::{Motion, Outcome, Request, RequestSource, VetoEffect};
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::network::Network;
@@ -34,9 +36,9 @@ fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
         deadline_s: 1e-3 * deadline,
         range_m: f64::INFINITY,
         bursts: None,
-        silences: Vec::new(),
+        radio_outages: Vec::new(),
         partitions: Vec::new(),
-        one_ways: Vec::new(),
+        unidirectional_links: Vec::new(),
     }
 }
 
@@ -45,15 +47,15 @@ fn sights<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     leader: usize,
-    wish: &Wish<D>,
-) -> Vec<Sight<D>> {
+    wish: &Intention<D>,
+) -> Vec<ConnectorPercept<D>> {
     let (points, n) = (chain.points(), chain.points().len() as u32);
     let all = obstacles.still().iter().chain(obstacles.moving());
-    let seen: Vec<Seen> = all.map(Seen::of).collect();
-    let sight = |k: u32| Sight {
+    let seen: Vec<SensedObstacle> = all.map(SensedObstacle::from_obstacle).collect();
+    let sight = |k: u32| ConnectorPercept {
         cycle: 5,
-        at: Place(points[k as usize]),
-        neighbors: Side::ALL.map(|side| side.of(k, n).map(|j| Place(points[j as usize]))),
+        at: WirePoint(points[k as usize]),
+        neighbors: Side::ALL.map(|side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]))),
         max_bend_rad: chain.connectors()[k as usize].max_bend_rad,
         seen: seen.clone(),
         is_silent: false,
@@ -66,24 +68,28 @@ fn sights<const D: usize>(
 /// A team that makes a motion; returns its decisions.
 fn talked<const D: usize>(
     (chain, obstacles, rules): (&Chain<D>, &Obstacles<D>, &Rules),
-    (leader, to, source): (usize, Point<D>, Source),
+    (leader, to, source): (usize, Point<D>, RequestSource),
     network: Option<&Network>,
     seed: u64,
 ) -> Vec<Option<Control<D>>> {
     let is_empty = obstacles.is_empty();
-    let wish = Wish {
-        to: Place(to),
+    let wish = Intention {
+        to: WirePoint(to),
         source,
         situation: Situation::default(),
-        memory: Memory::default(),
+        memory: RecoveryMemory::default(),
         is_empty,
         is_open: is_empty && chain.is_plain(),
     };
-    let agent = |k: usize| ConnectorAgent::of(chain, k as u32, rules, Rungs::default()).on(network);
+    let agent = |k: usize| {
+        ConnectorAgent::from_chain(chain, k as u32, rules, RecoveryLimits::default())
+            .with_network(network)
+    };
     let mut agents: Vec<_> = (0..chain.points().len()).map(agent).collect();
     let streams = Streams::new(Seed(seed));
-    let talk = Talk { network, streams, first_id: 0, begins: (first_tick(network, 5), 0.0) };
-    run(talk, &mut agents, sights(chain, obstacles, leader, &wish))
+    let talk =
+        NegotiationContext { network, streams, first_id: 0, begins: (first_tick(network, 5), 0.0) };
+    run_agents(talk, &mut agents, sights(chain, obstacles, leader, &wish))
 }
 
 /// Makes random motions in both ways; returns the number of those that moved something, and of the vetoes.
@@ -96,27 +102,28 @@ fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) 
         let Request { motion: Motion::Connector { k, to }, .. } = world.any_request(0.15) else {
             continue;
         };
-        let source = Source::Operator;
+        let source = RequestSource::Operator;
         let before = world.chain.clone();
         let obstacles = &world.obstacles;
         let controls =
             talked((&before, obstacles, &rules), (k, to, source), network, seed + t as u64);
-        let request = Request { motion: Motion::Connector { k, to }, source, mode: Mode::Exact };
+        let request =
+            Request { motion: Motion::Connector { k, to }, source, mode: VetoEffect::Exact };
         let outcome = propagator.propagate(&mut world.chain, &world.obstacles, &request).unwrap();
-        let points = settled(&before, &controls).unwrap_or(before.points().to_vec());
+        let points = final_positions(&before, &controls).unwrap_or(before.points().to_vec());
         assert_eq!(points, world.chain.points(), "seed {seed}, motion {t}: {outcome:?}");
         let ended = controls[k].as_ref().and_then(|control| control.ended.clone());
         let climbed = match outcome.clone() {
-            Outcome::Moved(moved) => Climbed::Straight(moved),
-            Outcome::Vetoed(veto) => Climbed::Vetoed(veto),
+            Outcome::Moved(moved) => RecoveryOutcome::Straight(moved),
+            Outcome::Vetoed(veto) => RecoveryOutcome::Vetoed(veto),
         };
         match ended {
-            Some(Ended::Climbed { climbed: told, .. }) => {
+            Some(LeaderOutcome::Climbed { climbed: told, .. }) => {
                 assert_eq!(told, climbed, "seed {seed}, motion {t}")
             }
             other => panic!("seed {seed}, motion {t}: {other:?}"),
         }
-        moved += usize::from(outcome.moved().is_some_and(|m| m.changed > 1));
+        moved += usize::from(outcome.motion().is_some_and(|m| m.changed > 1));
         vetoed += usize::from(outcome.veto().is_some());
     }
     (moved, vetoed)
@@ -129,9 +136,9 @@ fn compared_on<const D: usize>(
     (k, to): (usize, Point<D>),
 ) -> Chain<D> {
     let motion = Motion::Connector { k, to };
-    let request = Request { motion, source: Source::Operator, mode: Mode::Exact };
+    let request = Request { motion, source: RequestSource::Operator, mode: VetoEffect::Exact };
     let moved = Propagator::new(*rules).propagate(&mut world.chain, &world.obstacles, &request);
-    assert!(moved.is_ok_and(|outcome| outcome.moved().is_some()));
+    assert!(moved.is_ok_and(|outcome| outcome.motion().is_some()));
     world.chain.clone()
 }
 

@@ -1,6 +1,6 @@
 //! Orders from outside, and the outcome of the last ones.
 
-use super::Objection;
+use super::VetoRecord;
 use serde::{Deserialize, Serialize};
 
 /// The share of the state that belongs to a caller that decides from outside.
@@ -9,7 +9,7 @@ pub(crate) struct External {
     /// Orders for the next cycle.
     pub(crate) orders: Orders,
     /// The answer to those of the last one.
-    pub(crate) answer: Answer,
+    pub(crate) answer: OrderResult,
 }
 
 /// Orders for one cycle; a later one takes the place of an earlier one of its name.
@@ -36,9 +36,9 @@ pub(crate) enum Target {
 
 /// The answer to orders.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Answer {
+pub(crate) struct OrderResult {
     /// The outcome.
-    pub(crate) came: Came,
+    pub(crate) came: OrderOutcome,
     /// The places that were to be reached within the cycle: of a rod's ends, or twice that of a connector.
     pub(crate) wish_m: [[f64; 3]; 2],
     /// The place that the first of them has reached, or could have reached.
@@ -46,14 +46,14 @@ pub(crate) struct Answer {
     /// The part of the cycle's way that was done.
     pub(crate) done_share: f64,
     /// The objection, if there was one.
-    pub(crate) veto: Option<Objection>,
+    pub(crate) veto: Option<VetoRecord>,
     /// The obstacle that caused it.
     pub(crate) obstacle: Option<u32>,
 }
 
 /// Outcome of orders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub(crate) enum Came {
+pub(crate) enum OrderOutcome {
     /// There was no order to go anywhere.
     #[default]
     NoOrder,
@@ -69,7 +69,7 @@ pub(crate) enum Came {
     Unheard,
 }
 
-impl Came {
+impl OrderOutcome {
     /// Their names, in their order.
     pub(crate) const NAMES: [&str; 6] =
         ["no-order", "moved", "cut-short", "vetoed", "waited", "unheard"];
@@ -102,7 +102,7 @@ impl Orders {
     pub(crate) const REACH: &str = "reach";
 
     /// Notes an order by its name.
-    pub(crate) fn note(&mut self, order: &str, values: &[f64]) {
+    pub(crate) fn record(&mut self, order: &str, values: &[f64]) {
         let place = |at: &[f64]| std::array::from_fn(|i| at.get(i).copied().unwrap_or_default());
         match (order, values) {
             (Self::TO, at) => self.target = Some(Target::Connector(place(at))),

@@ -1,6 +1,6 @@
 //! Corridors: straight and bent legs between two walls (slides E2, N6).
 
-use super::Pose;
+use super::GroundPose;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
@@ -30,7 +30,7 @@ pub enum Leg {
 
 impl Leg {
     /// Returns the length of the center line, and its turn to the left.
-    fn measures(self) -> (f64, f64) {
+    fn length_and_turn(self) -> (f64, f64) {
         match self {
             Self::Straight { length_m } => (length_m, 0.0),
             Self::Bend { radius_m, turn_deg } => {
@@ -130,7 +130,7 @@ impl Corridor {
 
     /// Returns the length of the center line, meters.
     pub fn length_m(&self) -> f64 {
-        self.legs.iter().map(|leg| leg.measures().0).sum()
+        self.legs.iter().map(|leg| leg.length_and_turn().0).sum()
     }
 
     /// Returns poses along the center line, from its start to its end, at most `step_m` apart; the
@@ -138,17 +138,17 @@ impl Corridor {
     ///
     /// # Panics
     /// If `step_m` is not positive.
-    pub fn line(&self, step_m: f64) -> Vec<Pose> {
+    pub fn center_line(&self, step_m: f64) -> Vec<GroundPose> {
         assert!(step_m > 0.0, "poses lie apart");
-        let mut line = vec![Pose { at: [0.0; 2], heading_rad: 0.0 }];
+        let mut line = vec![GroundPose { at: [0.0; 2], heading_rad: 0.0 }];
         for leg in &self.legs {
-            let (length_m, turn_rad) = leg.measures();
+            let (length_m, turn_rad) = leg.length_and_turn();
             let n = (length_m / step_m).ceil();
             let (ds_m, turn_rad) = (length_m / n, turn_rad / n);
             for _ in 0..n as usize {
-                let Pose { at: [x, y], heading_rad } = line[line.len() - 1];
+                let GroundPose { at: [x, y], heading_rad } = line[line.len() - 1];
                 let middle_rad = heading_rad + 0.5 * turn_rad;
-                line.push(Pose {
+                line.push(GroundPose {
                     at: [x + ds_m * cos(middle_rad), y + ds_m * sin(middle_rad)],
                     heading_rad: heading_rad + turn_rad,
                 });
@@ -160,18 +160,22 @@ impl Corridor {
     /// Returns its walls, without thickness, in pieces of about [`WALL_PIECE_M`]: first the right
     /// one, then the left one, numbered on from `first_id` in the direction of the corridor.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
-        let line = self.line(WALL_PIECE_M);
+        let line = self.center_line(WALL_PIECE_M);
         let sides = [-1.0, 1.0].map(|side| line.windows(2).map(move |piece| (side, piece)));
         (first_id..)
             .zip(sides.into_iter().flatten())
             .map(|(id, (side, piece))| {
-                Obstacle::capsule(id, [0, 1].map(|k| self.beside(piece[k], side)), 0.0)
+                Obstacle::capsule(id, [0, 1].map(|k| self.wall_point(piece[k], side)), 0.0)
             })
             .collect()
     }
 
     /// Returns the point of a wall beside a pose; `side` is 1 to the left, -1 to the right.
-    fn beside(&self, Pose { at: [x, y], heading_rad }: Pose, side: f64) -> Point<2> {
+    fn wall_point(
+        &self,
+        GroundPose { at: [x, y], heading_rad }: GroundPose,
+        side: f64,
+    ) -> Point<2> {
         let half_m = 0.5 * self.width_m;
         [x - side * half_m * sin(heading_rad), y + side * half_m * cos(heading_rad)]
     }
@@ -198,7 +202,7 @@ mod tests {
             legs in prop::collection::vec(leg(), 1..8), step_m in 0.02..0.3f64,
         ) {
             let corridor = Corridor::new(legs.clone(), 1.0).unwrap();
-            let line = corridor.line(step_m);
+            let line = corridor.center_line(step_m);
             let way_m: f64 = line.windows(2).map(|w| distance(w[0].at, w[1].at)).sum();
             prop_assert!((way_m - corridor.length_m()).abs() < 1e-9);
             prop_assert!(line.windows(2).all(|w| distance(w[0].at, w[1].at) <= step_m + 1e-12));
@@ -212,7 +216,7 @@ mod tests {
         #[test]
         fn a_bend_ends_where_its_circle_says(radius_m in 0.5..5.0f64, turn_deg in 5.0..180.0f64) {
             let corridor = Corridor::new(vec![Leg::Bend { radius_m, turn_deg }], 1.0).unwrap();
-            let line = corridor.line(0.01 * radius_m);
+            let line = corridor.center_line(0.01 * radius_m);
             let turn_rad = turn_deg.to_radians();
             let end = [radius_m * sin(turn_rad), radius_m * (1.0 - cos(turn_rad))];
             prop_assert!(distance(line[line.len() - 1].at, end) < 1e-4 * radius_m);
@@ -223,7 +227,7 @@ mod tests {
     fn walls_are_half_a_width_beside_the_line_and_closed() {
         let corridor = Corridor::pinned(2.0).unwrap();
         let walls = corridor.walls(7);
-        assert_eq!(walls.len(), 2 * (corridor.line(WALL_PIECE_M).len() - 1));
+        assert_eq!(walls.len(), 2 * (corridor.center_line(WALL_PIECE_M).len() - 1));
         assert!((7..).zip(&walls).all(|(id, wall)| wall.id == id));
         let ends: Vec<_> = walls
             .iter()
@@ -235,7 +239,7 @@ mod tests {
         let breaks = ends.windows(2).filter(|w| w[0][1] != w[1][0]).count();
         assert_eq!(breaks, 1, "between the right wall and the left one");
         let all = Obstacles::new(walls, 1.0).unwrap();
-        for pose in corridor.line(0.05) {
+        for pose in corridor.center_line(0.05) {
             let clearance_m = all.clearance_m([pose.at; 2], 0.0, 2.0);
             assert!((clearance_m - 1.0).abs() < 0.01, "{clearance_m} at {:?}", pose.at);
         }

@@ -3,7 +3,9 @@
 //! Every course is a closed formula of time: nothing keeps a state, any worker computes any
 //! obstacle at any moment, and a checkpoint needs only the time.
 
-use crate::rods::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
+use crate::rods::geometry::{
+    Bounds, Point, distance, is_finite, lerp, norm, normalized, scaled, sub,
+};
 use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 
@@ -64,7 +66,7 @@ impl<const D: usize> Mover<D> {
         match &self.course {
             Course::Straight { velocity_m_s } => (!moves(velocity_m_s)).then_some(still),
             Course::Bouncing { velocity_m_s, .. } if !moves(velocity_m_s) => Some(still),
-            Course::Bouncing { room, .. } if !holds(room, &self.bounds) => {
+            Course::Bouncing { room, .. } if !contains_box(room, &self.bounds) => {
                 Some(("is not in its room", "put it inside, or make the room larger"))
             }
             Course::Bouncing { .. } => None,
@@ -77,12 +79,12 @@ impl<const D: usize> Mover<D> {
 
     /// Returns the obstacle at a time, with the velocity that it has from then on.
     pub fn at(&self, t_s: f64) -> Obstacle<D> {
-        let (shift_m, velocity_m_s) = self.motion(t_s);
+        let (shift_m, velocity_m_s) = self.shift_and_velocity(t_s);
         Obstacle { core: self.body.core.shifted(shift_m), velocity_m_s, ..self.body }
     }
 
     /// Returns the shift of the body from its given place, and its velocity.
-    fn motion(&self, t_s: f64) -> (Point<D>, Point<D>) {
+    fn shift_and_velocity(&self, t_s: f64) -> (Point<D>, Point<D>) {
         match &self.course {
             Course::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
             Course::Bouncing { velocity_m_s, room } => {
@@ -96,14 +98,14 @@ impl<const D: usize> Mover<D> {
             }
             Course::Patrol { way_points, closed, speed_m_s } => {
                 let (at, velocity_m_s) = patrol(way_points, *closed, *speed_m_s, t_s);
-                (sub(at, between(self.bounds.lo, self.bounds.hi, 0.5)), velocity_m_s)
+                (sub(at, lerp(self.bounds.lo, self.bounds.hi, 0.5)), velocity_m_s)
             }
         }
     }
 }
 
 /// Returns whether a box holds another, apart from rounding.
-fn holds<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
+fn contains_box<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
     let slack_m = 1e-9;
     is_finite(&room.lo)
         && is_finite(&room.hi)
@@ -132,13 +134,13 @@ fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     if span_m <= 0.0 {
         return (0.0, 0.0);
     }
-    let (x_m, forward) = there_and_back(v_m_s * t_s - lo_m, span_m);
+    let (x_m, forward) = shuttle(v_m_s * t_s - lo_m, span_m);
     (lo_m + x_m, if forward { v_m_s } else { -v_m_s })
 }
 
 /// Returns the position on a way of `length_m` after `way_m` of going to and fro on it, and whether
 /// the body goes forward from there.
-fn there_and_back(way_m: f64, length_m: f64) -> (f64, bool) {
+fn shuttle(way_m: f64, length_m: f64) -> (f64, bool) {
     let m = way_m.rem_euclid(2.0 * length_m);
     // The remainder may round up to the modulus itself.
     if m < length_m { (m, true) } else { ((2.0 * length_m - m).max(0.0), false) }
@@ -157,13 +159,13 @@ fn patrol<const D: usize>(
     let (mut left_m, forward) = if closed {
         ((speed_m_s * t_s).rem_euclid(length_m), true)
     } else {
-        there_and_back(speed_m_s * t_s, length_m)
+        shuttle(speed_m_s * t_s, length_m)
     };
     let (mut at, mut u) = (way_points[0], [0.0; D]);
     for (a, b) in ends() {
         let leg_m = distance(*a, *b);
-        let Some(along) = unit(sub(*b, *a)) else { continue };
-        at = between(*a, *b, (left_m / leg_m).min(1.0));
+        let Some(along) = normalized(sub(*b, *a)) else { continue };
+        at = lerp(*a, *b, (left_m / leg_m).min(1.0));
         u = along;
         // At a way point the next leg counts when going forward, the one before when going back.
         if left_m < leg_m || (!forward && left_m <= leg_m) {
@@ -297,7 +299,7 @@ mod tests {
                 }
                 let obstacle = mover.at(f64::from(k) * dt_s);
                 prop_assert!(distance(center(&obstacle), at) < 1e-8);
-                prop_assert!(holds(&ROOM, &obstacle.bounds()));
+                prop_assert!(contains_box(&ROOM, &obstacle.bounds()));
             }
         }
 

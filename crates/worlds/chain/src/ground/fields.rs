@@ -2,7 +2,7 @@
 
 use super::courses::{Course, Mover};
 use super::purposes;
-use crate::rods::geometry::{Bounds, Core, Point, along, is_finite, unit};
+use crate::rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
 use crate::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 /// Largest number of obstacles; more are taken as a mistake.
 const MAX_OBSTACLES: f64 = 1e7;
 /// Attempts to find a place for an obstacle before the search fails.
-const ATTEMPTS: u64 = 1000;
+const MAX_ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,14 +39,14 @@ impl<const D: usize> Field<D> {
     /// When a room, part or size is not finite or not positive, or there are over ten million
     /// obstacles.
     pub(crate) fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
-        let n = self.count()?;
+        let n = self.obstacle_count()?;
         let streams = Streams::new(seed);
-        let clear = Clear::new(&self.keep_clear, self.keep_m, self.length_m)?;
+        let clear = KeepClearIndex::new(&self.keep_clear, self.keep_m, self.length_m)?;
         let one = |k: u32| {
             let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
             let core = if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
             clear
-                .is_away(ends, self.radius_m)
+                .is_clear(ends, self.radius_m)
                 .then(|| Obstacle::still(first_id + k, core, self.radius_m))
         };
         Ok((0..n).filter_map(one).collect())
@@ -54,14 +54,14 @@ impl<const D: usize> Field<D> {
 
     /// Returns the ends of a core somewhere in the room.
     fn ends(&self, draws: &mut Draws) -> [Point<D>; 2] {
-        let middle = point_in(draws, &self.room);
-        let u = direction(draws);
-        [-0.5, 0.5].map(|k| along(middle, u, k * self.length_m))
+        let middle = random_point(draws, &self.room);
+        let u = random_direction(draws);
+        [-0.5, 0.5].map(|k| add_scaled(middle, u, k * self.length_m))
     }
 
-    fn count(&self) -> Result<u32, InputError> {
+    fn obstacle_count(&self) -> Result<u32, InputError> {
         let extent = |i: usize| self.room.hi[i] - self.room.lo[i];
-        let n = self.part * (0..D).map(extent).product::<f64>() / self.size_of_one();
+        let n = self.part * (0..D).map(extent).product::<f64>() / self.obstacle_size();
         let is_room = (0..D).all(|i| extent(i) > 0.0) && is_finite(&self.room.lo);
         let is_body = self.radius_m > 0.0 && self.length_m >= 0.0 && self.part >= 0.0;
         if is_room && is_body && self.keep_m.is_finite() && n <= MAX_OBSTACLES {
@@ -78,7 +78,7 @@ impl<const D: usize> Field<D> {
     }
 
     /// Returns the area or volume of one obstacle.
-    fn size_of_one(&self) -> f64 {
+    fn obstacle_size(&self) -> f64 {
         let r = self.radius_m;
         match D {
             2 => PI * r * r + 2.0 * r * self.length_m,
@@ -110,49 +110,49 @@ impl<const D: usize> Crowd<D> {
     /// # Errors
     /// When a room is too small for them, or has no place away from `keep_clear`; when sizes or
     /// speeds are not finite and positive.
-    pub(crate) fn gather(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
+    pub(crate) fn generate(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
         if f64::from(self.n) > MAX_OBSTACLES {
             let cause = format!("{} moving obstacles", self.n);
             return Err(InputError::new("crowd", cause, "give at most 1e7"));
         }
         let streams = Streams::new(seed);
-        let clear = Clear::new(&self.keep_clear, self.keep_m, *self.radius_m.end())?;
-        (0..self.n).map(|k| self.one(&streams, &clear, k, first_id + k)).collect()
+        let clear = KeepClearIndex::new(&self.keep_clear, self.keep_m, *self.radius_m.end())?;
+        (0..self.n).map(|k| self.place_one(&streams, &clear, k, first_id + k)).collect()
     }
 
-    fn one(
+    fn place_one(
         &self,
         streams: &Streams,
-        clear: &Clear<D>,
+        clear: &KeepClearIndex<D>,
         k: u32,
         id: u32,
     ) -> Result<Mover<D>, InputError> {
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..MAX_ATTEMPTS {
             let mut draws = streams.draws(k, attempt, purposes::MOVING);
-            let radius_m = within(&mut draws, &self.radius_m);
-            let speed_m_s = within(&mut draws, &self.speed_m_s);
-            let velocity_m_s = direction::<D>(&mut draws).map(|u| u * speed_m_s);
+            let radius_m = uniform(&mut draws, &self.radius_m);
+            let speed_m_s = uniform(&mut draws, &self.speed_m_s);
+            let velocity_m_s = random_direction::<D>(&mut draws).map(|u| u * speed_m_s);
             let places = self.room.grown(-radius_m);
             if !(radius_m > 0.0 && (0..D).all(|i| places.lo[i] <= places.hi[i])) {
                 let cause = format!("a ball of radius {radius_m} m does not fit into the room");
                 return Err(InputError::new("crowd", cause, "make the room larger"));
             }
-            let at = point_in(&mut draws, &places);
-            if clear.is_away([at; 2], radius_m) {
+            let at = random_point(&mut draws, &places);
+            if clear.is_clear([at; 2], radius_m) {
                 let ball = Obstacle::ball(id, at, radius_m);
                 return Mover::new(ball, Course::Bouncing { velocity_m_s, room: self.room });
             }
         }
         Err(InputError::new(
             "crowd",
-            format!("found no place for moving obstacle {id} in {ATTEMPTS} attempts"),
+            format!("found no place for moving obstacle {id} in {MAX_ATTEMPTS} attempts"),
             "make the room larger, or keep less of it clear",
         ))
     }
 }
 
 /// Bodies that are kept clear, by place.
-struct Clear<const D: usize> {
+struct KeepClearIndex<const D: usize> {
     bodies: Obstacles<D>,
     keep_m: f64,
 }
@@ -160,7 +160,7 @@ struct Clear<const D: usize> {
 /// Room around a query, meters, so that no rounding leaves out a body exactly as far away as allowed.
 const ROUNDING_M: f64 = 1e-6;
 
-impl<const D: usize> Clear<D> {
+impl<const D: usize> KeepClearIndex<D> {
     /// Returns bodies from which obstacles of about `size_m` keep a distance.
     fn new(bodies: &[Core<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
         let body = |(k, core): (u32, &Core<D>)| Obstacle::still(k, *core, 0.0);
@@ -172,30 +172,30 @@ impl<const D: usize> Clear<D> {
     }
 
     /// Returns whether a capsule between `ends` stays away from all of them.
-    fn is_away(&self, ends: [Point<D>; 2], radius_m: f64) -> bool {
+    fn is_clear(&self, ends: [Point<D>; 2], radius_m: f64) -> bool {
         let reach_m = radius_m + self.keep_m;
         let mut is_away = reach_m.is_finite();
-        self.bodies.visit(&Bounds::of(&ends).grown(reach_m + ROUNDING_M), |body| {
+        self.bodies.visit(&Bounds::from_points(&ends).grown(reach_m + ROUNDING_M), |body| {
             is_away &= body.core.nearest_to_segment(ends).distance_m > reach_m;
         });
         is_away
     }
 }
 
-fn within(draws: &mut Draws, range: &RangeInclusive<f64>) -> f64 {
+fn uniform(draws: &mut Draws, range: &RangeInclusive<f64>) -> f64 {
     range.start() + (range.end() - range.start()) * draws.uniform()
 }
 
-fn point_in<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D> {
-    std::array::from_fn(|i| within(draws, &(room.lo[i]..=room.hi[i])))
+fn random_point<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D> {
+    std::array::from_fn(|i| uniform(draws, &(room.lo[i]..=room.hi[i])))
 }
 
 /// Returns a unit vector, all directions equally likely: a point in the unit ball, scaled.
-fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
+fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     loop {
         let p: Point<D> = std::array::from_fn(|_| 2.0 * draws.uniform() - 1.0);
         let squared: f64 = p.iter().map(|x| x * x).sum();
-        if let Some(u) = unit(p).filter(|_| (0.01..=1.0).contains(&squared)) {
+        if let Some(u) = normalized(p).filter(|_| (0.01..=1.0).contains(&squared)) {
             return u;
         }
     }
@@ -222,7 +222,7 @@ mod tests {
     fn check<const D: usize>(length_m: f64) {
         let field = field::<D>(0.2, length_m);
         let found = field.fill(Seed(3), 5).unwrap();
-        assert!(found.len() > 10 && found.len() < field.count().unwrap() as usize);
+        assert!(found.len() > 10 && found.len() < field.obstacle_count().unwrap() as usize);
         for o in &found {
             let ends = match o.core {
                 Core::Point(c) => [c; 2],
@@ -266,7 +266,7 @@ mod tests {
             keep_clear: vec![Core::Point([0.0; 2])],
             keep_m: 0.5,
         };
-        for mover in crowd.gather(Seed(9), 100).unwrap() {
+        for mover in crowd.generate(Seed(9), 100).unwrap() {
             let start = mover.at(0.0);
             assert!(start.id >= 100 && (0.2..=0.5).contains(&start.radius_m));
             assert!(start.core.nearest_to_point([0.0; 2]).distance_m > start.radius_m + 0.5);
@@ -279,9 +279,9 @@ mod tests {
             }
         }
         let cramped = Crowd { keep_m: 9.0, ..crowd.clone() };
-        assert!(cramped.gather(Seed(9), 0).is_err());
+        assert!(cramped.generate(Seed(9), 0).is_err());
         let too_large = Crowd { radius_m: 2.5..=3.0, ..crowd };
-        assert!(too_large.gather(Seed(9), 0).is_err());
+        assert!(too_large.generate(Seed(9), 0).is_err());
     }
 
     #[test]

@@ -9,13 +9,13 @@
 pub mod corridor;
 pub(crate) mod courses;
 pub(crate) mod fields;
-pub(crate) mod pixels;
+pub(crate) mod floor;
 pub(crate) mod route;
 pub(crate) mod site;
 
 pub use corridor::{Corridor, Leg};
 pub use courses::{Course, Mover, Movers};
-pub use pixels::Floor;
+pub use floor::Floor;
 pub use site::Site;
 
 use super::rods::geometry::Point;
@@ -23,7 +23,7 @@ use sidestep_kernel::stream::Purpose;
 
 /// A place in the plane and a heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pose {
+pub struct GroundPose {
     /// The place, meters.
     pub at: Point<2>,
     /// Heading, counterclockwise from the first axis, rad.

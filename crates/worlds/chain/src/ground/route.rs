@@ -1,7 +1,7 @@
 //! Room for a chain on a floor: a start for its leader, and a free way behind it.
 
-use super::{Pose, Site, purposes};
-use crate::rods::geometry::{Bounds, Point, along, between, distance, dot, sub, unit};
+use super::{GroundPose, Site, purposes};
+use crate::rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
 use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
@@ -9,15 +9,15 @@ use sidestep_kernel::{InputError, Seed};
 use sidestep_map::planning::{Distances, FreeSpace, STEPS};
 
 /// Random places that are tried.
-const PLACES: u64 = 20_000;
+const MAX_PLACES: u64 = 20_000;
 /// Free places among them for which a way for the chain is searched.
-const STARTS: u32 = 64;
+const MAX_STARTS: u32 = 64;
 /// Largest half side, in boxes, of the grid in which the way behind the leader is searched.
 const MAX_HALF_BOXES: f64 = 500.0;
 
 /// Needs of a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wanted {
+pub(crate) struct SpaceRequirement {
     /// Leader and followers.
     pub(crate) connectors: usize,
     /// Distance from each connector to the next, meters.
@@ -35,16 +35,16 @@ pub(crate) struct Wanted {
 
 /// The start of a chain.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Start {
+pub(crate) struct ChainPlacement {
     /// The leader, which faces away from its chain.
-    pub(crate) leader: Pose,
+    pub(crate) leader: GroundPose,
     /// All connectors, the leader first.
     pub(crate) points: Vec<Point<2>>,
 }
 
 /// Counts that explain why no start was found.
 #[derive(Debug, Default)]
-struct Wanting {
+struct PlacementFailure {
     free_places: u32,
     longest_m: f64,
     laid: u32,
@@ -57,18 +57,18 @@ struct Wanting {
 ///
 /// # Errors
 /// When sizes are not positive, or there is no room, with the cause.
-pub(crate) fn find(
+pub(crate) fn find_placement(
     site: &Site,
     obstacles: &Obstacles<2>,
-    wanted: &Wanted,
+    wanted: &SpaceRequirement,
     seed: Seed,
     number: u32,
-) -> Result<Start, InputError> {
+) -> Result<ChainPlacement, InputError> {
     wanted.check()?;
-    let search = Search { site, obstacles, wanted };
-    let (streams, mut wanting) = (Streams::new(seed), Wanting::default());
+    let search = RouteSearch { site, obstacles, wanted };
+    let (streams, mut wanting) = (Streams::new(seed), PlacementFailure::default());
     let bounds = wanted.within.unwrap_or_else(|| site.bounds());
-    for place in 0..PLACES {
+    for place in 0..MAX_PLACES {
         let mut draws = streams.draws(number, place, purposes::ROUTE);
         let leader =
             std::array::from_fn(|i| bounds.lo[i] + (bounds.hi[i] - bounds.lo[i]) * draws.uniform());
@@ -76,22 +76,22 @@ pub(crate) fn find(
             continue;
         }
         wanting.free_places += 1;
-        let way = search.way_from(leader, draws.next_u32());
+        let way = search.route_from(leader, draws.next_u32());
         wanting.longest_m = wanting.longest_m.max(length_m(&way));
-        if let Some(points) = search.lay(&way) {
+        if let Some(points) = search.lay_chain(&way) {
             wanting.laid += 1;
-            if let Some(start) = search.start(points) {
+            if let Some(start) = search.placement(points) {
                 return Ok(start);
             }
         }
-        if wanting.free_places >= STARTS {
+        if wanting.free_places >= MAX_STARTS {
             break;
         }
     }
     Err(wanting.error(wanted))
 }
 
-impl Wanted {
+impl SpaceRequirement {
     /// Returns the length of the chain.
     fn length_m(&self) -> f64 {
         self.spacing_m * (self.connectors.max(1) - 1) as f64
@@ -115,11 +115,11 @@ impl Wanted {
     }
 }
 
-impl Wanting {
-    fn error(&self, wanted: &Wanted) -> InputError {
+impl PlacementFailure {
+    fn error(&self, wanted: &SpaceRequirement) -> InputError {
         let (cause, remedy) = if self.free_places == 0 {
             let cause = format!(
-                "no place with {} m free around it among {PLACES} random ones",
+                "no place with {} m free around it among {MAX_PLACES} random ones",
                 wanted.clearance_m
             );
             (cause, "make the robots smaller or the clearance less")
@@ -139,13 +139,13 @@ impl Wanting {
     }
 }
 
-struct Search<'a> {
+struct RouteSearch<'a> {
     site: &'a Site,
     obstacles: &'a Obstacles<2>,
-    wanted: &'a Wanted,
+    wanted: &'a SpaceRequirement,
 }
 
-impl Search<'_> {
+impl RouteSearch<'_> {
     fn is_clear(&self, ends: [Point<2>; 2], radius_m: f64) -> bool {
         self.obstacles.clearance_m(ends, 0.0, radius_m) >= radius_m
     }
@@ -155,8 +155,8 @@ impl Search<'_> {
     }
 
     /// Returns a long way away from a place, pulled straight.
-    fn way_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
-        let Wanted { spacing_m, clearance_m, .. } = *self.wanted;
+    fn route_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
+        let SpaceRequirement { spacing_m, clearance_m, .. } = *self.wanted;
         // On 4 neighbors a way counts up to sqrt(2) times its length.
         let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
         let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
@@ -168,12 +168,12 @@ impl Search<'_> {
         let side = 2 * half + 1;
         let free = FreeSpace::new(side, side, |col, row| self.is_free(place((col, row))));
         let steps = Distances::to_nearest(&free, 1, &[(half, half)]);
-        let way = back_from(&steps, furthest(&steps, half, choice));
-        self.pulled(way.into_iter().rev().map(place).collect())
+        let way = path_back(&steps, far_box(&steps, half, choice));
+        self.straighten(way.into_iter().rev().map(place).collect())
     }
 
     /// Returns a way with fewer corners: from each, straight on as far as there is clearance.
-    fn pulled(&self, way: Vec<Point<2>>) -> Vec<Point<2>> {
+    fn straighten(&self, way: Vec<Point<2>>) -> Vec<Point<2>> {
         let (mut pulled, mut from) = (vec![way[0]], 0);
         while from + 1 < way.len() {
             let is_clear =
@@ -187,16 +187,16 @@ impl Search<'_> {
 
     /// Returns connectors along a way, each at the spacing from the one before; `None` if it is too
     /// short, or a rod would come too near to an obstacle.
-    fn lay(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
-        let Wanted { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
+    fn lay_chain(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
+        let SpaceRequirement { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
         let (mut points, mut leg, mut part) = (vec![way[0]], 0, 0.0);
         while points.len() < connectors {
             let last = points[points.len() - 1];
             loop {
                 let [a, b] = [*way.get(leg)?, *way.get(leg + 1)?];
-                match leaves_at(last, spacing_m, [a, b]).filter(|&p| p >= part) {
+                match exit_fraction(last, spacing_m, [a, b]).filter(|&p| p >= part) {
                     Some(found) => {
-                        points.push(between(a, b, found));
+                        points.push(lerp(a, b, found));
                         part = found;
                         break;
                     }
@@ -210,18 +210,18 @@ impl Search<'_> {
     }
 
     /// Returns the start of a chain that lies at `points`, if there is room ahead of it.
-    fn start(&self, points: Vec<Point<2>>) -> Option<Start> {
+    fn placement(&self, points: Vec<Point<2>>) -> Option<ChainPlacement> {
         let at = points[0];
-        let u = points.get(1).and_then(|&next| unit(sub(at, next))).unwrap_or([1.0, 0.0]);
-        let ahead = [at, along(at, u, self.wanted.ahead_m)];
-        let leader = Pose { at, heading_rad: atan2(u[1], u[0]) };
-        self.is_clear(ahead, self.wanted.clearance_m).then_some(Start { leader, points })
+        let u = points.get(1).and_then(|&next| normalized(sub(at, next))).unwrap_or([1.0, 0.0]);
+        let ahead = [at, add_scaled(at, u, self.wanted.ahead_m)];
+        let leader = GroundPose { at, heading_rad: atan2(u[1], u[0]) };
+        self.is_clear(ahead, self.wanted.clearance_m).then_some(ChainPlacement { leader, points })
     }
 }
 
 /// Returns one of the boxes that are nearly the most steps away.
-fn furthest(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
-    let most = steps.max().unwrap_or(0);
+fn far_box(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
+    let most = steps.max_steps().unwrap_or(0);
     let all = (0..=2 * half).flat_map(|row| (0..=2 * half).map(move |col| (col, row)));
     let far =
         |&(col, row): &(u32, u32)| steps.steps(col, row).is_some_and(|n| n + most / 20 >= most);
@@ -230,7 +230,7 @@ fn furthest(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
 }
 
 /// Returns the boxes from one to that at 0 steps, each a step nearer.
-fn back_from(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
+fn path_back(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
     let mut way = vec![at];
     while let Some(n) = steps.steps(at.0, at.1).filter(|&n| n > 0) {
         let beside = STEPS
@@ -245,7 +245,7 @@ fn back_from(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
 
 /// Returns the part of a segment at which a way along it leaves the circle around a point, if it
 /// does.
-fn leaves_at(center: Point<2>, radius_m: f64, [a, b]: [Point<2>; 2]) -> Option<f64> {
+fn exit_fraction(center: Point<2>, radius_m: f64, [a, b]: [Point<2>; 2]) -> Option<f64> {
     let (d, r) = (sub(b, a), sub(a, center));
     let (dd, dr) = (dot(d, d), dot(d, r));
     let root = dr * dr - dd * (dot(r, r) - radius_m * radius_m);
@@ -262,11 +262,11 @@ mod tests {
     use super::*;
     use crate::rods::chain::{Chain, Connector, Rod};
     use sidestep_import::{PixelMap, rosmap, stage};
-    use sidestep_kernel::view::Plane;
+    use sidestep_kernel::view::Isometry2;
     use sidestep_map::{Cell, UnknownPolicy};
     use sidestep_testing::shared_data as shared;
 
-    const WANTED: Wanted = Wanted {
+    const WANTED: SpaceRequirement = SpaceRequirement {
         connectors: 16,
         spacing_m: 0.7,
         clearance_m: 0.33,
@@ -287,19 +287,19 @@ mod tests {
         ];
         let pixels = rows.iter().rev().flat_map(|row| row.chars());
         let cell = |c| if c == '#' { Cell::Wall } else { Cell::Free };
-        let plane = Plane { origin_m: [-2.0, 1.0], yaw_rad: 0.0 };
+        let plane = Isometry2 { origin_m: [-2.0, 1.0], yaw_rad: 0.0 };
         let map = PixelMap::new(20, 6, 0.5, plane, pixels.map(cell).collect());
-        Site::of_map(&map, UnknownPolicy::Wall)
+        Site::from_map(&map, UnknownPolicy::Wall)
     }
 
-    fn check(name: &str, site: &Site, wanted: &Wanted, seeds: u64) {
+    fn check(name: &str, site: &Site, wanted: &SpaceRequirement, seeds: u64) {
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         for seed in 0..seeds {
-            let start = find(site, &obstacles, wanted, Seed(seed), 0).expect(name);
-            assert_eq!(start, find(site, &obstacles, wanted, Seed(seed), 0).unwrap());
+            let start = find_placement(site, &obstacles, wanted, Seed(seed), 0).expect(name);
+            assert_eq!(start, find_placement(site, &obstacles, wanted, Seed(seed), 0).unwrap());
             assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
             let within = wanted.within.unwrap_or_else(|| site.bounds());
-            assert!(within.meets(&Bounds::of(&[start.leader.at])));
+            assert!(within.meets(&Bounds::from_points(&[start.leader.at])));
             for rod in start.points.windows(2) {
                 assert!((distance(rod[0], rod[1]) - wanted.spacing_m).abs() < 1e-9);
                 let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
@@ -318,18 +318,19 @@ mod tests {
 
     #[test]
     fn a_chain_has_room_in_a_bent_corridor() {
-        check("bent", &bent(), &Wanted { connectors: 10, ..WANTED }, 10);
-        check("alone", &bent(), &Wanted { connectors: 1, ..WANTED }, 3);
+        check("bent", &bent(), &SpaceRequirement { connectors: 10, ..WANTED }, 10);
+        check("alone", &bent(), &SpaceRequirement { connectors: 1, ..WANTED }, 3);
     }
 
     #[test]
     fn starts_differ_by_seed_and_number() {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
-        let wanted = Wanted { connectors: 5, ..WANTED };
-        let start = |seed| find(&site, &obstacles, &wanted, Seed(seed), 0).unwrap();
+        let wanted = SpaceRequirement { connectors: 5, ..WANTED };
+        let start = |seed| find_placement(&site, &obstacles, &wanted, Seed(seed), 0).unwrap();
         assert_ne!(start(1), start(2));
-        let of_number = |number| find(&site, &obstacles, &wanted, Seed(1), number).unwrap();
+        let of_number =
+            |number| find_placement(&site, &obstacles, &wanted, Seed(1), number).unwrap();
         assert_ne!(of_number(0), of_number(1));
     }
 
@@ -337,21 +338,23 @@ mod tests {
     fn what_is_wanting_is_said() {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
-        let cause = |wanted: Wanted| {
-            find(&site, &obstacles, &wanted, Seed(1), 0).unwrap_err().cause().to_owned()
+        let cause = |wanted: SpaceRequirement| {
+            find_placement(&site, &obstacles, &wanted, Seed(1), 0).unwrap_err().cause().to_owned()
         };
-        assert!(cause(Wanted { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m"));
-        let too_long = cause(Wanted { connectors: 40, ..WANTED });
+        assert!(
+            cause(SpaceRequirement { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m")
+        );
+        let too_long = cause(SpaceRequirement { connectors: 40, ..WANTED });
         assert!(too_long.contains("no free way for a chain of 27.3"), "{too_long}");
-        let no_room = cause(Wanted { connectors: 3, ahead_m: 50.0, ..WANTED });
+        let no_room = cause(SpaceRequirement { connectors: 3, ahead_m: 50.0, ..WANTED });
         assert!(no_room.contains("nowhere 50 m free"), "{no_room}");
         for wrong in [
-            Wanted { connectors: 0, ..WANTED },
-            Wanted { spacing_m: 0.0, ..WANTED },
-            Wanted { clearance_m: f64::NAN, ..WANTED },
-            Wanted { spacing_m: f64::INFINITY, ..WANTED },
+            SpaceRequirement { connectors: 0, ..WANTED },
+            SpaceRequirement { spacing_m: 0.0, ..WANTED },
+            SpaceRequirement { clearance_m: f64::NAN, ..WANTED },
+            SpaceRequirement { spacing_m: f64::INFINITY, ..WANTED },
         ] {
-            assert!(find(&site, &obstacles, &wrong, Seed(1), 0).is_err());
+            assert!(find_placement(&site, &obstacles, &wrong, Seed(1), 0).is_err());
         }
     }
 
@@ -360,11 +363,11 @@ mod tests {
         for name in ["porto/porto", "berlin/berlin"] {
             let Some(path) = shared(&format!("maps/{name}.yaml")) else { return };
             let map = rosmap::load(&path).expect(name);
-            check(name, &Site::of_map(&map, UnknownPolicy::Wall), &WANTED, 4);
+            check(name, &Site::from_map(&map, UnknownPolicy::Wall), &WANTED, 4);
         }
         let path = shared("worlds/stage/SFU.world").expect("there");
         let world = stage::load(&path).expect("SFU");
         let within = Some(Bounds { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
-        check("SFU", &Site::of_stage(&world), &Wanted { within, ..WANTED }, 3);
+        check("SFU", &Site::from_stage(&world), &SpaceRequirement { within, ..WANTED }, 3);
     }
 }

@@ -1,7 +1,7 @@
 //! Ground read from files: floors of pixels and boxes.
 
-use super::Pose;
-use super::pixels::Floor;
+use super::GroundPose;
+use super::floor::Floor;
 use crate::rods::geometry::{Bounds, Core, Cuboid, Point};
 use crate::rods::obstacle::{Obstacle, outline};
 use sidestep_import::{PixelMap, stage};
@@ -18,28 +18,28 @@ pub struct Site {
 
 impl Site {
     /// Returns the site of a map, solid all around.
-    pub fn of_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
-        Self { floors: vec![Floor::of_map(map, unknown)], solids: Vec::new() }
+    pub fn from_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
+        Self { floors: vec![Floor::from_map(map, unknown)], solids: Vec::new() }
     }
 
     /// Returns the site of a Stage world, without its robots (see [`stage::Robot`] for their
     /// starts). A floor plan with a boundary has thin walls around it; without one, nothing beside
     /// it is solid.
-    pub fn of_stage(world: &stage::World) -> Self {
+    pub fn from_stage(world: &stage::World) -> Self {
         let mut site = Self::default();
         for plan in &world.floor_plans {
             let pixel_m =
                 [plan.size_m[0] / f64::from(plan.width), plan.size_m[1] / f64::from(plan.height)];
             let floor = Floor::new(plan.width, plan.height, pixel_m, plan.solid.clone());
-            let pose = Pose::from(plan.pose);
-            site.floors.push(floor.centered(pose.at, pose.heading_rad).open());
+            let pose = GroundPose::from(plan.pose);
+            site.floors.push(floor.centered(pose.at, pose.heading_rad).with_open_surroundings());
             if plan.has_boundary {
                 let edges = cuboid(pose, plan.size_m).edges_2d();
                 site.solids.extend(outline(0, &edges.map(|edge| edge[0]), 0.0));
             }
         }
         let boxes = world.boxes.iter();
-        let solid = |body: &stage::Body| Core::Cuboid(cuboid(body.pose.into(), body.size_m));
+        let solid = |body: &stage::BoxObstacle| Core::Cuboid(cuboid(body.pose.into(), body.size_m));
         site.solids.extend(boxes.map(|body| Obstacle::still(0, solid(body), 0.0)));
         site
     }
@@ -64,18 +64,18 @@ impl Site {
 
     /// Returns the box around all floors.
     pub fn bounds(&self) -> Bounds<2> {
-        self.floors.iter().fold(Bounds::nothing(), |all, floor| all.joined(&floor.bounds()))
+        self.floors.iter().fold(Bounds::empty(), |all, floor| all.joined(&floor.bounds()))
     }
 }
 
-impl From<stage::Pose> for Pose {
-    fn from(pose: stage::Pose) -> Self {
+impl From<stage::Pose2> for GroundPose {
+    fn from(pose: stage::Pose2) -> Self {
         Self { at: [pose.x_m, pose.y_m], heading_rad: pose.yaw_rad }
     }
 }
 
 /// Returns a box around a pose.
-fn cuboid(pose: Pose, size_m: [f64; 2]) -> Cuboid<2> {
+fn cuboid(pose: GroundPose, size_m: [f64; 2]) -> Cuboid<2> {
     let (s, c) = (sin(pose.heading_rad), cos(pose.heading_rad));
     Cuboid { center: pose.at, axes: [[c, s], [-s, c]], half_m: size_m.map(|m| 0.5 * m) }
 }
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_stage_world_is_its_floors_boundaries_and_boxes() {
-        let pose = stage::Pose { x_m: 10.0, y_m: 0.0, yaw_rad: std::f64::consts::FRAC_PI_2 };
+        let pose = stage::Pose2 { x_m: 10.0, y_m: 0.0, yaw_rad: std::f64::consts::FRAC_PI_2 };
         let plan = stage::FloorPlan {
             name: String::new(),
             width: 2,
@@ -98,10 +98,10 @@ mod tests {
             pose,
             has_boundary: true,
         };
-        let body = stage::Body { name: String::new(), pose, size_m: [0.2, 0.1] };
+        let body = stage::BoxObstacle { name: String::new(), pose, size_m: [0.2, 0.1] };
         let world =
             stage::World { floor_plans: vec![plan], boxes: vec![body], ..Default::default() };
-        let site = Site::of_stage(&world);
+        let site = Site::from_stage(&world);
         // Turned to the left: the solid pixel is the southern one.
         assert!(!site.is_free([10.0, -1.0]) && site.is_free([10.0, 1.0]) && site.is_free([0.0; 2]));
         let obstacles = site.obstacles(3);
@@ -117,12 +117,12 @@ mod tests {
         for name in ["stage/simple", "stage/SFU", "willow/willow-erratic"] {
             let Some(path) = shared(&format!("worlds/{name}.world")) else { return };
             let world = stage::load(&path).expect(name);
-            let site = Site::of_stage(&world);
+            let site = Site::from_stage(&world);
             let obstacles = site.obstacles(0);
             println!("{name}: {} obstacles", obstacles.len());
             let all = Obstacles::new(obstacles, 1.0).unwrap();
             for robot in &world.robots {
-                let at = Pose::from(robot.pose).at;
+                let at = GroundPose::from(robot.pose).at;
                 assert!(site.is_free(at) && all.clearance_m([at; 2], robot.radius_m, 1.0) > 0.0);
             }
         }

@@ -1,6 +1,6 @@
 use crate::chain_run;
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{Inspection, Kind, Role, Value, Who};
+use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole};
 use sidestep_scenario::Source;
 
 fn run(text: &str) -> Box<dyn Simulation> {
@@ -9,7 +9,7 @@ fn run(text: &str) -> Box<dyn Simulation> {
 }
 
 fn told(run: &dyn Simulation, k: u32) -> Inspection {
-    run.inspect(Who::new(Kind::Connector, 0, Some(k))).expect("it is there")
+    run.inspect(BodyId::new(BodyKind::Connector, 0, Some(k))).expect("it is there")
 }
 
 /// A chain that an operator drives against a disc: its head touches it at x = 0.6.
@@ -26,21 +26,23 @@ fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
     assert_eq!(free.value("Ladder", "rung"), Some(&"as wanted".into()));
     run.advance(20);
     let told = told(&*run, 2);
-    let head: Who = Who::new(Kind::Connector, 0, Some(0));
-    assert_eq!(told.value("Veto", "by"), Some(&Value::Who(head)));
+    let head: BodyId = BodyId::new(BodyKind::Connector, 0, Some(0));
+    assert_eq!(told.value("Veto", "by"), Some(&FactValue::Who(head)));
     assert_eq!(told.value("Veto", "reason"), Some(&"target-blocked".into()));
-    let disc = Who::new(Kind::Obstacle, 0, None);
-    assert_eq!(told.value("Veto", "because of"), Some(&Value::from(Some(disc))));
-    let Some(Value::Place([x_m, ..])) = told.value("Veto", "as far as") else { panic!("nowhere") };
+    let disc = BodyId::new(BodyKind::Obstacle, 0, None);
+    assert_eq!(told.value("Veto", "because of"), Some(&FactValue::from(Some(disc))));
+    let Some(FactValue::Place([x_m, ..])) = told.value("Veto", "as far as") else {
+        panic!("nowhere")
+    };
     assert!((0.56..=0.6).contains(x_m), "the disc begins at 0.6 m, and it can go to {x_m} m");
-    let Some(Value::Number { value: far_m, unit: "m" }) = told.value("Veto", "could go") else {
+    let Some(FactValue::Number { value: far_m, unit: "m" }) = told.value("Veto", "could go") else {
         panic!("no way")
     };
     assert!((0.0..0.07).contains(far_m), "less than a step, and not {far_m} m");
     assert_eq!(told.value("Outcome", "next place"), told.value("Now", "place"));
-    assert_eq!(told.value("Wish", "of"), Some(&Value::Who(head)));
-    assert_eq!(told.marks_of(Role::Wish).count(), 1);
-    assert_eq!(told.value("Moves", "connectors"), Some(&Value::count(0)));
+    assert_eq!(told.value("Wish", "of"), Some(&FactValue::Who(head)));
+    assert_eq!(told.marks_with_role(MarkRole::Wish).count(), 1);
+    assert_eq!(told.value("Moves", "connectors"), Some(&FactValue::count(0)));
 }
 
 #[test]
@@ -51,13 +53,13 @@ fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
         speed_m_s = 0.5\n";
     let mut run = run(text);
     run.advance(30);
-    let told = run.inspect(Who::new(Kind::Robot, 0, Some(3))).expect("it is there");
-    let Some(Value::Text(layer)) = told.value("Decides", "layer") else { panic!("no layer") };
+    let told = run.inspect(BodyId::new(BodyKind::Robot, 0, Some(3))).expect("it is there");
+    let Some(FactValue::Text(layer)) = told.value("Decides", "layer") else { panic!("no layer") };
     assert!(layer.starts_with(|digit| ('1'..='6').contains(&digit)), "{layer}");
     let robots = told.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     assert_eq!(robots.rows.len(), 4);
     run.advance(1);
-    let then = run.inspect(Who::new(Kind::Robot, 0, Some(3))).expect("it is there");
+    let then = run.inspect(BodyId::new(BodyKind::Robot, 0, Some(3))).expect("it is there");
     assert_eq!(then.value("Now", "place"), told.value("Outcome", "next place"));
     let table = then.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     let [was, is] = [(robots, "behind then"), (table, "behind now")]
@@ -69,11 +71,11 @@ fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
 fn nobody_is_told_of_who_is_not_there() {
     let run = run(AGAINST_A_DISC);
     for who in [
-        Who::new(Kind::Connector, 0, Some(4)),
-        Who::new(Kind::Connector, 1, Some(0)),
-        Who::new(Kind::Connector, 0, None),
-        Who::new(Kind::Robot, 0, Some(0)),
-        Who::new(Kind::Rods, 0, Some(0)),
+        BodyId::new(BodyKind::Connector, 0, Some(4)),
+        BodyId::new(BodyKind::Connector, 1, Some(0)),
+        BodyId::new(BodyKind::Connector, 0, None),
+        BodyId::new(BodyKind::Robot, 0, Some(0)),
+        BodyId::new(BodyKind::Rods, 0, Some(0)),
     ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }

@@ -22,19 +22,19 @@ use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::propagate::Propagator;
 use crate::rods::rules::Rules;
 use crate::rods::veto::Veto;
-use literal::Literal;
+use literal::LiteralEscape;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
-pub(crate) use simultaneous::Lead;
-use simultaneous::Simultaneous;
-pub use simultaneous::WayOut;
-pub(crate) use threat::Part;
+pub use simultaneous::EscapePlan;
+pub(crate) use simultaneous::LeadMotion;
+use simultaneous::SimultaneousEscape;
+pub(crate) use threat::ChainPart;
 
 /// The method by which a chain gets out of the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Method {
+pub enum EscapeMethod {
     /// All constraints of a tick are solved at once; caught parts are led out.
     #[default]
     Simultaneous,
@@ -44,7 +44,7 @@ pub enum Method {
 
 /// Rules for getting out of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Escape {
+pub struct EscapeRules {
     /// Length of a tick, s.
     pub dt_s: f64,
     /// Greatest speed: no connector is farther from its place at the start of the tick than this
@@ -57,14 +57,14 @@ pub struct Escape {
     /// contacts.
     pub most: usize,
     /// The method.
-    pub method: Method,
+    pub method: EscapeMethod,
 }
 
-impl Escape {
+impl EscapeRules {
     /// Returns rules of the usual method with a look-ahead of 20 ticks and, where it counts them, up
     /// to 40 violations a tick.
     pub fn new(dt_s: f64, speed_max_m_s: f64) -> Self {
-        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40, method: Method::default() }
+        Self { dt_s, speed_max_m_s, ticks_ahead: 20.0, most: 40, method: EscapeMethod::default() }
     }
 
     fn check(&self) -> Result<(), InputError> {
@@ -83,13 +83,13 @@ impl Escape {
         Ok(())
     }
 
-    fn most_m(&self) -> f64 {
+    fn max_step_m(&self) -> f64 {
         self.speed_max_m_s * self.dt_s
     }
 
-    fn look_ahead(&self) -> Margin {
+    fn look_ahead_margin(&self) -> Margin {
         if self.ticks_ahead > 0.0 {
-            Margin { ahead_s: self.ticks_ahead * self.dt_s, spare_m: SPARE_M }
+            Margin { ahead_s: self.ticks_ahead * self.dt_s, spare_m: MARGIN_M }
         } else {
             Margin::NONE
         }
@@ -98,7 +98,7 @@ impl Escape {
 
 /// Outcome of an escape.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Escaped<const D: usize> {
+pub struct EscapeReport<const D: usize> {
     /// Motions that brought a part farther away.
     pub moves: usize,
     /// Violations that no motion reduced.
@@ -108,7 +108,7 @@ pub struct Escaped<const D: usize> {
     /// Depth of the deepest part still in a moving obstacle, meters; 0 if none is.
     pub deepest_m: f64,
     /// The part that is still in one.
-    pub left: Option<Left<D>>,
+    pub left: Option<TrappedPart<D>>,
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
@@ -119,9 +119,9 @@ pub struct Escaped<const D: usize> {
 
 /// A part that is still in a moving obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Left<const D: usize> {
+pub struct TrappedPart<const D: usize> {
     /// The part.
-    pub part: Part,
+    pub part: ChainPart,
     /// The obstacle.
     pub obstacle: u32,
     /// The reason why it could not leave; `None` if the tick's motions were used up.
@@ -129,16 +129,16 @@ pub struct Left<const D: usize> {
 }
 
 /// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick; a chain's
-/// memory is in its [`WayOut`].
+/// memory is in its [`EscapePlan`].
 #[derive(Debug, Clone)]
 pub struct Escaper<const D: usize> {
-    rules: Escape,
-    literal: Literal<D>,
-    simultaneous: Simultaneous<D>,
+    rules: EscapeRules,
+    literal: LiteralEscape<D>,
+    simultaneous: SimultaneousEscape<D>,
 }
 
 /// The working data of a tick.
-struct Tick<'a, const D: usize> {
+struct EscapeTick<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     propagator: &'a mut Propagator<D>,
@@ -156,46 +156,50 @@ struct Margin {
 impl Margin {
     const NONE: Self = Self { ahead_s: 0.0, spare_m: 0.0 };
 
-    fn around<const D: usize>(self, mover: &Obstacle<D>) -> f64 {
+    fn required_gap_m<const D: usize>(self, mover: &Obstacle<D>) -> f64 {
         norm(mover.velocity_m_s) * self.ahead_s + self.spare_m
     }
 }
 
 /// Gap that is kept beyond the way of the obstacle, meters.
-const SPARE_M: f64 = 0.05;
+const MARGIN_M: f64 = 0.05;
 /// Time from one choice of a leader to the next, s.
-const CHOOSES_EVERY_S: f64 = 0.2;
+const LEADER_CHOICE_INTERVAL_S: f64 = 0.2;
 
 impl<const D: usize> Escaper<D> {
     /// Returns an escaper for rules.
-    pub fn new(rules: Escape) -> Self {
-        Self { rules, literal: Literal::new(rules), simultaneous: Simultaneous::new(rules) }
+    pub fn new(rules: EscapeRules) -> Self {
+        Self {
+            rules,
+            literal: LiteralEscape::new(rules),
+            simultaneous: SimultaneousEscape::new(rules),
+        }
     }
 
     /// Returns its rules.
-    pub fn rules(&self) -> &Escape {
+    pub fn rules(&self) -> &EscapeRules {
         &self.rules
     }
 
     /// Returns the ticks from one choice of a leader to the next; none if leaders choose nothing, because the chain
     /// gives way on contact or by the literal method only.
-    pub(crate) fn chooses_every(&self) -> Option<u64> {
-        let Escape { dt_s, ticks_ahead, method, .. } = self.rules;
-        let chooses = method == Method::Simultaneous && ticks_ahead > 0.0;
-        chooses.then(|| (CHOOSES_EVERY_S / dt_s).round().max(1.0) as u64)
+    pub(crate) fn choice_interval_ticks(&self) -> Option<u64> {
+        let EscapeRules { dt_s, ticks_ahead, method, .. } = self.rules;
+        let chooses = method == EscapeMethod::Simultaneous && ticks_ahead > 0.0;
+        chooses.then(|| (LEADER_CHOICE_INTERVAL_S / dt_s).round().max(1.0) as u64)
     }
 
     /// Lets the leader of a chain choose between its wish and resting, whichever keeps parts of the chain
     /// inside moving obstacles for less time. The choice is in `way_out`.
-    pub(crate) fn choose(
+    pub(crate) fn choose_leader_action(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         rules: &Rules,
-        lead: &Lead<D>,
-        way_out: &mut WayOut,
+        lead: &LeadMotion<D>,
+        way_out: &mut EscapePlan,
     ) {
-        way_out.set_rests(self.simultaneous.should_rest(chain, obstacles, rules, lead));
+        way_out.set_resting(self.simultaneous.should_rest(chain, obstacles, rules, lead));
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
@@ -210,20 +214,20 @@ impl<const D: usize> Escaper<D> {
         obstacles: &Obstacles<D>,
         propagator: &mut Propagator<D>,
         start: &[Point<D>],
-        way_out: &mut WayOut,
-    ) -> Result<Escaped<D>, InputError> {
+        way_out: &mut EscapePlan,
+    ) -> Result<EscapeReport<D>, InputError> {
         self.rules.check()?;
         if start.len() != chain.points().len() {
             let cause = format!("has {} places for {}", start.len(), chain.points().len());
             return Err(InputError::new("start of the tick", cause, "give one a connector"));
         }
-        if self.rules.method == Method::Simultaneous {
+        if self.rules.method == EscapeMethod::Simultaneous {
             let rules = propagator.rules;
             return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, way_out));
         }
         let step_max_m = propagator.rules.slave_step_max_m;
-        propagator.rules.slave_step_max_m = step_max_m.min(self.rules.most_m());
-        let mut tick = Tick { chain, obstacles, propagator, start };
+        propagator.rules.slave_step_max_m = step_max_m.min(self.rules.max_step_m());
+        let mut tick = EscapeTick { chain, obstacles, propagator, start };
         let escaped = self.literal.escape(&mut tick);
         propagator.rules.slave_step_max_m = step_max_m;
         escaped

@@ -7,5 +7,5 @@
 //! ```
 
 pub(crate) mod escape;
-pub(crate) mod go;
-pub(crate) mod replan;
+pub(crate) mod recovery;
+pub(crate) mod request;

@@ -3,15 +3,20 @@
 
 use super::chain::{Mobility, Rod};
 use super::geometry::{
-    Core, Cuboid, Point, add, along, angle_rad, between, distance, dot, first_axis, norm, scaled,
-    sub, unit,
+    Core, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
+    normalized, scaled, sub,
 };
-use super::interval::{self, Arc, Reach, Side, beyond_bend, block_rod, block_tip, least_turn_rad};
-use super::obstacle::around;
+use super::interval::{
+    self, AngleInterval, MasterRod, TurnDirection, bend_forbidden_arc, block_rod, block_tip,
+    min_turn_rad,
+};
+use super::motion_context::{
+    Block, BlockOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep, is_length_allowed,
+};
+use super::obstacle::bounds_around;
 use super::rules::Rotation;
-use super::scene::{Block, Name, Refusal, SKIN_M, Scene, Step, fits};
-use super::search::{Search, away, cosine_of_half_angle};
-use super::veto::Reason;
+use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
+use super::veto::VetoReason;
 use std::f64::consts::PI;
 
 /// A possible place for a slave.
@@ -25,16 +30,16 @@ pub(super) struct Candidate<const D: usize> {
 
 /// Buffers that live from one slave to the next.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Work<const D: usize> {
+pub(super) struct CandidateScratch<const D: usize> {
     blocks: Vec<Block<D>>,
-    arcs: Arcs,
+    arcs: BlockedArcs,
     /// Whether a rod that turns tries all its lengths, or others only if its present one is
     /// blocked.
     pub(super) all_lengths: bool,
     /// Whether a plane rod looks for a way on both sides, or on the farther one only if the nearer
     /// has none.
     pub(super) both_sides: bool,
-    /// Places found by [`Scene::candidates`], best first.
+    /// Places found by [`MotionContext::candidates`], best first.
     pub(super) found: Vec<Candidate<D>>,
     /// Whether one side has not been examined yet.
     pub(super) has_other_side: bool,
@@ -45,7 +50,7 @@ pub(super) struct Work<const D: usize> {
 
 /// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
 #[inline]
-pub(super) fn guided<const D: usize>(
+pub(super) fn guide<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
     least_move_m: f64,
@@ -56,9 +61,9 @@ pub(super) fn guided<const D: usize>(
     if (t - d).abs() <= least_move_m {
         so
     } else if d > 0.0 {
-        along(mn, g, t / d)
+        add_scaled(mn, g, t / d)
     } else {
-        along(mn, unit(sub(so, mo)).unwrap_or(first_axis()), t)
+        add_scaled(mn, normalized(sub(so, mo)).unwrap_or(first_axis()), t)
     }
 }
 
@@ -71,40 +76,44 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
 }
 
 /// Most rounds of bringing a place into a box and back to an allowed length of the rod.
-const TURNS_INTO_A_BOX: usize = 200;
+const MAX_BOX_ROUNDS: usize = 200;
 
 /// Relative rounding of ways.
 const ROUNDING: f64 = 1e-9;
 
 /// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
-fn guide_line<const D: usize>(step: &Step<D>) -> Point<D> {
-    unit(sub(step.so, step.mn)).or(unit(sub(step.so, step.mo))).unwrap_or(first_axis())
+fn guide_line<const D: usize>(step: &SlaveStep<D>) -> Point<D> {
+    normalized(sub(step.so, step.mn)).or(normalized(sub(step.so, step.mo))).unwrap_or(first_axis())
 }
 
-impl<const D: usize> Scene<'_, D> {
+impl<const D: usize> MotionContext<'_, D> {
     /// Puts all good places for a slave, best first, into `work.found`; only the one on the guide
     /// line if it is good.
-    pub(super) fn candidates(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
+    pub(super) fn candidates(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
         work.found.clear();
         work.has_other_side = false;
         let connector = &self.chain.connectors()[step.slave];
         if connector.is_still() {
-            return self.stay(step, work);
+            return self.place_fixed(step, work);
         }
         if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
-            return self.on_its_line(step, work);
+            return self.place_on_line(step, work);
         }
-        let guided = guided([step.mo, step.mn, step.so], step.rod, self.chain.least_move_m());
-        let refusal = match self.judge_place(step, guided) {
+        let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+        let refusal = match self.check_place(step, guided) {
             Ok(()) => {
                 work.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
                 return Ok(());
             }
             Err(refusal) => refusal,
         };
-        if refusal.reason == Reason::Mobility
-            && let Some(at) = self.in_its_box(step, guided)
-            && self.judge(step, at).is_ok()
+        if refusal.reason == VetoReason::Mobility
+            && let Some(at) = self.place_in_box(step, guided)
+            && self.check_slave(step, at).is_ok()
         {
             work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
             return Ok(());
@@ -118,56 +127,64 @@ impl<const D: usize> Scene<'_, D> {
 
     /// Returns a place that the rod allows for a slave confined to a box, by alternating between
     /// the box and the rod's lengths.
-    fn in_its_box(&self, step: &Step<D>, guided: Point<D>) -> Option<Point<D>> {
+    fn place_in_box(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
         let mobility = &self.chain.connectors()[step.slave].mobility;
         let mut at = guided;
-        for _ in 0..TURNS_INTO_A_BOX {
+        for _ in 0..MAX_BOX_ROUNDS {
             at = mobility.project(at, step.so);
             let d = distance(at, step.mn);
-            if fits(step.rod, d) {
+            if is_length_allowed(step.rod, d) {
                 return Some(at);
             }
             let t = d.max(step.rod.min_m).min(step.rod.max_m);
-            at = along(step.mn, sub(at, step.mn), t / d.max(f64::MIN_POSITIVE));
+            at = add_scaled(step.mn, sub(at, step.mn), t / d.max(f64::MIN_POSITIVE));
         }
         None
     }
 
-    fn judge_place(&self, step: &Step<D>, at: Point<D>) -> Result<(), Refusal> {
+    fn check_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
         if !self.may_be_at(step.slave, at) {
-            return Err(Refusal::of(Reason::Mobility));
+            return Err(PendingVeto::new(VetoReason::Mobility));
         }
-        self.judge(step, at)
+        self.check_slave(step, at)
     }
 
     /// Handles a slave that never moves: it objects unless the rod is good as it is.
-    fn stay(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
-        if !fits(step.rod, distance(step.mn, step.so)) {
-            return Err(Refusal::of(self.chain.connectors()[step.slave].why_still()));
+    fn place_fixed(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        if !is_length_allowed(step.rod, distance(step.mn, step.so)) {
+            return Err(PendingVeto::new(self.chain.connectors()[step.slave].still_reason()));
         }
-        self.judge(step, step.so)?;
+        self.check_slave(step, step.so)?;
         work.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
         Ok(())
     }
 
     /// Handles a slave on a line or in a plane: finds the nearest places there that the rod allows.
-    fn on_its_line(&self, step: &Step<D>, work: &mut Work<D>) -> Result<(), Refusal> {
+    fn place_on_line(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
         let d = distance(step.mn, step.so);
         let t = d.max(step.rod.min_m).min(step.rod.max_m);
-        let places = if (t - d).abs() <= self.chain.least_move_m() {
+        let places = if (t - d).abs() <= self.chain.min_move_m() {
             [Some(step.so), None]
         } else {
             match self.chain.connectors()[step.slave].mobility {
-                Mobility::OnSegment(ends) => on_segment_at(step.mn, t, ends),
+                Mobility::OnSegment(ends) => segment_points_at(step.mn, t, ends),
                 Mobility::OnPlane { normal, offset_m } => {
-                    on_plane_at(step.mn, t, step.so, normal, offset_m)
+                    plane_points_at(step.mn, t, step.so, normal, offset_m)
                 }
                 _ => [None; 2],
             }
         };
-        let mut refusal = Refusal::of(Reason::Mobility);
+        let mut refusal = PendingVeto::new(VetoReason::Mobility);
         for at in places.into_iter().flatten() {
-            match self.judge(step, at) {
+            match self.check_slave(step, at) {
                 Ok(()) => work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
                 Err(objection) => refusal = objection,
             }
@@ -180,11 +197,11 @@ impl<const D: usize> Scene<'_, D> {
     /// master.
     fn rotate_once(
         &self,
-        step: &Step<D>,
+        step: &SlaveStep<D>,
         guided: Point<D>,
-        work: &mut Work<D>,
-    ) -> Result<(), Refusal> {
-        self.collect(step, distance(step.mn, guided), work);
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        self.collect_blocks(step, distance(step.mn, guided), work);
         let rod = [step.mn, guided];
         let hit = work
             .blocks
@@ -200,12 +217,12 @@ impl<const D: usize> Scene<'_, D> {
             .and_then(|(nearest, radius_m, _)| {
                 let to = sub(nearest.on_core, step.mn);
                 let cosine = cosine_of_half_angle(norm(to), radius_m, length_m, false)?;
-                let u = away(guide_line(step), unit(to)?, cosine);
-                Some(along(step.mn, u, length_m))
+                let u = direction_off(guide_line(step), normalized(to)?, cosine);
+                Some(add_scaled(step.mn, u, length_m))
             })
             .unwrap_or(guided);
         if !self.may_be_at(step.slave, at) {
-            return Err(Refusal::of(Reason::Mobility));
+            return Err(PendingVeto::new(VetoReason::Mobility));
         }
         work.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
         Ok(())
@@ -215,13 +232,13 @@ impl<const D: usize> Scene<'_, D> {
     /// directions free of all obstacles.
     fn rotate(
         &self,
-        step: &Step<D>,
+        step: &SlaveStep<D>,
         guided: Point<D>,
-        refusal: Refusal,
-        work: &mut Work<D>,
-    ) -> Result<(), Refusal> {
+        refusal: PendingVeto,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
         let Rod { min_m, max_m, .. } = step.rod;
-        self.collect(step, max_m, work);
+        self.collect_blocks(step, max_m, work);
         let own_m = distance(step.mn, guided);
         let lengths_m = [own_m, min_m, max_m, 0.5 * (min_m + max_m)];
         let n = if min_m < max_m { 4 } else { 1 };
@@ -229,7 +246,7 @@ impl<const D: usize> Scene<'_, D> {
         let mut inside = None;
         for &length_m in &lengths_m[..n] {
             if work.found.is_empty() || work.all_lengths {
-                inside = inside.or(self.turns(step, length_m, work, &mut why));
+                inside = inside.or(self.add_turns(step, length_m, work, &mut why));
             }
         }
         sort(step, &mut work.found);
@@ -237,24 +254,24 @@ impl<const D: usize> Scene<'_, D> {
             work.has_turned = true;
             return Ok(());
         }
-        let inside = inside.map(|name| Refusal::by(Reason::Inside, name));
+        let inside = inside.map(|name| PendingVeto::from_owner(VetoReason::Inside, name));
         Err(why.or(inside).unwrap_or(refusal))
     }
 
     /// Adds the good places for one length of the rod; returns the block that contains the master.
-    fn turns(
+    fn add_turns(
         &self,
-        step: &Step<D>,
+        step: &SlaveStep<D>,
         length_m: f64,
-        work: &mut Work<D>,
-        why: &mut Option<Refusal>,
-    ) -> Option<Name> {
+        work: &mut CandidateScratch<D>,
+        why: &mut Option<PendingVeto>,
+    ) -> Option<BlockOwner> {
         let u0 = guide_line(step);
-        let Work { blocks, arcs, found, has_other_side, .. } = work;
+        let CandidateScratch { blocks, arcs, found, has_other_side, .. } = work;
         let look_on = work.all_lengths || work.both_sides;
-        let mut add = |u: Point<D>, why: &mut Option<Refusal>| {
-            let at = along(step.mn, u, length_m);
-            match self.judge_place(step, at) {
+        let mut add = |u: Point<D>, why: &mut Option<PendingVeto>| {
+            let at = add_scaled(step.mn, u, length_m);
+            match self.check_place(step, at) {
                 Ok(()) => {
                     found.push(Candidate { at, rotated: true, turn_rad: angle_rad(u0, u) });
                     true
@@ -266,10 +283,10 @@ impl<const D: usize> Scene<'_, D> {
             }
         };
         if D == 2 {
-            let plane = Plane { step, length_m, u0: plane(u0), blocks };
-            let mut sides = plane.sides(arcs);
-            while let Some(u) =
-                sides.next(|u| why.is_some() && self.is_too_far(step, along(step.mn, u, length_m)))
+            let plane = PlanarRod { step, length_m, u0: to_plane(u0), blocks };
+            let mut sides = plane.free_directions(arcs);
+            while let Some(u) = sides
+                .next(|u| why.is_some() && self.is_too_far(step, add_scaled(step.mn, u, length_m)))
             {
                 if add(u, why) && !look_on {
                     *has_other_side = sides.has_more();
@@ -281,10 +298,10 @@ impl<const D: usize> Scene<'_, D> {
         // A master inside an obstacle cannot turn out of it.
         let inside = blocks.iter().filter(|b| contains_master(step, b)).map(|b| b.name).min();
         blocks.retain(|b| !contains_master(step, b));
-        let search = Search { step, length_m, blocks };
+        let search = DirectionSearch { step, length_m, blocks };
         let turned = search.turn_away(u0);
         if !turned.is_some_and(|u| add(u, why)) {
-            let is_good = |u| self.judge_place(step, along(step.mn, u, length_m)).is_ok();
+            let is_good = |u| self.check_place(step, add_scaled(step.mn, u, length_m)).is_ok();
             if let Some(u) = search.rings(u0, is_good) {
                 add(u, why);
             }
@@ -293,17 +310,17 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Returns whether a place is surely farther from the slave than it may go in one step.
-    fn is_too_far(&self, step: &Step<D>, at: Point<D>) -> bool {
+    fn is_too_far(&self, step: &SlaveStep<D>, at: Point<D>) -> bool {
         distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
     }
 
     /// Collects all blocks that a rod of a length may meet on any side. The order is that of the grid
     /// or the tree, and must not matter, so ties go to the lower name.
-    fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
+    fn collect_blocks(&self, step: &SlaveStep<D>, length_m: f64, work: &mut CandidateScratch<D>) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();
         let rod = step.master.min(step.slave);
-        self.visit_blocks(&around(step.mn, reach_m), Some(rod), step.slave, |block| {
+        self.visit_blocks(&bounds_around(step.mn, reach_m), Some(rod), step.slave, |block| {
             if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
                 work.blocks.push(*block);
             }
@@ -313,18 +330,18 @@ impl<const D: usize> Scene<'_, D> {
 
 /// Keeps the first refusal that is more informative than the first objection: a free direction that fails
 /// for another reason.
-fn keep_informative(why: &mut Option<Refusal>, refusal: Refusal) {
-    if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
+fn keep_informative(why: &mut Option<PendingVeto>, refusal: PendingVeto) {
+    if !matches!(refusal.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
         why.get_or_insert(refusal);
     }
 }
 
-fn contains_master<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
+fn contains_master<const D: usize>(step: &SlaveStep<D>, block: &Block<D>) -> bool {
     let radius_m = block.radius_m + step.rod.radius_m;
     block.stops_rod && block.core.nearest_to_point(step.mn).distance_m < radius_m
 }
 
-fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
+fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [Candidate<D>]) {
     // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
     // first.
     found.sort_by(|a, b| {
@@ -335,45 +352,45 @@ fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
 
 /// Blocked directions, computed only where needed.
 #[derive(Debug, Clone, Default)]
-struct Arcs {
-    arcs: Vec<Arc>,
+struct BlockedArcs {
+    arcs: Vec<AngleInterval>,
     /// Whether the arcs of each block have been computed.
     known: Vec<bool>,
     /// The block that contains the master.
-    inside: Option<Name>,
+    inside: Option<BlockOwner>,
 }
 
 /// A plane rod of one length that looks for a free direction near `u0`.
-struct Plane<'a, const D: usize> {
-    step: &'a Step<D>,
+struct PlanarRod<'a, const D: usize> {
+    step: &'a SlaveStep<D>,
     length_m: f64,
     u0: Point<2>,
     blocks: &'a [Block<D>],
 }
 
-impl<const D: usize> Plane<'_, D> {
+impl<const D: usize> PlanarRod<'_, D> {
     /// Returns the nearest free directions to the left and to the right, the nearer one first.
-    fn sides<'a>(&'a self, known: &'a mut Arcs) -> Sides<'a, D> {
+    fn free_directions<'a>(&'a self, known: &'a mut BlockedArcs) -> FreeDirections<'a, D> {
         known.arcs.clear();
         known.known.clear();
         known.known.resize(self.blocks.len(), false);
         known.inside = None;
         let step = self.step;
         if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
-            known.arcs.push(beyond_bend(plane(sub(step.mn, prev)), step.max_bend_rad));
+            known.arcs.push(bend_forbidden_arc(to_plane(sub(step.mn, prev)), step.max_bend_rad));
         }
         let start_rad = interval::direction_rad(self.u0);
-        Sides { plane: self, known, start_rad, is_open: [true; 2] }
+        FreeDirections { plane: self, known, start_rad, is_open: [true; 2] }
     }
 
     /// Adds the arcs of all blocks that a rod in a direction meets; returns whether there were any.
-    fn learns(&self, u: Point<D>, known: &mut Arcs) -> bool {
-        let s = along(self.step.mn, u, self.length_m);
+    fn add_arcs_at(&self, u: Point<D>, known: &mut BlockedArcs) -> bool {
+        let s = add_scaled(self.step.mn, u, self.length_m);
         let mut learns = false;
         for (k, block) in self.blocks.iter().enumerate() {
             if !known.known[k] && self.meets(s, block) {
                 known.known[k] = true;
-                self.block(block, known);
+                self.add_block(block, known);
                 learns = true;
             }
         }
@@ -388,10 +405,10 @@ impl<const D: usize> Plane<'_, D> {
     }
 
     /// Adds all directions that one block blocks.
-    fn block(&self, block: &Block<D>, known: &mut Arcs) {
+    fn add_block(&self, block: &Block<D>, known: &mut BlockedArcs) {
         let step = self.step;
-        let reach = Reach { master: plane(step.mn), length_m: self.length_m };
-        let core = plane_core(&block.core);
+        let reach = MasterRod { master: to_plane(step.mn), length_m: self.length_m };
+        let core = core_to_plane(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
         // If the master is within the skin of a surface, the half-plane behind it is blocked.
@@ -411,15 +428,15 @@ impl<const D: usize> Plane<'_, D> {
 /// Only blocks that are met on the way are turned into arcs: a direction that is the first outside
 /// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
 /// all blocks.
-struct Sides<'a, const D: usize> {
-    plane: &'a Plane<'a, D>,
-    known: &'a mut Arcs,
+struct FreeDirections<'a, const D: usize> {
+    plane: &'a PlanarRod<'a, D>,
+    known: &'a mut BlockedArcs,
     start_rad: f64,
     /// Whether there may be a direction to the left, and one to the right.
     is_open: [bool; 2],
 }
 
-impl<const D: usize> Sides<'_, D> {
+impl<const D: usize> FreeDirections<'_, D> {
     fn has_more(&self) -> bool {
         self.is_open != [false; 2]
     }
@@ -428,23 +445,23 @@ impl<const D: usize> Sides<'_, D> {
     /// is farther from the start, is of no use.
     fn next(&mut self, is_vain: impl Fn(Point<D>) -> bool) -> Option<Point<D>> {
         loop {
-            let turns_rad = [Side::Left, Side::Right].map(|side| {
+            let turns_rad = [TurnDirection::Left, TurnDirection::Right].map(|side| {
                 let is_open = self.is_open[side as usize];
-                is_open.then(|| least_turn_rad(&self.known.arcs, self.start_rad, side)).flatten()
+                is_open.then(|| min_turn_rad(&self.known.arcs, self.start_rad, side)).flatten()
             });
             self.is_open = turns_rad.map(|turn| turn.is_some());
             let (side, turn_rad) = match turns_rad {
-                [Some(left), Some(right)] if right < left => (Side::Right, right),
-                [Some(left), _] => (Side::Left, left),
-                [None, Some(right)] => (Side::Right, right),
+                [Some(left), Some(right)] if right < left => (TurnDirection::Right, right),
+                [Some(left), _] => (TurnDirection::Left, left),
+                [None, Some(right)] => (TurnDirection::Right, right),
                 [None, None] => return None,
             };
-            let turned = interval::turned(self.plane.u0, turn_rad, side);
+            let turned = interval::turn(self.plane.u0, turn_rad, side);
             let u: Point<D> = std::array::from_fn(|i| turned[i]);
             if is_vain(u) {
                 return None;
             }
-            if !self.plane.learns(u, self.known) {
+            if !self.plane.add_arcs_at(u, self.known) {
                 self.is_open[side as usize] = false;
                 return Some(u);
             }
@@ -452,24 +469,24 @@ impl<const D: usize> Sides<'_, D> {
     }
 }
 
-fn plane<const D: usize>(p: Point<D>) -> Point<2> {
+fn to_plane<const D: usize>(p: Point<D>) -> Point<2> {
     [p[0], p[1]]
 }
 
-fn plane_core<const D: usize>(core: &Core<D>) -> Core<2> {
+fn core_to_plane<const D: usize>(core: &Core<D>) -> Core<2> {
     match core {
-        Core::Point(c) => Core::Point(plane(*c)),
-        Core::Segment([a, b]) => Core::Segment([plane(*a), plane(*b)]),
+        Core::Point(c) => Core::Point(to_plane(*c)),
+        Core::Segment([a, b]) => Core::Segment([to_plane(*a), to_plane(*b)]),
         Core::Cuboid(c) => Core::Cuboid(Cuboid {
-            center: plane(c.center),
-            axes: [plane(c.axes[0]), plane(c.axes[1])],
-            half_m: plane(c.half_m),
+            center: to_plane(c.center),
+            axes: [to_plane(c.axes[0]), to_plane(c.axes[1])],
+            half_m: to_plane(c.half_m),
         }),
     }
 }
 
 /// Returns the points of a segment at a given distance from `m`.
-fn on_segment_at<const D: usize>(
+fn segment_points_at<const D: usize>(
     m: Point<D>,
     t: f64,
     [a, b]: [Point<D>; 2],
@@ -482,13 +499,13 @@ fn on_segment_at<const D: usize>(
     }
     [-inside.sqrt(), inside.sqrt()].map(|root| {
         let part = (-dr + root) / dd;
-        (0.0..=1.0).contains(&part).then(|| between(a, b, part))
+        (0.0..=1.0).contains(&part).then(|| lerp(a, b, part))
     })
 }
 
 /// Returns the points of a plane at a given distance from `m` that are nearest to and farthest from
 /// `so`.
-fn on_plane_at<const D: usize>(
+fn plane_points_at<const D: usize>(
     m: Point<D>,
     t: f64,
     so: Point<D>,
@@ -496,13 +513,13 @@ fn on_plane_at<const D: usize>(
     offset_m: f64,
 ) -> [Option<Point<D>>; 2] {
     let height_m = offset_m - dot(normal, m);
-    let foot = along(m, normal, height_m);
+    let foot = add_scaled(m, normal, height_m);
     let radius2 = t * t - height_m * height_m;
     if radius2 < 0.0 {
         return [None; 2];
     }
     let flat = sub(so, foot);
-    let flat = along(flat, normal, -dot(normal, flat));
-    let u = unit(flat).unwrap_or_else(|| super::geometry::perpendicular(normal));
+    let flat = add_scaled(flat, normal, -dot(normal, flat));
+    let u = normalized(flat).unwrap_or_else(|| super::geometry::perpendicular(normal));
     [1.0, -1.0].map(|side| Some(add(foot, scaled(u, side * radius2.sqrt()))))
 }

@@ -3,7 +3,7 @@
 //! A rod's length is never stored: it is the distance between its ends (V7).
 
 use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
-use super::veto::Reason;
+use super::veto::VetoReason;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
@@ -56,7 +56,7 @@ impl<const D: usize> Mobility<D> {
             Self::Free => p,
             Self::OnSegment([a, b]) => geometry::nearest_on_segment(p, *a, *b),
             Self::OnPlane { normal, offset_m } => {
-                geometry::along(p, *normal, offset_m - dot(*normal, p))
+                geometry::add_scaled(p, *normal, offset_m - dot(*normal, p))
             }
             Self::InBox { lo, hi } => std::array::from_fn(|i| p[i].clamp(lo[i], hi[i])),
             Self::Fixed => at,
@@ -94,8 +94,8 @@ impl<const D: usize> Connector<D> {
     }
 
     /// Returns the reason for which a connector that never moves objects.
-    pub(super) fn why_still(&self) -> Reason {
-        if self.failed { Reason::Failed } else { Reason::Fixed }
+    pub(super) fn still_reason(&self) -> VetoReason {
+        if self.failed { VetoReason::Failed } else { VetoReason::Fixed }
     }
 
     fn is_plain(&self) -> bool {
@@ -130,17 +130,17 @@ pub struct Chain<const D: usize> {
     rods: Vec<Rod>,
     /// Number of connectors that are not free, have failed, or have a bend limit.
     special: usize,
-    still: StillMeasures,
+    still: FixedMeasures,
 }
 
 /// Part of its greatest length below which the least length of a rod means that its ends can come together.
-const CLOSED: f64 = 1e-3;
+const CLOSABLE_FRACTION: f64 = 1e-3;
 
 /// Returns the least of radii and rods. Rods that can close give no measure for the length of a step; they count only
 /// where there is nothing else.
-fn least_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
+fn min_size_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
     let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
-    let stays_open = |rod: &&Rod| rod.min_m >= CLOSED * rod.max_m;
+    let stays_open = |rod: &&Rod| rod.min_m >= CLOSABLE_FRACTION * rod.max_m;
     let open = rods.iter().filter(stays_open).map(|rod| rod.min_m);
     let least_m = least(&mut open.chain(radii));
     if least_m.is_finite() { least_m } else { least(&mut rods.iter().map(|rod| rod.min_m)) }
@@ -148,7 +148,7 @@ fn least_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
 
 /// Measures that only new rods or radii change.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct StillMeasures {
+struct FixedMeasures {
     longest_m: f64,
     least_m: f64,
     thickest_m: f64,
@@ -165,8 +165,8 @@ impl<const D: usize> Chain<D> {
         connectors: Vec<Connector<D>>,
         rods: Vec<Rod>,
     ) -> Result<Self, InputError> {
-        let chain = Self::broken(points, connectors, rods)?;
-        match (0..chain.rods.len()).find(|&i| !chain.is_rod_within(i)) {
+        let chain = Self::new_broken(points, connectors, rods)?;
+        match (0..chain.rods.len()).find(|&i| !chain.is_rod_within_limits(i)) {
             None => Ok(chain),
             Some(i) => Err(InputError::new(
                 format!("chain, rod {i}"),
@@ -186,7 +186,7 @@ impl<const D: usize> Chain<D> {
     ///
     /// # Errors
     /// As [`Self::new`], except for the lengths.
-    pub fn broken(
+    pub fn new_broken(
         points: Vec<Point<D>>,
         connectors: Vec<Connector<D>>,
         rods: Vec<Rod>,
@@ -208,9 +208,9 @@ impl<const D: usize> Chain<D> {
         let special = connectors.iter().filter(|c| !c.is_plain()).count();
         let longest_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
-        let least_m = least_m(&rods, radii);
+        let least_m = min_size_m(&rods, radii);
         let thickest_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
-        let still = StillMeasures { longest_m, least_m, thickest_m };
+        let still = FixedMeasures { longest_m, least_m, thickest_m };
         Ok(Self { points, connectors, rods, special, still })
     }
 
@@ -226,13 +226,13 @@ impl<const D: usize> Chain<D> {
         rod: Rod,
         connector: Connector<D>,
     ) -> Result<Self, InputError> {
-        let at = |i: usize| geometry::along(start, u, rod.max_m * i as f64);
+        let at = |i: usize| geometry::add_scaled(start, u, rod.max_m * i as f64);
         let points = (0..=n_rods).map(at).collect();
         Self::new(points, vec![connector; n_rods + 1], vec![rod; n_rods])
     }
 
     /// Returns a chain of connector `k` alone, in which moves and steps count as in this one.
-    pub(super) fn alone(&self, k: usize) -> Self {
+    pub(super) fn single_connector(&self, k: usize) -> Self {
         let connector = self.connectors[k];
         Self {
             points: vec![self.points[k]],
@@ -279,7 +279,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns whether a rod is within its limits, to a tolerance of `LENGTH_TOLERANCE_M`.
-    pub fn is_rod_within(&self, i: usize) -> bool {
+    pub fn is_rod_within_limits(&self, i: usize) -> bool {
         let rod = self.rods[i];
         let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
         allowed.contains(&self.length_m(i))
@@ -305,7 +305,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns the length below which a move counts as none, meters.
-    pub fn least_move_m(&self) -> f64 {
+    pub fn min_move_m(&self) -> f64 {
         1e-12 * self.still.longest_m
     }
 
@@ -316,12 +316,12 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns the greatest length of any rod, meters.
-    pub(super) fn longest_m(&self) -> f64 {
+    pub(super) fn max_rod_m(&self) -> f64 {
         self.still.longest_m
     }
 
     /// Returns the greatest radius of any part, meters; no rod is thicker than its connectors.
-    pub(super) fn thickest_m(&self) -> f64 {
+    pub(super) fn max_radius_m(&self) -> f64 {
         self.still.thickest_m
     }
 

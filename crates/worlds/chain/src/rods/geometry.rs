@@ -5,14 +5,14 @@
 //! off by up to 4e-8 for nearly parallel segments, too much for a promise of 1e-9 m.
 
 pub use sidestep_kernel::geometry::{
-    Point, across, add, along, angle_rad, between, cross, cross_2d, distance, dot, first_axis,
-    in_dimensions, is_finite, nearest_on_segment, norm, norm2, perpendicular, scaled, sub, toward,
-    unit,
+    Point, add, add_scaled, angle_rad, cross, cross_2d, distance, dot, first_axis, is_finite, lerp,
+    move_toward, nearest_on_segment, norm, norm_squared, normalized, perpendicular, rejection,
+    scaled, sub, with_dimensions,
 };
 
 /// Nearest points of two bodies, and their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nearest<const D: usize> {
+pub struct NearestPoints<const D: usize> {
     /// Distance between the nearest points, meters.
     pub distance_m: f64,
     /// The nearest point of the segment or point in question.
@@ -21,13 +21,13 @@ pub struct Nearest<const D: usize> {
     pub on_core: Point<D>,
 }
 
-impl<const D: usize> Nearest<D> {
+impl<const D: usize> NearestPoints<D> {
     /// Returns the distance between two points.
-    pub fn of(on_body: Point<D>, on_core: Point<D>) -> Self {
+    pub fn from_points(on_body: Point<D>, on_core: Point<D>) -> Self {
         Self { distance_m: distance(on_body, on_core), on_body, on_core }
     }
 
-    fn or(self, other: Self) -> Self {
+    fn nearer(self, other: Self) -> Self {
         if other.distance_m < self.distance_m { other } else { self }
     }
 }
@@ -36,12 +36,12 @@ impl<const D: usize> Nearest<D> {
 pub fn between_segments<const D: usize>(
     [p, q]: [Point<D>; 2],
     [a, b]: [Point<D>; 2],
-) -> Nearest<D> {
-    let ends = Nearest::of(nearest_on_segment(a, p, q), a)
-        .or(Nearest::of(nearest_on_segment(b, p, q), b))
-        .or(Nearest::of(p, nearest_on_segment(p, a, b)))
-        .or(Nearest::of(q, nearest_on_segment(q, a, b)));
-    between_insides([p, q], [a, b]).map_or(ends, |inside| ends.or(inside))
+) -> NearestPoints<D> {
+    let ends = NearestPoints::from_points(nearest_on_segment(a, p, q), a)
+        .nearer(NearestPoints::from_points(nearest_on_segment(b, p, q), b))
+        .nearer(NearestPoints::from_points(p, nearest_on_segment(p, a, b)))
+        .nearer(NearestPoints::from_points(q, nearest_on_segment(q, a, b)));
+    between_interiors([p, q], [a, b]).map_or(ends, |inside| ends.nearer(inside))
 }
 
 /// Squared sine of the angle below which segments count as parallel: then the lines are nearer than
@@ -49,35 +49,35 @@ pub fn between_segments<const D: usize>(
 const PARALLEL2: f64 = 1e-14;
 
 /// Returns the nearest points of the lines, if both lie inside the segments.
-fn between_insides<const D: usize>(
+fn between_interiors<const D: usize>(
     [p, q]: [Point<D>; 2],
     [a, b]: [Point<D>; 2],
-) -> Option<Nearest<D>> {
+) -> Option<NearestPoints<D>> {
     let (d1, d2, r) = (sub(q, p), sub(b, a), sub(p, a));
     let (aa, ee, bb, c, f) = (dot(d1, d1), dot(d2, d2), dot(d1, d2), dot(d1, r), dot(d2, r));
     let s = (bb * f - c * ee) / (aa * ee - bb * bb);
     if D == 2 {
-        return cross_each_other([p, q], [a, b]).then(|| {
+        return segments_cross([p, q], [a, b]).then(|| {
             let part = if s.is_finite() { s.clamp(0.0, 1.0) } else { 0.5 };
-            let at = along(p, d1, part);
-            Nearest { distance_m: 0.0, on_body: at, on_core: at }
+            let at = add_scaled(p, d1, part);
+            NearestPoints { distance_m: 0.0, on_body: at, on_core: at }
         });
     }
     let n = cross(d1, d2);
     let t = (bb * s + f) / ee;
     let is_inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
-    (is_inside && norm2(n) > PARALLEL2 * aa * ee).then(|| {
-        let (on_body, on_core) = (along(p, d1, s), along(a, d2, t));
+    (is_inside && norm_squared(n) > PARALLEL2 * aa * ee).then(|| {
+        let (on_body, on_core) = (add_scaled(p, d1, s), add_scaled(a, d2, t));
         // The points are slightly off along the lines; their distance across the lines is not.
         let r = sub(on_body, on_core);
         let distance_m = dot([r[0], r[1], r[2]], n).abs() / norm(n);
-        Nearest { distance_m, on_body, on_core }
+        NearestPoints { distance_m, on_body, on_core }
     })
 }
 
 /// Returns whether two plane segments cross: the ends of each are strictly on both sides of the other.
 #[inline]
-pub fn cross_each_other<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
+pub fn segments_cross<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
     let (d1, d2) = (sub(q, p), sub(b, a));
     cross_2d(d1, sub(a, p)) * cross_2d(d1, sub(b, p)) < 0.0
         && cross_2d(d2, sub(p, a)) * cross_2d(d2, sub(q, a)) < 0.0
@@ -101,23 +101,23 @@ impl<const D: usize> Cuboid<D> {
     }
 
     fn to_world(self, local: Point<D>) -> Point<D> {
-        (0..D).fold(self.center, |at, i| along(at, self.axes[i], local[i]))
+        (0..D).fold(self.center, |at, i| add_scaled(at, self.axes[i], local[i]))
     }
 
     /// Returns the nearest points of the segment `p q` and the box (which is solid).
     ///
     /// The squared distance along the segment is convex and made of parabolas; its slope rises, so
     /// the minimum lies where the slope changes sign between two of the at most `2 D` joints.
-    pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> Nearest<D> {
+    pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> NearestPoints<D> {
         let (from, to) = (self.to_local(p), self.to_local(q));
         let d = sub(to, from);
-        let part = self.lowest(from, d);
-        let local = along(from, d, part);
+        let part = self.min_slope_fraction(from, d);
+        let local = add_scaled(from, d, part);
         let clamped: Point<D> =
             std::array::from_fn(|i| local[i].clamp(-self.half_m[i], self.half_m[i]));
-        Nearest {
+        NearestPoints {
             distance_m: distance(local, clamped),
-            on_body: between(p, q, part),
+            on_body: lerp(p, q, part),
             on_core: self.to_world(clamped),
         }
     }
@@ -131,7 +131,7 @@ impl<const D: usize> Cuboid<D> {
         (0..D).map(|i| outside(i) * d[i]).sum()
     }
 
-    fn lowest(&self, from: Point<D>, d: Point<D>) -> f64 {
+    fn min_slope_fraction(&self, from: Point<D>, d: Point<D>) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
         if self.slope(from, d, low) >= 0.0 {
             return low;
@@ -183,19 +183,21 @@ pub enum Core<const D: usize> {
 
 impl<const D: usize> Core<D> {
     /// Returns the nearest points of a segment and the core.
-    pub fn nearest_to_segment(&self, body: [Point<D>; 2]) -> Nearest<D> {
+    pub fn nearest_to_segment(&self, body: [Point<D>; 2]) -> NearestPoints<D> {
         match self {
-            Self::Point(c) => Nearest::of(nearest_on_segment(*c, body[0], body[1]), *c),
+            Self::Point(c) => {
+                NearestPoints::from_points(nearest_on_segment(*c, body[0], body[1]), *c)
+            }
             Self::Segment(core) => between_segments(body, *core),
             Self::Cuboid(cuboid) => cuboid.nearest_to_segment(body),
         }
     }
 
     /// Returns the nearest point of the core.
-    pub fn nearest_to_point(&self, p: Point<D>) -> Nearest<D> {
+    pub fn nearest_to_point(&self, p: Point<D>) -> NearestPoints<D> {
         match self {
-            Self::Point(c) => Nearest::of(p, *c),
-            Self::Segment([a, b]) => Nearest::of(p, nearest_on_segment(p, *a, *b)),
+            Self::Point(c) => NearestPoints::from_points(p, *c),
+            Self::Segment([a, b]) => NearestPoints::from_points(p, nearest_on_segment(p, *a, *b)),
             Self::Cuboid(cuboid) => cuboid.nearest_to_segment([p, p]),
         }
     }
@@ -210,12 +212,12 @@ impl<const D: usize> Core<D> {
         match self {
             Self::Point(c) => is_far_from_segment(*c, [p, q], reach_m),
             Self::Segment([a, b]) if D == 2 => {
-                is_beside(*a, *b, p, q, reach_m)
+                is_on_one_side(*a, *b, p, q, reach_m)
                     || is_far_from_segment(*a, [p, q], reach_m)
                         && is_far_from_segment(*b, [p, q], reach_m)
                         && is_far_from_segment(p, [*a, *b], reach_m)
                         && is_far_from_segment(q, [*a, *b], reach_m)
-                        && !cross_each_other([p, q], [*a, *b])
+                        && !segments_cross([p, q], [*a, *b])
             }
             _ => self.nearest_to_segment([p, q]).distance_m >= reach_m,
         }
@@ -240,9 +242,11 @@ impl<const D: usize> Core<D> {
     /// Returns the box around the core.
     pub fn bounds(&self) -> Bounds<D> {
         match self {
-            Self::Point(c) => Bounds::of(&[*c]),
-            Self::Segment(ends) => Bounds::of(ends),
-            Self::Cuboid(b) => Bounds::of(&[sub(b.center, b.extent()), add(b.center, b.extent())]),
+            Self::Point(c) => Bounds::from_points(&[*c]),
+            Self::Segment(ends) => Bounds::from_points(ends),
+            Self::Cuboid(b) => {
+                Bounds::from_points(&[sub(b.center, b.extent()), add(b.center, b.extent())])
+            }
         }
     }
 
@@ -280,13 +284,13 @@ fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach
         let r = sub(c, q);
         return dot(r, r) >= reach2;
     }
-    let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm2(cross(d, r)) };
+    let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm_squared(cross(d, r)) };
     across2 >= reach2 * whole
 }
 
 /// Returns whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.
 #[inline]
-fn is_beside<const D: usize>(
+fn is_on_one_side<const D: usize>(
     a: Point<D>,
     b: Point<D>,
     p: Point<D>,
@@ -311,7 +315,7 @@ pub struct Bounds<const D: usize> {
 impl<const D: usize> Bounds<D> {
     /// Returns the least box around points.
     #[inline]
-    pub fn of(points: &[Point<D>]) -> Self {
+    pub fn from_points(points: &[Point<D>]) -> Self {
         let (mut lo, mut hi) = (points[0], points[0]);
         for p in &points[1..] {
             for i in 0..D {
@@ -323,7 +327,7 @@ impl<const D: usize> Bounds<D> {
     }
 
     /// Returns the empty box.
-    pub fn nothing() -> Self {
+    pub fn empty() -> Self {
         Self { lo: [f64::INFINITY; D], hi: [f64::NEG_INFINITY; D] }
     }
 
@@ -372,7 +376,7 @@ mod tests {
     use sidestep_kernel::math;
 
     fn sampled_distance<const D: usize>(body: [Point<D>; 2], core: &Core<D>) -> f64 {
-        let at = |k: i32| between(body[0], body[1], f64::from(k) / 2000.0);
+        let at = |k: i32| lerp(body[0], body[1], f64::from(k) / 2000.0);
         (0..=2000).map(|k| core.nearest_to_point(at(k)).distance_m).fold(f64::INFINITY, f64::min)
     }
 
@@ -399,10 +403,10 @@ mod tests {
         fn nearly_parallel_segments_keep_their_distance(
             p in point::<3>(), u in point::<3>(), tilt in -1e-7..1e-7f64, gap_m in 0.01..1.0f64,
         ) {
-            let Some(u) = unit(u) else { return Ok(()) };
+            let Some(u) = normalized(u) else { return Ok(()) };
             let n = perpendicular(u);
-            let q = along(p, u, 2.0);
-            let core = [along(p, n, gap_m), along(along(p, n, gap_m + tilt), u, 2.0)];
+            let q = add_scaled(p, u, 2.0);
+            let core = [add_scaled(p, n, gap_m), add_scaled(add_scaled(p, n, gap_m + tilt), u, 2.0)];
             let least = gap_m + tilt.min(0.0);
             prop_assert!((between_segments([p, q], core).distance_m - least).abs() < 1e-12);
         }
@@ -412,15 +416,15 @@ mod tests {
             at in point::<3>(), u in point::<3>(), magnitude in -14.0..0.0f64,
             gap_m in 0.001..1.0f64, parts in prop::array::uniform2(0.1..0.9f64),
         ) {
-            let Some(u) = unit(u) else { return Ok(()) };
+            let Some(u) = normalized(u) else { return Ok(()) };
             let n = perpendicular(u);
             let angle_rad = math::exp(magnitude * std::f64::consts::LN_10);
             let across = cross(n, u);
             let v = add(scaled(u, math::cos(angle_rad)), scaled(across, math::sin(angle_rad)));
             let through = |at: Point<3>, u: Point<3>, part: f64| {
-                [along(at, u, -2.0 * part), along(at, u, 2.0 * (1.0 - part))]
+                [add_scaled(at, u, -2.0 * part), add_scaled(at, u, 2.0 * (1.0 - part))]
             };
-            let core = through(along(at, n, gap_m), v, parts[1]);
+            let core = through(add_scaled(at, n, gap_m), v, parts[1]);
             let nearest = between_segments(through(at, u, parts[0]), core);
             prop_assert!((nearest.distance_m - gap_m).abs() < 1e-11, "{}", nearest.distance_m);
         }
@@ -431,7 +435,7 @@ mod tests {
             noise in point::<3>(),
         ) {
             let tilt = math::exp(magnitude * std::f64::consts::LN_10);
-            let (body, core) = ([p, add(p, d)], [a, along(add(a, d), noise, tilt)]);
+            let (body, core) = ([p, add(p, d)], [a, add_scaled(add(a, d), noise, tilt)]);
             let ends = [body[0], body[1]].map(|x| distance(x, nearest_on_segment(x, core[0], core[1])));
             let others = [core[0], core[1]].map(|x| distance(x, nearest_on_segment(x, p, body[1])));
             let least_m = ends.into_iter().chain(others).fold(f64::INFINITY, f64::min);
@@ -470,7 +474,7 @@ mod tests {
             p in point::<3>(), q in point::<3>(), center in point::<3>(), u in point::<3>(),
             half_m in proptest::array::uniform3(0.1..1.5f64),
         ) {
-            let Some(u) = unit(u) else { return Ok(()) };
+            let Some(u) = normalized(u) else { return Ok(()) };
             let v = perpendicular(u);
             let cuboid = Cuboid { center, axes: [u, v, cross(u, v)], half_m };
             let nearest = cuboid.nearest_to_segment([p, q]);

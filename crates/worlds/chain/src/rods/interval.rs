@@ -13,15 +13,15 @@ use std::f64::consts::TAU;
 
 /// The directions from `from_rad`, counterclockwise, over `width_rad`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Arc {
+pub(super) struct AngleInterval {
     /// Its start, rad.
     pub(crate) from_rad: f64,
     /// Its width, counterclockwise, rad; 2 pi for all directions.
     pub(crate) width_rad: f64,
 }
 
-impl Arc {
-    fn around(center_rad: f64, low_rad: f64, high_rad: f64) -> Self {
+impl AngleInterval {
+    fn from_center(center_rad: f64, low_rad: f64, high_rad: f64) -> Self {
         Self { from_rad: center_rad + low_rad, width_rad: (high_rad - low_rad).min(TAU) }
     }
 
@@ -34,7 +34,7 @@ impl Arc {
 
 /// A rod at its master.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reach {
+pub(super) struct MasterRod {
     /// Position of the master.
     pub(crate) master: Point<2>,
     /// Length of the rod, meters.
@@ -43,7 +43,12 @@ pub(super) struct Reach {
 
 /// Adds the directions in which a rod of no thickness meets the points within `radius_m` of a
 /// core. Returns false, and adds nothing, where the master itself is inside.
-pub(super) fn block_rod(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) -> bool {
+pub(super) fn block_rod(
+    reach: &MasterRod,
+    core: &Core<2>,
+    radius_m: f64,
+    arcs: &mut Vec<AngleInterval>,
+) -> bool {
     match core {
         Core::Point(c) => block_by_capsule(reach, [*c, *c], radius_m, arcs),
         Core::Segment(ends) => block_by_capsule(reach, *ends, radius_m, arcs),
@@ -57,10 +62,10 @@ pub(super) fn block_rod(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut
 }
 
 fn block_by_capsule(
-    reach: &Reach,
+    reach: &MasterRod,
     [a, b]: [Point<2>; 2],
     radius_m: f64,
-    arcs: &mut Vec<Arc>,
+    arcs: &mut Vec<AngleInterval>,
 ) -> bool {
     let (a, b) = (sub(a, reach.master), sub(b, reach.master));
     let nearest = nearest_on_segment([0.0; 2], a, b);
@@ -73,7 +78,7 @@ fn block_by_capsule(
     }
     // Seen from outside, a convex body lies within a quarter turn of its nearest point, so angles
     // from there never wrap.
-    let seen = Seen { middle: nearest, length_m: reach.length_m, radius_m };
+    let seen = AngularView { middle: nearest, length_m: reach.length_m, radius_m };
     let mut low_high = (0.0f64, 0.0f64);
     seen.widen_by_disc(a, &mut low_high);
     if a != b {
@@ -81,18 +86,18 @@ fn block_by_capsule(
         seen.widen_by_edges(a, b, &mut low_high);
     }
     let middle_rad = math::atan2(nearest[1], nearest[0]);
-    arcs.push(Arc::around(middle_rad, low_high.0, low_high.1));
+    arcs.push(AngleInterval::from_center(middle_rad, low_high.0, low_high.1));
     true
 }
 
 /// The view of an obstacle from the master, in angles from the direction of the nearest point.
-struct Seen {
+struct AngularView {
     middle: Point<2>,
     length_m: f64,
     radius_m: f64,
 }
 
-impl Seen {
+impl AngularView {
     fn angle_to(&self, p: Point<2>) -> f64 {
         math::atan2(cross_2d(self.middle, p), dot(self.middle, p))
     }
@@ -154,7 +159,12 @@ fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
 
 /// Adds the directions in which the rod's far end is within `radius_m` of a core: arcs of the
 /// circle on which it turns, up to four for a capsule.
-pub(super) fn block_tip(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut Vec<Arc>) {
+pub(super) fn block_tip(
+    reach: &MasterRod,
+    core: &Core<2>,
+    radius_m: f64,
+    arcs: &mut Vec<AngleInterval>,
+) {
     match core {
         Core::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
         Core::Segment(ends) => block_tip_by_capsule(reach, *ends, radius_m, arcs),
@@ -166,14 +176,19 @@ pub(super) fn block_tip(reach: &Reach, core: &Core<2>, radius_m: f64, arcs: &mut
     }
 }
 
-fn block_tip_by_capsule(reach: &Reach, [a, b]: [Point<2>; 2], radius_m: f64, arcs: &mut Vec<Arc>) {
+fn block_tip_by_capsule(
+    reach: &MasterRod,
+    [a, b]: [Point<2>; 2],
+    radius_m: f64,
+    arcs: &mut Vec<AngleInterval>,
+) {
     let (a, b, t) = (sub(a, reach.master), sub(b, reach.master), reach.length_m);
     if norm(nearest_on_segment([0.0; 2], a, b)) >= t + radius_m
         || norm(a).max(norm(b)) <= t - radius_m
     {
         return;
     }
-    let mut borders = Borders::default();
+    let mut borders = BorderAngles::default();
     borders.add_disc(a, radius_m, t);
     if a != b {
         borders.add_disc(b, radius_m, t);
@@ -188,12 +203,12 @@ fn block_tip_by_capsule(reach: &Reach, [a, b]: [Point<2>; 2], radius_m: f64, arc
 
 /// Directions in which the circle of the tip crosses the border of a capsule.
 #[derive(Default)]
-struct Borders {
+struct BorderAngles {
     angles_rad: [f64; 8],
     n: usize,
 }
 
-impl Borders {
+impl BorderAngles {
     fn push(&mut self, angle_rad: f64) {
         self.angles_rad[self.n] = wrapped_rad(angle_rad);
         self.n += 1;
@@ -226,12 +241,12 @@ impl Borders {
     }
 
     /// Between two borders all directions give the same answer, so the middle one is tested.
-    fn arcs_where(&mut self, is_blocked: impl Fn(f64) -> bool, arcs: &mut Vec<Arc>) {
+    fn arcs_where(&mut self, is_blocked: impl Fn(f64) -> bool, arcs: &mut Vec<AngleInterval>) {
         let angles_rad = &mut self.angles_rad[..self.n];
         angles_rad.sort_unstable_by(f64::total_cmp);
         if angles_rad.is_empty() {
             if is_blocked(0.0) {
-                arcs.push(Arc { from_rad: 0.0, width_rad: TAU });
+                arcs.push(AngleInterval { from_rad: 0.0, width_rad: TAU });
             }
             return;
         }
@@ -239,16 +254,19 @@ impl Borders {
             let from_rad = angles_rad[k];
             let to_rad = angles_rad.get(k + 1).copied().unwrap_or(angles_rad[0] + TAU);
             if to_rad > from_rad && is_blocked(0.5 * (from_rad + to_rad)) {
-                arcs.push(Arc { from_rad, width_rad: to_rad - from_rad });
+                arcs.push(AngleInterval { from_rad, width_rad: to_rad - from_rad });
             }
         }
     }
 }
 
 /// Returns the directions that bend a connector beyond its limit, when it is reached along `into`.
-pub(super) fn beyond_bend(into: Point<2>, max_bend_rad: f64) -> Arc {
+pub(super) fn bend_forbidden_arc(into: Point<2>, max_bend_rad: f64) -> AngleInterval {
     let into_rad = math::atan2(into[1], into[0]);
-    Arc { from_rad: into_rad + max_bend_rad, width_rad: (TAU - 2.0 * max_bend_rad).max(0.0) }
+    AngleInterval {
+        from_rad: into_rad + max_bend_rad,
+        width_rad: (TAU - 2.0 * max_bend_rad).max(0.0),
+    }
 }
 
 /// Returns the same direction in [0, 2 pi]: `rem_euclid` without a division, for angles that are at
@@ -265,7 +283,7 @@ fn wrapped_rad(mut angle_rad: f64) -> f64 {
 
 /// Sense of rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub(super) enum TurnDirection {
     /// Counter-clockwise.
     Left,
     /// Clockwise.
@@ -274,15 +292,19 @@ pub(super) enum Side {
 
 /// Returns the least turn from a direction to one in no arc, in [0, 2 pi); `None` if all are
 /// blocked.
-pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option<f64> {
+pub(super) fn min_turn_rad(
+    arcs: &[AngleInterval],
+    start_rad: f64,
+    side: TurnDirection,
+) -> Option<f64> {
     let mut turn_rad = 0.0;
     // Each round passes at least one arc for good.
     for _ in 0..=2 * arcs.len() {
         let mut next_rad: f64 = turn_rad;
         for arc in arcs {
             let into_rad = match side {
-                Side::Left => start_rad + turn_rad - arc.from_rad,
-                Side::Right => arc.from_rad + arc.width_rad - (start_rad - turn_rad),
+                TurnDirection::Left => start_rad + turn_rad - arc.from_rad,
+                TurnDirection::Right => arc.from_rad + arc.width_rad - (start_rad - turn_rad),
             };
             let into_rad = wrapped_rad(into_rad);
             // An arc that starts where another ends leaves no gap, however both were rounded.
@@ -307,8 +329,8 @@ pub(super) fn least_turn_rad(arcs: &[Arc], start_rad: f64, side: Side) -> Option
 const ARC_TOLERANCE_RAD: f64 = 1e-13;
 
 /// Returns the direction of a turn from a unit vector.
-pub(super) fn turned(u: Point<2>, turn_rad: f64, side: Side) -> Point<2> {
-    let signed_rad = if side == Side::Left { turn_rad } else { -turn_rad };
+pub(super) fn turn(u: Point<2>, turn_rad: f64, side: TurnDirection) -> Point<2> {
+    let signed_rad = if side == TurnDirection::Left { turn_rad } else { -turn_rad };
     let (c, s) = (math::cos(signed_rad), math::sin(signed_rad));
     [u[0] * c - u[1] * s, u[0] * s + u[1] * c]
 }
@@ -329,14 +351,14 @@ mod tests {
         std::env::var("SIDESTEP_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
     }
 
-    fn tip(reach: &Reach, angle_rad: f64) -> Point<2> {
-        let Reach { master: [x, y], length_m } = *reach;
+    fn tip(reach: &MasterRod, angle_rad: f64) -> Point<2> {
+        let MasterRod { master: [x, y], length_m } = *reach;
         [x + length_m * math::cos(angle_rad), y + length_m * math::sin(angle_rad)]
     }
 
     #[derive(Debug, Clone)]
     struct Case {
-        reach: Reach,
+        reach: MasterRod,
         core: Core<2>,
         radius_m: f64,
         tip_radius_m: f64,
@@ -360,7 +382,7 @@ mod tests {
         let angles = prop::collection::vec(0.0..TAU, 8);
         (point(), 0.05..2.5f64, core, radii, angles).prop_map(
             |(master, length_m, core, (radius_m, more_m), angles_rad)| Case {
-                reach: Reach { master, length_m },
+                reach: MasterRod { master, length_m },
                 core,
                 radius_m,
                 tip_radius_m: radius_m + more_m,
@@ -421,7 +443,12 @@ mod tests {
     }
 
     /// Returns the depth of the rod, or its end, in any core, meters.
-    fn depth_m(reach: &Reach, cores: &[Core<2>], [rod_m, tip_m]: [f64; 2], angle_rad: f64) -> f64 {
+    fn depth_m(
+        reach: &MasterRod,
+        cores: &[Core<2>],
+        [rod_m, tip_m]: [f64; 2],
+        angle_rad: f64,
+    ) -> f64 {
         let end = tip(reach, angle_rad);
         let depth_m = |core: &Core<2>| {
             let rod_m = rod_m - core.nearest_to_segment([reach.master, end]).distance_m;
@@ -441,7 +468,7 @@ mod tests {
             rod_m in 0.01..0.2f64, more_m in 0.01..0.3f64, start_rad in 0.0..TAU,
         ) {
             // Walls in a row: where one ends the next begins.
-            let reach = Reach { master, length_m };
+            let reach = MasterRod { master, length_m };
             let cores: Vec<_> =
                 corners.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).collect();
             let (mut arcs, radii_m) = (Vec::new(), [rod_m, rod_m + more_m]);
@@ -449,8 +476,8 @@ mod tests {
                 prop_assume!(block_rod(&reach, core, rod_m, &mut arcs));
                 block_tip(&reach, core, radii_m[1], &mut arcs);
             }
-            for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
-                let turn_rad = least_turn_rad(&arcs, start_rad, side);
+            for (side, sign) in [(TurnDirection::Left, 1.0), (TurnDirection::Right, -1.0)] {
+                let turn_rad = min_turn_rad(&arcs, start_rad, side);
                 if let Some(turn_rad) = turn_rad {
                     let depth_m = depth_m(&reach, &cores, radii_m, start_rad + sign * turn_rad);
                     prop_assert!(depth_m < 1e-9, "{side:?} {turn_rad}: {depth_m}");
@@ -470,25 +497,33 @@ mod tests {
     fn two_arcs_that_touch_are_left_together() {
         // The second begins at the direction 1 rad up to rounding, where the first ends.
         for gap_rad in [0.0, 1e-16, 2e-16, 1e-15] {
-            let second = Arc { from_rad: 1.0 + gap_rad, width_rad: 1.0 };
-            let arcs = [Arc { from_rad: 0.3, width_rad: 0.7 }, second];
-            assert!(least_turn_rad(&arcs, 0.5, Side::Left).unwrap() > 1.4);
-            assert!(least_turn_rad(&arcs, 1.5, Side::Right).unwrap() > 1.1);
+            let second = AngleInterval { from_rad: 1.0 + gap_rad, width_rad: 1.0 };
+            let arcs = [AngleInterval { from_rad: 0.3, width_rad: 0.7 }, second];
+            assert!(min_turn_rad(&arcs, 0.5, TurnDirection::Left).unwrap() > 1.4);
+            assert!(min_turn_rad(&arcs, 1.5, TurnDirection::Right).unwrap() > 1.1);
         }
     }
 
     #[test]
     fn two_arcs_that_overlap_are_left_together() {
-        let arcs = [Arc { from_rad: 6.0, width_rad: 1.0 }, Arc { from_rad: 0.5, width_rad: 1.0 }];
-        assert!((least_turn_rad(&arcs, 0.0, Side::Left).unwrap() - 1.5).abs() < 1e-12);
-        assert!((least_turn_rad(&arcs, 0.0, Side::Right).unwrap() - (TAU - 6.0)).abs() < 1e-12);
-        assert_eq!(least_turn_rad(&arcs, 3.0, Side::Left), Some(0.0));
+        let arcs = [
+            AngleInterval { from_rad: 6.0, width_rad: 1.0 },
+            AngleInterval { from_rad: 0.5, width_rad: 1.0 },
+        ];
+        assert!((min_turn_rad(&arcs, 0.0, TurnDirection::Left).unwrap() - 1.5).abs() < 1e-12);
+        assert!(
+            (min_turn_rad(&arcs, 0.0, TurnDirection::Right).unwrap() - (TAU - 6.0)).abs() < 1e-12
+        );
+        assert_eq!(min_turn_rad(&arcs, 3.0, TurnDirection::Left), Some(0.0));
     }
 
     #[test]
     fn a_full_circle_has_no_way_out() {
-        let arcs = [Arc { from_rad: 1.0, width_rad: 4.0 }, Arc { from_rad: 4.5, width_rad: 3.0 }];
-        assert_eq!(least_turn_rad(&arcs, 2.0, Side::Left), None);
-        assert_eq!(least_turn_rad(&arcs, 2.0, Side::Right), None);
+        let arcs = [
+            AngleInterval { from_rad: 1.0, width_rad: 4.0 },
+            AngleInterval { from_rad: 4.5, width_rad: 3.0 },
+        ];
+        assert_eq!(min_turn_rad(&arcs, 2.0, TurnDirection::Left), None);
+        assert_eq!(min_turn_rad(&arcs, 2.0, TurnDirection::Right), None);
     }
 }

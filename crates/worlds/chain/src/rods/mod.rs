@@ -17,27 +17,29 @@ pub(crate) mod chain;
 pub mod geometry;
 pub(crate) mod grid;
 mod interval;
-mod leeway;
+mod motion_bounds;
+pub(crate) mod motion_context;
 pub(crate) mod obstacle;
 mod open;
-pub(crate) mod own_body;
 mod pass;
-pub(crate) mod passage;
 pub(crate) mod propagate;
 pub(crate) mod reach;
 pub mod rebuild;
+pub(crate) mod rod_bvh;
 pub(crate) mod rules;
-pub(crate) mod scene;
 mod search;
+pub(crate) mod serde_point;
 mod span;
 pub(crate) mod sweep;
+pub(crate) mod tunneling;
 pub(crate) mod veto;
 pub mod wavefront;
-pub(crate) mod wire;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
+pub use motion_context::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
 pub use obstacle::{Obstacle, Obstacles};
 pub use propagate::Propagator;
 pub use rules::{Rotation, Rules};
-pub use scene::{BEND_TOLERANCE_RAD, SKIN_M, TOLERANCE_M};
-pub use veto::{Mode, Motion, Moved, Outcome, Reason, Request, Source, Veto};
+pub use veto::{
+    CompletedMotion, Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason,
+};

@@ -93,7 +93,7 @@ const MAX_EXTENT_M: f64 = 1e7;
 /// ones, so every worker may have a copy.
 #[derive(Debug, Clone, Default)]
 pub struct Obstacles<const D: usize> {
-    still: Arc<Still<D>>,
+    still: Arc<StillObstacles<D>>,
     moving: Vec<Obstacle<D>>,
     /// Index of the moving ones, if they are many.
     moving_grid: Grid<D>,
@@ -102,13 +102,13 @@ pub struct Obstacles<const D: usize> {
 
 /// The obstacles that never move.
 #[derive(Debug, Default)]
-struct Still<const D: usize> {
+struct StillObstacles<const D: usize> {
     all: Vec<Obstacle<D>>,
     grid: Grid<D>,
 }
 
 /// Number of moving obstacles up to which a linear scan is faster than a grid.
-const FEW: usize = 12;
+const MAX_LINEAR_SCAN: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
     /// Returns the same obstacles for a world in the plane; none if `D` is not 2.
@@ -128,7 +128,7 @@ impl<const D: usize> Obstacles<D> {
         let (moving, still): (Vec<_>, Vec<_>) = all.into_iter().partition(Obstacle::is_moving);
         let mut grid = Grid::default();
         grid.rebuild(still.iter().map(Obstacle::bounds), reach_m);
-        let still = Arc::new(Still { all: still, grid });
+        let still = Arc::new(StillObstacles { all: still, grid });
         let mut obstacles = Self { still, moving, moving_grid: Grid::default(), reach_m };
         obstacles.index_moving();
         Ok(obstacles)
@@ -174,7 +174,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     fn index_moving(&mut self) {
-        if self.moving.len() > FEW {
+        if self.moving.len() > MAX_LINEAR_SCAN {
             self.moving_grid.rebuild(self.moving.iter().map(Obstacle::bounds), self.reach_m);
         }
     }
@@ -184,7 +184,7 @@ impl<const D: usize> Obstacles<D> {
     #[inline]
     pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
         self.still.grid.visit(near, |k| look(&self.still.all[k]));
-        if self.moving.len() > FEW {
+        if self.moving.len() > MAX_LINEAR_SCAN {
             return self.moving_grid.visit(near, |k| look(&self.moving[k]));
         }
         for obstacle in self.moving.iter().filter(|o| o.bounds().meets(near)) {
@@ -193,9 +193,9 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns the obstacle with the lowest id among those that a capsule overlaps.
-    pub(crate) fn first_at(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
+    pub(crate) fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
-        self.visit(&Bounds::of(&[p, q]).grown(radius_m.max(0.0)), |o| {
+        self.visit(&Bounds::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
             if apart_m < 0.0 && first.is_none_or(|id| o.id < id) {
                 first = Some(o.id);
@@ -208,7 +208,7 @@ impl<const D: usize> Obstacles<D> {
     /// `look_m` if none is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {
         let mut least_m = look_m;
-        self.visit(&Bounds::of(&[p, q]).grown(radius_m + look_m), |o| {
+        self.visit(&Bounds::from_points(&[p, q]).grown(radius_m + look_m), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
             least_m = least_m.min(apart_m);
         });
@@ -218,13 +218,13 @@ impl<const D: usize> Obstacles<D> {
 
 /// Returns the box around a segment and its earlier place.
 #[inline]
-pub(super) fn swept<const D: usize>(points: [Point<D>; 4], by_m: f64) -> Bounds<D> {
-    Bounds::of(&points).grown(by_m)
+pub(super) fn swept_bounds<const D: usize>(points: [Point<D>; 4], by_m: f64) -> Bounds<D> {
+    Bounds::from_points(&points).grown(by_m)
 }
 
 /// Returns a box of `half_m` around a point.
 #[inline]
-pub(crate) fn around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
+pub(crate) fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
     Bounds { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }
 }
 
@@ -264,7 +264,7 @@ mod tests {
             let (still, moving) = (named(&still, 0), named(&moving, 100));
             let moving: Vec<_> =
                 moving.into_iter().map(|o| Obstacle { velocity_m_s: by, ..o }).collect();
-            let near = around(at, half_m);
+            let near = bounds_around(at, half_m);
             let expected = |moving: &[Obstacle<2>]| -> Vec<u32> {
                 let near_by = |o: &&Obstacle<2>| o.bounds().meets(&near);
                 still.iter().chain(moving).filter(near_by).map(|o| o.id).collect()
@@ -291,7 +291,7 @@ mod tests {
                 let mut obstacles = Obstacles::default();
                 obstacles.set_moving(moving).unwrap();
                 let mut seen = Vec::new();
-                obstacles.visit(&around([0.0; 2], half_m), |o| seen.push(o.id));
+                obstacles.visit(&bounds_around([0.0; 2], half_m), |o| seen.push(o.id));
                 seen
             };
             prop_assert_eq!(order(&moving), order(&other_order));
@@ -318,7 +318,7 @@ mod tests {
         let mut obstacles = Obstacles::new(vec![ball], 1.0).unwrap();
         obstacles.advance(3.0);
         let mut seen = Vec::new();
-        obstacles.visit(&around([3.4, 0.0], 0.1), |o| seen.push(o.id));
+        obstacles.visit(&bounds_around([3.4, 0.0], 0.1), |o| seen.push(o.id));
         assert_eq!(seen, [7]);
     }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Results of a request so far.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Tally {
+pub(super) struct MotionTally {
     /// First and one past the last connector that reacted.
     pub(super) from: usize,
     pub(super) to: usize,
@@ -13,7 +13,7 @@ pub(super) struct Tally {
     pub(super) max_slave_step_m: f64,
 }
 
-impl Tally {
+impl MotionTally {
     #[inline]
     pub(super) fn start(first: usize) -> Self {
         Self { from: first, to: first, ..Self::default() }
@@ -21,21 +21,21 @@ impl Tally {
 
     /// Counts the connectors around the initiator that have reacted.
     #[inline]
-    pub(super) fn touch(&mut self, run: Range<usize>) {
+    pub(super) fn record_run(&mut self, run: Range<usize>) {
         (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
     }
 
     /// Adds the results of a separate motion.
     pub(super) fn add(&mut self, motion: &Self) {
-        self.touch(motion.from..motion.to);
+        self.record_run(motion.from..motion.to);
         self.changed += motion.changed;
         self.rotated += motion.rotated;
-        self.slave_went(motion.max_slave_step_m);
+        self.record_slave_move(motion.max_slave_step_m);
     }
 
     /// Counts a connector other than the initiator that moved by `way_m`.
     #[inline]
-    pub(super) fn slave_went(&mut self, way_m: f64) {
+    pub(super) fn record_slave_move(&mut self, way_m: f64) {
         self.max_slave_step_m = self.max_slave_step_m.max(way_m);
     }
 }
@@ -55,7 +55,7 @@ impl Direction {
 
     /// Returns the master of a slave.
     #[inline]
-    pub(super) fn before(self, slave: usize) -> usize {
+    pub(super) fn master(self, slave: usize) -> usize {
         match self {
             Self::Up => slave - 1,
             Self::Down => slave + 1,

@@ -4,25 +4,28 @@
 //! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a
 //! veto leaves every bit of the chain as it was.
 
-use super::candidates::{Candidate, Work};
+use super::candidates::{Candidate, CandidateScratch};
 use super::chain::{Chain, is_in_range, out_of_range};
-use super::geometry::{Bounds, Point, between, distance};
-use super::leeway::Leeway;
-use super::obstacle::{Obstacles, swept};
-use super::open::{self, Stays};
-use super::own_body::OwnBody;
-use super::pass::{Direction, Tally};
+use super::geometry::{Bounds, Point, distance, lerp};
+use super::motion_bounds::MotionBounds;
+use super::motion_context::{
+    BlockOwner, MotionContext, PendingVeto, SlaveStep, TOLERANCE_M, TentativePositions,
+    contact_distance_m, is_length_allowed,
+};
+use super::obstacle::{Obstacles, swept_bounds};
+use super::open::{self, StayRule};
+use super::pass::{Direction, MotionTally};
+use super::rod_bvh::RodBvh;
 use super::rules::{Rotation, Rules};
-use super::scene::{Name, Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
-use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
-use apart::Proofs;
+use super::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
+use separation::ProofSchedule;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
 /// Most sub-steps of a request; one that would need more is refused.
 const MAX_SUB_STEPS: f64 = 1e6;
 /// Number of sub-steps from one look at whether to go on to the next.
-const LOOKS_EVERY: usize = 16;
+const INTERRUPT_CHECK_INTERVAL: usize = 16;
 
 /// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
 /// remembers nothing from one motion to the next that a result depends on.
@@ -30,22 +33,22 @@ const LOOKS_EVERY: usize = 16;
 pub struct Propagator<const D: usize> {
     /// Rules by which chains react.
     pub rules: Rules,
-    overlay: Overlay<D>,
-    own: OwnBody<D>,
-    leeway: Leeway<D>,
-    proofs: Proofs,
+    overlay: TentativePositions<D>,
+    own: RodBvh<D>,
+    leeway: MotionBounds<D>,
+    proofs: ProofSchedule,
     /// Proofs of all sub-steps of a request at once.
-    whole_proofs: Proofs,
-    work: Work<D>,
-    untried: Vec<Untried<D>>,
+    whole_proofs: ProofSchedule,
+    work: CandidateScratch<D>,
+    untried: Vec<Alternative<D>>,
     /// Positions before the request, for the run of connectors that have moved.
-    before: Overlay<D>,
-    tally: Tally,
+    before: TentativePositions<D>,
+    tally: MotionTally,
 }
 
 /// An alternative for an earlier slave.
 #[derive(Debug, Clone, Copy)]
-enum Untried<const D: usize> {
+enum Alternative<const D: usize> {
     /// Another place.
     Place { slave: usize, candidate: Candidate<D> },
     /// A turn of its rod to the other side, which has not been examined yet.
@@ -54,14 +57,14 @@ enum Untried<const D: usize> {
 
 /// The connectors that are moved from outside: one, or the two of a rod.
 #[derive(Debug, Clone, Copy)]
-struct Heads<const D: usize> {
+struct DrivenConnectors<const D: usize> {
     first: usize,
     n: usize,
     to: [Point<D>; 2],
 }
 
-impl<const D: usize> Heads<D> {
-    fn of(motion: &Motion<D>) -> Self {
+impl<const D: usize> DrivenConnectors<D> {
+    fn from_motion(motion: &Motion<D>) -> Self {
         match *motion {
             Motion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
             Motion::Rod { i, to } => Self { first: i, n: 2, to },
@@ -73,19 +76,19 @@ impl<const D: usize> Heads<D> {
     }
 
     /// Returns their positions after `k` of `n` equal parts of their way.
-    fn part_of(&self, from: [Point<D>; 2], [k, n]: [usize; 2]) -> [Point<D>; 2] {
+    fn positions_at(&self, from: [Point<D>; 2], [k, n]: [usize; 2]) -> [Point<D>; 2] {
         let part = k as f64 / n as f64;
-        [0, 1].map(|h| if k == n { self.to[h] } else { between(from[h], self.to[h], part) })
+        [0, 1].map(|h| if k == n { self.to[h] } else { lerp(from[h], self.to[h], part) })
     }
 
     /// Returns their positions.
-    fn places(&self, chain: &Chain<D>) -> [Point<D>; 2] {
+    fn positions(&self, chain: &Chain<D>) -> [Point<D>; 2] {
         [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
     }
 }
 
 /// An objection and the connector that raised it.
-type Objection = (usize, Refusal);
+type ConnectorVeto = (usize, PendingVeto);
 
 impl<const D: usize> Propagator<D> {
     /// Returns a propagator for rules.
@@ -104,54 +107,54 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         request: &Request<D>,
     ) -> Result<Outcome<D>, InputError> {
-        let mut heads = Heads::of(&request.motion);
+        let mut heads = DrivenConnectors::from_motion(&request.motion);
         check(chain, &heads)?;
-        let from = heads.places(chain);
-        self.tally = Tally::start(heads.first);
+        let from = heads.positions(chain);
+        self.tally = MotionTally::start(heads.first);
         self.before.start(chain.points().len(), heads.first);
         if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
-            return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
+            return Ok(Outcome::Vetoed(make_veto(chain, heads.first, by, refusal)));
         }
         let n = self.sub_steps(chain, obstacles, &heads, from)?;
-        if self.pull_all_apart(chain, obstacles, &heads, n) {
-            return Ok(Outcome::Moved(self.moved(None)));
+        if self.pull_all_if_separated(chain, obstacles, &heads, n) {
+            return Ok(Outcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
-            if k.is_multiple_of(LOOKS_EVERY) {
-                interrupt::look();
+            if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
+                interrupt::check();
             }
-            let heads = Heads { to: heads.part_of(from, [k, n]), ..heads };
+            let heads = DrivenConnectors { to: heads.positions_at(from, [k, n]), ..heads };
             if let Err((by, refusal)) = self.sub_step(chain, obstacles, heads, k < n) {
-                let veto = veto(chain, heads.first, by, refusal);
-                return Ok(self.stopped(chain, request.mode, veto));
+                let veto = make_veto(chain, heads.first, by, refusal);
+                return Ok(self.stop(chain, request.mode, veto));
             }
         }
-        Ok(Outcome::Moved(self.moved(None)))
+        Ok(Outcome::Moved(self.completed_motion(None)))
     }
 
     fn sub_steps(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &Heads<D>,
+        heads: &DrivenConnectors<D>,
         from: [Point<D>; 2],
     ) -> Result<usize, InputError> {
         let way_m = distance(from[0], heads.to[0]).max(distance(from[1], heads.to[heads.n - 1]));
-        n_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), way_m)
+        count_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), way_m)
     }
 
-    fn stopped(&mut self, chain: &mut Chain<D>, mode: Mode, veto: Veto<D>) -> Outcome<D> {
-        if mode == Mode::AsFarAsPossible && self.tally.changed > 0 {
-            return Outcome::Moved(self.moved(Some(veto)));
+    fn stop(&mut self, chain: &mut Chain<D>, mode: VetoEffect, veto: Veto<D>) -> Outcome<D> {
+        if mode == VetoEffect::AsFarAsPossible && self.tally.changed > 0 {
+            return Outcome::Moved(self.completed_motion(Some(veto)));
         }
         let run = self.before.from..self.before.to;
-        chain.points_mut()[run].copy_from_slice(self.before.placed());
+        chain.points_mut()[run].copy_from_slice(self.before.positions());
         Outcome::Vetoed(veto)
     }
 
-    fn moved(&self, cut_short: Option<Veto<D>>) -> Moved<D> {
-        let Tally { from, to, changed, rotated, max_slave_step_m } = self.tally;
-        Moved { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
+    fn completed_motion(&self, cut_short: Option<Veto<D>>) -> CompletedMotion<D> {
+        let MotionTally { from, to, changed, rotated, max_slave_step_m } = self.tally;
+        CompletedMotion { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
     /// Makes one short motion, after which the request goes on or ends: all of it, or none.
@@ -159,25 +162,24 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: Heads<D>,
+        heads: DrivenConnectors<D>,
         goes_on: bool,
-    ) -> Result<(), Objection> {
-        let is_there = |(h, k): (usize, usize)| {
-            distance(heads.to[h], chain.points()[k]) <= chain.least_move_m()
-        };
+    ) -> Result<(), ConnectorVeto> {
+        let is_there =
+            |(h, k): (usize, usize)| distance(heads.to[h], chain.points()[k]) <= chain.min_move_m();
         if heads.indices().enumerate().all(is_there) {
             return Ok(());
         }
         let is_open = is_open(chain, obstacles, &heads);
         if is_open && !self.rules.self_collision {
-            open::pull(chain, heads.first, heads.to[0], Stays::Exactly, &mut self.tally);
+            open::pull(chain, heads.first, heads.to[0], StayRule::Exactly, &mut self.tally);
             return Ok(());
         }
-        if is_open && self.pull_apart(chain, &heads, goes_on) {
+        if is_open && self.pull_if_separated(chain, &heads, goes_on) {
             return Ok(());
         }
         if self.rules.self_collision {
-            if !is_open && self.sweep_apart(chain, obstacles, &heads) {
+            if !is_open && self.sweep_if_separated(chain, obstacles, &heads) {
                 return Ok(());
             }
             let rods = 0..chain.rods().len();
@@ -197,8 +199,8 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &Heads<D>,
-    ) -> Result<(), Objection> {
+        heads: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
         self.overlay.start(chain.points().len(), heads.first);
         self.place_heads(chain, obstacles, heads)?;
         self.sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)?;
@@ -209,33 +211,37 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &Heads<D>,
-    ) -> Result<(), Objection> {
+        heads: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
         for (h, k) in heads.indices().enumerate() {
             let scene = self.scene(chain, obstacles);
-            scene.judge_initiator(k, heads.to[h]).map_err(|refusal| (k, refusal))?;
+            scene.check_initiator(k, heads.to[h]).map_err(|refusal| (k, refusal))?;
         }
         for (h, k) in heads.indices().enumerate() {
             self.place(chain, k, heads.to[h]);
         }
         if heads.n == 2 {
             let [m, s] = [heads.first, heads.first + 1];
-            let step = Step {
+            let step = SlaveStep {
                 mn: heads.to[0],
                 ..self.scene(chain, obstacles).step(m, s, Direction::Up, chain.points()[s])
             };
-            if !fits(step.rod, distance(heads.to[0], heads.to[1])) {
-                return Err((s, Refusal::of(Reason::Mobility)));
+            if !is_length_allowed(step.rod, distance(heads.to[0], heads.to[1])) {
+                return Err((s, PendingVeto::new(VetoReason::Mobility)));
             }
-            let alone = Step { prev: None, ..step };
-            self.scene(chain, obstacles).judge(&alone, heads.to[1]).map_err(|r| (s, r))?;
+            let alone = SlaveStep { prev: None, ..step };
+            self.scene(chain, obstacles).check_slave(&alone, heads.to[1]).map_err(|r| (s, r))?;
         }
         Ok(())
     }
 
-    fn scene<'a>(&'a self, chain: &'a Chain<D>, obstacles: &'a Obstacles<D>) -> Scene<'a, D> {
+    fn scene<'a>(
+        &'a self,
+        chain: &'a Chain<D>,
+        obstacles: &'a Obstacles<D>,
+    ) -> MotionContext<'a, D> {
         let Self { rules, overlay, own, .. } = self;
-        Scene { chain, obstacles, rules, overlay, own }
+        MotionContext { chain, obstacles, rules, overlay, own }
     }
 
     /// Sweeps from a head outward. Rods keep their lengths when they turn, which is cheap and
@@ -247,7 +253,7 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         head: usize,
         direction: Direction,
-    ) -> Result<(), Objection> {
+    ) -> Result<(), ConnectorVeto> {
         let rotated = self.tally.rotated;
         (self.work.all_lengths, self.work.has_turned) = (false, false);
         let followed = self.follow(chain, obstacles, head, direction);
@@ -255,11 +261,11 @@ impl<const D: usize> Propagator<D> {
         if followed.is_ok()
             || self.rules.rotation != Rotation::Union
             || !self.work.has_turned
-            || !may_go_elsewhere(chain, head, direction)
+            || !has_more_places(chain, head, direction)
         {
             return followed;
         }
-        self.take_back(chain, first, direction);
+        self.revert(chain, first, direction);
         self.tally.rotated = rotated;
         self.work.all_lengths = true;
         self.follow(chain, obstacles, head, direction)
@@ -272,9 +278,9 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         head: usize,
         direction: Direction,
-    ) -> Result<(), Objection> {
+    ) -> Result<(), ConnectorVeto> {
         self.untried.clear();
-        let mut first_objection: Option<Objection> = None;
+        let mut first_objection: Option<ConnectorVeto> = None;
         let mut left = self.rules.backtracks;
         let mut master = head;
         while let Some(slave) = direction.next(master, chain.points().len()) {
@@ -286,7 +292,7 @@ impl<const D: usize> Propagator<D> {
                 }
             };
             let so = chain.points()[at_slave];
-            let stays = distance(chosen.at, so) <= chain.least_move_m();
+            let stays = distance(chosen.at, so) <= chain.min_move_m();
             if stays && self.may_stop(chain, obstacles, at_slave, direction) {
                 return Ok(());
             }
@@ -304,29 +310,29 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         slave: usize,
         direction: Direction,
-    ) -> Result<Candidate<D>, Refusal> {
-        self.look(chain, obstacles, slave, direction)?;
+    ) -> Result<Candidate<D>, PendingVeto> {
+        self.find_candidates(chain, obstacles, slave, direction)?;
         let Self { work, untried, .. } = self;
         let chosen = work.found[0];
         let rest = work.found[1..].iter().rev();
-        untried.extend(rest.map(|&candidate| Untried::Place { slave, candidate }));
+        untried.extend(rest.map(|&candidate| Alternative::Place { slave, candidate }));
         if work.has_other_side {
-            untried.push(Untried::OtherSide { slave, tried: chosen.at });
+            untried.push(Alternative::OtherSide { slave, tried: chosen.at });
         }
         Ok(chosen)
     }
 
     /// Fills `work.found` with places for a slave.
-    fn look(
+    fn find_candidates(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         slave: usize,
         direction: Direction,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), PendingVeto> {
         let Self { rules, overlay, own, work, .. } = self;
-        let scene = Scene { chain, obstacles, rules, overlay, own };
-        let master = direction.before(slave);
+        let scene = MotionContext { chain, obstacles, rules, overlay, own };
+        let master = direction.master(slave);
         scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
     }
 
@@ -338,22 +344,25 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         direction: Direction,
         left: &mut usize,
-        objection: Objection,
-    ) -> Result<(usize, Candidate<D>), Objection> {
+        objection: ConnectorVeto,
+    ) -> Result<(usize, Candidate<D>), ConnectorVeto> {
         while let Some(untried) = self.untried.pop() {
             if *left == 0 {
-                return Err((objection.0, Refusal { reason: Reason::Limit, ..objection.1 }));
+                return Err((
+                    objection.0,
+                    PendingVeto { reason: VetoReason::Limit, ..objection.1 },
+                ));
             }
             *left -= 1;
             match untried {
-                Untried::Place { slave, candidate } => {
-                    self.take_back(chain, slave, direction);
+                Alternative::Place { slave, candidate } => {
+                    self.revert(chain, slave, direction);
                     return Ok((slave, candidate));
                 }
-                Untried::OtherSide { slave, tried } => {
-                    self.take_back(chain, slave, direction);
+                Alternative::OtherSide { slave, tried } => {
+                    self.revert(chain, slave, direction);
                     self.work.both_sides = true;
-                    let found = self.look(chain, obstacles, slave, direction);
+                    let found = self.find_candidates(chain, obstacles, slave, direction);
                     self.work.both_sides = false;
                     let other = self.work.found.iter().find(|c| c.at != tried);
                     if let (Ok(()), Some(&candidate)) = (found, other) {
@@ -377,7 +386,7 @@ impl<const D: usize> Propagator<D> {
         let Some(next) = direction.next(slave, chain.points().len()) else { return true };
         let scene = self.scene(chain, obstacles);
         let step = scene.step(slave, next, direction, chain.points()[next]);
-        fits(step.rod, distance(step.so, step.mn)) && step.bends_at(step.so)
+        is_length_allowed(step.rod, distance(step.so, step.mn)) && step.exceeds_bend_at(step.so)
     }
 
     fn place(&mut self, chain: &Chain<D>, i: usize, at: Point<D>) {
@@ -397,7 +406,7 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Forgets the new places from a slave outward.
-    fn take_back(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
+    fn revert(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
         let (from, to) = (self.overlay.from, self.overlay.to);
         let forgotten = match direction {
             Direction::Up => slave..to,
@@ -412,7 +421,7 @@ impl<const D: usize> Propagator<D> {
         }
     }
 
-    fn commit(&mut self, chain: &mut Chain<D>, heads: &Heads<D>) {
+    fn commit(&mut self, chain: &mut Chain<D>, heads: &DrivenConnectors<D>) {
         // Outward from the head, so that the run of old positions has no gap.
         let (from, to) = (self.overlay.from, self.overlay.to);
         for i in (heads.first..to).chain((from..heads.first).rev()) {
@@ -423,21 +432,25 @@ impl<const D: usize> Propagator<D> {
             }
             self.tally.changed += usize::from(old != new);
             if !heads.indices().contains(&i) {
-                self.tally.slave_went(distance(old, new));
+                self.tally.record_slave_move(distance(old, new));
             }
             chain.points_mut()[i] = new;
         }
-        self.tally.touch(from..to);
+        self.tally.record_run(from..to);
     }
 }
 
 /// Returns whether only the chain itself can be in the way of a motion.
-fn is_open<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>, heads: &Heads<D>) -> bool {
+fn is_open<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    heads: &DrivenConnectors<D>,
+) -> bool {
     obstacles.is_empty() && chain.is_plain() && heads.n == 1
 }
 
 /// Returns the number of sub-steps of a way. `is_empty` says that there is no obstacle.
-fn n_sub_steps(
+fn count_sub_steps(
     rules: &Rules,
     least_step_m: f64,
     is_empty: bool,
@@ -461,7 +474,7 @@ fn n_sub_steps(
 
 /// Returns whether a second try finds slaves more places: rods of other lengths, and in the plane also the
 /// other side.
-fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
+fn has_more_places<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
     let rods = match direction {
         Direction::Up => &chain.rods()[head..],
         Direction::Down => &chain.rods()[..head],
@@ -469,9 +482,15 @@ fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Di
     D == 2 || rods.iter().any(|rod| rod.min_m < rod.max_m)
 }
 
-impl<const D: usize> Scene<'_, D> {
+impl<const D: usize> MotionContext<'_, D> {
     /// Returns the step of a slave whose master's new place is settled.
-    fn step(&self, master: usize, slave: usize, direction: Direction, so: Point<D>) -> Step<D> {
+    fn step(
+        &self,
+        master: usize,
+        slave: usize,
+        direction: Direction,
+        so: Point<D>,
+    ) -> SlaveStep<D> {
         let points = self.chain.points();
         let before = match direction {
             Direction::Up => master.checked_sub(1),
@@ -481,13 +500,13 @@ impl<const D: usize> Scene<'_, D> {
         // second sweep will check the bend.
         let prev =
             before.filter(|&b| direction == Direction::Down || self.overlay.get(b).is_some());
-        Step {
+        SlaveStep {
             master,
             slave,
             mo: points[master],
-            mn: self.at(master),
+            mn: self.position(master),
             so,
-            prev: prev.map(|b| self.at(b)),
+            prev: prev.map(|b| self.position(b)),
             rod: self.chain.rod_between(master, slave),
             tip_radius_m: self.chain.connectors()[slave].radius_m,
             max_bend_rad: self.chain.connectors()[master].max_bend_rad,
@@ -495,17 +514,19 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Checks whether the way of an initiator is free of obstacles and of the chain's own parts.
-    fn judge_initiator(&self, k: usize, to: Point<D>) -> Result<(), Refusal> {
+    fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
         if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
             return Ok(());
         }
         let from = self.chain.points()[k];
         let radius_m = self.chain.connectors()[k].radius_m;
-        let near = swept([from, from, to, to], radius_m);
-        let mut worst: Option<(f64, Name, Reason)> = None;
+        let near = swept_bounds([from, from, to, to], radius_m);
+        let mut worst: Option<(f64, BlockOwner, VetoReason)> = None;
         self.visit_blocks(&near, None, k, |block| {
             let keep_m = block.radius_m + radius_m;
-            if !block.stops_tip || block.core.is_clear_of_segment([from, to], needed_m(keep_m)) {
+            if !block.stops_tip
+                || block.core.is_clear_of_segment([from, to], contact_distance_m(keep_m))
+            {
                 return;
             }
             let before_m = keep_m - block.core.nearest_to_point(from).distance_m;
@@ -514,34 +535,34 @@ impl<const D: usize> Scene<'_, D> {
             if was_inside && after_m <= before_m {
                 return;
             }
-            let reason = if was_inside { Reason::Inside } else { Reason::TargetBlocked };
+            let reason = if was_inside { VetoReason::Inside } else { VetoReason::TargetBlocked };
             let deeper =
                 worst.is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
             if deeper {
                 worst = Some((after_m, block.name, reason));
             }
         });
-        worst.map_or(Ok(()), |(_, name, reason)| Err(Refusal::by(reason, name)))
+        worst.map_or(Ok(()), |(_, name, reason)| Err(PendingVeto::from_owner(reason, name)))
     }
 }
 
 /// Projects the targets to allowed places of the heads, or returns the objection.
 fn project<const D: usize>(
     chain: &Chain<D>,
-    heads: &mut Heads<D>,
-    mode: Mode,
-) -> Result<(), Objection> {
+    heads: &mut DrivenConnectors<D>,
+    mode: VetoEffect,
+) -> Result<(), ConnectorVeto> {
     for (h, k) in heads.indices().enumerate() {
         let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
         if heads.to[h] == at {
             continue;
         }
-        if connector.is_still() && distance(heads.to[h], at) > chain.least_move_m() {
-            return Err((k, Refusal::of(connector.why_still())));
+        if connector.is_still() && distance(heads.to[h], at) > chain.min_move_m() {
+            return Err((k, PendingVeto::new(connector.still_reason())));
         }
         if !connector.mobility.allows(heads.to[h], at) {
-            if mode == Mode::Exact || heads.n > 1 {
-                return Err((k, Refusal::of(Reason::Mobility)));
+            if mode == VetoEffect::Exact || heads.n > 1 {
+                return Err((k, PendingVeto::new(VetoReason::Mobility)));
             }
             heads.to[h] = connector.mobility.project(heads.to[h], at);
         }
@@ -556,15 +577,20 @@ fn rod_box<const D: usize>(
 ) -> Bounds<D> {
     // Rods are no thicker than their connectors.
     let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
-    Bounds::of(&[at(i), at(i + 1)]).grown(radius_m)
+    Bounds::from_points(&[at(i), at(i + 1)]).grown(radius_m)
 }
 
-fn veto<const D: usize>(chain: &Chain<D>, from: usize, by: usize, refusal: Refusal) -> Veto<D> {
-    let Refusal { reason, obstacle } = refusal;
+fn make_veto<const D: usize>(
+    chain: &Chain<D>,
+    from: usize,
+    by: usize,
+    refusal: PendingVeto,
+) -> Veto<D> {
+    let PendingVeto { reason, obstacle } = refusal;
     Veto { by, from, reason, obstacle, reached: chain.points()[from] }
 }
 
-fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), InputError> {
+fn check<const D: usize>(chain: &Chain<D>, heads: &DrivenConnectors<D>) -> Result<(), InputError> {
     if heads.first + heads.n > chain.points().len() {
         return Err(InputError::new(
             "initiator",
@@ -579,7 +605,7 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), Input
     heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
-pub(crate) mod alone;
-mod apart;
+pub(crate) mod local_solver;
+mod separation;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -9,9 +9,9 @@
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Mobility};
 use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
-use super::passage::passed;
 use super::propagate::Propagator;
-use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
+use super::tunneling::find_tunneling;
+use super::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason};
 use sidestep_kernel::{InputError, interrupt};
 
 /// Most double passes before the search is given up.
@@ -20,14 +20,14 @@ const MAX_DOUBLE_PASSES: usize = 40;
 const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.
-const LEAST_GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 /// Distance from their places within which several held connectors count as being back; each is put
 /// there exactly then, which takes up a tenth of the tolerance of the rods' lengths.
-const BACK_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
+const RETURN_TOLERANCE_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 
 /// The target of a connector, and the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reach<const D: usize> {
+pub(crate) struct ReachRequest<const D: usize> {
     /// The connector that is to move.
     pub(crate) k: usize,
     /// Its target.
@@ -40,7 +40,7 @@ pub(crate) struct Reach<const D: usize> {
 
 /// Outcome of a reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Reached<const D: usize> {
+pub(crate) enum ReachOutcome<const D: usize> {
     /// The connector is at the target.
     There {
         /// Distance from the target, meters.
@@ -59,16 +59,16 @@ pub(crate) enum Reached<const D: usize> {
 
 /// A connector that is held, its place before, and its constraint.
 #[derive(Debug, Clone, Copy)]
-struct Held<const D: usize> {
+struct HeldConnector<const D: usize> {
     k: usize,
     home: Point<D>,
     mobility: Mobility<D>,
     failed: bool,
 }
 
-impl<const D: usize> Held<D> {
+impl<const D: usize> HeldConnector<D> {
     /// Returns the place to which the connector goes back from where it is.
-    fn place(&self, chain: &Chain<D>) -> Point<D> {
+    fn home_position(&self, chain: &Chain<D>) -> Point<D> {
         match self.mobility {
             _ if self.failed => self.home,
             Mobility::Free | Mobility::Fixed => self.home,
@@ -86,8 +86,8 @@ pub(crate) fn reach<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    order: &Reach<D>,
-) -> Result<Reached<D>, InputError> {
+    order: &ReachRequest<D>,
+) -> Result<ReachOutcome<D>, InputError> {
     if order.base >= chain.points().len() || order.base == order.k {
         return Err(InputError::new(
             "base",
@@ -96,33 +96,36 @@ pub(crate) fn reach<const D: usize>(
         ));
     }
     let before = chain.points().to_vec();
-    let held = held(chain, order);
+    let held = held_connectors(chain, order);
     for h in &held {
         chain.set_mobility(h.k, Mobility::Free)?;
         chain.set_failed(h.k, false);
     }
-    let came = passes(propagator, chain, obstacles, order, &held);
+    let came = run_passes(propagator, chain, obstacles, order, &held);
     for h in &held {
         chain.set_mobility(h.k, h.mobility)?;
         chain.set_failed(h.k, h.failed);
     }
     let came = came.map(|came| match came {
-        Reached::There { .. } => {
-            blocked_way(chain, obstacles, &before, order).map_or(came, |veto| Reached::Short {
+        ReachOutcome::There { .. } => {
+            path_veto(chain, obstacles, &before, order).map_or(came, |veto| ReachOutcome::Short {
                 nearest: chain.points()[order.k],
                 veto: Some(veto),
             })
         }
-        short @ Reached::Short { .. } => short,
+        short @ ReachOutcome::Short { .. } => short,
     });
-    if !matches!(came, Ok(Reached::There { .. })) {
+    if !matches!(came, Ok(ReachOutcome::There { .. })) {
         chain.points_mut().copy_from_slice(&before);
     }
     came
 }
 
 /// Returns the connectors that are not free to go anywhere, and the base.
-fn held<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Vec<Held<D>> {
+fn held_connectors<const D: usize>(
+    chain: &Chain<D>,
+    order: &ReachRequest<D>,
+) -> Vec<HeldConnector<D>> {
     let is_held = |k: usize| {
         let connector = &chain.connectors()[k];
         k != order.k
@@ -131,36 +134,36 @@ fn held<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Vec<Held<D>> {
     let held = (0..chain.points().len()).filter(|&k| is_held(k)).map(|k| {
         let connector = &chain.connectors()[k];
         let home = chain.points()[k];
-        Held { k, home, mobility: connector.mobility, failed: connector.failed }
+        HeldConnector { k, home, mobility: connector.mobility, failed: connector.failed }
     });
     held.collect()
 }
 
-fn passes<const D: usize>(
+fn run_passes<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    order: &Reach<D>,
-    held: &[Held<D>],
-) -> Result<Reached<D>, InputError> {
+    order: &ReachRequest<D>,
+    held: &[HeldConnector<D>],
+) -> Result<ReachOutcome<D>, InputError> {
     let most = if held.len() > 1 { MAX_MUTUAL_PASSES } else { MAX_DOUBLE_PASSES };
     let mut nearest = chain.points()[order.k];
     let mut off_m = distance(nearest, order.target);
     for double_passes in 0..=most {
-        interrupt::look();
-        if off_m <= order.tolerance_m && settle(chain, held) {
-            return Ok(Reached::There { off_m, double_passes });
+        interrupt::check();
+        if off_m <= order.tolerance_m && restore_held(chain, held) {
+            return Ok(ReachOutcome::There { off_m, double_passes });
         }
         if let Some(veto) = double_pass(propagator, chain, obstacles, order, held)? {
-            return Ok(Reached::Short { nearest, veto: Some(veto) });
+            return Ok(ReachOutcome::Short { nearest, veto: Some(veto) });
         }
-        let now_m = distance(chain.points()[order.k], order.target) + astray_m(chain, held);
-        if now_m > off_m * (1.0 - LEAST_GAIN) && now_m > order.tolerance_m {
-            return Ok(Reached::Short { nearest, veto: None });
+        let now_m = distance(chain.points()[order.k], order.target) + max_error_m(chain, held);
+        if now_m > off_m * (1.0 - MIN_GAIN) && now_m > order.tolerance_m {
+            return Ok(ReachOutcome::Short { nearest, veto: None });
         }
         (nearest, off_m) = (chain.points()[order.k], now_m);
     }
-    Ok(Reached::Short { nearest, veto: None })
+    Ok(ReachOutcome::Short { nearest, veto: None })
 }
 
 /// Leads the initiator to its target, and then all held connectors back; returns the objection, if there
@@ -169,16 +172,16 @@ fn double_pass<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    order: &Reach<D>,
-    held: &[Held<D>],
+    order: &ReachRequest<D>,
+    held: &[HeldConnector<D>],
 ) -> Result<Option<Veto<D>>, InputError> {
     for pass in 0..=held.len() {
         let (k, to) = match pass.checked_sub(1) {
             None => (order.k, order.target),
-            Some(i) => (held[i].k, held[i].place(chain)),
+            Some(i) => (held[i].k, held[i].home_position(chain)),
         };
         let motion = Motion::Connector { k, to };
-        let request = Request { motion, source: Source::Planner, mode: Mode::Exact };
+        let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
         if let Outcome::Vetoed(veto) = propagator.propagate(chain, obstacles, &request)? {
             return Ok(Some(veto));
         }
@@ -191,16 +194,16 @@ fn double_pass<const D: usize>(
 }
 
 /// Returns the greatest distance of a held connector from its place, meters.
-fn astray_m<const D: usize>(chain: &Chain<D>, held: &[Held<D>]) -> f64 {
-    let off_m = held.iter().map(|h| distance(chain.points()[h.k], h.place(chain)));
+fn max_error_m<const D: usize>(chain: &Chain<D>, held: &[HeldConnector<D>]) -> f64 {
+    let off_m = held.iter().map(|h| distance(chain.points()[h.k], h.home_position(chain)));
     off_m.fold(0.0, f64::max)
 }
 
 /// Puts all held connectors exactly where they belong, if they are as good as there; returns whether they are.
-fn settle<const D: usize>(chain: &mut Chain<D>, held: &[Held<D>]) -> bool {
-    let is_back = astray_m(chain, held) <= BACK_M;
+fn restore_held<const D: usize>(chain: &mut Chain<D>, held: &[HeldConnector<D>]) -> bool {
+    let is_back = max_error_m(chain, held) <= RETURN_TOLERANCE_M;
     for h in held.iter().filter(|_| is_back) {
-        let place = h.place(chain);
+        let place = h.home_position(chain);
         chain.points_mut()[h.k] = place;
     }
     is_back
@@ -208,16 +211,16 @@ fn settle<const D: usize>(chain: &mut Chain<D>, held: &[Held<D>]) -> bool {
 
 /// Returns the veto of an obstacle on the way from the old state to the new one, because no pass has
 /// checked that whole way.
-fn blocked_way<const D: usize>(
+fn path_veto<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     before: &[Point<D>],
-    order: &Reach<D>,
+    order: &ReachRequest<D>,
 ) -> Option<Veto<D>> {
-    passed(chain, before, obstacles, 0.0).map(|passed| Veto {
+    find_tunneling(chain, before, obstacles, 0.0).map(|passed| Veto {
         by: passed.rod + 1,
         from: order.k,
-        reason: Reason::WouldTunnel,
+        reason: VetoReason::WouldTunnel,
         obstacle: Some(passed.obstacle),
         reached: before[order.k],
     })
@@ -240,9 +243,9 @@ mod tests {
     #[test]
     fn an_arm_reaches_and_its_base_keeps_every_bit() {
         let mut chain = arm();
-        let order = Reach { k: 6, target: [3.0, 2.5], base: 0, tolerance_m: 1e-6 };
+        let order = ReachRequest { k: 6, target: [3.0, 2.5], base: 0, tolerance_m: 1e-6 };
         let came = reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &order);
-        assert!(matches!(came.unwrap(), Reached::There { .. }));
+        assert!(matches!(came.unwrap(), ReachOutcome::There { .. }));
         assert_eq!(chain.points()[0], [0.0, 0.0]);
         assert!(distance(chain.points()[6], order.target) <= 1e-6);
         assert!(chain.max_rod_violation_m() <= 1e-9);
@@ -253,16 +256,16 @@ mod tests {
     fn a_target_out_of_reach_changes_nothing() {
         let mut chain = arm();
         let before = chain.clone();
-        let order = Reach { k: 6, target: [0.0, 9.0], base: 0, tolerance_m: 1e-6 };
+        let order = ReachRequest { k: 6, target: [0.0, 9.0], base: 0, tolerance_m: 1e-6 };
         let came = reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &order);
-        assert!(matches!(came.unwrap(), Reached::Short { veto: None, .. }));
+        assert!(matches!(came.unwrap(), ReachOutcome::Short { veto: None, .. }));
         assert_eq!(chain, before);
         assert!(
             reach(
                 &mut Propagator::default(),
                 &mut chain,
                 &Obstacles::default(),
-                &Reach { base: 6, ..order }
+                &ReachRequest { base: 6, ..order }
             )
             .is_err()
         );
@@ -273,10 +276,10 @@ mod tests {
         let mut chain = arm();
         let before = chain.clone();
         let obstacles = Obstacles::new(vec![Obstacle::ball(4, [4.0, 2.0], 0.5)], 1.0).unwrap();
-        let order = Reach { k: 6, target: [4.0, 2.0], base: 0, tolerance_m: 1e-6 };
+        let order = ReachRequest { k: 6, target: [4.0, 2.0], base: 0, tolerance_m: 1e-6 };
         let came = reach(&mut Propagator::default(), &mut chain, &obstacles, &order).unwrap();
-        let Reached::Short { veto: Some(veto), .. } = came else { panic!("{came:?}") };
-        assert_eq!((veto.reason, veto.obstacle), (Reason::TargetBlocked, Some(4)));
+        let ReachOutcome::Short { veto: Some(veto), .. } = came else { panic!("{came:?}") };
+        assert_eq!((veto.reason, veto.obstacle), (VetoReason::TargetBlocked, Some(4)));
         assert_eq!(chain, before);
     }
 }

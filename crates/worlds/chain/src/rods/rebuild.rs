@@ -6,13 +6,13 @@
 //! without end, and are laid out instead. If the gap is longer than the remaining parts, one end must
 //! come, and only an end that may.
 
-use super::candidates::guided;
+use super::candidates::guide;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
-use super::geometry::{Point, between, distance};
+use super::geometry::{Point, distance, lerp};
+use super::motion_context::is_length_allowed;
 use super::obstacle::Obstacles;
 use super::pass::Direction;
 use super::propagate::Propagator;
-use super::scene::fits;
 use super::span::joints;
 use super::veto::Request;
 use sidestep_kernel::InputError;
@@ -22,13 +22,13 @@ use std::ops::RangeInclusive;
 /// case measured took 120.
 const MAX_DOUBLE_PASSES: usize = 1_000;
 /// Ratio of the gap to the reach of the scattered parts from which on they are stretched out.
-const STRETCHED: f64 = 0.999;
+const STRETCH_RATIO: f64 = 0.999;
 /// Ratio of the gap to the reach of the scattered parts that an end leaves when it comes.
-const SLACK_LEFT: f64 = 0.95;
+const SLACK_RATIO: f64 = 0.95;
 
 /// The whole end that may come if the gap is too long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MayCome {
+pub enum MovableEnd {
     /// Neither end.
     Nobody,
     /// The end with connector 0.
@@ -39,7 +39,7 @@ pub enum MayCome {
 
 /// Outcome of re-forming.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reformed {
+pub enum ReformResult {
     /// All rods are within their limits again.
     Whole {
         /// Number of passes there and back.
@@ -72,8 +72,8 @@ pub enum Reformed {
 pub fn reform<const D: usize>(
     chain: &mut Chain<D>,
     scattered: RangeInclusive<usize>,
-    may_come: MayCome,
-) -> Result<Reformed, InputError> {
+    may_come: MovableEnd,
+) -> Result<ReformResult, InputError> {
     let (first, last) = (*scattered.start(), *scattered.end());
     check_ends(chain, first, last)?;
     let before = chain.points().to_vec();
@@ -82,21 +82,21 @@ pub fn reform<const D: usize>(
     let need_m = distance(chain.points()[low], chain.points()[high]);
     if need_m > have_m + LENGTH_TOLERANCE_M {
         match may_come {
-            MayCome::Nobody => {
-                let missing = missing(&chain.rods()[low..high], need_m - have_m);
-                return Ok(Reformed::GapTooLong { have_m, need_m, missing });
+            MovableEnd::Nobody => {
+                let missing = missing_rods(&chain.rods()[low..high], need_m - have_m);
+                return Ok(ReformResult::GapTooLong { have_m, need_m, missing });
             }
-            MayCome::First => pull_end(chain, 0..=low, high, have_m)?,
-            MayCome::Last => pull_end(chain, high..=chain.points().len() - 1, low, have_m)?,
+            MovableEnd::First => pull_end(chain, 0..=low, high, have_m)?,
+            MovableEnd::Last => pull_end(chain, high..=chain.points().len() - 1, low, have_m)?,
         }
     }
     lay_out(chain, low, high, have_m);
     for double_passes in 0..MAX_DOUBLE_PASSES {
         if is_whole(chain, low, high) {
-            return Ok(Reformed::Whole { double_passes });
+            return Ok(ReformResult::Whole { double_passes });
         }
-        pass(chain, low, high, Direction::Up);
-        pass(chain, high, low, Direction::Down);
+        run_pass(chain, low, high, Direction::Up);
+        run_pass(chain, high, low, Direction::Down);
     }
     if !is_whole(chain, low, high) {
         let [a, b] = [chain.points()[low], chain.points()[high]];
@@ -104,11 +104,11 @@ pub fn reform<const D: usize>(
         chain.points_mut()[first..=last].copy_from_slice(&places);
     }
     if is_whole(chain, low, high) {
-        return Ok(Reformed::Whole { double_passes: MAX_DOUBLE_PASSES });
+        return Ok(ReformResult::Whole { double_passes: MAX_DOUBLE_PASSES });
     }
     let off_m = chain.max_rod_violation_m();
     chain.points_mut().copy_from_slice(&before);
-    Ok(Reformed::NotReached { off_m })
+    Ok(ReformResult::NotReached { off_m })
 }
 
 fn check_ends<const D: usize>(
@@ -125,11 +125,11 @@ fn check_ends<const D: usize>(
 
 /// Returns whether all rods between two connectors are within their limits.
 fn is_whole<const D: usize>(chain: &Chain<D>, low: usize, high: usize) -> bool {
-    (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i)))
+    (low..high).all(|i| is_length_allowed(chain.rods()[i], chain.length_m(i)))
 }
 
 /// Returns the least number of rods, each as long as the longest, that fill a gap.
-fn missing(rods: &[Rod], gap_m: f64) -> usize {
+fn missing_rods(rods: &[Rod], gap_m: f64) -> usize {
     let longest_m = rods.iter().map(|rod| rod.max_m).fold(0.0, f64::max);
     // A gap of a whole number of rods needs no further part because of rounding.
     ((gap_m - LENGTH_TOLERANCE_M) / longest_m).ceil().max(1.0) as usize
@@ -140,26 +140,26 @@ fn missing(rods: &[Rod], gap_m: f64) -> usize {
 fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
     let [a, b] = [chain.points()[low], chain.points()[high]];
     let part = distance(a, b) / have_m;
-    let fit = |rod: &Rod| fits(*rod, part * rod.max_m);
-    if part < STRETCHED || !chain.rods()[low..high].iter().all(fit) {
+    let fit = |rod: &Rod| is_length_allowed(*rod, part * rod.max_m);
+    if part < STRETCH_RATIO || !chain.rods()[low..high].iter().all(fit) {
         return;
     }
     let mut way_m = 0.0;
     for i in low..high - 1 {
         way_m += chain.rods()[i].max_m;
-        chain.points_mut()[i + 1] = between(a, b, way_m / have_m);
+        chain.points_mut()[i + 1] = lerp(a, b, way_m / have_m);
     }
 }
 
 /// Passes from one stub to the connector before the other.
-fn pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
-    let least_move_m = chain.least_move_m();
+fn run_pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
+    let least_move_m = chain.min_move_m();
     let mut master = from;
     let mut mo = chain.points()[from];
     while let Some(slave) = direction.next(master, chain.points().len()).filter(|&s| s != to) {
         let (mn, so) = (chain.points()[master], chain.points()[slave]);
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = guided([mo, mn, so], rod, least_move_m);
+        chain.points_mut()[slave] = guide([mo, mn, so], rod, least_move_m);
         (master, mo) = (slave, so);
     }
 }
@@ -175,9 +175,9 @@ fn pull_end<const D: usize>(
     let stub = if low == 0 { high } else { low };
     let (at, to) = (chain.points()[stub], chain.points()[other_stub]);
     // Passes converge slowly where the parts are stretched out, so they get some slack.
-    let part = 1.0 - SLACK_LEFT * have_m / distance(at, to);
-    let target: Point<D> = between(at, to, part);
-    let mut alone = Chain::broken(
+    let part = 1.0 - SLACK_RATIO * have_m / distance(at, to);
+    let target: Point<D> = lerp(at, to, part);
+    let mut alone = Chain::new_broken(
         chain.points()[low..=high].to_vec(),
         chain.connectors()[low..=high].to_vec(),
         chain.rods()[low..high].to_vec(),
@@ -193,10 +193,10 @@ mod tests {
     use super::super::chain::Connector;
     use super::super::geometry::add;
     use super::*;
-    use crate::scenes::Numbers;
+    use crate::fixtures::TestRng;
 
     fn broken<const D: usize>(seed: u64, scattered: RangeInclusive<usize>, by_m: f64) -> Chain<D> {
-        let mut numbers = Numbers::new(seed);
+        let mut numbers = TestRng::new(seed);
         let mut points: Vec<Point<D>> = (0..40)
             .map(|i| {
                 let mut p = [0.0; D];
@@ -208,7 +208,7 @@ mod tests {
             points[i] = add(points[i], numbers.point(by_m));
         }
         let rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.0 };
-        Chain::broken(points, vec![Connector::free(0.0); 40], vec![rod; 39]).unwrap()
+        Chain::new_broken(points, vec![Connector::free(0.0); 40], vec![rod; 39]).unwrap()
     }
 
     #[test]
@@ -219,8 +219,8 @@ mod tests {
             let mut chain =
                 broken::<2>(seed, scattered.clone(), [1.0, 10.0, 100.0][seed as usize / 20]);
             let before = chain.clone();
-            let came = reform(&mut chain, scattered.clone(), MayCome::Nobody).unwrap();
-            assert!(matches!(came, Reformed::Whole { .. }), "{seed}: {came:?}");
+            let came = reform(&mut chain, scattered.clone(), MovableEnd::Nobody).unwrap();
+            assert!(matches!(came, ReformResult::Whole { .. }), "{seed}: {came:?}");
             assert!(chain.max_rod_violation_m() <= 1e-9);
             assert_eq!(chain.points()[..*scattered.start()], before.points()[..*scattered.start()]);
             assert_eq!(
@@ -237,12 +237,12 @@ mod tests {
             let rod = Rod { min_m: 0.9 * rod_m, max_m: rod_m, radius_m: 0.0 };
             let mut chain =
                 Chain::straight([0.0; 2], [1.0, 0.0], n - 1, rod, Connector::free(0.0)).unwrap();
-            let mut numbers = Numbers::new(n as u64);
+            let mut numbers = TestRng::new(n as u64);
             for p in &mut chain.points_mut()[3..n - 2] {
                 *p = add(*p, numbers.point(5.0));
             }
-            let came = reform(&mut chain, 3..=n - 3, MayCome::Nobody).unwrap();
-            assert_eq!(came, Reformed::Whole { double_passes: 0 });
+            let came = reform(&mut chain, 3..=n - 3, MovableEnd::Nobody).unwrap();
+            assert_eq!(came, ReformResult::Whole { double_passes: 0 });
             assert!(chain.max_rod_violation_m() <= 1e-9);
         }
     }
@@ -255,21 +255,21 @@ mod tests {
             p[0] += 2.0;
         }
         let before = chain.clone();
-        let told = reform(&mut chain, 18..=21, MayCome::Nobody).unwrap();
-        let Reformed::GapTooLong { have_m, need_m, missing } = told else { panic!("{told:?}") };
+        let told = reform(&mut chain, 18..=21, MovableEnd::Nobody).unwrap();
+        let ReformResult::GapTooLong { have_m, need_m, missing } = told else { panic!("{told:?}") };
         assert!((have_m - 5.5).abs() < 1e-12 && (need_m - 7.0).abs() < 1e-12);
         assert_eq!(missing, 2, "1.5 m of rods of 1.1 m");
         assert_eq!(chain, before);
-        let came = reform(&mut chain, 18..=21, MayCome::Last).unwrap();
-        assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
+        let came = reform(&mut chain, 18..=21, MovableEnd::Last).unwrap();
+        assert!(matches!(came, ReformResult::Whole { .. }), "{came:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
         assert_eq!(chain.points()[..18], before.points()[..18]);
-        assert!(reform(&mut chain, 0..=3, MayCome::Nobody).is_err());
+        assert!(reform(&mut chain, 0..=3, MovableEnd::Nobody).is_err());
     }
 
     /// Chains with missing parts, so that those left reach across the gap with `part` of their length.
     fn wanting<const D: usize>(seed: u64, part: f64) -> Chain<D> {
-        let mut numbers = Numbers::new(seed);
+        let mut numbers = TestRng::new(seed);
         let parts = 3 + seed as usize % 18;
         let gap_m = part * 1.1 * (parts + 1) as f64;
         let mut points: Vec<Point<D>> = (0..parts + 6).map(|_| numbers.point(5.0)).collect();
@@ -281,7 +281,7 @@ mod tests {
         }
         let n = points.len();
         let rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.0 };
-        Chain::broken(points, vec![Connector::free(0.0); n], vec![rod; n - 1]).unwrap()
+        Chain::new_broken(points, vec![Connector::free(0.0); n], vec![rod; n - 1]).unwrap()
     }
 
     #[test]
@@ -290,9 +290,13 @@ mod tests {
             let part = 1.01 - 0.02 * (seed as f64 / 400.0) * (seed as f64 / 400.0);
             let mut chain = wanting::<2>(seed, part);
             let scattered = 3..=chain.points().len() - 4;
-            let came = reform(&mut chain, scattered, MayCome::Nobody).unwrap();
+            let came = reform(&mut chain, scattered, MovableEnd::Nobody).unwrap();
             let reaches = part <= 1.0;
-            assert_eq!(matches!(came, Reformed::Whole { .. }), reaches, "{seed}: {part}, {came:?}");
+            assert_eq!(
+                matches!(came, ReformResult::Whole { .. }),
+                reaches,
+                "{seed}: {part}, {came:?}"
+            );
             assert!(!reaches || chain.max_rod_violation_m() <= 1e-9);
         }
     }
@@ -302,9 +306,10 @@ mod tests {
     fn parts_on_a_line_fold_where_they_are_too_long_for_the_gap() {
         let rod = Rod::fixed(1.0, 0.0);
         let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
-        let mut chain = Chain::broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
-        let came = reform(&mut chain, 1..=6, MayCome::Nobody).unwrap();
-        assert!(matches!(came, Reformed::Whole { .. }), "{came:?}");
+        let mut chain =
+            Chain::new_broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
+        let came = reform(&mut chain, 1..=6, MovableEnd::Nobody).unwrap();
+        assert!(matches!(came, ReformResult::Whole { .. }), "{came:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
     }
 }

@@ -6,7 +6,7 @@
 
 use super::chain::Rod;
 use super::geometry::{
-    Point, add, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
+    Point, add, add_scaled, distance, first_axis, lerp, normalized, perpendicular, scaled, sub,
 };
 
 /// Returns places for the joints of rods from `a` to `b`; rods that cannot span this gap come as near
@@ -49,7 +49,7 @@ fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Poin
         Some(*way_m)
     });
     let joints = lengths_m.len().saturating_sub(1);
-    ends_m.take(joints).map(|way_m| between(a, b, way_m / whole_m)).collect()
+    ends_m.take(joints).map(|way_m| lerp(a, b, way_m / whole_m)).collect()
 }
 
 /// Returns the joints of rods that lie as a triangle. Its first side is the gap, extended beyond `a`
@@ -58,14 +58,14 @@ fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Poin
 fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let half_m = 0.5 * (gap_m + lengths_m.iter().sum::<f64>());
-    let ahead = unit(sub(b, a)).unwrap_or(first_axis());
+    let ahead = normalized(sub(b, a)).unwrap_or(first_axis());
     let (mut joints, mut back_m) = (Vec::with_capacity(lengths_m.len()), 0.0);
     for length_m in lengths_m {
         if gap_m + back_m + length_m > half_m {
             break;
         }
         back_m += length_m;
-        joints.push(along(a, ahead, -back_m));
+        joints.push(add_scaled(a, ahead, -back_m));
     }
     let corner = joints.last().copied().unwrap_or(a);
     let Some((second_m, rest)) = lengths_m[joints.len()..].split_first() else { return joints };
@@ -76,7 +76,7 @@ fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<
     let foot_m = (second_m - third_m) * (second_m + third_m) / first_m.max(f64::MIN_POSITIVE);
     let foot_m = (0.5 * (foot_m + first_m)).clamp(-second_m, *second_m);
     let side_m = (second_m * second_m - foot_m * foot_m).max(0.0).sqrt();
-    let apex = add(along(corner, ahead, foot_m), scaled(perpendicular(ahead), side_m));
+    let apex = add(add_scaled(corner, ahead, foot_m), scaled(perpendicular(ahead), side_m));
     joints.push(apex);
     joints.extend(on_line([apex, b], rest));
     joints

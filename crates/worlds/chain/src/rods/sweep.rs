@@ -6,7 +6,7 @@
 //! than half of the distance that it must keep at rest. [`super::passage`] describes the guarantees of
 //! that and their limits.
 
-use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
+use super::geometry::{Core, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
 
 /// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,13 +18,13 @@ pub(crate) struct Sweep<const D: usize> {
 }
 
 /// The part of the distance at rest that a rod keeps on its way in space.
-const PART_KEPT: f64 = 0.5;
+const KEPT_FRACTION: f64 = 0.5;
 /// Conservative steps before a way counts as blocked.
 const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> Sweep<D> {
     /// Returns the longest distance that any point of the rod moves, meters.
-    pub(super) fn longest_way_m(&self) -> f64 {
+    pub(super) fn max_travel_m(&self) -> f64 {
         let way2 = |end: usize| {
             let way = sub(self.to[end], self.from[end]);
             dot(way, way)
@@ -35,20 +35,20 @@ impl<const D: usize> Sweep<D> {
     /// Returns whether the rod passes no point of the core on its way; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
     pub(crate) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
-        let way_m = self.longest_way_m();
-        core.is_clear_of_segment(self.to, Self::sure_m(way_m, keep_m))
+        let way_m = self.max_travel_m();
+        core.is_clear_of_segment(self.to, Self::safe_distance_m(way_m, keep_m))
             || self.is_clear_on_the_way(core, keep_m, way_m)
     }
 
     /// Returns the distance at the end of a move, in meters, from which on a rod whose points move
     /// at most `way_m` is surely clear of a core: no point was nearer than its end distance less
     /// its way.
-    pub(super) fn sure_m(way_m: f64, keep_m: f64) -> f64 {
+    pub(super) fn safe_distance_m(way_m: f64, keep_m: f64) -> f64 {
         way_m + Self::kept_m(keep_m) + TOUCH_M
     }
 
     fn kept_m(keep_m: f64) -> f64 {
-        if D == 2 { 0.0 } else { PART_KEPT * keep_m }
+        if D == 2 { 0.0 } else { KEPT_FRACTION * keep_m }
     }
 
     /// Returns whether the way is clear, without checking where it ends.
@@ -66,7 +66,7 @@ impl<const D: usize> Sweep<D> {
     }
 
     fn crosses(&self, wall: [Point<D>; 2]) -> bool {
-        cross_each_other([self.from[1], self.to[1]], wall)
+        segments_cross([self.from[1], self.to[1]], wall)
     }
 
     /// Returns whether a plane point lies on the rod at some time, by the roots of a parabola.
@@ -77,8 +77,8 @@ impl<const D: usize> Sweep<D> {
         let (a, b, c) = (cross_2d(dr, dm), cross_2d(r, dm) + cross_2d(dr, m), cross_2d(r, m));
         roots(a, b, c).into_iter().flatten().any(|time| {
             (0.0..=1.0).contains(&time) && {
-                let rod = along(r, dr, time);
-                let to_p = sub([0.0; D], along(m, dm, time));
+                let rod = add_scaled(r, dr, time);
+                let to_p = sub([0.0; D], add_scaled(m, dm, time));
                 (0.0..=dot(rod, rod)).contains(&dot(to_p, rod))
             }
         })
@@ -88,7 +88,7 @@ impl<const D: usize> Sweep<D> {
     fn stays_away(&self, core: &Core<D>, kept_m: f64, way_m: f64) -> bool {
         let mut time = 0.0;
         for _ in 0..MAX_ADVANCES {
-            let rod = [0, 1].map(|end| between(self.from[end], self.to[end], time));
+            let rod = [0, 1].map(|end| lerp(self.from[end], self.to[end], time));
             let spare_m = core.nearest_to_segment(rod).distance_m - kept_m;
             if spare_m <= 0.0 {
                 return false;
@@ -127,8 +127,8 @@ mod tests {
     /// Returns whether a rod crosses a wall at one of many times between.
     fn sampled(sweep: &Sweep<2>, wall: [Point<2>; 2]) -> bool {
         (0..=4000).any(|k| {
-            let rod = [0, 1].map(|e| between(sweep.from[e], sweep.to[e], f64::from(k) / 4000.0));
-            cross_each_other(rod, wall)
+            let rod = [0, 1].map(|e| lerp(sweep.from[e], sweep.to[e], f64::from(k) / 4000.0));
+            segments_cross(rod, wall)
         })
     }
 
@@ -143,8 +143,8 @@ mod tests {
         ) {
             let sweep = Sweep { from, to };
             // The master's own way was checked when the master was a slave.
-            let master_crosses = cross_each_other([from[0], to[0]], wall);
-            let starts_crossing = cross_each_other(from, wall);
+            let master_crosses = segments_cross([from[0], to[0]], wall);
+            let starts_crossing = segments_cross(from, wall);
             prop_assume!(!master_crosses && !starts_crossing);
             if sampled(&sweep, wall) {
                 prop_assert!(!sweep.is_clear(&Core::Segment(wall), 0.0));
@@ -161,7 +161,7 @@ mod tests {
             let (sweep, core) = (Sweep { from, to }, Core::Point(center));
             if sweep.is_clear(&core, 0.2) {
                 for k in 0..=100 {
-                    let rod = [0, 1].map(|e| between(from[e], to[e], f64::from(k) / 100.0));
+                    let rod = [0, 1].map(|e| lerp(from[e], to[e], f64::from(k) / 100.0));
                     prop_assert!(core.nearest_to_segment(rod).distance_m >= 0.1 - 1e-9);
                 }
             }

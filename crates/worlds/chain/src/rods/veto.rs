@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// Source of a request (slide R4).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Source {
+pub enum RequestSource {
     /// The connector itself.
     Autonomous,
     /// A planner.
@@ -21,7 +21,7 @@ pub enum Source {
 
 /// Effect of a veto on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
+pub enum VetoEffect {
     /// All of the way, or nothing of it.
     Exact,
     /// The way up to the veto.
@@ -53,21 +53,25 @@ pub struct Request<const D: usize> {
     /// The motion.
     pub motion: Motion<D>,
     /// The source of the request.
-    pub source: Source,
+    pub source: RequestSource,
     /// Effect of a veto on the way.
-    pub mode: Mode,
+    pub mode: VetoEffect,
 }
 
 impl<const D: usize> Request<D> {
     /// Returns an operator's request that connector `k` goes to `to`, or nothing moves.
     pub fn exact(k: usize, to: Point<D>) -> Self {
-        Self { motion: Motion::Connector { k, to }, source: Source::Operator, mode: Mode::Exact }
+        Self {
+            motion: Motion::Connector { k, to },
+            source: RequestSource::Operator,
+            mode: VetoEffect::Exact,
+        }
     }
 }
 
 /// The constraint that forbids a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Reason {
+pub enum VetoReason {
     /// A fixed connector would have to move.
     Fixed,
     /// A failed connector would have to move.
@@ -96,7 +100,7 @@ pub enum Reason {
     JointLimit,
 }
 
-impl Reason {
+impl VetoReason {
     /// All reasons.
     pub const ALL: [Self; 13] = [
         Self::Fixed,
@@ -139,7 +143,7 @@ impl Reason {
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for VetoReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Fixed => "it is fixed",
@@ -167,11 +171,11 @@ pub struct Veto<const D: usize> {
     /// The initiator.
     pub from: usize,
     /// The reason.
-    pub reason: Reason,
+    pub reason: VetoReason,
     /// The obstacle concerned, if any.
     pub obstacle: Option<u32>,
     /// The place that the initiator could have reached.
-    #[serde(with = "super::wire")]
+    #[serde(with = "super::serde_point")]
     pub reached: Point<D>,
 }
 
@@ -187,7 +191,7 @@ impl<const D: usize> fmt::Display for Veto<D> {
 
 /// A motion that took place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Moved<const D: usize> {
+pub struct CompletedMotion<const D: usize> {
     /// Connectors that reacted, including the initiator.
     pub touched: Range<usize>,
     /// Number of connectors that moved, summed over the sub-steps.
@@ -204,14 +208,14 @@ pub struct Moved<const D: usize> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome<const D: usize> {
     /// The chain moved.
-    Moved(Moved<D>),
+    Moved(CompletedMotion<D>),
     /// Nothing moved; every bit is as before.
     Vetoed(Veto<D>),
 }
 
 impl<const D: usize> Outcome<D> {
     /// Returns the motion, if there was one.
-    pub fn moved(&self) -> Option<&Moved<D>> {
+    pub fn motion(&self) -> Option<&CompletedMotion<D>> {
         match self {
             Self::Moved(moved) => Some(moved),
             Self::Vetoed(_) => None,

@@ -9,11 +9,11 @@
     reason = "an index is a lane or a coordinate of several arrays"
 )]
 
-use super::candidates::{clamped, guided};
+use super::candidates::{clamped, guide};
 use super::chain::{Chain, MAX_COORDINATE_M, Rod, is_in_range, out_of_range};
 use super::geometry::{Point, distance, dot, sub};
+use super::motion_context::is_length_allowed;
 use super::propagate::Propagator;
-use super::scene::fits;
 use super::veto::Request;
 use super::{Obstacles, Rules};
 use sidestep_kernel::InputError;
@@ -23,10 +23,10 @@ pub const LANES: usize = 12;
 
 /// Length in meters above which no move is lost to rounding: coordinates of up to 1e6 m are sums of numbers with
 /// errors below 2^-51 of that, and of three coordinates one has more than half of a move.
-const ROUNDED_M: f64 = MAX_COORDINATE_M * 3.6e-15;
+const ROUNDING_LENGTH_M: f64 = MAX_COORDINATE_M * 3.6e-15;
 
 /// Number of motions below which one after the other is faster.
-const WORTH_IT: usize = 3;
+const MIN_MOTIONS: usize = 3;
 
 /// Moves the first connector through `heads`, one after the other, like the same number of
 /// requests.
@@ -50,7 +50,7 @@ pub fn pull_first<const D: usize>(
     }
     let mut propagator = Propagator::new(Rules::default());
     for group in heads.chunks(LANES) {
-        if group.len() >= WORTH_IT {
+        if group.len() >= MIN_MOTIONS {
             pull_lanes::<D, false>(chain, group);
             continue;
         }
@@ -63,7 +63,7 @@ pub fn pull_first<const D: usize>(
 
 /// Measures of several motions, as if the chain had been measured after each.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Measured {
+pub(crate) struct WavefrontMeasures {
     /// Connectors that have changed, the initiator included, summed over the motions.
     pub(crate) changed: u64,
     /// Longest way of a connector other than the initiator, meters.
@@ -74,23 +74,26 @@ pub(crate) struct Measured {
 
 /// Moves the first connector of a plain chain through at most [`LANES`] heads, each farther from the
 /// one before than the least move.
-pub(crate) fn pull_measured<const D: usize>(chain: &mut Chain<D>, heads: &[Point<D>]) -> Measured {
+pub(crate) fn pull_and_measure<const D: usize>(
+    chain: &mut Chain<D>,
+    heads: &[Point<D>],
+) -> WavefrontMeasures {
     pull_lanes::<D, true>(chain, heads)
 }
 
 /// One coordinate of the connectors that lanes are at: lane `w` has its slave at `w` and its
 /// master at `w + 1`, which is where lane `w + 1` has its slave.
-type Row = [f64; LANES + 1];
+type LaneRow = [f64; LANES + 1];
 
 /// Positions of the connectors that lanes are at, lane 0 farthest along the chain.
 #[derive(Clone, Copy)]
-struct Front<const D: usize> {
-    rows: [Row; D],
+struct LanePositions<const D: usize> {
+    rows: [LaneRow; D],
 }
 
-impl<const D: usize> Front<D> {
+impl<const D: usize> LanePositions<D> {
     /// Returns positions apart from each other, which are never read.
-    fn nobody() -> Self {
+    fn far_apart() -> Self {
         Self { rows: [std::array::from_fn(|w| -4.0 * w as f64); D] }
     }
 
@@ -106,14 +109,14 @@ impl<const D: usize> Front<D> {
 }
 
 /// Limits of the rods that lanes are at.
-struct Limits {
+struct LaneLimits {
     min_m: [f64; LANES],
     max_m: [f64; LANES],
     /// Number of rods in a row that equal the last.
     alike: usize,
 }
 
-impl Limits {
+impl LaneLimits {
     /// Passes every lane's rod on to the next lane, and a new one to the first.
     #[inline]
     fn shift(&mut self, next: Rod) {
@@ -128,12 +131,12 @@ impl Limits {
 }
 
 /// The motions of a group: lane `w` makes motion `w`.
-struct Motions<const D: usize, const MEASURES: bool> {
+struct LaneMotions<const D: usize, const MEASURES: bool> {
     /// Number of motions.
     n: usize,
     /// Number of connectors.
     connectors: usize,
-    limits: Limits,
+    limits: LaneLimits,
     least_move_m: f64,
     /// Length of a move above which a slave surely moves; -1 in lanes without a motion, where it is never read.
     surely_m: [f64; LANES],
@@ -148,14 +151,14 @@ struct Motions<const D: usize, const MEASURES: bool> {
     changed: u64,
 }
 
-impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
+impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     fn new(chain: &Chain<D>, n: usize) -> Self {
-        let surely_m = chain.least_move_m().max(ROUNDED_M);
+        let surely_m = chain.min_move_m().max(ROUNDING_LENGTH_M);
         Self {
             n,
             connectors: chain.points().len(),
-            limits: Limits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
-            least_move_m: chain.least_move_m(),
+            limits: LaneLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
+            least_move_m: chain.min_move_m(),
             surely_m: std::array::from_fn(|w| if w < n { surely_m } else { -1.0 }),
             rests: [false; LANES],
             ended: [false; LANES],
@@ -171,11 +174,11 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         w < self.n && w < j && j - w < self.connectors
     }
 
-    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guided`], lane
+    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guide`], lane
     /// by lane. Before the call, `next` holds the positions of one connector ago; after it, those of
     /// the slaves that now become masters.
     #[inline]
-    fn react(&mut self, now: &Front<D>, next: &mut Front<D>, j: usize) {
+    fn react(&mut self, now: &LanePositions<D>, next: &mut LanePositions<D>, j: usize) {
         let mut g = [[0.0; LANES]; D];
         let mut square = [0.0; LANES];
         for i in 0..D {
@@ -209,7 +212,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
 
     /// Measures all lanes at once.
     #[inline]
-    fn measure(&mut self, now: &Front<D>, next: &Front<D>) {
+    fn measure(&mut self, now: &LanePositions<D>, next: &LanePositions<D>) {
         let (mut way2, mut length2) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..D {
             for w in 0..LANES {
@@ -228,9 +231,9 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         self.changed += self.n as u64;
     }
 
-    /// The same as [`Motions::react`] by single lanes, some of which rest, have ended, or are at no slave.
+    /// The same as [`LaneMotions::react`] by single lanes, some of which rest, have ended, or are at no slave.
     #[cold]
-    fn react_one_by_one(&mut self, now: &Front<D>, next: &mut Front<D>, j: usize) {
+    fn react_one_by_one(&mut self, now: &LanePositions<D>, next: &mut LanePositions<D>, j: usize) {
         // Downward, because lane w - 1 still needs its master's old position, at w - 1.
         for w in (0..LANES).rev() {
             if !self.is_at_slave(w, j) {
@@ -241,12 +244,12 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
             let rod =
                 Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
             // The way a sweep ends: at a slave that stays, if the rod beyond is good as it is.
-            self.ended[w] |= self.rests[w] && fits(rod, distance(mn, so));
+            self.ended[w] |= self.rests[w] && is_length_allowed(rod, distance(mn, so));
             if self.ended[w] {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = guided([mo, mn, so], rod, self.least_move_m);
+            let new = guide([mo, mn, so], rod, self.least_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
@@ -269,9 +272,9 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }
 
-    fn measured(&self) -> Measured {
+    fn measures(&self) -> WavefrontMeasures {
         let most = |by_lane: &[f64]| by_lane[..self.n].iter().copied().fold(0.0, f64::max);
-        Measured {
+        WavefrontMeasures {
             changed: self.changed,
             longest_m: most(&self.longest2).sqrt(),
             max_rod_violation_m: most(&self.violation_m),
@@ -284,12 +287,12 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
 fn pull_lanes<const D: usize, const MEASURES: bool>(
     chain: &mut Chain<D>,
     heads: &[Point<D>],
-) -> Measured {
+) -> WavefrontMeasures {
     let n = heads.len();
-    let mut motions = Motions::<D, MEASURES>::new(chain, n);
+    let mut motions = LaneMotions::<D, MEASURES>::new(chain, n);
     let (points, rods) = chain.parts_mut();
     let nobody = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
-    let (mut now, mut next) = (Front::nobody(), Front::nobody());
+    let (mut now, mut next) = (LanePositions::far_apart(), LanePositions::far_apart());
     for j in 0..points.len() + n - 1 {
         // Past the last connector, never at the place before, so that no rod has length zero.
         let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
@@ -313,14 +316,14 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
         }
         std::mem::swap(&mut now, &mut next);
     }
-    motions.measured()
+    motions.measures()
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::chain::Connector;
     use super::*;
-    use crate::scenes::Wanderer;
+    use crate::fixtures::Wanderer;
     use proptest::prelude::*;
 
     fn same_bits<const D: usize>(n_rods: usize, rod: Rod, n_heads: usize, step_m: f64, seed: u64) {
@@ -350,19 +353,19 @@ mod tests {
     fn measures_as_single_motions_do<const D: usize>(start: Chain<D>, heads: &[Point<D>]) {
         for group in heads.chunks(LANES) {
             let (mut at_once, mut single) = (start.clone(), start.clone());
-            let mut expected = Measured::default();
+            let mut expected = WavefrontMeasures::default();
             for head in group {
                 let request = Request::exact(0, *head);
                 let mut propagator = Propagator::default();
                 let outcome =
                     propagator.propagate(&mut single, &Obstacles::default(), &request).unwrap();
-                let moved = outcome.moved().unwrap();
+                let moved = outcome.motion().unwrap();
                 expected.changed += moved.changed as u64;
                 expected.longest_m = expected.longest_m.max(moved.max_slave_step_m);
                 expected.max_rod_violation_m =
                     expected.max_rod_violation_m.max(single.max_rod_violation_m());
             }
-            let measured = pull_measured(&mut at_once, group);
+            let measured = pull_and_measure(&mut at_once, group);
             assert_eq!(at_once.points(), single.points());
             assert_eq!(measured.changed, expected.changed);
             assert_eq!(measured.longest_m.to_bits(), expected.longest_m.to_bits());

@@ -41,25 +41,25 @@ impl<const D: usize> Compiler<'_, D> {
         let model = self.model(s, at.clone())?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {
-                let at = || self.source.within(at.clone(), &[key]);
-                model.link(key, name).map_err(|error| self.source.error_of(at(), &error))
+                let at = || self.source.key_span(at.clone(), &[key]);
+                model.link(key, name).map_err(|error| self.source.error_from(at(), &error))
             }
             None => Ok(preset),
         };
         let base = link(&s.base, "base", model.root)?;
         let tip = link(&s.tip, "tip", model.default_tip())?;
         let serial = SerialChain::new(&model, base, tip, s.urdf.as_deref().unwrap_or("urdf_text"))
-            .map_err(|error| self.source.error_of(at.clone(), &error))?;
+            .map_err(|error| self.source.error_from(at.clone(), &error))?;
         if serial.variables.is_empty() {
-            let at = self.source.within(at, &["tip", "base", "urdf", "urdf_text"]);
+            let at = self.source.key_span(at, &["tip", "base", "urdf", "urdf_text"]);
             let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);
             return Err(self.source.error(at, cause, "name another base or another tip"));
         }
         let values = self.values(s, &model, &serial, at.clone())?;
-        let at = || self.source.within(at, &["joints", "posture"]);
+        let at = || self.source.key_span(at, &["joints", "posture"]);
         serial
             .check_limits("joints", &values)
-            .map_err(|error| self.source.error_of(at(), &error))?;
+            .map_err(|error| self.source.error_from(at(), &error))?;
         Ok(Arm::new(serial, at_m, values))
     }
 
@@ -68,15 +68,15 @@ impl<const D: usize> Compiler<'_, D> {
         match (&s.urdf, &s.urdf_text) {
             (Some(file), None) => {
                 let model = Model::load(&self.source.path(file.as_ref()));
-                self.source.named(at, "urdf", model)
+                self.source.with_file_key(at, "urdf", model)
             }
             (None, Some(text)) => {
                 let model = Model::parse("urdf_text", text);
-                self.source.named(at, "urdf_text", model)
+                self.source.with_file_key(at, "urdf_text", model)
             }
             _ => {
                 let remedy = "give urdf = \"FILE\", or urdf_text = the text of such a file";
-                let at = self.source.within(at, &["urdf_text", "urdf"]);
+                let at = self.source.key_span(at, &["urdf_text", "urdf"]);
                 Err(self.source.error(at, "an arm needs one model", remedy))
             }
         }
@@ -91,8 +91,8 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<Vec<f64>, InputError> {
         let told = |error: InputError| {
-            let at = self.source.within(at.clone(), &["joints", "posture"]);
-            self.source.error_of(at, &error)
+            let at = self.source.key_span(at.clone(), &["joints", "posture"]);
+            self.source.error_from(at, &error)
         };
         match (&s.joints, &s.posture, &s.srdf) {
             (Some(values), None, None) => {
@@ -101,14 +101,14 @@ impl<const D: usize> Compiler<'_, D> {
             }
             (None, Some(name), Some(srdf)) => {
                 let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model);
-                let semantics = self.source.named(at.clone(), "srdf", semantics)?;
+                let semantics = self.source.with_file_key(at.clone(), "srdf", semantics)?;
                 let posture = semantics.posture("posture", name).map_err(told)?;
                 Ok(serial.with_posture(model, &posture))
             }
-            (None, None, None) => Ok(serial.rest()),
+            (None, None, None) => Ok(serial.rest_values()),
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
-                let at = self.source.within(at.clone(), &["posture", "srdf", "joints"]);
+                let at = self.source.key_span(at.clone(), &["posture", "srdf", "joints"]);
                 Err(self.source.error(at, "a posture given in two ways, or half", remedy))
             }
         }

@@ -1,35 +1,35 @@
 //! Chains: their shape, their limits, and their start.
 
 use super::super::arms::arm::Arm;
-use super::super::driver::{Driver, Task};
+use super::super::driver::{Task, TaskKind};
 use super::super::formation::Robots;
 use super::super::ground::Site;
-use super::super::ground::route::{Wanted, find};
-use super::super::motion::escape::{Escape, Method};
+use super::super::ground::route::{SpaceRequirement, find_placement};
+use super::super::motion::escape::{EscapeMethod, EscapeRules};
 use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
-use super::super::rods::geometry::{Point, along, first_axis, perpendicular, unit};
+use super::super::rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
 use super::super::rods::obstacle::Obstacles;
-use super::super::world::{ChainSpec, Change, What};
+use super::super::world::{ChainSpec, Change, ChangeKind};
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
-use super::obstacles::fitted;
+use super::obstacles::to_dimensions;
 use super::tasks::TaskSection;
-use super::{Compiler, Measure, Place, Room};
+use super::{BoxSection, Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
-use sidestep_scenario::{Limits, Sections, Spanned};
+use sidestep_scenario::{NumberRange, Sections, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Room around the parts of a chain that starts anywhere, as a multiple of its radius.
-const ROOM: f64 = 1.2;
+const ROOM_FACTOR: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
 /// Keys of a chain that an arm does not have, and the arm.
-const BESIDE_ARMS: [&str; 11] = [
+const NON_ARM_KEYS: [&str; 11] = [
     "connectors",
     "points_m",
     "rod_m",
@@ -49,7 +49,7 @@ const MAX_CONNECTORS: usize = 10_000_000;
 
 /// Everything already present when the chains of a section are placed.
 #[derive(Clone, Copy)]
-struct Around<'a, const D: usize> {
+struct PlacementContext<'a, const D: usize> {
     site: Option<&'a Site>,
     /// The number of the section.
     number: u32,
@@ -66,20 +66,20 @@ pub(super) struct ChainSection<const D: usize> {
     name: String,
     #[serde(default = "one_chain")]
     pub(super) count: usize,
-    apart_m: Option<Place<D>>,
+    apart_m: Option<PointValue<D>>,
     connectors: Option<usize>,
-    at_m: Option<Place<D>>,
-    along: Option<Spanned<Place<D>>>,
+    at_m: Option<PointValue<D>>,
+    along: Option<Spanned<PointValue<D>>>,
     heading_deg: Option<f64>,
     /// Length of the legs in which it lies, and the distance from one to the next.
     folded_m: Option<[Measure; 2]>,
-    points_m: Option<Vec<Place<D>>>,
+    points_m: Option<Vec<PointValue<D>>>,
     #[serde(default)]
     pub(super) anywhere: bool,
-    within_m: Option<Spanned<Room<D>>>,
+    within_m: Option<Spanned<BoxSection<D>>>,
     pub(super) arm: Option<Spanned<ArmSection>>,
     robots: Option<Spanned<RobotsSection>>,
-    rod_m: Option<Limits>,
+    rod_m: Option<NumberRange>,
     radius_m: Option<f64>,
     rod_radius_m: Option<f64>,
     max_bend_deg: Option<f64>,
@@ -121,9 +121,10 @@ impl<const D: usize> Compiler<'_, D> {
         self.check_total()?;
         let mut all = Vec::new();
         for (number, section) in (0..).zip(&self.file.chains.0) {
-            let spec = self.chain(section, dt_s, Around { site, number, placed: &all })?;
+            let spec =
+                self.chain(section, dt_s, PlacementContext { site, number, placed: &all })?;
             for copy in 0..section.get_ref().count {
-                all.push(self.copied(&spec, section, copy)?);
+                all.push(self.copy_chain(&spec, section, copy)?);
             }
         }
         if all.is_empty() {
@@ -144,7 +145,7 @@ impl<const D: usize> Compiler<'_, D> {
             if total > MAX_CONNECTORS {
                 let cause = format!("{total} connectors in all");
                 let remedy = format!("give at most {MAX_CONNECTORS}: connectors times count");
-                let at = self.source.within(section.span(), &["connectors", "points_m", "count"]);
+                let at = self.source.key_span(section.span(), &["connectors", "points_m", "count"]);
                 return Err(self.source.error(at, cause, remedy));
             }
         }
@@ -152,7 +153,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns one more chain like `spec`, shifted by a multiple of `apart_m`.
-    fn copied(
+    fn copy_chain(
         &self,
         spec: &ChainSpec<D>,
         section: &Spanned<ChainSection<D>>,
@@ -164,7 +165,7 @@ impl<const D: usize> Compiler<'_, D> {
             None if s.count > 1 => {
                 let remedy = "add apart_m = [...], the way from one to the next";
                 return Err(self.source.error(
-                    self.source.within(section.span(), &["count"]),
+                    self.source.key_span(section.span(), &["count"]),
                     format!("{} chains at one place", s.count),
                     remedy,
                 ));
@@ -173,9 +174,9 @@ impl<const D: usize> Compiler<'_, D> {
         };
         let by = apart_m.map(|x| x * copy as f64);
         let chain = &spec.start;
-        let points = chain.points().iter().map(|p| along(*p, by, 1.0)).collect();
+        let points = chain.points().iter().map(|p| add_scaled(*p, by, 1.0)).collect();
         let start = Chain::new(points, chain.connectors().to_vec(), chain.rods().to_vec())
-            .map_err(|error| self.source.error_of(section.span(), &error))?;
+            .map_err(|error| self.source.error_from(section.span(), &error))?;
         Ok(ChainSpec { start, ..spec.clone() })
     }
 
@@ -183,7 +184,7 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         section: &Spanned<ChainSection<D>>,
         dt_s: f64,
-        around: Around<D>,
+        around: PlacementContext<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
         let (start, arm) = self.shape(s, around, at.clone())?;
@@ -192,7 +193,7 @@ impl<const D: usize> Compiler<'_, D> {
             let sections = s.tasks.0.iter().zip(&tasks);
             sections
                 .into_iter()
-                .try_for_each(|(section, task)| self.joints_reach(section, task, arm))?;
+                .try_for_each(|(section, task)| self.check_joint_reach(section, task, arm))?;
         }
         let changes = self.changes(s, &start, dt_s, at.clone())?;
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
@@ -203,7 +204,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
-            let at = self.source.within(at, &["robots"]);
+            let at = self.source.key_span(at, &["robots"]);
             return Err(self.source.error(at, "robots on wheels in space", remedy));
         }
         Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
@@ -220,13 +221,13 @@ impl<const D: usize> Compiler<'_, D> {
         let tasks =
             s.tasks.0.iter().map(|task| self.task(task, start)).collect::<Result<Vec<_>, _>>()?;
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
-            self.can_lead(s, section, task, start)?;
+            self.check_leader(s, section, task, start)?;
         }
         let is_endless = |task: &Task<D>| {
             let has_an_end = match &task.driver {
-                Driver::Rest | Driver::Wander(_) | Driver::External => false,
-                Driver::Navigate(navigator) => navigator.goal.is_some(),
-                Driver::Script(_) | Driver::Targets(_) => true,
+                TaskKind::Rest | TaskKind::Wander(_) | TaskKind::External => false,
+                TaskKind::Navigate(navigator) => navigator.goal.is_some(),
+                TaskKind::Script(_) | TaskKind::Targets(_) => true,
             };
             !has_an_end && task.lasts_s.is_infinite()
         };
@@ -253,30 +254,27 @@ impl<const D: usize> Compiler<'_, D> {
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
         // A chain may break and be joined in the same cycle, in either order in the file.
-        let joins = |change: &Change<D>| matches!(change.what, What::Reform { .. });
+        let joins = |change: &Change<D>| matches!(change.what, ChangeKind::Reform { .. });
         changes.sort_by_key(|change| (change.cycle, joins(change)));
-        let breaks = changes.iter().filter(|change| matches!(change.what, What::Scatter { .. }));
+        let breaks =
+            changes.iter().filter(|change| matches!(change.what, ChangeKind::Scatter { .. }));
         if breaks.count() > 1 {
             let remedy = "let it break once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
-        self.breaks_before_it_is_whole_again(s, dt_s)?;
+        self.check_breaks(s, dt_s)?;
         Ok(changes)
     }
 
     /// Refuses to join a chain that has not been broken by then, by the cycles in which both take effect.
-    fn breaks_before_it_is_whole_again(
-        &self,
-        s: &ChainSection<D>,
-        dt_s: f64,
-    ) -> Result<(), InputError> {
-        let broken = s.changes.0.iter().find_map(|change| change.get_ref().breaks_at(dt_s));
+    fn check_breaks(&self, s: &ChainSection<D>, dt_s: f64) -> Result<(), InputError> {
+        let broken = s.changes.0.iter().find_map(|change| change.get_ref().break_cycle(dt_s));
         let is_early = |joins: u64| broken.is_none_or(|broken| joins < broken);
-        let joins_at = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at(dt_s);
+        let joins_at = |change: &Spanned<ChangeSection<D>>| change.get_ref().join_cycle(dt_s);
         match s.changes.0.iter().find(|change| joins_at(change).is_some_and(is_early)) {
             None => Ok(()),
             Some(change) => {
-                let at = self.source.within(change.span(), &["reform"]);
+                let at = self.source.key_span(change.span(), &["reform"]);
                 let remedy = "break the chain before: a change with scatter = [first, last]";
                 Err(self.source.error(at, "reform of a chain that is whole", remedy))
             }
@@ -304,9 +302,9 @@ impl<const D: usize> Compiler<'_, D> {
     pub(super) fn check_escapes(
         &self,
         chains: &[ChainSpec<D>],
-        escape: Option<&Escape>,
+        escape: Option<&EscapeRules>,
     ) -> Result<(), InputError> {
-        let Some(escape) = escape.filter(|escape| escape.method == Method::Literal) else {
+        let Some(escape) = escape.filter(|escape| escape.method == EscapeMethod::Literal) else {
             return Ok(());
         };
         let way_m = escape.speed_max_m_s * escape.dt_s;
@@ -320,7 +318,7 @@ impl<const D: usize> Compiler<'_, D> {
         );
         let remedy = "give a shorter chain.dt_s, a lower chain.escape_speed_m_s, slower obstacles, \
                       chain.escape_by = \"simultaneous\", or a longer chain.step_m";
-        Err(self.source.error(self.section_of(slot), cause, remedy))
+        Err(self.source.error(self.section_span(slot), cause, remedy))
     }
 
     /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
@@ -334,12 +332,12 @@ impl<const D: usize> Compiler<'_, D> {
         let least_m = chain.rods().iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
         if least_m < 2.0 * radius_m {
             let cause = format!("robots of radius {radius_m} m as near as {least_m} m");
-            let at = self.source.within(at, &["rod_m", "robots"]);
+            let at = self.source.key_span(at, &["rod_m", "robots"]);
             return Err(self.source.error(at, cause, "give longer rods, or smaller robots"));
         }
         if chain.connectors().iter().any(|connector| connector.radius_m < radius_m) {
             let remedy = "give robots.margin_m of 0 or more";
-            let at = self.source.within(at, &["robots"]);
+            let at = self.source.key_span(at, &["robots"]);
             return Err(self.source.error(at, "connectors smaller than their robots", remedy));
         }
         Ok(())
@@ -348,7 +346,7 @@ impl<const D: usize> Compiler<'_, D> {
     fn shape(
         &self,
         s: &ChainSection<D>,
-        around: Around<D>,
+        around: PlacementContext<D>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let radius_m = self.radius_m(s, at.clone())?;
@@ -365,7 +363,7 @@ impl<const D: usize> Compiler<'_, D> {
             ));
         }
         let points = match s.anywhere {
-            true => self.anywhere(s, &rod, radius_m, around, at.clone())?,
+            true => self.random_start(s, &rod, radius_m, around, at.clone())?,
             false => self.points(s, rod.max_m, at.clone())?,
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
@@ -378,7 +376,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
         let rods = vec![rod; points.len() - 1];
         let chain = Chain::new(points, connectors, rods)
-            .map_err(|error| self.source.error_of(at, &error))?;
+            .map_err(|error| self.source.error_from(at, &error))?;
         Ok((chain, None))
     }
 
@@ -393,7 +391,7 @@ impl<const D: usize> Compiler<'_, D> {
             }
             (Some(_), Some(_)) => {
                 let remedy = "give robots.radius_m and robots.margin_m instead";
-                let at = self.source.within(at, &["radius_m"]);
+                let at = self.source.key_span(at, &["radius_m"]);
                 Err(self.source.error(at, "radius_m beside robots", remedy))
             }
         }
@@ -402,7 +400,7 @@ impl<const D: usize> Compiler<'_, D> {
     /// Removes the margin from leaders, because they are exactly where their connectors are.
     fn trim_leaders(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
         let Some(robots) = &s.robots else { return };
-        for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.navigates()) {
+        for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.is_navigator()) {
             if let Some(connector) = connectors.get_mut(task.connector()) {
                 connector.radius_m = robots.get_ref().radius_m();
             }
@@ -424,15 +422,15 @@ impl<const D: usize> Compiler<'_, D> {
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
                           along, heading_deg, folded_m, max_bend_deg, anywhere, robots and count";
-            let at = self.source.within(at, &BESIDE_ARMS);
+            let at = self.source.key_span(at, &NON_ARM_KEYS);
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
-        let base_m = s.at_m.map_or([0.0; D], Place::get);
-        let arm = self.arm(section, fitted(base_m))?;
+        let base_m = s.at_m.map_or([0.0; D], PointValue::get);
+        let arm = self.arm(section, to_dimensions(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(0.8 * radius_m));
-        let solid = solid.map_err(|error| self.source.error_of(section.span(), &error))?;
+        let solid = solid.map_err(|error| self.source.error_from(section.span(), &error))?;
         // The same in the required number of dimensions, which is three.
-        let points = solid.points().iter().map(|p| fitted(*p)).collect();
+        let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let connector = |c: &Connector<3>| Connector {
             mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
             max_bend_rad: c.max_bend_rad,
@@ -442,21 +440,21 @@ impl<const D: usize> Compiler<'_, D> {
         for limit in &s.limits.0 {
             self.limit(&mut connectors, limit)?;
         }
-        self.stays_whole(s, &connectors, at.clone())?;
+        self.check_arm_whole(s, &connectors, at.clone())?;
         let chain = Chain::new(points, connectors, solid.rods().to_vec());
-        Ok((chain.map_err(|error| self.source.error_of(at, &error))?, Some(Arc::new(arm))))
+        Ok((chain.map_err(|error| self.source.error_from(at, &error))?, Some(Arc::new(arm))))
     }
 
     /// Refuses an arm with a base that may move, and changes that take it apart: its joints determine the places
     /// of its connectors.
-    fn stays_whole(
+    fn check_arm_whole(
         &self,
         s: &ChainSection<D>,
         connectors: &[Connector<D>],
         at: Range<usize>,
     ) -> Result<(), InputError> {
         if connectors.first().is_some_and(|base| base.mobility != Mobility::Fixed) {
-            let at = self.source.within(at, &["limits"]);
+            let at = self.source.key_span(at, &["limits"]);
             let remedy = "leave the mobility of connector 0 out; at_m says where the base stands";
             return Err(self.source.error(at, "an arm whose base may move", remedy));
         }
@@ -475,7 +473,7 @@ impl<const D: usize> Compiler<'_, D> {
         // Thick rods make slaves jump, and those of a swarm are virtual anyway.
         let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
         match s.rod_m {
-            Some(Limits { least, greatest }) => {
+            Some(NumberRange { low: least, high: greatest }) => {
                 Ok(Rod { min_m: least, max_m: greatest, radius_m: rod_radius_m })
             }
             None => {
@@ -486,39 +484,40 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns a random place on the ground where the chain has room; it depends on the seed.
-    fn anywhere(
+    fn random_start(
         &self,
         s: &ChainSection<D>,
         rod: &Rod,
         radius_m: f64,
-        Around { site, number, placed }: Around<D>,
+        PlacementContext { site, number, placed }: PlacementContext<D>,
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
             let remedy = "name a ground.map or a ground.stage, and give connectors";
-            let at = self.source.within(at, &["anywhere"]);
+            let at = self.source.key_span(at, &["anywhere"]);
             return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };
         let is_placed = s.at_m.is_some() || s.points_m.is_some() || s.folded_m.is_some();
         if is_placed || s.along.is_some() || s.heading_deg.is_some() {
             let remedy = "leave out at_m, points_m, along, heading_deg and folded_m";
             let keys = ["at_m", "points_m", "along", "heading_deg", "folded_m"];
-            let at = self.source.within(at, &keys);
+            let at = self.source.key_span(at, &keys);
             return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
-        let obstacles = Obstacles::new(self.in_the_way(Some(site), placed)?, rod.max_m.max(1e-3))
-            .map_err(|error| self.source.error_of(at.clone(), &error))?;
+        let obstacles =
+            Obstacles::new(self.placement_obstacles(Some(site), placed)?, rod.max_m.max(1e-3))
+                .map_err(|error| self.source.error_from(at.clone(), &error))?;
         let obstacles = obstacles.in_plane().expect("only worlds in the plane have a ground");
-        let wanted = Wanted {
+        let wanted = SpaceRequirement {
             connectors,
             spacing_m: rod.max_m,
-            clearance_m: ROOM * radius_m,
-            rod_clearance_m: ROOM * rod.radius_m,
+            clearance_m: ROOM_FACTOR * radius_m,
+            rod_clearance_m: ROOM_FACTOR * rod.radius_m,
             ahead_m: rod.max_m,
-            within: s.within_m.as_ref().map(|within| within.get_ref().in_the_plane()),
+            within: s.within_m.as_ref().map(|within| within.get_ref().to_plane()),
         };
-        let start = find(site, obstacles, &wanted, Seed(self.head.seed), number)
-            .map_err(|error| self.source.error_of(at, &error))?;
+        let start = find_placement(site, obstacles, &wanted, Seed(self.head.seed), number)
+            .map_err(|error| self.source.error_from(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
 
@@ -532,16 +531,16 @@ impl<const D: usize> Compiler<'_, D> {
         if let Some(given) = &s.points_m {
             if s.connectors.is_some() || s.at_m.is_some() || s.folded_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
-                let at = self.source.within(at, &["points_m"]);
+                let at = self.source.key_span(at, &["points_m"]);
                 return Err(self.source.error(at, "a chain placed in two ways", remedy));
             }
             let keys = [
                 ("along", s.along.is_some(), false),
                 ("heading_deg", s.heading_deg.is_some(), false),
             ];
-            self.has_no_idle_key(&keys, "beside points_m", at.clone())?;
+            self.check_unused_key(&keys, "beside points_m", at.clone())?;
             if given.is_empty() {
-                let at = self.source.within(at, &["points_m"]);
+                let at = self.source.key_span(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));
             }
             return Ok(given.iter().map(|place| place.get()).collect());
@@ -552,14 +551,14 @@ impl<const D: usize> Compiler<'_, D> {
                 let cause =
                     format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
                 let remedy = "give a number from 1 to 10000000, or points_m";
-                let at = self.source.within(at, &["connectors"]);
+                let at = self.source.key_span(at, &["connectors"]);
                 return Err(self.source.error(at, cause, remedy));
             }
         };
-        let start = s.at_m.map_or([0.0; D], Place::get);
+        let start = s.at_m.map_or([0.0; D], PointValue::get);
         let u = self.direction(s)?;
         Ok(match s.folded_m {
-            None => (0..n).map(|k| along(start, u, length_m * k as f64)).collect(),
+            None => (0..n).map(|k| add_scaled(start, u, length_m * k as f64)).collect(),
             Some(folds_m) => folded(n, start, u, length_m, folds_m.map(f64::from)),
         })
     }
@@ -574,7 +573,7 @@ impl<const D: usize> Compiler<'_, D> {
                 let ahead = [math::cos(rad), math::sin(rad), 0.0];
                 Ok(std::array::from_fn(|i| -ahead[i]))
             }
-            (Some(given), None) => unit(given.get_ref().get()).ok_or_else(|| {
+            (Some(given), None) => normalized(given.get_ref().get()).ok_or_else(|| {
                 let remedy = "give a direction that is not zero";
                 self.source.error(given.span(), "along has no length", remedy)
             }),
@@ -596,7 +595,7 @@ impl<const D: usize> Compiler<'_, D> {
         let Some(connector) = connectors.get_mut(s.connector) else {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             let remedy = format!("count from 0: the last connector is {}", n - 1);
-            let at = self.source.within(limit.span(), &["connector"]);
+            let at = self.source.key_span(limit.span(), &["connector"]);
             return Err(self.source.error(at, cause, remedy));
         };
         connector.failed = s.failed.unwrap_or(connector.failed);
@@ -628,8 +627,8 @@ fn folded<const D: usize>(
         let (fold, rest) = (k / (leg + apart), k % (leg + apart));
         let (on, aside_by) = (rest.min(leg), fold * apart + rest.saturating_sub(leg));
         let along_by = if fold % 2 == 0 { on } else { leg - on };
-        let at = along(start, u, rod_m * along_by as f64);
-        along(at, aside, rod_m * aside_by as f64)
+        let at = add_scaled(start, u, rod_m * along_by as f64);
+        add_scaled(at, aside, rod_m * aside_by as f64)
     };
     (0..n).map(place).collect()
 }

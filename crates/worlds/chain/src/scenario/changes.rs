@@ -1,19 +1,19 @@
 //! Changes to a chain during a run.
 
 use super::super::rods::chain::Chain;
-use super::super::rods::rebuild::MayCome;
-use super::super::world::{Change, What};
+use super::super::rods::rebuild::MovableEnd;
+use super::super::world::{Change, ChangeKind};
 use super::mobility::MobilitySection;
-use super::{Compiler, Measure, Place};
+use super::{Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
-use sidestep_scenario::{AboveBelow, NonNegative, Number, Spanned};
+use sidestep_scenario::{NonNegative, Number, Open, Spanned};
 use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum MayComeWord {
+enum MovableEndWord {
     #[default]
     Nobody,
     First,
@@ -35,10 +35,10 @@ pub(super) struct ChangeSection<const D: usize> {
     /// Places where it may be from then on.
     mobility: Option<MobilitySection<D>>,
     scatter: Option<[usize; 2]>,
-    by_m: Option<Number<AboveBelow<0, 10_000>>>,
-    apart_m: Option<Place<D>>,
+    by_m: Option<Number<Open<0, 10_000>>>,
+    apart_m: Option<PointValue<D>>,
     reform: Option<bool>,
-    may_come: Option<MayComeWord>,
+    may_come: Option<MovableEndWord>,
     /// Speed at which they come back.
     speed_m_s: Option<Measure>,
 }
@@ -50,12 +50,12 @@ impl<const D: usize> ChangeSection<D> {
     }
 
     /// Returns the cycle in which it breaks the chain, if it does.
-    pub(super) fn breaks_at(&self, dt_s: f64) -> Option<u64> {
+    pub(super) fn break_cycle(&self, dt_s: f64) -> Option<u64> {
         self.scatter.is_some().then(|| self.cycle(dt_s))
     }
 
     /// Returns whether it may let a connector go that is held or has failed.
-    pub(super) fn lets_go(&self, connector: usize) -> bool {
+    pub(super) fn releases(&self, connector: usize) -> bool {
         self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
     }
 
@@ -65,7 +65,7 @@ impl<const D: usize> ChangeSection<D> {
     }
 
     /// Returns the cycle in which it joins the chain again, if it does.
-    pub(super) fn joins_at(&self, dt_s: f64) -> Option<u64> {
+    pub(super) fn join_cycle(&self, dt_s: f64) -> Option<u64> {
         (self.reform == Some(true)).then(|| self.cycle(dt_s))
     }
 }
@@ -79,56 +79,59 @@ impl<const D: usize> Compiler<'_, D> {
         dt_s: f64,
     ) -> Result<Change<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        Ok(Change { cycle: s.cycle(dt_s), what: self.what(s, chain, at)? })
+        Ok(Change { cycle: s.cycle(dt_s), what: self.change_kind(s, chain, at)? })
     }
 
-    fn what(
+    fn change_kind(
         &self,
         s: &ChangeSection<D>,
         chain: &Chain<D>,
         at: Range<usize>,
-    ) -> Result<What<D>, InputError> {
-        self.is_one_thing(s, at.clone())?;
+    ) -> Result<ChangeKind<D>, InputError> {
+        self.check_one_change(s, at.clone())?;
         let n = chain.points().len();
         if let Some([first, last]) = s.scatter {
             return self.scatter(s, [first, last], n, at);
         }
         if s.reform == Some(true) {
             let may_come = match s.may_come.unwrap_or_default() {
-                MayComeWord::Nobody => MayCome::Nobody,
-                MayComeWord::First => MayCome::First,
-                MayComeWord::Last => MayCome::Last,
+                MovableEndWord::Nobody => MovableEnd::Nobody,
+                MovableEndWord::First => MovableEnd::First,
+                MovableEndWord::Last => MovableEnd::Last,
             };
-            return Ok(What::Reform { may_come, speed_m_s: s.speed_m_s.map_or(0.5, f64::from) });
+            return Ok(ChangeKind::Reform {
+                may_come,
+                speed_m_s: s.speed_m_s.map_or(0.5, f64::from),
+            });
         }
         let Some(connector) = s.connector.filter(|&k| k < n) else {
             let cause = match s.connector {
                 Some(connector) => format!("connector = {connector} of a chain of {n}"),
                 None => "a change of no connector".into(),
             };
-            let at = self.source.within(at, &["connector"]);
+            let at = self.source.key_span(at, &["connector"]);
             let remedy = format!("give connector, counted from 0: the last is {}", n - 1);
             return Err(self.source.error(at, cause, remedy));
         };
         let what = match (s.failed, s.max_bend_deg, &s.mobility) {
-            (Some(failed), ..) => What::Failed { connector, failed },
-            (_, Some(deg), _) => What::MaxBend { connector, max_bend_rad: deg.to_radians() },
-            (_, _, Some(given)) => What::Mobility { connector, mobility: given.mobility() },
+            (Some(failed), ..) => ChangeKind::Failed { connector, failed },
+            (_, Some(deg), _) => ChangeKind::MaxBend { connector, max_bend_rad: deg.to_radians() },
+            (_, _, Some(given)) => ChangeKind::Mobility { connector, mobility: given.mobility() },
             _ => unreachable!("one of them is given"),
         };
-        self.try_constraint(&what, chain, at)?;
+        self.check_constraint(&what, chain, at)?;
         Ok(what)
     }
 
     /// Refuses two changes at once, and keys that have no effect beside the one.
-    fn is_one_thing(&self, s: &ChangeSection<D>, at: Range<usize>) -> Result<(), InputError> {
+    fn check_one_change(&self, s: &ChangeSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let (throws, joins) = (s.scatter.is_some(), s.reform == Some(true));
         let others = [s.failed.is_some(), s.max_bend_deg.is_some(), s.mobility.is_some()];
         if others.into_iter().chain([throws, joins]).filter(|is_given| *is_given).count() != 1 {
             let remedy = "give one of failed, max_bend_deg, mobility, scatter = [first, last], \
                           reform = true";
             let given = ["reform", "scatter", "mobility", "max_bend_deg", "failed"];
-            let at = self.source.within(at, &given);
+            let at = self.source.key_span(at, &given);
             return Err(self.source.error(at, "a change that is not one thing", remedy));
         }
         let keys = [
@@ -138,26 +141,28 @@ impl<const D: usize> Compiler<'_, D> {
             ("may_come", s.may_come.is_some(), joins),
             ("speed_m_s", s.speed_m_s.is_some(), joins),
         ];
-        self.has_no_idle_key(&keys, "in this change", at)
+        self.check_unused_key(&keys, "in this change", at)
     }
 
     /// Tries a constraint on a copy, so that it cannot fail during a run.
-    fn try_constraint(
+    fn check_constraint(
         &self,
-        what: &What<D>,
+        what: &ChangeKind<D>,
         chain: &Chain<D>,
         at: Range<usize>,
     ) -> Result<(), InputError> {
         let mut chain = chain.clone();
         let tried = match what {
-            What::Mobility { connector, mobility } => chain.set_mobility(*connector, *mobility),
-            What::MaxBend { connector, max_bend_rad } => {
+            ChangeKind::Mobility { connector, mobility } => {
+                chain.set_mobility(*connector, *mobility)
+            }
+            ChangeKind::MaxBend { connector, max_bend_rad } => {
                 chain.set_max_bend_rad(*connector, *max_bend_rad)
             }
             _ => Ok(()),
         };
-        let at = || self.source.within(at, &["max_bend_deg", "mobility"]);
-        tried.map_err(|error| self.source.error_of(at(), &error))
+        let at = || self.source.key_span(at, &["max_bend_deg", "mobility"]);
+        tried.map_err(|error| self.source.error_from(at(), &error))
     }
 
     fn scatter(
@@ -166,15 +171,15 @@ impl<const D: usize> Compiler<'_, D> {
         [first, last]: [usize; 2],
         n: usize,
         at: Range<usize>,
-    ) -> Result<What<D>, InputError> {
+    ) -> Result<ChangeKind<D>, InputError> {
         if first == 0 || first > last || last + 1 >= n {
             let cause = format!("scatter = [{first}, {last}] of a chain of {n}");
             let remedy = "leave a whole end on both sides: at least connectors 0 and the last";
-            let at = self.source.within(at, &["scatter"]);
+            let at = self.source.key_span(at, &["scatter"]);
             return Err(self.source.error(at, cause, remedy));
         }
         let by_m = s.by_m.map_or(1.0, f64::from);
-        let apart_m = s.apart_m.map_or([0.0; D], Place::get);
-        Ok(What::Scatter { connectors: first..=last, by_m, apart_m })
+        let apart_m = s.apart_m.map_or([0.0; D], PointValue::get);
+        Ok(ChangeKind::Scatter { connectors: first..=last, by_m, apart_m })
     }
 }

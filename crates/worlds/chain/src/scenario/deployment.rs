@@ -1,20 +1,20 @@
 //! Scenarios in which agents that know only their neighbors and their own perception can move the chains.
 
 use super::{ChainSpec, Compiler};
-use crate::deploy::kind::Deployment;
-use crate::driver::Driver;
+use crate::deploy::deployment::Deployment;
+use crate::driver::TaskKind;
 use crate::rods::chain::Mobility;
 use crate::rods::rules::Rules;
-use crate::world::What;
+use crate::world::ChangeKind;
 use sidestep_kernel::InputError;
 
 /// A key, the reason why its value needs a view of the whole chain, and the remedy.
-type NotLocal = (String, String, &'static str);
+type NonLocalKey = (String, String, &'static str);
 
 impl<const D: usize> Compiler<'_, D> {
     /// Refuses a scenario that is deployed as a team and in which a connector would have to know more than it
     /// does.
-    pub(super) fn is_local(
+    pub(super) fn check_local(
         &self,
         chains: &[ChainSpec<D>],
         rules: &Rules,
@@ -25,8 +25,8 @@ impl<const D: usize> Compiler<'_, D> {
         }
         let counts = self.file.chains.0.iter().map(|section| section.get_ref().count);
         let sections = counts.enumerate().flat_map(|(s, count)| std::iter::repeat_n(s, count));
-        let mut parts = sections.zip(chains).filter_map(|(s, spec)| not_local(s, spec));
-        match not_local_rule(rules, escapes).or_else(|| parts.next()) {
+        let mut parts = sections.zip(chains).filter_map(|(s, spec)| non_local_key(s, spec));
+        match non_local_rule(rules, escapes).or_else(|| parts.next()) {
             None => Ok(()),
             Some((key, reason, remedy)) => {
                 let cause = format!("{reason}, which no connector of a team sees");
@@ -38,7 +38,7 @@ impl<const D: usize> Compiler<'_, D> {
 }
 
 /// Returns the first rule by which chains cannot be moved by their neighbors alone.
-fn not_local_rule(rules: &Rules, escapes: bool) -> Option<NotLocal> {
+fn non_local_rule(rules: &Rules, escapes: bool) -> Option<NonLocalKey> {
     let at = |key: &str, reason: &str, remedy| Some((key.into(), reason.into(), remedy));
     if rules.self_collision {
         let reason = "self_collision = true: a chain in its own way has to know all its parts";
@@ -64,7 +64,7 @@ fn not_local_rule(rules: &Rules, escapes: bool) -> Option<NotLocal> {
 }
 
 /// Returns the first thing about a chain of section `s` for which its neighbors are not enough.
-fn not_local<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NotLocal> {
+fn non_local_key<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NonLocalKey> {
     let passes = "is reached by passes to and fro over the whole chain";
     if spec.arm.is_some() {
         let reason = format!("an arm: the target of its tool {passes}");
@@ -82,7 +82,7 @@ fn not_local<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NotLocal> 
             let reason = "a planner: its ways are postures of the whole chain".into();
             return Some((key("planner"), reason, "set planner = \"none\""));
         }
-        if matches!(task.driver, Driver::External) {
+        if matches!(task.driver, TaskKind::External) {
             let reason =
                 "kind = \"external\": as far as it goes is found by halves, of rods as well".into();
             return Some((key("kind"), reason, "give another kind"));
@@ -90,11 +90,11 @@ fn not_local<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NotLocal> 
     }
     spec.changes.iter().find_map(|change| {
         let reason = match &change.what {
-            What::MaxBend { .. } => return None,
-            What::Failed { connector, .. } | What::Mobility { connector, .. } => {
+            ChangeKind::MaxBend { .. } => return None,
+            ChangeKind::Failed { connector, .. } | ChangeKind::Mobility { connector, .. } => {
                 format!("connector {connector} is held at some time: a target {passes}")
             }
-            What::Scatter { .. } | What::Reform { .. } => {
+            ChangeKind::Scatter { .. } | ChangeKind::Reform { .. } => {
                 "a chain that breaks: its parts find together by passes from end to end".into()
             }
         };

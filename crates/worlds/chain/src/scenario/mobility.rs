@@ -1,7 +1,7 @@
 //! Constraints on the places of a connector.
 
 use super::super::rods::chain::Mobility;
-use super::Place;
+use super::PointValue;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -15,11 +15,11 @@ pub(super) enum MobilitySection<const D: usize> {
     /// Stays at the place where it begins.
     Fixed,
     /// Stays on the line between two points.
-    OnSegment([Place<D>; 2]),
+    OnSegment([PointValue<D>; 2]),
     /// Stays on a line or a plane, given by its normal and its distance from the origin.
-    OnPlane { normal: Place<D>, offset_m: f64 },
+    OnPlane { normal: PointValue<D>, offset_m: f64 },
     /// Stays in a box, given by its lower and its upper corner.
-    InBox([Place<D>; 2]),
+    InBox([PointValue<D>; 2]),
 }
 
 impl<const D: usize> MobilitySection<D> {
@@ -27,7 +27,7 @@ impl<const D: usize> MobilitySection<D> {
         match *self {
             Self::Free => Mobility::Free,
             Self::Fixed => Mobility::Fixed,
-            Self::OnSegment(ends) => Mobility::OnSegment(ends.map(Place::get)),
+            Self::OnSegment(ends) => Mobility::OnSegment(ends.map(PointValue::get)),
             Self::OnPlane { normal, offset_m } => {
                 Mobility::OnPlane { normal: normal.get(), offset_m }
             }

@@ -1,12 +1,12 @@
 //! Initiators on wheels, and the robots that follow them.
 
 use super::super::formation::Robots;
-use super::super::navigate::{Goal, Navigator};
-use super::super::swarm::drive::Drive;
+use super::super::navigate::{NavigationGoal, Navigator};
+use super::super::swarm::drive::DifferentialDrive;
 use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
-use super::super::swarm::leader::{Leader, LeaveRule, Leaving, TargetSense, Turning};
-use super::{Compiler, MOST, Unbounded};
+use super::super::swarm::leader::{Leader, LeaveRule, TargetSense, TurnMode, WallLossRule};
+use super::{Compiler, MAX_VALUE, Unbounded};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -17,40 +17,40 @@ use std::f64::consts::PI;
 /// Distance between points of a corridor's middle, meters.
 const LINE_STEP_M: f64 = 0.1;
 /// Default lag of a robot at which a leader waits for it, meters.
-const LAG_LIMIT_M: f64 = 0.15;
+const DEFAULT_LAG_LIMIT_M: f64 = 0.15;
 /// Default distance between the wheels of a robot, meters.
-const WHEELBASE_M: f64 = 0.4;
+const DEFAULT_WHEELBASE_M: f64 = 0.4;
 
 /// A measure of a robot, limited because squares and quotients of others would overflow.
-type Size = Number<OfARobot>;
+type Size = Number<RobotSizeRule>;
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OfARobot;
+pub(super) struct RobotSizeRule;
 
-impl Rule for OfARobot {
+impl Rule for RobotSizeRule {
     fn allows(number: f64) -> bool {
-        (1e-6..=MOST).contains(&number)
+        (1e-6..=MAX_VALUE).contains(&number)
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "a number from 1e-6 to 1e6".into()
     }
 
     fn limits() -> Value {
-        json!({ "minimum": 1e-6, "maximum": MOST })
+        json!({ "minimum": 1e-6, "maximum": MAX_VALUE })
     }
 }
 
 /// Angles up to a whole turn to either side, degrees.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OfATurn;
+pub(super) struct TurnAngleRule;
 
-impl Rule for OfATurn {
+impl Rule for TurnAngleRule {
     fn allows(number: f64) -> bool {
         number.abs() <= 360.0
     }
 
-    fn words() -> String {
+    fn description() -> String {
         "a number from -360 to 360".into()
     }
 
@@ -61,7 +61,7 @@ impl Rule for OfATurn {
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum LeavingWord {
+enum WallLossWord {
     #[default]
     Latched,
     Range,
@@ -70,7 +70,7 @@ enum LeavingWord {
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum TurningWord {
+enum TurnModeWord {
     #[default]
     AboutAWheel,
     OnTheSpotWhereBlocked,
@@ -96,13 +96,13 @@ pub(super) struct NavigatorSection {
     /// Distance at which a wall is lost.
     lost_m: Option<f64>,
     /// Sector of the laser that looks at the wall.
-    sector_deg: Option<[Number<OfATurn>; 2]>,
+    sector_deg: Option<[Number<TurnAngleRule>; 2]>,
     /// Rule by which a wall is left.
-    leaving: LeavingWord,
+    leaving: WallLossWord,
     /// Whether walls are left at all.
     leave_rule: Option<bool>,
     /// Way to turn.
-    turning: TurningWord,
+    turning: TurnModeWord,
     /// The answer to a body that moves ahead.
     movers: MoversWord,
     /// Number of beams of the laser.
@@ -150,20 +150,20 @@ impl<const D: usize> Compiler<'_, D> {
         let preset = NavigatorSection::default();
         let s = section.map_or(&preset, Spanned::get_ref);
         let told = |error: InputError| match section {
-            Some(section) => self.source.error_of(section.span(), &error),
+            Some(section) => self.source.error_from(section.span(), &error),
             None => error,
         };
         if let Some(section) = section {
-            self.seeks_a_target(section)?;
+            self.check_target_keys(section)?;
         }
         let leader = s.leader(speed_m_s).map_err(told)?;
-        let wheelbase_m = s.wheelbase_m.map_or(WHEELBASE_M, f64::from);
-        let drive = Drive::new(wheelbase_m, speed_m_s).map_err(told)?;
+        let wheelbase_m = s.wheelbase_m.map_or(DEFAULT_WHEELBASE_M, f64::from);
+        let drive = DifferentialDrive::new(wheelbase_m, speed_m_s).map_err(told)?;
         Ok(Navigator { leader, drive, goal: self.goal(s)? })
     }
 
     /// Refuses keys about a target where there is none.
-    fn seeks_a_target(&self, section: &Spanned<NavigatorSection>) -> Result<(), InputError> {
+    fn check_target_keys(&self, section: &Spanned<NavigatorSection>) -> Result<(), InputError> {
         let s = section.get_ref();
         let seeks = s.target_m.is_some();
         let keys = [
@@ -171,17 +171,17 @@ impl<const D: usize> Compiler<'_, D> {
             ("detects_from_m", s.detects_from_m.is_some(), seeks),
             ("needs_line_of_sight", s.needs_line_of_sight, seeks),
         ];
-        self.has_no_idle_key(&keys, "without target_m", section.span())
+        self.check_unused_key(&keys, "without target_m", section.span())
     }
 
     /// Returns the target, or the end of the scenario's corridor.
-    fn goal(&self, s: &NavigatorSection) -> Result<Option<Goal>, InputError> {
+    fn goal(&self, s: &NavigatorSection) -> Result<Option<NavigationGoal>, InputError> {
         if let Some(at) = s.target_m {
             let tolerance_m = s.tolerance_m.map_or(0.5, f64::from);
-            return Ok(Some(Goal::Target { at: at.get(), tolerance_m }));
+            return Ok(Some(NavigationGoal::Target { at: at.get(), tolerance_m }));
         }
         let middle = self.corridor_middle(LINE_STEP_M)?;
-        Ok(middle.map(|(line, width_m)| Goal::EndOf { line, width_m }))
+        Ok(middle.map(|(line, width_m)| NavigationGoal::EndOf { line, width_m }))
     }
 
     /// Returns the robots of a swarm with a leader that drives at `speed_m_s`.
@@ -191,7 +191,7 @@ impl<const D: usize> Compiler<'_, D> {
         speed_m_s: f64,
     ) -> Result<Robots, InputError> {
         let robots = section.get_ref().robots(speed_m_s);
-        robots.map_err(|error| self.source.error_of(section.span(), &error))
+        robots.map_err(|error| self.source.error_from(section.span(), &error))
     }
 }
 
@@ -214,9 +214,9 @@ impl NavigatorSection {
             far_m: self.far_m.unwrap_or(usual.far_m),
             lost_m: self.lost_m.unwrap_or(usual.lost_m),
             leaving: match self.leaving {
-                LeavingWord::Latched => Leaving::Latched,
-                LeavingWord::Range => Leaving::Range,
-                LeavingWord::Level => Leaving::Level,
+                WallLossWord::Latched => WallLossRule::Latched,
+                WallLossWord::Range => WallLossRule::Range,
+                WallLossWord::Level => WallLossRule::Level,
             },
             leave_rule: self.leave_rule.unwrap_or(true).then(LeaveRule::default),
             target_sense: TargetSense {
@@ -224,8 +224,8 @@ impl NavigatorSection {
                 needs_line_of_sight: self.needs_line_of_sight,
             },
             turning: match self.turning {
-                TurningWord::AboutAWheel => Turning::AboutAWheel,
-                TurningWord::OnTheSpotWhereBlocked => Turning::OnTheSpotWhereBlocked,
+                TurnModeWord::AboutAWheel => TurnMode::AboutAWheel,
+                TurnModeWord::OnTheSpotWhereBlocked => TurnMode::OnTheSpotWhereBlocked,
             },
             gives_way: self.movers == MoversWord::GiveWay,
         };
@@ -237,12 +237,18 @@ impl NavigatorSection {
 impl RobotsSection {
     fn robots(&self, speed_m_s: f64) -> Result<Robots, InputError> {
         let wheel_m_s = self.wheel_speed_m_s.map_or(1.2 * speed_m_s, f64::from);
-        let drive = Drive::new(self.wheelbase_m.map_or(WHEELBASE_M, f64::from), wheel_m_s)?;
+        let drive = DifferentialDrive::new(
+            self.wheelbase_m.map_or(DEFAULT_WHEELBASE_M, f64::from),
+            wheel_m_s,
+        )?;
         let mut follower = Follower::new(drive, self.radius_m())?;
         follower.gain_per_s = self.gain_per_s.map_or(follower.gain_per_s, f64::from);
         follower.turn_gain_per_s = self.turn_gain_per_s.map_or(follower.turn_gain_per_s, f64::from);
         follower.ring.range_m = self.sensors_m.map_or(follower.ring.range_m, f64::from);
-        Ok(Robots { follower, lag_limit_m: self.lag_limit_m.map_or(LAG_LIMIT_M, f64::from) })
+        Ok(Robots {
+            follower,
+            lag_limit_m: self.lag_limit_m.map_or(DEFAULT_LAG_LIMIT_M, f64::from),
+        })
     }
 
     /// Returns the radius of a robot's body.

@@ -1,19 +1,19 @@
 //! The section of a network that may lose and delay messages.
 
 use super::{ChainSpec, Compiler};
-use crate::deploy::kind::Deployment;
+use crate::deploy::deployment::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::network::{Names, Wrong, check_sides, during, for_ever};
+use sidestep_scenario::network::{AgentNaming, SectionError, check_sides, endless_s, time_window};
 
-pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Connectors>;
+pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<ConnectorCounts>;
 
 /// A period in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Silence {
+pub(super) struct RadioOutageSection {
     /// Number of the connector in its chain.
     connector: u32,
     /// Number of the chain.
@@ -23,7 +23,7 @@ pub(super) struct Silence {
     #[serde(default)]
     from_s: f64,
     /// End of the silence, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Silence {
 /// heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Partition {
+pub(super) struct PartitionSection {
     /// Numbers of the connectors on each side.
     sides: Vec<Vec<u32>>,
     /// Number of the chain.
@@ -41,14 +41,14 @@ pub(super) struct Partition {
     #[serde(default)]
     from_s: f64,
     /// End of the partition, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
 /// A period in which a link between two neighbors works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct OneWay {
+pub(super) struct UnidirectionalLinkSection {
     /// Number of the connector that is heard by the other.
     sender: u32,
     /// Number of its neighbor, which it does not hear.
@@ -60,69 +60,72 @@ pub(super) struct OneWay {
     #[serde(default)]
     from_s: f64,
     /// End of that period, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless_s")]
     until_s: f64,
 }
 
 /// The connectors of a scenario: their number in each chain. On the network they are counted on, chain
 /// after chain.
 #[derive(Debug)]
-pub(super) struct Connectors(Vec<u32>);
+pub(super) struct ConnectorCounts(Vec<u32>);
 
-impl Connectors {
-    fn of<const D: usize>(chains: &[ChainSpec<D>]) -> Self {
+impl ConnectorCounts {
+    fn from_chains<const D: usize>(chains: &[ChainSpec<D>]) -> Self {
         Self(chains.iter().map(|spec| spec.start.points().len() as u32).collect())
     }
 
     /// Returns the ids on the network of some connectors of a chain.
-    fn ids(&self, chain: EntityId, connectors: &[u32]) -> Result<Vec<EntityId>, Wrong> {
+    fn ids(&self, chain: EntityId, connectors: &[u32]) -> Result<Vec<EntityId>, SectionError> {
         let Some((before, &[n, ..])) = self.0.split_at_checked(chain as usize) else {
             let cause = format!("chain {chain} does not exist");
             let last = self.0.len().max(1) - 1;
-            return Err(Wrong::new(cause, format!("give numbers from 0 to {last}")));
+            return Err(SectionError::new(cause, format!("give numbers from 0 to {last}")));
         };
         if let Some(k) = connectors.iter().find(|&&k| k >= n) {
             let cause = format!("connector {k} does not exist in chain {chain}");
-            return Err(Wrong::new(cause, format!("give numbers from 0 to {}", n - 1)));
+            return Err(SectionError::new(cause, format!("give numbers from 0 to {}", n - 1)));
         }
         let first_id: u32 = before.iter().sum();
         Ok(connectors.iter().map(|k| first_id + k).collect())
     }
 }
 
-impl Names for Connectors {
-    type Silence = Silence;
-    type Partition = Partition;
-    type OneWay = OneWay;
+impl AgentNaming for ConnectorCounts {
+    type RadioOutage = RadioOutageSection;
+    type Partition = PartitionSection;
+    type UnidirectionalLink = UnidirectionalLinkSection;
 
     // That of a bus along the chain.
-    const LATENCY_S: f64 = 1e-5;
-    const SHORTEST_LATENCY_S: f64 = 1e-7;
-    const TALKS: u32 = 1;
-    const LONGEST_DEADLINE: &str = "at most dt_s";
+    const DEFAULT_LATENCY_S: f64 = 1e-5;
+    const MIN_LATENCY_S: f64 = 1e-7;
+    const CONVERSATIONS_PER_CYCLE: u32 = 1;
+    const MAX_DEADLINE_TEXT: &str = "at most dt_s";
 
-    fn silence(&self, one: &Silence) -> Result<network::Silence, Wrong> {
+    fn radio_outage(&self, one: &RadioOutageSection) -> Result<network::RadioOutage, SectionError> {
         let agent = self.ids(one.chain, &[one.connector])?[0];
-        Ok(network::Silence { agent, during: during(one.from_s, one.until_s)? })
+        Ok(network::RadioOutage { agent, window: time_window(one.from_s, one.until_s)? })
     }
 
-    fn partition(&self, one: &Partition) -> Result<network::Partition, Wrong> {
+    fn partition(&self, one: &PartitionSection) -> Result<network::Partition, SectionError> {
         let sides = one.sides.iter().map(|side| self.ids(one.chain, side));
         let sides = sides.collect::<Result<_, _>>()?;
         check_sides(&one.sides, "connector")?;
-        Ok(network::Partition { sides, during: during(one.from_s, one.until_s)? })
+        Ok(network::Partition { sides, window: time_window(one.from_s, one.until_s)? })
     }
 
-    fn one_way(&self, one: &OneWay) -> Result<network::OneWay, Wrong> {
-        let OneWay { sender, receiver, chain, from_s, until_s } = *one;
+    fn unidirectional_link(
+        &self,
+        one: &UnidirectionalLinkSection,
+    ) -> Result<network::UnidirectionalLink, SectionError> {
+        let UnidirectionalLinkSection { sender, receiver, chain, from_s, until_s } = *one;
         let ids = self.ids(chain, &[sender, receiver])?;
         if sender.abs_diff(receiver) != 1 {
             let cause = format!("connectors {sender} and {receiver} are no neighbors");
             let remedy = "only neighbors talk to each other: give numbers that differ by 1";
-            return Err(Wrong::new(cause, remedy));
+            return Err(SectionError::new(cause, remedy));
         }
-        let during = during(from_s, until_s)?;
-        Ok(network::OneWay { sender: ids[0], receiver: ids[1], during })
+        let window = time_window(from_s, until_s)?;
+        Ok(network::UnidirectionalLink { sender: ids[0], receiver: ids[1], window })
     }
 }
 
@@ -139,8 +142,8 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "set deployment = \"team\", or leave [chain.network] out";
             return Err(self.source.error(section.span(), cause, remedy));
         }
-        let network = section.get_ref().network(dt_s, &Connectors::of(chains));
-        network.map(Some).map_err(|Wrong { span, cause, remedy }| {
+        let network = section.get_ref().network(dt_s, &ConnectorCounts::from_chains(chains));
+        network.map(Some).map_err(|SectionError { span, cause, remedy }| {
             self.source.error(span.unwrap_or_else(|| section.span()), cause, remedy)
         })
     }

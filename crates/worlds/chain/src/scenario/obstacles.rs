@@ -6,17 +6,17 @@ use super::super::rods::chain::Chain;
 use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::{ChainSpec, push_parts};
-use super::{Compiler, MOST, Measure, Place};
+use super::{Compiler, MAX_VALUE, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
-use sidestep_scenario::{Limits, Spanned};
+use sidestep_scenario::{NumberRange, Spanned};
 use std::ops::{Range, RangeInclusive};
 
 /// Default distance of generated obstacles from chains at the start, meters.
-const KEEP_M: f64 = 0.1;
+const DEFAULT_KEEP_M: f64 = 0.1;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -66,21 +66,21 @@ struct LegSection {
 #[schemars(rename = "ObstacleSection")]
 pub(super) struct ObstacleSection<const D: usize> {
     /// Center of a ball or a box.
-    at_m: Option<Place<D>>,
+    at_m: Option<PointValue<D>>,
     /// Ends of a capsule or of a thin wall.
-    ends_m: Option<[Place<D>; 2]>,
+    ends_m: Option<[PointValue<D>; 2]>,
     /// Size of a box.
-    size_m: Option<Place<D>>,
+    size_m: Option<PointValue<D>>,
     /// Corners of a polygon, whose walls stand.
-    corners_m: Option<Vec<Place<D>>>,
+    corners_m: Option<Vec<PointValue<D>>>,
     #[serde(default)]
     radius_m: f64,
     turn_deg: Option<f64>,
     /// Velocity of an obstacle that moves straight on.
-    velocity_m_s: Option<Place<D>>,
-    bounces_m: Option<[Place<D>; 2]>,
+    velocity_m_s: Option<PointValue<D>>,
+    bounces_m: Option<[PointValue<D>; 2]>,
     /// Way points of an obstacle that goes from one to the next.
-    patrol_m: Option<Vec<Place<D>>>,
+    patrol_m: Option<Vec<PointValue<D>>>,
     closed: Option<bool>,
     /// Speed along them.
     speed_m_s: Option<Measure>,
@@ -92,17 +92,17 @@ pub(super) struct ObstacleSection<const D: usize> {
 #[schemars(rename = "FieldSection")]
 pub(super) struct FieldSection<const D: usize> {
     /// Lower corner of the field.
-    lo_m: Place<D>,
+    lo_m: PointValue<D>,
     /// Upper corner of the field.
-    hi_m: Place<D>,
+    hi_m: PointValue<D>,
     part: Option<f64>,
     /// Number of balls that move.
     n: Option<u32>,
     /// Radius, or the least and the greatest.
-    radius_m: Limits,
+    radius_m: NumberRange,
     length_m: Option<f64>,
     /// Speed, or the least and the greatest.
-    speed_m_s: Option<Limits>,
+    speed_m_s: Option<NumberRange>,
     /// Distance from chains at the start.
     keep_m: Option<f64>,
 }
@@ -114,13 +114,13 @@ pub(super) struct Ground<const D: usize> {
 }
 
 /// The obstacles gathered so far.
-struct Gathered<const D: usize> {
+struct ObstacleBuilder<const D: usize> {
     still: Vec<Obstacle<D>>,
     movers: Vec<Mover<D>>,
     next_id: u32,
 }
 
-impl<const D: usize> Gathered<D> {
+impl<const D: usize> ObstacleBuilder<D> {
     fn add_still(&mut self, obstacles: impl IntoIterator<Item = Obstacle<D>>) {
         for obstacle in obstacles {
             self.next_id = self.next_id.max(obstacle.id + 1);
@@ -136,7 +136,7 @@ impl<const D: usize> Compiler<'_, D> {
         site: Option<&Site>,
         chains: &[ChainSpec<D>],
     ) -> Result<Ground<D>, InputError> {
-        let mut all = self.given(site)?;
+        let mut all = self.given_obstacles(site)?;
         for (k, section) in (0..).zip(&self.file.fields.0) {
             self.add_field(section, k, chains, &mut all)?;
         }
@@ -157,11 +157,11 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns all obstacles except those at random places, which keep away from chains.
-    fn given(&self, site: Option<&Site>) -> Result<Gathered<D>, InputError> {
-        let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
+    fn given_obstacles(&self, site: Option<&Site>) -> Result<ObstacleBuilder<D>, InputError> {
+        let mut all = ObstacleBuilder { still: Vec::new(), movers: Vec::new(), next_id: 0 };
         self.add_corridor(&mut all)?;
         if let Some(site) = site {
-            all.add_still(site.obstacles(0).iter().map(lifted));
+            all.add_still(site.obstacles(0).iter().map(wall_to_dimensions));
         }
         for section in &self.file.obstacles.0 {
             self.add_obstacle(section, &mut all)?;
@@ -171,12 +171,12 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Returns the obstacles among which a chain is placed: all except those at random places, as they are at the
     /// start, and the parts of the chains that are placed already.
-    pub(super) fn in_the_way(
+    pub(super) fn placement_obstacles(
         &self,
         site: Option<&Site>,
         placed: &[ChainSpec<D>],
     ) -> Result<Vec<Obstacle<D>>, InputError> {
-        let Gathered { still: mut all, movers, .. } = self.given(site)?;
+        let ObstacleBuilder { still: mut all, movers, .. } = self.given_obstacles(site)?;
         all.extend(movers.iter().map(|mover| mover.at(0.0)));
         (0..).zip(placed).for_each(|(slot, spec)| push_parts(&mut all, slot, &spec.start));
         Ok(all)
@@ -199,7 +199,7 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, "a ground lies in the plane", remedy));
         }
         let unknown = [("unknown", s.unknown.is_some(), s.map.is_some())];
-        self.has_no_idle_key(&unknown, "without ground.map", at.clone())?;
+        self.check_unused_key(&unknown, "without ground.map", at.clone())?;
         let unknown = match s.unknown.unwrap_or_default() {
             UnknownWord::Solid => UnknownPolicy::Wall,
             UnknownWord::Free => UnknownPolicy::Free,
@@ -207,22 +207,22 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(match (&s.map, &s.stage) {
             (Some(map), _) => {
                 let map = rosmap::load(&self.source.path(map.as_ref()));
-                Some(Site::of_map(&self.source.named(at, "map", map)?, unknown))
+                Some(Site::from_map(&self.source.with_file_key(at, "map", map)?, unknown))
             }
             (_, Some(world)) => {
                 let world = stage::load(&self.source.path(world.as_ref()));
-                Some(Site::of_stage(&self.source.named(at, "stage", world)?))
+                Some(Site::from_stage(&self.source.with_file_key(at, "stage", world)?))
             }
             _ => None,
         })
     }
 
-    fn add_corridor(&self, all: &mut Gathered<D>) -> Result<(), InputError> {
+    fn add_corridor(&self, all: &mut ObstacleBuilder<D>) -> Result<(), InputError> {
         let section =
             self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
         let Some(given) = section else { return Ok(()) };
         let walls = self.corridor(given)?.walls(all.next_id);
-        all.add_still(walls.iter().map(lifted));
+        all.add_still(walls.iter().map(wall_to_dimensions));
         Ok(())
     }
 
@@ -235,7 +235,7 @@ impl<const D: usize> Compiler<'_, D> {
             self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
         let corridor = section.map(|given| self.corridor(given)).transpose()?;
         let middle =
-            |corridor: &Corridor| corridor.line(step_m).iter().map(|pose| pose.at).collect();
+            |corridor: &Corridor| corridor.center_line(step_m).iter().map(|pose| pose.at).collect();
         Ok(corridor.map(|corridor| (middle(&corridor), corridor.width_m())))
     }
 
@@ -248,7 +248,7 @@ impl<const D: usize> Compiler<'_, D> {
                 Corridor::new(legs?, s.width_m)
             }
         };
-        corridor.map_err(|error| self.source.error_of(given.span(), &error))
+        corridor.map_err(|error| self.source.error_from(given.span(), &error))
     }
 
     fn leg(&self, given: &Spanned<LegSection>) -> Result<Leg, InputError> {
@@ -267,23 +267,23 @@ impl<const D: usize> Compiler<'_, D> {
     fn add_obstacle(
         &self,
         section: &Spanned<ObstacleSection<D>>,
-        all: &mut Gathered<D>,
+        all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
         let (s, at) = (section.get_ref(), section.span());
         let id = all.next_id;
-        self.shapes_one_thing(s, at.clone())?;
+        self.check_shape_keys(s, at.clone())?;
         if let Some(corners) = &s.corners_m {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
-        let of_shape = || self.source.within(at.clone(), &["radius_m", "size_m"]);
-        body.check().map_err(|error| self.source.error_of(of_shape(), &error))?;
+        let of_shape = || self.source.key_span(at.clone(), &["radius_m", "size_m"]);
+        body.check().map_err(|error| self.source.error_from(of_shape(), &error))?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
             Some(course) => {
                 let mover =
-                    Mover::new(body, course).map_err(|error| self.source.error_of(at, &error))?;
+                    Mover::new(body, course).map_err(|error| self.source.error_from(at, &error))?;
                 all.movers.push(mover);
             }
         }
@@ -291,7 +291,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses keys that have no effect for a shape or a way to move.
-    fn shapes_one_thing(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<(), InputError> {
+    fn check_shape_keys(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<(), InputError> {
         let is_box = s.size_m.is_some() && s.corners_m.is_none();
         let keys = [
             ("size_m", s.size_m.is_some(), is_box),
@@ -300,40 +300,41 @@ impl<const D: usize> Compiler<'_, D> {
             ("closed", s.closed.is_some(), s.patrol_m.is_some()),
             ("speed_m_s", s.speed_m_s.is_some(), s.patrol_m.is_some()),
         ];
-        self.has_no_idle_key(&keys, "for this obstacle", at)
+        self.check_unused_key(&keys, "for this obstacle", at)
     }
 
     fn add_outline(
         &self,
         s: &ObstacleSection<D>,
-        corners: &[Place<D>],
+        corners: &[PointValue<D>],
         at: Range<usize>,
-        all: &mut Gathered<D>,
+        all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
         let moves = s.velocity_m_s.is_some() || s.patrol_m.is_some();
         if D != 2 || corners.len() < 3 || moves || s.at_m.is_some() || s.ends_m.is_some() {
             let remedy = "give three corners or more, in two dimensions, and nothing that moves";
-            let at = self.source.within(at, &["corners_m"]);
+            let at = self.source.key_span(at, &["corners_m"]);
             return Err(self.source.error(at, "this is no polygon", remedy));
         }
-        let corners: Vec<Point<2>> = corners.iter().map(|corner| fitted(corner.get())).collect();
+        let corners: Vec<Point<2>> =
+            corners.iter().map(|corner| to_dimensions(corner.get())).collect();
         let walls = outline(all.next_id, &corners, s.radius_m);
-        all.add_still(walls.iter().map(lifted));
+        all.add_still(walls.iter().map(wall_to_dimensions));
         Ok(())
     }
 
     fn core(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<Core<D>, InputError> {
         match (s.at_m, s.ends_m, s.size_m) {
             (Some(center), None, None) => Ok(Core::Point(center.get())),
-            (None, Some(ends), None) => Ok(Core::Segment(ends.map(Place::get))),
+            (None, Some(ends), None) => Ok(Core::Segment(ends.map(PointValue::get))),
             (Some(_), None, Some(size)) if size.get().contains(&0.0) => {
-                let at = self.source.within(at, &["size_m"]);
+                let at = self.source.key_span(at, &["size_m"]);
                 let remedy = "give every side a length, or leave size_m out for a ball";
                 Err(self.source.error(at, "a box of no size", remedy))
             }
             (Some(center), None, Some(size)) => {
                 let half_m = size.get().map(|x| 0.5 * x.abs());
-                let axes = turned(s.turn_deg.unwrap_or(0.0));
+                let axes = turned_axes(s.turn_deg.unwrap_or(0.0));
                 Ok(Core::Cuboid(Cuboid { center: center.get(), axes, half_m }))
             }
             _ => {
@@ -350,11 +351,11 @@ impl<const D: usize> Compiler<'_, D> {
         s: &ObstacleSection<D>,
         at: Range<usize>,
     ) -> Result<Option<Course<D>>, InputError> {
-        let course = match (s.velocity_m_s.map(Place::get), s.bounces_m, &s.patrol_m) {
+        let course = match (s.velocity_m_s.map(PointValue::get), s.bounces_m, &s.patrol_m) {
             (None, None, None) => return Ok(None),
             (Some(velocity_m_s), None, None) => Course::Straight { velocity_m_s },
             (Some(velocity_m_s), Some(corners), None) => {
-                let [lo, hi] = corners.map(Place::get);
+                let [lo, hi] = corners.map(PointValue::get);
                 Course::Bouncing { velocity_m_s, room: Bounds { lo, hi } }
             }
             (None, None, Some(way_points)) => Course::Patrol {
@@ -364,7 +365,7 @@ impl<const D: usize> Compiler<'_, D> {
             },
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
-                let at = self.source.within(at, &["patrol_m", "bounces_m"]);
+                let at = self.source.key_span(at, &["patrol_m", "bounces_m"]);
                 return Err(self.source.error(at, "an obstacle that moves in two ways", remedy));
             }
         };
@@ -376,18 +377,18 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<FieldSection<D>>,
         number: u64,
         chains: &[ChainSpec<D>],
-        all: &mut Gathered<D>,
+        all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
         let s = section.get_ref();
-        let told = |error: InputError| self.source.error_of(section.span(), &error);
+        let told = |error: InputError| self.source.error_from(section.span(), &error);
         let room = Bounds { lo: s.lo_m.get(), hi: s.hi_m.get() };
         let keep_clear = chains.iter().flat_map(|spec| parts(&spec.start)).collect();
         let widest = chains.iter().flat_map(|spec| spec.start.connectors());
         let widest_m = widest.map(|c| c.radius_m).fold(0.0, f64::max);
-        let keep_m = widest_m + s.keep_m.unwrap_or(KEEP_M);
+        let keep_m = widest_m + s.keep_m.unwrap_or(DEFAULT_KEEP_M);
         // Every field has its own places.
         let seed = Seed(self.head.seed.wrapping_add(number << 32));
-        let Limits { least, greatest } = s.radius_m;
+        let NumberRange { low: least, high: greatest } = s.radius_m;
         match (s.part, s.n, s.speed_m_s) {
             (Some(part), None, None) if least == greatest => {
                 let length_m = s.length_m.unwrap_or(0.0);
@@ -395,9 +396,10 @@ impl<const D: usize> Compiler<'_, D> {
                 all.add_still(field.fill(seed, all.next_id).map_err(told)?);
             }
             (None, Some(n), Some(speed_m_s)) if s.length_m.is_none() => {
-                let [radius_m, speed_m_s] = self.sizes([s.radius_m, speed_m_s], section.span())?;
+                let [radius_m, speed_m_s] =
+                    self.crowd_sizes([s.radius_m, speed_m_s], section.span())?;
                 let crowd = Crowd { room, n, radius_m, speed_m_s, keep_clear, keep_m };
-                all.movers.extend(crowd.gather(seed, all.next_id).map_err(told)?);
+                all.movers.extend(crowd.generate(seed, all.next_id).map_err(told)?);
                 all.next_id += n;
             }
             _ => {
@@ -411,17 +413,17 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the radii and speeds of a crowd.
-    fn sizes(
+    fn crowd_sizes(
         &self,
-        limits: [Limits; 2],
+        limits: [NumberRange; 2],
         at: Range<usize>,
     ) -> Result<[RangeInclusive<f64>; 2], InputError> {
-        let mut ends = limits.iter().flat_map(|limits| [limits.least, limits.greatest]);
-        match ends.find(|x| !(0.0..=MOST).contains(x)) {
-            None => Ok(limits.map(|limits| limits.least..=limits.greatest)),
+        let mut ends = limits.iter().flat_map(|limits| [limits.low, limits.high]);
+        match ends.find(|x| !(0.0..=MAX_VALUE).contains(x)) {
+            None => Ok(limits.map(|limits| limits.low..=limits.high)),
             Some(x) => {
                 let cause = format!("a radius_m or a speed_m_s of {x}");
-                let at = self.source.within(at, &["radius_m", "speed_m_s"]);
+                let at = self.source.key_span(at, &["radius_m", "speed_m_s"]);
                 Err(self.source.error(at, cause, "give numbers from 0 to 1e6"))
             }
         }
@@ -436,25 +438,30 @@ fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_
 }
 
 /// Returns a point in the required number of dimensions.
-pub(super) fn fitted<const FROM: usize, const TO: usize>(p: Point<FROM>) -> Point<TO> {
+pub(super) fn to_dimensions<const FROM: usize, const TO: usize>(p: Point<FROM>) -> Point<TO> {
     std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
 }
 
 /// Returns a plane wall in the required number of dimensions.
-fn lifted<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
+fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     let core = match wall.core {
-        Core::Point(c) => Core::Point(fitted(c)),
-        Core::Segment(ends) => Core::Segment(ends.map(fitted)),
+        Core::Point(c) => Core::Point(to_dimensions(c)),
+        Core::Segment(ends) => Core::Segment(ends.map(to_dimensions)),
         Core::Cuboid(Cuboid { center, axes, half_m }) => {
-            let axes = std::array::from_fn(|i| axes.get(i).map_or([0.0; D], |axis| fitted(*axis)));
-            Core::Cuboid(Cuboid { center: fitted(center), axes, half_m: fitted(half_m) })
+            let axes =
+                std::array::from_fn(|i| axes.get(i).map_or([0.0; D], |axis| to_dimensions(*axis)));
+            Core::Cuboid(Cuboid {
+                center: to_dimensions(center),
+                axes,
+                half_m: to_dimensions(half_m),
+            })
         }
     };
     Obstacle::still(wall.id, core, wall.radius_m)
 }
 
 /// Returns the axes of a box turned in the plane of the first two.
-fn turned<const D: usize>(turn_deg: f64) -> [Point<D>; D] {
+fn turned_axes<const D: usize>(turn_deg: f64) -> [Point<D>; D] {
     let (s, c) = (math::sin(turn_deg.to_radians()), math::cos(turn_deg.to_radians()));
     std::array::from_fn(|i| {
         let mut axis = [0.0; D];

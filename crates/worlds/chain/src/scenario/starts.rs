@@ -1,6 +1,6 @@
 //! Checks that chains have their places to themselves at the start.
 
-use super::super::metrics::PENETRATION_M;
+use super::super::metrics::PENETRATION_THRESHOLD_M;
 use super::super::rods::chain::Chain;
 use super::super::rods::geometry::Bounds;
 use super::super::rods::obstacle::{Obstacle, Obstacles};
@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// A part of a chain that is inside a solid.
 #[derive(Debug, Clone, Copy)]
-struct Inside {
+struct StartOverlap {
     /// The part's connector; for a rod the one before it.
     connector: usize,
     id: u32,
@@ -22,7 +22,7 @@ struct Inside {
 impl<const D: usize> Compiler<'_, D> {
     /// Refuses chains that start in obstacles, or in each other, because every motion out of there
     /// would pass through a solid.
-    pub(super) fn starts(
+    pub(super) fn check_starts(
         &self,
         chains: &[ChainSpec<D>],
         ground: &Ground<D>,
@@ -35,7 +35,7 @@ impl<const D: usize> Compiler<'_, D> {
         obstacles.set_moving(&moving)?;
         for (slot, spec) in chains.iter().enumerate() {
             if let Some(inside) = deepest(&spec.start, &obstacles, None) {
-                return Err(self.starts_in(slot, inside, &format!("obstacle {}", inside.id)));
+                return Err(self.start_error(slot, inside, &format!("obstacle {}", inside.id)));
             }
         }
         if chains.len() < 2 {
@@ -51,22 +51,22 @@ impl<const D: usize> Compiler<'_, D> {
         });
         met.map_or(Ok(()), |(slot, inside): (Slot, _)| {
             let other = format!("chain {}", inside.id - OTHER_CHAIN);
-            Err(self.starts_in(slot as usize, inside, &other))
+            Err(self.start_error(slot as usize, inside, &other))
         })
     }
 
-    fn starts_in(&self, slot: usize, inside: Inside, what: &str) -> InputError {
-        let Inside { connector, depth_m, .. } = inside;
+    fn start_error(&self, slot: usize, inside: StartOverlap, what: &str) -> InputError {
+        let StartOverlap { connector, depth_m, .. } = inside;
         let cause = format!(
             "chain {slot} begins {depth_m:.3e} m deep in {what}, with connector {connector} or \
              the rod behind it"
         );
         let remedy = "move one of them, or set chain.may_start_inside = true";
-        self.source.error(self.section_of(slot), cause, remedy)
+        self.source.error(self.section_span(slot), cause, remedy)
     }
 
     /// Returns the place of the section that a chain comes from.
-    pub(super) fn section_of(&self, slot: usize) -> Option<Range<usize>> {
+    pub(super) fn section_span(&self, slot: usize) -> Option<Range<usize>> {
         let sections = self.file.chains.0.iter();
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
         spans.nth(slot)
@@ -78,21 +78,22 @@ fn deepest<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     own: Option<u32>,
-) -> Option<Inside> {
+) -> Option<StartOverlap> {
     let points = chain.points();
-    let mut deepest: Option<Inside> = None;
+    let mut deepest: Option<StartOverlap> = None;
     for connector in 0..points.len() {
         let end = (connector + 1).min(points.len() - 1);
         let radius_m = chain.connectors()[connector].radius_m;
         let rod_radius_m = chain.rods().get(connector).map_or(0.0, |rod| rod.radius_m);
-        let near = Bounds::of(&[points[connector], points[end]]).grown(radius_m.max(rod_radius_m));
+        let near = Bounds::from_points(&[points[connector], points[end]])
+            .grown(radius_m.max(rod_radius_m));
         obstacles.visit(&near, |o| {
             let ball_m = o.core.nearest_to_point(points[connector]).distance_m - radius_m;
             let rod_m = o.core.nearest_to_segment([points[connector], points[end]]).distance_m;
             let depth_m = o.radius_m - ball_m.min(rod_m - rod_radius_m);
-            let most_m = deepest.map_or(PENETRATION_M, |inside| inside.depth_m);
+            let most_m = deepest.map_or(PENETRATION_THRESHOLD_M, |inside| inside.depth_m);
             if depth_m > most_m && own != Some(o.id) {
-                deepest = Some(Inside { connector, id: o.id, depth_m });
+                deepest = Some(StartOverlap { connector, id: o.id, depth_m });
             }
         });
     }

@@ -1,9 +1,9 @@
 //! Tasks of initiators.
 
-use super::super::driver::{Driver, MAX_MOTIONS, Targets, Task, Wander};
-use super::super::script::{Motion, Script, Turtle};
+use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
+use super::super::script::{Script, ScriptMotion, Turtle};
 use super::navigators::NavigatorSection;
-use super::{Compiler, MOST, Measure, Place, Room};
+use super::{BoxSection, Compiler, MAX_VALUE, Measure, PointValue};
 use crate::rods::chain::{Chain, Mobility};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -13,15 +13,15 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Speed of initiators, unless it is given.
-const SPEED_M_S: f64 = 0.5;
+const DEFAULT_SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
-const TOLERANCE_M: f64 = 1e-3;
+const DEFAULT_TOLERANCE_M: f64 = 1e-3;
 /// Time without coming nearer to a target after which a way is planned, s.
-const PLANS_AFTER_S: f64 = 0.5;
+const DEFAULT_PLAN_DELAY_S: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum Kind {
+enum TaskKindWord {
     /// Rests, but gets out of the way.
     Rest,
     /// Wanders anywhere, at random.
@@ -50,7 +50,7 @@ enum PlannerWord {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "TaskSection")]
 pub(super) struct TaskSection<const D: usize> {
-    kind: Kind,
+    kind: TaskKindWord,
     #[serde(default)]
     connector: usize,
     speed_m_s: Option<Measure>,
@@ -58,12 +58,12 @@ pub(super) struct TaskSection<const D: usize> {
     patience_s: Option<Measure>,
     turn_deg: Option<Measure>,
     /// Box to stay in: its lower and its upper corner.
-    within_m: Option<Room<D>>,
+    within_m: Option<BoxSection<D>>,
     /// An operator's orders.
     script: Option<String>,
     script_file: Option<String>,
     /// Places to go to, one after the other.
-    targets_m: Option<Vec<Place<D>>>,
+    targets_m: Option<Vec<PointValue<D>>>,
     tolerance_m: Option<Measure>,
     navigator: Option<Spanned<NavigatorSection>>,
     planner: Option<PlannerWord>,
@@ -77,20 +77,20 @@ impl<const D: usize> TaskSection<D> {
     }
 
     fn speed_m_s(&self) -> f64 {
-        self.speed_m_s.map_or(SPEED_M_S, f64::from)
+        self.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from)
     }
 
     /// Returns whether it plans ways, on a chain with or without a fixed base.
-    fn plans(&self, has_base: bool) -> bool {
+    fn has_planner(&self, has_base: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
-            None => has_base && self.kind == Kind::Targets,
+            None => has_base && self.kind == TaskKindWord::Targets,
         }
     }
 
     /// Returns whether it drives on wheels.
-    pub(super) fn navigates(&self) -> bool {
-        self.kind == Kind::Navigate
+    pub(super) fn is_navigator(&self) -> bool {
+        self.kind == TaskKindWord::Navigate
     }
 }
 
@@ -103,49 +103,49 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Task<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
         let n = chain.points().len();
-        let plans = s.plans(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
+        let plans = s.has_planner(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             let remedy = format!("count from 0: the last connector is {}", n - 1);
-            let at = self.source.within(at, &["connector"]);
+            let at = self.source.key_span(at, &["connector"]);
             return Err(self.source.error(at, cause, remedy));
         }
-        self.has_only_its_own(s, plans, at.clone())?;
+        self.check_keys(s, plans, at.clone())?;
         Ok(Task {
             agent: s.connector,
             speed_m_s: s.speed_m_s(),
             lasts_s: s.lasts_s.map_or(f64::INFINITY, f64::from),
             patience_s: s.patience_s.map_or(5.0, f64::from),
-            plans_after_s: plans.then(|| s.plans_after_s.map_or(PLANS_AFTER_S, f64::from)),
+            plans_after_s: plans.then(|| s.plans_after_s.map_or(DEFAULT_PLAN_DELAY_S, f64::from)),
             driver: self.driver(s, at)?,
         })
     }
 
-    fn driver(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<Driver<D>, InputError> {
+    fn driver(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<TaskKind<D>, InputError> {
         Ok(match s.kind {
-            Kind::Rest => Driver::Rest,
-            Kind::Wander => Driver::Wander(Wander {
+            TaskKindWord::Rest => TaskKind::Rest,
+            TaskKindWord::Wander => TaskKind::Wander(Wander {
                 turn_rad: s.turn_deg.map_or(30.0, f64::from).to_radians(),
                 within: s.within_m.map(|room| room.0),
             }),
-            Kind::Script => {
+            TaskKindWord::Script => {
                 let script = self.script(s, at.clone())?;
-                self.try_script(&script, at)?;
-                Driver::Script(Arc::new(script))
+                self.check_script(&script, at)?;
+                TaskKind::Script(Arc::new(script))
             }
-            Kind::Targets => Driver::Targets(self.targets(s, at)?),
-            Kind::External => Driver::External,
-            Kind::Navigate if D != 2 => {
+            TaskKindWord::Targets => TaskKind::Targets(self.targets(s, at)?),
+            TaskKindWord::External => TaskKind::External,
+            TaskKindWord::Navigate if D != 2 => {
                 let remedy = "set chain.dimensions = 2, or give another kind";
-                let at = self.source.within(at, &["kind"]);
+                let at = self.source.key_span(at, &["kind"]);
                 return Err(self.source.error(
                     at,
                     "only who drives in the plane navigates",
                     remedy,
                 ));
             }
-            Kind::Navigate => {
-                Driver::Navigate(Arc::new(self.navigator(s.navigator.as_ref(), s.speed_m_s())?))
+            TaskKindWord::Navigate => {
+                TaskKind::Navigate(Arc::new(self.navigator(s.navigator.as_ref(), s.speed_m_s())?))
             }
         })
     }
@@ -162,11 +162,11 @@ impl<const D: usize> Compiler<'_, D> {
                     sidestep_scenario::file::read_text(&path, crate::script::MAX_BYTES as u64);
                 let script =
                     text.and_then(|text| Script::parse(&path.display().to_string(), &text));
-                self.source.named(at, "script_file", script)
+                self.source.with_file_key(at, "script_file", script)
             }
             _ => {
                 let remedy = "give script = \"\"\"...\"\"\" or script_file = \"...\"";
-                let at = self.source.within(at, &["script_file", "kind"]);
+                let at = self.source.key_span(at, &["script_file", "kind"]);
                 Err(self.source.error(at, "a task of kind script needs one script", remedy))
             }
         }
@@ -174,10 +174,12 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Runs a script once, so that it cannot fail during a run: whether it yields motions does not
     /// depend on where it starts, except for places beyond all numbers.
-    fn try_script(&self, script: &Script, at: Range<usize>) -> Result<(), InputError> {
+    fn check_script(&self, script: &Script, at: Range<usize>) -> Result<(), InputError> {
         for (n, motion) in script.motions(Turtle::default()).enumerate() {
             let is_far = match motion? {
-                Motion::MoveTo { position_m } => position_m.iter().any(|x| x.abs() > MOST),
+                ScriptMotion::MoveTo { position_m } => {
+                    position_m.iter().any(|x| x.abs() > MAX_VALUE)
+                }
                 _ => false,
             };
             if is_far || n >= MAX_MOTIONS {
@@ -185,7 +187,7 @@ impl<const D: usize> Compiler<'_, D> {
                     true => "the script leads further than 1e6 m".into(),
                     false => format!("the script comes to more than {MAX_MOTIONS} motions"),
                 };
-                let at = self.source.within(at, &["script", "script_file"]);
+                let at = self.source.key_span(at, &["script", "script_file"]);
                 return Err(self.source.error(at, cause, "go less far, or repeat less often"));
             }
         }
@@ -195,38 +197,38 @@ impl<const D: usize> Compiler<'_, D> {
     fn targets(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<Targets<D>, InputError> {
         let Some(given) = s.targets_m.as_ref().filter(|list| !list.is_empty()) else {
             let remedy = "add targets_m = [[x, y], ...]";
-            let at = self.source.within(at, &["targets_m", "kind"]);
+            let at = self.source.key_span(at, &["targets_m", "kind"]);
             return Err(self.source.error(at, "a task of kind targets needs targets", remedy));
         };
         let places = given.iter().map(|place| place.get()).collect();
-        Ok(Targets { places, tolerance_m: s.tolerance_m.map_or(TOLERANCE_M, f64::from) })
+        Ok(Targets { places, tolerance_m: s.tolerance_m.map_or(DEFAULT_TOLERANCE_M, f64::from) })
     }
 
     /// Refuses keys that have no effect in a task of this kind.
-    fn has_only_its_own(
+    fn check_keys(
         &self,
         s: &TaskSection<D>,
         plans: bool,
         at: Range<usize>,
     ) -> Result<(), InputError> {
         let keys = [
-            ("turn_deg", s.turn_deg.is_some(), Kind::Wander),
-            ("within_m", s.within_m.is_some(), Kind::Wander),
-            ("script", s.script.is_some(), Kind::Script),
-            ("script_file", s.script_file.is_some(), Kind::Script),
-            ("targets_m", s.targets_m.is_some(), Kind::Targets),
-            ("tolerance_m", s.tolerance_m.is_some(), Kind::Targets),
-            ("navigator", s.navigator.is_some(), Kind::Navigate),
-            ("planner", s.planner.is_some(), Kind::Targets),
+            ("turn_deg", s.turn_deg.is_some(), TaskKindWord::Wander),
+            ("within_m", s.within_m.is_some(), TaskKindWord::Wander),
+            ("script", s.script.is_some(), TaskKindWord::Script),
+            ("script_file", s.script_file.is_some(), TaskKindWord::Script),
+            ("targets_m", s.targets_m.is_some(), TaskKindWord::Targets),
+            ("tolerance_m", s.tolerance_m.is_some(), TaskKindWord::Targets),
+            ("navigator", s.navigator.is_some(), TaskKindWord::Navigate),
+            ("planner", s.planner.is_some(), TaskKindWord::Targets),
         ];
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
-        self.has_no_idle_key(&keys, &of, at.clone())?;
+        self.check_unused_key(&keys, &of, at.clone())?;
         // A caller sees each veto, and decides itself when to give up; a resting chain wants nothing.
-        let is_patient = !matches!(s.kind, Kind::External | Kind::Rest);
+        let is_patient = !matches!(s.kind, TaskKindWord::External | TaskKindWord::Rest);
         let keys = [("patience_s", s.patience_s.is_some(), is_patient)];
-        self.has_no_idle_key(&keys, &of, at.clone())?;
+        self.check_unused_key(&keys, &of, at.clone())?;
         let keys = [("plans_after_s", s.plans_after_s.is_some(), plans)];
-        self.has_no_idle_key(&keys, "without a planner", at)
+        self.check_unused_key(&keys, "without a planner", at)
     }
 }

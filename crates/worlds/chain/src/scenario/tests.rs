@@ -11,7 +11,7 @@ const WRIST: &str = "<robot name='wrist'><link name='base'/><link name='post'/><
 /// Returns the error of a scenario, in one line; none if it is valid.
 fn error_of(text: &str) -> Option<String> {
     let text = format!("format = 1\nworld = \"chain\"\n{text}");
-    let error = AnyCompiled::new(&Source::new("s.toml", text, "")).err()?;
+    let error = AnyChainScenario::new(&Source::new("s.toml", text, "")).err()?;
     Some(format!("{} | {}", error.cause(), error.remedy()))
 }
 
@@ -70,7 +70,8 @@ fn anywhere(second: &str) -> String {
 fn starts(text: &str, seed: u64) -> Vec<Vec<[f64; 2]>> {
     let text = text.replace("seed = 1", &format!("seed = {seed}"));
     let source = Source::new("s.toml", text, sidestep_testing::root());
-    let compiled = Compiled::<2>::new(&source).unwrap_or_else(|error| panic!("{seed}: {error}"));
+    let compiled =
+        ChainScenario::<2>::new(&source).unwrap_or_else(|error| panic!("{seed}: {error}"));
     compiled.world.chains.iter().map(|spec| spec.start.points().to_vec()).collect()
 }
 

@@ -32,7 +32,7 @@ mod tests;
 
 use sidestep_kernel::InputError;
 
-pub(crate) use run::{Motion, Motions, Turtle};
+pub(crate) use run::{ScriptMotion, ScriptMotions, Turtle};
 
 /// Longest script, in bytes.
 pub(crate) const MAX_BYTES: usize = 1 << 20;
@@ -67,12 +67,12 @@ impl Script {
 
     /// Returns the motions of an initiator that is at `start`, one after the other. None follow after
     /// an error.
-    pub fn motions(&self, start: Turtle) -> Motions<'_> {
-        Motions::new(self, start)
+    pub fn motions(&self, start: Turtle) -> ScriptMotions<'_> {
+        ScriptMotions::new(self, start)
     }
 
     fn error(&self, at: usize, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
-        InputError::new(&self.place, cause, remedy).in_text(&self.text, at)
+        InputError::new(&self.place, cause, remedy).with_offset(&self.text, at)
     }
 }
 

@@ -9,7 +9,7 @@ use winnow::token::{one_of, take_while};
 
 use super::{Action, Expression, MAX_BYTES, MAX_NESTING, Procedure, Script, Statement, Term};
 use sidestep_kernel::InputError;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 
 type Input<'a> = LocatingSlice<&'a str>;
 
@@ -27,7 +27,7 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
     check_nesting(place, text)?;
     let items = program.parse(LocatingSlice::new(text)).map_err(|error| {
         let (cause, remedy) = words(error.inner(), &text[error.offset()..]);
-        InputError::new(place, cause, remedy).in_text(text, error.offset())
+        InputError::new(place, cause, remedy).with_offset(text, error.offset())
     })?;
     let (mut main, mut procedures) = (Vec::new(), Vec::new());
     for item in items {
@@ -37,7 +37,7 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
         }
     }
     let script = Script { place: place.into(), text: text.into(), main, procedures };
-    resolved(script)
+    resolve_names(script)
 }
 
 /// Limits nesting, because the parser recurses for each bracket and the stack must not set the
@@ -54,7 +54,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
         }
         if depth > MAX_NESTING {
             let cause = format!("more than {MAX_NESTING} brackets in each other");
-            return Err(InputError::new(place, cause, "use procedures").in_text(text, at));
+            return Err(InputError::new(place, cause, "use procedures").with_offset(text, at));
         }
     }
     Ok(())
@@ -232,7 +232,7 @@ fn parameter(input: &mut Input) -> ModalResult<Term> {
 }
 
 /// Replaces names of procedures and parameters by indices.
-fn resolved(mut script: Script) -> Result<Script, InputError> {
+fn resolve_names(mut script: Script) -> Result<Script, InputError> {
     for (i, procedure) in script.procedures.iter().enumerate() {
         if script.procedures[..i].iter().any(|earlier| earlier.name == procedure.name) {
             let cause = format!("a second procedure `{}`", procedure.name);
@@ -269,7 +269,7 @@ fn resolve(
                 resolve(script, body, parameters)?;
             }
             Action::Call { name, procedure, arguments } => {
-                *procedure = called(script, *at, name, arguments.len())?;
+                *procedure = find_procedure(script, *at, name, arguments.len())?;
                 resolve_values(script, arguments, parameters)?;
             }
         }
@@ -277,12 +277,17 @@ fn resolve(
     Ok(())
 }
 
-fn called(script: &Script, at: usize, name: &str, arguments: usize) -> Result<usize, InputError> {
+fn find_procedure(
+    script: &Script,
+    at: usize,
+    name: &str,
+    arguments: usize,
+) -> Result<usize, InputError> {
     let Some(index) = script.procedures.iter().position(|p| p.name == name) else {
         let procedures = script.procedures.iter().map(|p| p.name.as_str());
         let known: Vec<&str> = RESERVED.into_iter().chain(procedures).collect();
         let cause = format!("there is no procedure `{name}`");
-        return Err(script.error(at, cause, nearest(name, &known)));
+        return Err(script.error(at, cause, suggestion(name, &known)));
     };
     let parameters = &script.procedures[index].parameters;
     if parameters.len() != arguments {
@@ -306,7 +311,7 @@ fn resolve_values(
         let Some(index) = parameters.iter().position(|parameter| parameter == name) else {
             let known: Vec<&str> = parameters.iter().map(String::as_str).collect();
             let cause = format!("there is no parameter `:{name}` here");
-            return Err(script.error(*at, cause, nearest(name, &known)));
+            return Err(script.error(*at, cause, suggestion(name, &known)));
         };
         *term = Term::Parameter(index);
     }

@@ -30,20 +30,22 @@ impl Turtle {
     }
 
     fn advance(&mut self, distance_m: f64) {
-        self.position_m = mixed(self.position_m, 1.0, self.ahead, distance_m);
+        self.position_m = linear_combination(self.position_m, 1.0, self.ahead, distance_m);
     }
 
     /// Turns to the left about the upward axis.
     fn turn(&mut self, angle_rad: f64) {
         let (s, c) = (sin(angle_rad), cos(angle_rad));
-        (self.ahead, self.left) =
-            (mixed(self.ahead, c, self.left, s), mixed(self.left, c, self.ahead, -s));
+        (self.ahead, self.left) = (
+            linear_combination(self.ahead, c, self.left, s),
+            linear_combination(self.left, c, self.ahead, -s),
+        );
         self.straighten();
     }
 
     /// Pitches the nose up about the axis to the left.
     fn pitch(&mut self, angle_rad: f64) {
-        self.ahead = mixed(self.ahead, cos(angle_rad), self.up(), sin(angle_rad));
+        self.ahead = linear_combination(self.ahead, cos(angle_rad), self.up(), sin(angle_rad));
         self.straighten();
     }
 
@@ -51,7 +53,8 @@ impl Turtle {
     /// earlier errors.
     fn straighten(&mut self) {
         self.ahead = unit(self.ahead);
-        self.left = unit(mixed(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
+        self.left =
+            unit(linear_combination(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
     }
 }
 
@@ -60,17 +63,17 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn unit(a: [f64; 3]) -> [f64; 3] {
-    mixed(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
+    linear_combination(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
 }
 
 /// Returns `a * by + b * times`.
-fn mixed(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3] {
+fn linear_combination(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| a[i] * by + b[i] * times)
 }
 
 /// The next motion of an initiator.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Motion {
+pub enum ScriptMotion {
     /// Move straight to this position, in m.
     MoveTo {
         /// The position.
@@ -90,7 +93,7 @@ pub enum Motion {
 
 /// The motions of a script.
 #[derive(Debug, Clone)]
-pub struct Motions<'a> {
+pub struct ScriptMotions<'a> {
     script: &'a Script,
     turtle: Turtle,
     frames: Vec<Frame<'a>>,
@@ -109,7 +112,7 @@ struct Frame<'a> {
     parameters: Vec<f64>,
 }
 
-impl<'a> Motions<'a> {
+impl<'a> ScriptMotions<'a> {
     pub(super) fn new(script: &'a Script, turtle: Turtle) -> Self {
         let main = Frame { body: &script.main, next: 0, again: 0, parameters: Vec::new() };
         Self { script, turtle, frames: vec![main], left: MAX_STATEMENTS }
@@ -152,25 +155,25 @@ impl<'a> Motions<'a> {
     }
 
     /// Carries out a statement; returns its motion, or none if it only opens a body.
-    fn carry_out(&mut self, statement: &'a Statement) -> Result<Option<Motion>, InputError> {
+    fn carry_out(&mut self, statement: &'a Statement) -> Result<Option<ScriptMotion>, InputError> {
         match &statement.action {
             Action::Forward(distance) => {
                 self.turtle.advance(self.value(distance)?);
-                self.moved(statement)
+                self.motion(statement)
             }
             Action::Goto(coordinates) => {
                 for (i, coordinate) in coordinates.iter().enumerate() {
                     self.turtle.position_m[i] = self.value(coordinate)?;
                 }
-                self.moved(statement)
+                self.motion(statement)
             }
             Action::Turn(angle) => {
                 self.turtle.turn(self.value(angle)?.to_radians());
-                Ok(Some(Motion::Face { ahead: self.turtle.ahead }))
+                Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
             Action::Pitch(angle) => {
                 self.turtle.pitch(self.value(angle)?.to_radians());
-                Ok(Some(Motion::Face { ahead: self.turtle.ahead }))
+                Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
             Action::Wait(duration) => self.wait(duration).map(Some),
             Action::Repeat(count, body) => self.repeat(count, body).map(|()| None),
@@ -184,21 +187,21 @@ impl<'a> Motions<'a> {
         }
     }
 
-    fn moved(&self, statement: &Statement) -> Result<Option<Motion>, InputError> {
+    fn motion(&self, statement: &Statement) -> Result<Option<ScriptMotion>, InputError> {
         let position_m = self.turtle.position_m;
         if position_m.iter().all(|x| x.is_finite()) {
-            return Ok(Some(Motion::MoveTo { position_m }));
+            return Ok(Some(ScriptMotion::MoveTo { position_m }));
         }
         Err(self.script.error(statement.at, "this goes beyond all numbers", "go less far"))
     }
 
-    fn wait(&self, duration: &Expression) -> Result<Motion, InputError> {
+    fn wait(&self, duration: &Expression) -> Result<ScriptMotion, InputError> {
         let duration_s = self.value(duration)?;
         if duration_s < 0.0 {
             let cause = format!("nobody can wait {duration_s} s");
             return Err(self.script.error(duration.at, cause, "write a time from 0 on"));
         }
-        Ok(Motion::Wait { duration_s })
+        Ok(ScriptMotion::Wait { duration_s })
     }
 
     fn repeat(&mut self, count: &Expression, body: &'a [Statement]) -> Result<(), InputError> {
@@ -270,8 +273,8 @@ fn pop(stack: &mut Vec<f64>) -> f64 {
     stack.pop().expect("the parser emits operands before operators")
 }
 
-impl Iterator for Motions<'_> {
-    type Item = Result<Motion, InputError>;
+impl Iterator for ScriptMotions<'_> {
+    type Item = Result<ScriptMotion, InputError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {

@@ -55,10 +55,11 @@ fn procedures_have_parameters_and_may_call_themselves() {
 #[test]
 fn motions_come_one_by_one() {
     let script = Script::parse("s", "forward 1 wait 0.5 turn 180").expect("a script");
-    let motions: Vec<Motion> = script.motions(Turtle::default()).map(|m| m.expect("ok")).collect();
-    assert_eq!(motions[0], Motion::MoveTo { position_m: [1.0, 0.0, 0.0] });
-    assert_eq!(motions[1], Motion::Wait { duration_s: 0.5 });
-    assert!(matches!(motions[2], Motion::Face { ahead } if (ahead[0] + 1.0).abs() < 1e-12));
+    let motions: Vec<ScriptMotion> =
+        script.motions(Turtle::default()).map(|m| m.expect("ok")).collect();
+    assert_eq!(motions[0], ScriptMotion::MoveTo { position_m: [1.0, 0.0, 0.0] });
+    assert_eq!(motions[1], ScriptMotion::Wait { duration_s: 0.5 });
+    assert!(matches!(motions[2], ScriptMotion::Face { ahead } if (ahead[0] + 1.0).abs() < 1e-12));
 }
 
 #[test]
@@ -127,7 +128,7 @@ proptest! {
         if let Ok(script) = Script::parse("s", &text) {
             let motions = script.motions(Turtle::default()).take(1000);
             for motion in motions.flatten() {
-                if let Motion::MoveTo { position_m } = motion {
+                if let ScriptMotion::MoveTo { position_m } = motion {
                     prop_assert!(position_m.iter().all(|x| x.is_finite()));
                 }
             }

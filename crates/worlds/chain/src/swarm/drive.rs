@@ -8,14 +8,14 @@ use std::f64::consts::FRAC_PI_4;
 
 /// Place and heading of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
+pub struct Pose2 {
     /// The middle of its axle, which is the middle of its body.
     pub at: Point<2>,
     /// Heading, counterclockwise from the first axis.
     pub heading_rad: f64,
 }
 
-impl Pose {
+impl Pose2 {
     /// Returns the direction of a point relative to the heading, in [-pi, pi); left is positive.
     pub fn bearing_rad(&self, p: Point<2>) -> f64 {
         let away = sidestep_kernel::math::atan2(p[1] - self.at[1], p[0] - self.at[0]);
@@ -45,13 +45,13 @@ impl Wheels {
 
     /// Returns the same arc, slower.
     #[must_use]
-    pub fn slowed(self, pace: f64) -> Self {
+    pub fn scaled(self, pace: f64) -> Self {
         Self::new(pace * self.left_m_s, pace * self.right_m_s)
     }
 
     /// Returns the same turn with the middle at rest.
     #[must_use]
-    pub fn on_the_spot(self) -> Self {
+    pub fn turn_in_place(self) -> Self {
         let half = 0.5 * (self.right_m_s - self.left_m_s);
         Self::new(-half, half)
     }
@@ -59,12 +59,12 @@ impl Wheels {
 
 /// A differential drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drive {
+pub struct DifferentialDrive {
     wheelbase_m: f64,
     max_wheel_m_s: f64,
 }
 
-impl Drive {
+impl DifferentialDrive {
     /// Returns a drive with wheels `wheelbase_m` apart and speeds up to `max_wheel_m_s`.
     ///
     /// # Errors
@@ -100,7 +100,7 @@ impl Drive {
     }
 
     /// Returns the pose to which wheels take a robot within `dt_s`: along an arc, exactly.
-    pub fn step(&self, pose: Pose, wheels: Wheels, dt_s: f64) -> Pose {
+    pub fn step(&self, pose: Pose2, wheels: Wheels, dt_s: f64) -> Pose2 {
         let max = self.max_wheel_m_s;
         let [left_m_s, right_m_s] =
             [wheels.left_m_s, wheels.right_m_s].map(|speed| speed.clamp(-max, max));
@@ -108,7 +108,7 @@ impl Drive {
         let half_rad = 0.5 * self.turn_rad_s(wheels) * dt_s;
         let chord_m = wheels.speed_m_s() * dt_s * sine_ratio(half_rad);
         let toward = pose.heading_rad + half_rad;
-        Pose {
+        Pose2 {
             at: [pose.at[0] + chord_m * cos(toward), pose.at[1] + chord_m * sin(toward)],
             heading_rad: wrap_angle(pose.heading_rad + 2.0 * half_rad),
         }
@@ -138,8 +138,8 @@ mod tests {
     use crate::rods::geometry::distance;
     use proptest::prelude::*;
 
-    fn drive() -> Drive {
-        Drive::new(0.4, 1.0).unwrap()
+    fn drive() -> DifferentialDrive {
+        DifferentialDrive::new(0.4, 1.0).unwrap()
     }
 
     proptest! {
@@ -148,7 +148,7 @@ mod tests {
             x in -5.0..5.0f64, heading_rad in -3.1..3.1f64,
             left in -1.0..1.0f64, right in -1.0..1.0f64, dt_s in 1e-6..2.0f64,
         ) {
-            let (start, wheels) = (Pose { at: [x, 1.0], heading_rad }, Wheels::new(left, right));
+            let (start, wheels) = (Pose2 { at: [x, 1.0], heading_rad }, Wheels::new(left, right));
             let once = drive().step(start, wheels, dt_s);
             let half = drive().step(start, wheels, 0.5 * dt_s);
             let twice = drive().step(half, wheels, 0.5 * dt_s);
@@ -164,7 +164,7 @@ mod tests {
 
         #[test]
         fn backward_undoes_forward(left in -1.0..1.0f64, right in -1.0..1.0f64) {
-            let start = Pose { at: [0.3, -0.2], heading_rad: 0.5 };
+            let start = Pose2 { at: [0.3, -0.2], heading_rad: 0.5 };
             let there = drive().step(start, Wheels::new(left, right), 0.7);
             let back = drive().step(there, Wheels::new(-left, -right), 0.7);
             prop_assert!(distance(start.at, back.at) < 1e-12);
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn one_wheel_turns_the_robot_about_the_other() {
-        let start = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+        let start = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         // The right wheel goes a quarter circle of 0.4 m about the left one at (0, 0.2).
         let quarter_s = 0.4 * std::f64::consts::FRAC_PI_2;
         let end = drive().step(start, Wheels::new(0.0, 1.0), quarter_s);
@@ -189,7 +189,10 @@ mod tests {
 
     #[test]
     fn a_drive_without_an_axle_is_refused() {
-        assert_eq!(Drive::new(0.0, 1.0).unwrap_err().place(), "wheelbase");
-        assert_eq!(Drive::new(0.4, f64::NAN).unwrap_err().place(), "greatest wheel speed");
+        assert_eq!(DifferentialDrive::new(0.0, 1.0).unwrap_err().place(), "wheelbase");
+        assert_eq!(
+            DifferentialDrive::new(0.4, f64::NAN).unwrap_err().place(),
+            "greatest wheel speed"
+        );
     }
 }

@@ -5,10 +5,10 @@
 //! that only stop get stuck at walls when they have to graze them, so their connectors' radius has
 //! to exceed their own by a margin.
 
-use super::drive::{Drive, Pose, Wheels};
-use super::laser::Body;
-use super::proximity::{Gaps, Ring, SECTOR_RAD, safe_speed_m_s};
-use crate::rods::geometry::{Point, along, dot, norm, sub};
+use super::drive::{DifferentialDrive, Pose2, Wheels};
+use super::laser::RobotBody;
+use super::proximity::{Gaps, SECTOR_RAD, SensorRing, safe_speed_m_s};
+use crate::rods::geometry::{Point, add_scaled, dot, norm, sub};
 use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
@@ -18,9 +18,9 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follower {
     /// Its wheels.
-    pub drive: Drive,
+    pub drive: DifferentialDrive,
     /// Its body and sensors.
-    pub ring: Ring,
+    pub ring: SensorRing,
     /// Speed per distance from the connector, beyond the connector's own speed.
     pub gain_per_s: f64,
     /// Turn rate per angle between its heading and its wanted direction.
@@ -33,7 +33,7 @@ pub struct Follower {
 
 /// Position and velocity of the connector that a follower keeps to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal {
+pub struct TrackingTarget {
     /// Its place.
     pub at: Point<2>,
     /// Its velocity.
@@ -51,9 +51,9 @@ pub struct Command {
 
 /// A follower after a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Followed {
+pub struct FollowResult {
     /// Its place and heading.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Whether its sensors slowed it down.
     pub is_held: bool,
     /// Whether its bumper is pressed.
@@ -75,12 +75,12 @@ impl Follower {
     ///
     /// # Errors
     /// When the radius is not above 0.
-    pub fn new(drive: Drive, radius_m: f64) -> Result<Self, InputError> {
+    pub fn new(drive: DifferentialDrive, radius_m: f64) -> Result<Self, InputError> {
         if !(radius_m > 0.0 && radius_m.is_finite()) {
             let cause = format!("has a radius of {radius_m} m");
             return Err(InputError::new("follower", cause, "give more than 0"));
         }
-        let ring = Ring { radius_m, range_m: 0.15 };
+        let ring = SensorRing { radius_m, range_m: 0.15 };
         Ok(Self {
             drive,
             ring,
@@ -98,9 +98,9 @@ impl Follower {
 
     /// Returns wheel speeds that keep to a connector, limited by the sensors' readings. The wheels
     /// will turn for `dt_s`.
-    pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {
-        let wished = along(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
-        let wanted = self.aside(wished, pose.heading_rad, gaps);
+    pub fn decide(&self, pose: &Pose2, goal: &TrackingTarget, gaps: &Gaps, dt_s: f64) -> Command {
+        let wished = add_scaled(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
+        let wanted = self.avoid_obstacles(wished, pose.heading_rad, gaps);
         let speed_m_s = norm(wanted);
         if speed_m_s <= STANDING_M_S {
             return Command { wheels: Wheels::default(), is_held: norm(wished) > STANDING_M_S };
@@ -110,45 +110,45 @@ impl Follower {
         let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
         let ahead_m_s = speed_m_s * cos(off_rad).max(0.0);
         let wheels = self.drive.wheels(ahead_m_s, self.turn_gain_per_s * off_rad);
-        self.held(wheels, is_backward, gaps, dt_s)
+        self.limit_speed(wheels, is_backward, gaps, dt_s)
     }
 
     /// Makes one tick: reads the sensors and turns the wheels. `others` are the bodies of other
     /// robots.
     pub fn follow(
         &self,
-        pose: &Pose,
-        goal: &Goal,
+        pose: &Pose2,
+        goal: &TrackingTarget,
         obstacles: &Obstacles<2>,
-        others: impl Iterator<Item = Body> + Clone,
+        others: impl Iterator<Item = RobotBody> + Clone,
         dt_s: f64,
-    ) -> Followed {
+    ) -> FollowResult {
         let gaps = self.ring.read(pose, obstacles, others.clone());
         let command = self.decide(pose, goal, &gaps, dt_s);
         let pose = self.drive.step(*pose, command.wheels, dt_s);
         let radius_m = self.ring.radius_m;
         let to_robot =
-            |b: Body| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
+            |b: RobotBody| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
         let apart_m = others.map(to_robot).fold(1.0, f64::min);
         let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, 1.0).min(apart_m);
-        Followed { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
+        FollowResult { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
     }
 
     /// Returns a wish without its part toward nearby obstacles, which is reduced more the nearer
     /// they are: the robot slides along.
-    fn aside(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
+    fn avoid_obstacles(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
         for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
             let toward = heading_rad + k as f64 * SECTOR_RAD;
             let u = [cos(toward), sin(toward)];
             let closing_m_s = dot(wished, u).max(0.0);
-            wished = along(wished, u, closing_m_s * (gap_m / self.slide_m - 1.0));
+            wished = add_scaled(wished, u, closing_m_s * (gap_m / self.slide_m - 1.0));
         }
         wished
     }
 
     /// Slows the middle, never the turn, because a round body that turns on the spot touches
     /// nothing.
-    fn held(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
+    fn limit_speed(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
         let turn_rad_s = self.drive.turn_rad_s(wheels);
         let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };
         let slack_rad = 0.5 * turn_rad_s.abs() * dt_s;
@@ -168,7 +168,7 @@ impl Follower {
 /// A connector that is pulled around a sharp corner goes up to three times as fast as the leader, too
 /// fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot reports
 /// its lag to the robot before it, as it would report a veto, and the leader slows down.
-pub(crate) fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
+pub(crate) fn speed_fraction(worst_lag_m: f64, limit_m: f64) -> f64 {
     (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
 }
 
@@ -183,10 +183,10 @@ mod tests {
     const DT_S: f64 = 0.02;
 
     fn follower() -> Follower {
-        Follower::new(Drive::new(0.4, 0.6).unwrap(), 0.25).unwrap()
+        Follower::new(DifferentialDrive::new(0.4, 0.6).unwrap(), 0.25).unwrap()
     }
 
-    fn run(mut pose: Pose, goal: impl Fn(f64) -> Goal, ticks: usize) -> (Pose, f64) {
+    fn run(mut pose: Pose2, goal: impl Fn(f64) -> TrackingTarget, ticks: usize) -> (Pose2, f64) {
         let follower = follower();
         let open = [follower.ring.range_m; 8];
         for k in 0..ticks {
@@ -199,8 +199,8 @@ mod tests {
     #[test]
     fn it_arrives_at_a_connector_at_rest_from_wherever_it_looks() {
         for k in 0..24 {
-            let pose = Pose { at: [0.0, 0.0], heading_rad: f64::from(k) * 0.26 - PI };
-            let rest = Goal { at: [0.5, 0.3], velocity_m_s: [0.0; 2] };
+            let pose = Pose2 { at: [0.0, 0.0], heading_rad: f64::from(k) * 0.26 - PI };
+            let rest = TrackingTarget { at: [0.5, 0.3], velocity_m_s: [0.0; 2] };
             let (_, off_m) = run(pose, |_| rest, 600);
             assert!(off_m < 0.01, "from {}: {off_m}", pose.heading_rad);
         }
@@ -208,15 +208,15 @@ mod tests {
 
     #[test]
     fn it_keeps_up_with_a_connector_that_moves() {
-        let goal = |t: f64| Goal { at: [0.5 * t, 0.0], velocity_m_s: [0.5, 0.0] };
-        let (_, lag_m) = run(Pose { at: [-0.3, 0.1], heading_rad: 0.0 }, goal, 500);
+        let goal = |t: f64| TrackingTarget { at: [0.5 * t, 0.0], velocity_m_s: [0.5, 0.0] };
+        let (_, lag_m) = run(Pose2 { at: [-0.3, 0.1], heading_rad: 0.0 }, goal, 500);
         assert!(lag_m < 0.02, "{lag_m}");
     }
 
     #[test]
     fn it_backs_off_where_its_connector_goes_back() {
-        let goal = |t: f64| Goal { at: [-0.4 * t, 0.0], velocity_m_s: [-0.4, 0.0] };
-        let (pose, lag_m) = run(Pose { at: [0.0, 0.0], heading_rad: 0.0 }, goal, 300);
+        let goal = |t: f64| TrackingTarget { at: [-0.4 * t, 0.0], velocity_m_s: [-0.4, 0.0] };
+        let (pose, lag_m) = run(Pose2 { at: [0.0, 0.0], heading_rad: 0.0 }, goal, 300);
         assert!(lag_m < 0.02 && pose.heading_rad.abs() < 0.01, "{pose:?}");
     }
 
@@ -232,8 +232,8 @@ mod tests {
             let obstacles = Obstacles::new(all, 1.0).unwrap();
             prop_assume!(obstacles.clearance_m([at, at], 0.25, 1.0) > 0.0);
             let follower = follower();
-            let goal = Goal { at: goal, velocity_m_s: [0.0; 2] };
-            let mut pose = Pose { at, heading_rad };
+            let goal = TrackingTarget { at: goal, velocity_m_s: [0.0; 2] };
+            let mut pose = Pose2 { at, heading_rad };
             for _ in 0..300 {
                 let gaps = follower.ring.read(&pose, &obstacles, []);
                 let command = follower.decide(&pose, &goal, &gaps, DT_S);

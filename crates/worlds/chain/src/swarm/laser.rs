@@ -1,9 +1,9 @@
 //! A rotating laser: distances from the robot's middle to its surroundings (slide N2).
 
-use super::drive::Pose;
+use super::drive::Pose2;
 use super::ray;
 use crate::rods::geometry::{Bounds, Core, Point};
-use crate::rods::obstacle::{Obstacle, Obstacles, around};
+use crate::rods::obstacle::{Obstacle, Obstacles, bounds_around};
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -16,14 +16,14 @@ pub const LASER_NOISE: Purpose = Purpose(1);
 
 /// A body in the way that is not an obstacle of the world: another robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Body {
+pub struct RobotBody {
     /// Its inner part.
     pub core: Core<2>,
     /// Its reach beyond its core, meters.
     pub radius_m: f64,
 }
 
-impl Body {
+impl RobotBody {
     /// Returns a round robot.
     pub fn disc(at: Point<2>, radius_m: f64) -> Self {
         Self { core: Core::Point(at), radius_m }
@@ -114,9 +114,9 @@ impl Laser {
     /// beams that may meet it.
     pub fn scan(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         obstacles: &Obstacles<2>,
-        bodies: impl IntoIterator<Item = Body>,
+        bodies: impl IntoIterator<Item = RobotBody>,
         noise: &mut Draws,
         scan: &mut Scan,
     ) {
@@ -124,16 +124,16 @@ impl Laser {
         scan.ranges_m.resize(self.directions.len(), 0.0);
         self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
         let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
-        let near = around(pose.at, self.range_m);
+        let near = bounds_around(pose.at, self.range_m);
         let mut some_move = false;
-        obstacles.visit(&near, |o| match moves(o) {
+        obstacles.visit(&near, |o| match is_moving(o) {
             true => some_move = true,
-            false => self.look(pose, turn, &o.core, o.radius_m, scan),
+            false => self.scan_core(pose, turn, &o.core, o.radius_m, scan),
         });
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.look(pose, turn, &body.core, body.radius_m, scan);
+            self.scan_core(pose, turn, &body.core, body.radius_m, scan);
         }
-        self.look_at_movers(pose, turn, obstacles, some_move, scan);
+        self.scan_movers(pose, turn, obstacles, some_move, scan);
         if scan.keeps_truth {
             scan.true_m.clone_from(&scan.ranges_m);
         }
@@ -147,9 +147,9 @@ impl Laser {
     }
 
     /// Shortens the beams that meet a moving obstacle, if there is any, and notes which they are.
-    fn look_at_movers(
+    fn scan_movers(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         turn: Point<2>,
         obstacles: &Obstacles<2>,
         some_move: bool,
@@ -160,9 +160,9 @@ impl Laser {
             return;
         }
         scan.still_m.clone_from(&scan.ranges_m);
-        obstacles.visit(&around(pose.at, self.range_m), |o| {
-            if moves(o) {
-                self.look(pose, turn, &o.core, o.radius_m, scan);
+        obstacles.visit(&bounds_around(pose.at, self.range_m), |o| {
+            if is_moving(o) {
+                self.scan_core(pose, turn, &o.core, o.radius_m, scan);
             }
         });
         let nearer = scan.ranges_m.iter().zip(&scan.still_m).map(|(with, still)| with < still);
@@ -176,26 +176,33 @@ impl Laser {
         (0..(2 * m + 1).min(n)).map(move |k| (n + k - m) % n)
     }
 
-    fn look(&self, pose: &Pose, turn: Point<2>, core: &Core<2>, radius_m: f64, scan: &mut Scan) {
+    fn scan_core(
+        &self,
+        pose: &Pose2,
+        turn: Point<2>,
+        core: &Core<2>,
+        radius_m: f64,
+        scan: &mut Scan,
+    ) {
         match core {
-            Core::Point(c) => self.look_at(pose, turn, [*c; 2], core, radius_m, scan),
-            Core::Segment(ends) => self.look_at(pose, turn, *ends, core, radius_m, scan),
+            Core::Point(c) => self.scan_segment(pose, turn, [*c; 2], core, radius_m, scan),
+            Core::Segment(ends) => self.scan_segment(pose, turn, *ends, core, radius_m, scan),
             Core::Cuboid(cuboid) => {
                 // From inside, the edges are not visible in every direction.
                 if core.nearest_to_point(pose.at).distance_m <= radius_m {
                     return scan.ranges_m.fill(0.0);
                 }
                 for edge in cuboid.edges_2d() {
-                    self.look_at(pose, turn, edge, &Core::Segment(edge), radius_m, scan);
+                    self.scan_segment(pose, turn, edge, &Core::Segment(edge), radius_m, scan);
                 }
             }
         }
     }
 
     /// Shortens the beams that meet a core, which lies around the segment `ends`.
-    fn look_at(
+    fn scan_segment(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         turn: Point<2>,
         ends: [Point<2>; 2],
         core: &Core<2>,
@@ -230,23 +237,25 @@ impl Laser {
     pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
         let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
-        self.read(&scan.ranges_m).enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
+        self.read_values(&scan.ranges_m)
+            .enumerate()
+            .map(move |(k, range_m)| (bearing_rad(k), range_m))
     }
 
     /// Returns the ranges without errors in the order of [`Self::readings`]; none unless they were
     /// kept.
-    pub fn truths<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = f64> + 'a {
-        self.read(&scan.true_m)
+    pub fn true_ranges<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = f64> + 'a {
+        self.read_values(&scan.true_m)
     }
 
     /// Returns the values of the beams that it reads, from the rightmost on.
-    fn read<'a>(&'a self, of_all: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    fn read_values<'a>(&'a self, of_all: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         self.read_beams().filter_map(|beam| of_all.get(beam).copied())
     }
 
     /// Returns the least range within a sector of beams, given by its ends relative to the heading,
     /// left positive; `None` if [`Self::sees`] returns false.
-    pub fn least_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
+    pub fn min_range_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
         let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
         let beams = self.sector(sector_rad)?;
@@ -254,8 +263,13 @@ impl Laser {
     }
 
     /// Returns the least range of the beams of a sector that meet a moving body, or of the others, as
-    /// [`Self::least_m`].
-    pub fn least_of_m(&self, scan: &Scan, sector_rad: [f64; 2], moves: bool) -> Option<f64> {
+    /// [`Self::min_range_m`].
+    pub fn min_range_by_motion_m(
+        &self,
+        scan: &Scan,
+        sector_rad: [f64; 2],
+        moves: bool,
+    ) -> Option<f64> {
         let n = self.directions.len() as isize;
         let counts = |k: &usize| scan.meets_mover.get(*k).copied().unwrap_or(false) == moves;
         let beams = self.sector(sector_rad)?.map(|k| k.rem_euclid(n) as usize);
@@ -281,7 +295,7 @@ impl Laser {
     }
 }
 
-fn moves(o: &Obstacle<2>) -> bool {
+fn is_moving(o: &Obstacle<2>) -> bool {
     o.velocity_m_s != [0.0; 2]
 }
 
@@ -293,7 +307,7 @@ fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
 mod tests {
     use super::super::ray::tests::{any_core, marched_m};
     use super::*;
-    use crate::rods::geometry::along;
+    use crate::rods::geometry::add_scaled;
     use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
@@ -303,7 +317,12 @@ mod tests {
         Streams::new(Seed(5)).draws(0, 0, LASER_NOISE)
     }
 
-    fn scanned(laser: &Laser, pose: &Pose, obstacles: &Obstacles<2>, bodies: &[Body]) -> Scan {
+    fn scanned(
+        laser: &Laser,
+        pose: &Pose2,
+        obstacles: &Obstacles<2>,
+        bodies: &[RobotBody],
+    ) -> Scan {
         let mut scan = Scan::default();
         laser.scan(pose, obstacles, bodies.iter().copied(), &mut draws(), &mut scan);
         scan
@@ -318,10 +337,10 @@ mod tests {
             at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
         ) {
             let laser = Laser::new(180, 3.2, PI, 0.0).unwrap();
-            let pose = Pose { at, heading_rad };
+            let pose = Pose2 { at, heading_rad };
             let all = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
             let obstacles = Obstacles::new(all, 1.0).unwrap();
-            let bodies = [Body { core: body.0, radius_m: body.1 }];
+            let bodies = [RobotBody { core: body.0, radius_m: body.1 }];
             let scan = scanned(&laser, &pose, &obstacles, &bodies);
             for beam in 0..180 {
                 let toward = heading_rad + beam as f64 * TAU / 180.0;
@@ -330,7 +349,7 @@ mod tests {
                     .filter_map(|(core, r)| marched_m(at, u, core, *r)).fold(3.2, f64::min);
                 let seen = scan.ranges_m[beam];
                 let grazes = cores.iter().chain([&body]).any(|(core, r)| {
-                    let least = core.nearest_to_segment([at, along(at, u, 3.2)]).distance_m;
+                    let least = core.nearest_to_segment([at, add_scaled(at, u, 3.2)]).distance_m;
                     (least - r).abs() < 1e-6
                 });
                 prop_assert!((seen - marched).abs() < 1e-3 || grazes, "{beam}: {seen} {marched}");
@@ -343,12 +362,12 @@ mod tests {
         let laser = Laser::new(180, 3.2, f64::to_radians(90.0), 0.0).unwrap();
         let wall = Obstacle::capsule(0, [[-9.0, 0.6], [9.0, 0.6]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
-        let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+        let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         let scan = scanned(&laser, &pose, &obstacles, &[]);
         let side = f64::to_radians(90.0);
-        assert!((laser.least_m(&scan, [0.0, side]).unwrap() - 0.6).abs() < 1e-12);
-        assert_eq!(laser.least_m(&scan, [-side, 0.0]), Some(3.2));
-        assert_eq!(laser.least_m(&scan, [0.0, side + 0.1]), None, "beyond the field");
+        assert!((laser.min_range_m(&scan, [0.0, side]).unwrap() - 0.6).abs() < 1e-12);
+        assert_eq!(laser.min_range_m(&scan, [-side, 0.0]), Some(3.2));
+        assert_eq!(laser.min_range_m(&scan, [0.0, side + 0.1]), None, "beyond the field");
     }
 
     #[test]
@@ -356,7 +375,7 @@ mod tests {
         let laser = Laser::new(180, 3.2, PI, 0.02).unwrap();
         let ring = Obstacle::ball(0, [0.0, 0.0], 0.1);
         let obstacles = Obstacles::new(vec![ring], 1.0).unwrap();
-        let pose = Pose { at: [1.0, 0.0], heading_rad: PI };
+        let pose = Pose2 { at: [1.0, 0.0], heading_rad: PI };
         let mut ahead_m = Vec::new();
         for cycle in 0..500 {
             let mut scan = Scan::default();

@@ -12,8 +12,8 @@
 //! A lower number replaces a higher one. The exclusions let the right side win every tie, which
 //! turns a robot around in a dead end. Distances are from the robot's middle.
 
-use super::drive::{Pose, Wheels, steer};
-use super::laser::{Body, Laser, Scan};
+use super::drive::{Pose2, Wheels, steer};
+use super::laser::{Laser, RobotBody, Scan};
 use super::ray;
 use crate::rods::geometry::{Point, distance};
 use crate::rods::obstacle::Obstacles;
@@ -64,7 +64,7 @@ impl Layer {
 
 /// The rule for when a wall counts as being left. The slides do not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Leaving {
+pub enum WallLossRule {
     /// It was near, is no longer, and is not lost yet: an event with a memory.
     #[default]
     Latched,
@@ -107,7 +107,7 @@ impl Default for TargetSense {
 
 /// The way in which a leader turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Turning {
+pub enum TurnMode {
     /// About the resting wheel, as in the slides; if that is blocked it stands.
     #[default]
     AboutAWheel,
@@ -132,13 +132,13 @@ pub struct Leader {
     /// Distance above which a wall is lost, meters.
     pub lost_m: f64,
     /// Rule for when a wall counts as being left.
-    pub leaving: Leaving,
+    pub leaving: WallLossRule,
     /// Rule for when a target ends the following of a wall; `None` for never, as in the slides.
     pub leave_rule: Option<LeaveRule>,
     /// Detection of targets.
     pub target_sense: TargetSense,
     /// Way in which it turns.
-    pub turning: Turning,
+    pub turning: TurnMode,
     /// Whether it takes no moving body for a wall, and stands while one is ahead and close. Otherwise a wall
     /// is anything that its laser meets, as in the slides, and a robot that crosses its way turns it around.
     pub gives_way: bool,
@@ -161,10 +161,10 @@ impl Leader {
             near_m: 0.7,
             far_m: 0.9,
             lost_m: 1.3,
-            leaving: Leaving::default(),
+            leaving: WallLossRule::default(),
             leave_rule: Some(LeaveRule::default()),
             target_sense: TargetSense::default(),
-            turning: Turning::default(),
+            turning: TurnMode::default(),
             gives_way: true,
         };
         leader.check()?;
@@ -211,14 +211,14 @@ impl Leader {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LeaderState {
     /// Its place and heading.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// The walls that it follows.
     pub followed: Sides<bool>,
 }
 
 impl LeaderState {
     /// Returns a leader that follows no wall yet.
-    pub fn at(pose: Pose) -> Self {
+    pub fn new(pose: Pose2) -> Self {
         Self { pose, followed: Sides::default() }
     }
 }
@@ -238,7 +238,7 @@ pub struct Surroundings<'a> {
     /// The world's obstacles.
     pub obstacles: &'a Obstacles<2>,
     /// Other robots.
-    pub bodies: &'a [Body],
+    pub bodies: &'a [RobotBody],
     /// Its target.
     pub target: Option<Point<2>>,
 }
@@ -283,7 +283,7 @@ impl Leader {
     /// forgotten. A leader that `is_patient` takes no moving body for a wall.
     pub fn perceive(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         around: &Surroundings<'_>,
         noise: &mut Draws,
         scan: &mut Scan,
@@ -293,19 +293,19 @@ impl Leader {
         let [from, to] = self.sector_rad;
         let stands_for_it = self.gives_way && is_patient;
         let least_m = |sector| match stands_for_it {
-            true => self.laser.least_of_m(scan, sector, false),
-            false => self.laser.least_m(scan, sector),
+            true => self.laser.min_range_by_motion_m(scan, sector, false),
+            false => self.laser.min_range_m(scan, sector),
         };
         let least_m = |sector| least_m(sector).unwrap_or(self.laser.range_m());
         let walls_m = Sides { left: least_m([from, to]), right: least_m([-to, -from]) };
         let target = around.target.filter(|&target| self.detects(pose, around, target));
-        let mover_m = self.laser.least_of_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
+        let mover_m = self.laser.min_range_by_motion_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
         let is_mover_ahead = self.gives_way && mover_m.is_some_and(|mover_m| mover_m < self.near_m);
         let target = target.map(|target| self.sighting(pose, target, scan));
         Percept { walls_m, target, is_mover_ahead, stands_for_it }
     }
 
-    fn detects(&self, pose: &Pose, around: &Surroundings<'_>, target: Point<2>) -> bool {
+    fn detects(&self, pose: &Pose2, around: &Surroundings<'_>, target: Point<2>) -> bool {
         let is_hidden = || {
             let line = [pose.at, target];
             !ray::is_clear(around.obstacles, line)
@@ -315,13 +315,13 @@ impl Leader {
             && !(self.target_sense.needs_line_of_sight && is_hidden())
     }
 
-    fn sighting(&self, pose: &Pose, target: Point<2>, scan: &Scan) -> Sighting {
+    fn sighting(&self, pose: &Pose2, target: Point<2>, scan: &Scan) -> Sighting {
         let bearing_rad = pose.bearing_rad(target);
         let is_free = |rule: LeaveRule| {
             let cone = [bearing_rad - rule.half_angle_rad, bearing_rad + rule.half_angle_rad];
             let needed_m = rule.free_m.min(distance(pose.at, target));
             // Where the laser does not look, the way is not known to be free.
-            self.laser.least_m(scan, cone).is_some_and(|free_m| free_m >= needed_m)
+            self.laser.min_range_m(scan, cone).is_some_and(|free_m| free_m >= needed_m)
         };
         Sighting { bearing_rad, way_is_free: self.leave_rule.is_some_and(is_free) }
     }
@@ -329,8 +329,8 @@ impl Leader {
     /// Returns the layer that acts, and its wheel speeds.
     pub fn decide(&self, followed: Sides<bool>, percept: &Percept) -> Decision {
         let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
-        let left = self.wall(followed.left, percept.walls_m.left, leaves_walls);
-        let right = self.wall(followed.right, percept.walls_m.right, leaves_walls);
+        let left = self.wall_view(followed.left, percept.walls_m.left, leaves_walls);
+        let right = self.wall_view(followed.right, percept.walls_m.right, leaves_walls);
         let s = self.speed_m_s;
         let (to_left, to_right) = (Wheels::new(0.0, s), Wheels::new(s, 0.0));
         let (layer, wheels) = if left.is_close && !right.is_close {
@@ -356,31 +356,31 @@ impl Leader {
         Decision { wheels, layer, followed, is_mover_ahead }
     }
 
-    fn wall(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> Wall {
+    fn wall_view(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> WallView {
         let is_far = wall_m > self.far_m;
         let is_followed = !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
         let is_left_behind = is_far
             && !leaves_walls
             && match self.leaving {
-                Leaving::Latched => is_followed,
-                Leaving::Range => wall_m < self.lost_m,
-                Leaving::Level => true,
+                WallLossRule::Latched => is_followed,
+                WallLossRule::Range => wall_m < self.lost_m,
+                WallLossRule::Level => true,
             };
-        Wall { is_close: wall_m < self.near_m, is_followed, is_left_behind }
+        WallView { is_close: wall_m < self.near_m, is_followed, is_left_behind }
     }
 
     /// Returns the wheel speeds to use if the way of its wheels is blocked.
-    pub fn when_blocked(&self, wheels: Wheels) -> Wheels {
+    pub fn blocked_wheels(&self, wheels: Wheels) -> Wheels {
         match self.turning {
-            Turning::AboutAWheel => Wheels::default(),
-            Turning::OnTheSpotWhereBlocked => wheels.on_the_spot(),
+            TurnMode::AboutAWheel => Wheels::default(),
+            TurnMode::OnTheSpotWhereBlocked => wheels.turn_in_place(),
         }
     }
 }
 
 /// The layers' view of a wall.
 #[derive(Debug, Clone, Copy)]
-struct Wall {
+struct WallView {
     is_close: bool,
     is_followed: bool,
     is_left_behind: bool,
@@ -391,7 +391,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn leader(leaving: Leaving) -> Leader {
+    fn leader(leaving: WallLossRule) -> Leader {
         Leader { leaving, ..Leader::new(0.5).unwrap() }
     }
 
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn the_table_of_the_slides_holds_line_by_line() {
-        let leader = leader(Leaving::Latched);
+        let leader = leader(WallLossRule::Latched);
         let (l, r) = (Wheels::new(0.0, 0.5), Wheels::new(0.5, 0.0));
         for (walls, followed, layer, wheels) in [
             ((0.6, 0.8), (false, false), Layer::CloseLeft, r),
@@ -433,17 +433,17 @@ mod tests {
             layer(&leader(leaving), (followed, false), &percept(left, 0.8))
         };
         let (far, keep) = (Layer::FarLeft, Layer::KeepMoving);
-        assert_eq!(reading(Leaving::Latched, true, 1.0), far);
-        assert_eq!(reading(Leaving::Latched, false, 1.0), keep, "never near");
-        assert_eq!(reading(Leaving::Latched, true, 1.4), keep, "lost");
-        assert_eq!(reading(Leaving::Range, false, 1.0), far);
-        assert_eq!(reading(Leaving::Range, true, 1.4), keep);
-        assert_eq!(reading(Leaving::Level, false, 3.2), far);
+        assert_eq!(reading(WallLossRule::Latched, true, 1.0), far);
+        assert_eq!(reading(WallLossRule::Latched, false, 1.0), keep, "never near");
+        assert_eq!(reading(WallLossRule::Latched, true, 1.4), keep, "lost");
+        assert_eq!(reading(WallLossRule::Range, false, 1.0), far);
+        assert_eq!(reading(WallLossRule::Range, true, 1.4), keep);
+        assert_eq!(reading(WallLossRule::Level, false, 3.2), far);
     }
 
     #[test]
     fn a_leader_that_cannot_work_is_refused() {
-        let right = leader(Leaving::Latched);
+        let right = leader(WallLossRule::Latched);
         assert!(right.check().is_ok());
         assert!(Leader::new(f64::NAN).is_err());
         assert!(Leader { near_m: 1.0, ..right.clone() }.check().is_err());
@@ -454,7 +454,7 @@ mod tests {
 
     #[test]
     fn a_lost_wall_is_forgotten() {
-        let leader = leader(Leaving::Latched);
+        let leader = leader(WallLossRule::Latched);
         let near = leader.decide(Sides::default(), &percept(0.8, 3.2)).followed;
         assert_eq!(near, Sides { left: true, right: false });
         let leaving = leader.decide(near, &percept(1.2, 3.2)).followed;
@@ -466,7 +466,7 @@ mod tests {
     #[test]
     fn a_free_way_to_the_target_ends_the_following() {
         let target = |way_is_free| Some(Sighting { bearing_rad: 0.1, way_is_free });
-        for leaving in [Leaving::Latched, Leaving::Range, Leaving::Level] {
+        for leaving in [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level] {
             let leader = leader(leaving);
             let seen = |free| Percept { target: target(free), ..percept(1.0, 3.2) };
             assert_eq!(layer(&leader, (true, false), &seen(true)), Layer::TargetCheck);
@@ -481,11 +481,11 @@ mod tests {
         let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
         let around = Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
-        let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+        let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
         let mut sees = |needs_line_of_sight, range_m| {
             let target_sense = TargetSense { range_m, needs_line_of_sight };
-            let leader = Leader { target_sense, ..leader(Leaving::Latched) };
+            let leader = Leader { target_sense, ..leader(WallLossRule::Latched) };
             let scan = &mut Scan::default();
             leader.perceive(&pose, &around, &mut noise, scan, true).target.is_some()
         };
@@ -498,12 +498,12 @@ mod tests {
     fn what_moves_is_waited_for_and_is_no_wall_until_patience_ends() {
         use crate::rods::obstacle::Obstacle;
         use sidestep_kernel::{Seed, stream::Streams};
-        let leader = leader(Leaving::Latched);
+        let leader = leader(WallLossRule::Latched);
         let sees = |at, velocity_m_s, is_patient| {
             let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };
             let obstacles = Obstacles::new(vec![disc], 1.0).unwrap();
             let around = Surroundings { obstacles: &obstacles, bodies: &[], target: None };
-            let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+            let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
             let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
             let scan = &mut Scan::default();
             let percept = leader.perceive(&pose, &around, &mut noise, scan, is_patient);
@@ -523,7 +523,7 @@ mod tests {
         fn what_is_mirrored_decides_mirrored_but_for_ties(
             left in 0.3..2.0f64, right in 0.3..2.0f64, fl: bool, fr: bool,
         ) {
-            let leader = leader(Leaving::Latched);
+            let leader = leader(WallLossRule::Latched);
             let this = leader.decide(Sides { left: fl, right: fr }, &percept(left, right));
             let other = leader.decide(Sides { left: fr, right: fl }, &percept(right, left));
             let both_close = left < 0.7 && right < 0.7;

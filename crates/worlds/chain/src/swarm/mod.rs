@@ -19,7 +19,7 @@ pub mod leader;
 pub(crate) mod proximity;
 pub(crate) mod ray;
 
-pub use drive::{Drive, Pose, Wheels};
+pub use drive::{DifferentialDrive, Pose2, Wheels};
 pub use follower::Follower;
-pub use laser::{Body, Laser, Scan};
-pub use leader::{Leader, Leaving, Percept};
+pub use laser::{Laser, RobotBody, Scan};
+pub use leader::{Leader, Percept, WallLossRule};

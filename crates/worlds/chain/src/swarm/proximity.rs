@@ -1,11 +1,11 @@
 //! Short-range sensors around a round body: they report the directions of imminent collisions
 //! (slide E2: the followers' simpler sensors).
 
-use super::drive::Pose;
-use super::laser::Body;
+use super::drive::Pose2;
+use super::laser::RobotBody;
 use super::ray;
 use crate::rods::geometry::{Core, sub};
-use crate::rods::obstacle::{Obstacles, around};
+use crate::rods::obstacle::{Obstacles, bounds_around};
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::TAU;
 
@@ -19,39 +19,39 @@ pub(crate) type Gaps = [f64; SECTORS];
 
 /// A ring of sensors around a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ring {
+pub struct SensorRing {
     /// Radius of the body.
     pub radius_m: f64,
     /// Range of the sensors beyond the body, meters.
     pub range_m: f64,
 }
 
-impl Ring {
+impl SensorRing {
     /// Reads all sensors: the least gap in each sector, exactly; 0 in contact.
     pub fn read(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         obstacles: &Obstacles<2>,
-        bodies: impl IntoIterator<Item = Body>,
+        bodies: impl IntoIterator<Item = RobotBody>,
     ) -> Gaps {
         let mut gaps = [self.range_m; SECTORS];
-        let near = around(pose.at, self.radius_m + self.range_m);
+        let near = bounds_around(pose.at, self.radius_m + self.range_m);
         let borders: [[f64; 2]; SECTORS] = std::array::from_fn(|k| {
             let toward = pose.heading_rad + (k as f64 + 0.5) * SECTOR_RAD;
             [cos(toward), sin(toward)]
         });
-        obstacles.visit(&near, |o| self.look(pose, &borders, &o.core, o.radius_m, &mut gaps));
+        obstacles.visit(&near, |o| self.read_body(pose, &borders, &o.core, o.radius_m, &mut gaps));
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.look(pose, &borders, &body.core, body.radius_m, &mut gaps);
+            self.read_body(pose, &borders, &body.core, body.radius_m, &mut gaps);
         }
         gaps
     }
 
     /// Finds the nearest point of a convex body in a sector: the nearest of all, or one on a
     /// border.
-    fn look(
+    fn read_body(
         &self,
-        pose: &Pose,
+        pose: &Pose2,
         borders: &[[f64; 2]; SECTORS],
         core: &Core<2>,
         radius_m: f64,
@@ -103,7 +103,7 @@ mod tests {
     use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
 
-    const RING: Ring = Ring { radius_m: 0.25, range_m: 0.15 };
+    const RING: SensorRing = SensorRing { radius_m: 0.25, range_m: 0.15 };
 
     proptest! {
         #[test]
@@ -113,7 +113,7 @@ mod tests {
         ) {
             let all = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
             let obstacles = Obstacles::new(all, 1.0).unwrap();
-            let gaps = RING.read(&Pose { at, heading_rad }, &obstacles, []);
+            let gaps = RING.read(&Pose2 { at, heading_rad }, &obstacles, []);
             for (k, gap_m) in gaps.iter().enumerate() {
                 let mut least_m = RING.range_m;
                 for i in -100..=100 {
@@ -132,8 +132,8 @@ mod tests {
 
     #[test]
     fn other_robots_are_seen_too() {
-        let pose = Pose { at: [0.0, 0.0], heading_rad: std::f64::consts::FRAC_PI_2 };
-        let gaps = RING.read(&pose, &Obstacles::default(), [Body::disc([0.6, 0.0], 0.25)]);
+        let pose = Pose2 { at: [0.0, 0.0], heading_rad: std::f64::consts::FRAC_PI_2 };
+        let gaps = RING.read(&pose, &Obstacles::default(), [RobotBody::disc([0.6, 0.0], 0.25)]);
         // It is on the right: the seventh of eight, counterclockwise from ahead.
         assert!((gaps[6] - 0.1).abs() < 1e-12);
         assert_eq!(gaps[0], 0.15);

@@ -1,7 +1,7 @@
 //! Exact distances from a point along a ray to the first obstacle, in the plane.
 
 use crate::rods::geometry::{
-    Bounds, Core, Point, add, cross_2d, distance, dot, perpendicular, scaled, sub, unit,
+    Bounds, Core, Point, add, cross_2d, distance, dot, normalized, perpendicular, scaled, sub,
 };
 use crate::rods::obstacle::Obstacles;
 
@@ -47,7 +47,7 @@ fn to_capsule(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -
 
 /// Returns the distance to the long sides of a capsule; without a radius, they are the segment.
 fn to_sides(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
-    let aside = scaled(perpendicular(unit(sub(ends[1], ends[0]))?), radius_m);
+    let aside = scaled(perpendicular(normalized(sub(ends[1], ends[0]))?), radius_m);
     let left = to_segment(from, u, ends.map(|end| add(end, aside)));
     if radius_m == 0.0 {
         return left;
@@ -71,7 +71,7 @@ fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64>
 /// Returns whether no obstacle lies on a line.
 pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
     let mut is_clear = true;
-    obstacles.visit(&Bounds::of(&line), |o| {
+    obstacles.visit(&Bounds::from_points(&line), |o| {
         is_clear &= o.core.nearest_to_segment(line).distance_m > o.radius_m;
     });
     is_clear
@@ -97,7 +97,7 @@ pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::rods::geometry::{Cuboid, along};
+    use crate::rods::geometry::{Cuboid, add_scaled};
     use proptest::prelude::*;
     use sidestep_kernel::math::{cos, sin};
 
@@ -110,7 +110,7 @@ pub(super) mod tests {
     ) -> Option<f64> {
         let mut gone_m = 0.0;
         for _ in 0..200_000 {
-            let gap_m = core.nearest_to_point(along(from, u, gone_m)).distance_m - radius_m;
+            let gap_m = core.nearest_to_point(add_scaled(from, u, gone_m)).distance_m - radius_m;
             if gap_m < 1e-9 {
                 return Some(gone_m);
             }
@@ -151,7 +151,7 @@ pub(super) mod tests {
                 (None, None) => {}
                 // A ray that just grazes.
                 (e, m) => {
-                    let least = core.nearest_to_segment([from, along(from, u, 20.0)]).distance_m;
+                    let least = core.nearest_to_segment([from, add_scaled(from, u, 20.0)]).distance_m;
                     prop_assert!((least - radius_m).abs() < 1e-6, "{e:?} {m:?}");
                 }
             }
@@ -163,8 +163,8 @@ pub(super) mod tests {
             a in prop::array::uniform2(-3.0..3.0f64), b in prop::array::uniform2(-3.0..3.0f64),
             part in 0.01..0.99f64,
         ) {
-            let at = crate::rods::geometry::between(a, b, part);
-            let Some(u) = unit(sub(at, from)) else { return Ok(()) };
+            let at = crate::rods::geometry::lerp(a, b, part);
+            let Some(u) = normalized(sub(at, from)) else { return Ok(()) };
             prop_assume!(cross_2d(u, sub(b, a)).abs() > 1e-3);
             let hit_m = distance_m(from, u, &Core::Segment([a, b]), 0.0).unwrap();
             prop_assert!((hit_m - distance(at, from)).abs() < 1e-9);

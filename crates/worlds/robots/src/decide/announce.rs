@@ -1,6 +1,6 @@
 //! Wandering with a radio: robots announce where they will be, and give way to each other.
 
-use super::{Behaviour, Decision, Heard, Memory, Percept, Sector, Wander};
+use super::{Behaviour, Decision, Memory, Percept, ReceivedMessage, Sector, Wander};
 use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
 use sidestep_kernel::stream::Draws;
 
@@ -17,7 +17,7 @@ pub struct Announce {
 
 /// The square in which a robot stands, and its heading: the content of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Place {
+struct AnnouncedPose {
     col: i32,
     row: i32,
     heading: u8,
@@ -26,34 +26,34 @@ struct Place {
 
 impl Behaviour for Announce {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let here = Place {
+        let here = AnnouncedPose {
             col: percept.at.0 as i32,
             row: percept.at.1 as i32,
             heading: percept.heading,
             size: self.size as i32,
         };
-        let next = here.after(FORWARD);
+        let next = here.after_action(FORWARD);
         let mut nearest_in = percept.nearest_in;
-        if places(percept.heard).any(|(_, other)| other.meets(next)) {
+        if announced_poses(percept.heard).any(|(_, other)| other.overlaps(next)) {
             nearest_in[Sector::Ahead as usize] = 0;
         }
         let wanted = self.wander.decide(&Percept { nearest_in, ..*percept }, memory, draws);
-        let mut first = places(percept.heard).filter(|(sender, _)| *sender < percept.id);
-        let gives_way =
-            wanted.action == FORWARD && first.any(|(_, other)| other.after(FORWARD).meets(next));
+        let mut first = announced_poses(percept.heard).filter(|(sender, _)| *sender < percept.id);
+        let gives_way = wanted.action == FORWARD
+            && first.any(|(_, other)| other.after_action(FORWARD).overlaps(next));
         let action = if gives_way { STAY } else { wanted.action };
-        Decision { action, broadcast: Some(here.after(action).word()), ..wanted }
+        Decision { action, broadcast: Some(here.after_action(action).word()), ..wanted }
     }
 }
 
 /// Returns the announced places, each with its sender.
-fn places(heard: &[Heard]) -> impl Iterator<Item = (u32, Place)> + '_ {
-    heard.iter().map(|heard| (heard.sender, Place::of_word(heard.word)))
+fn announced_poses(heard: &[ReceivedMessage]) -> impl Iterator<Item = (u32, AnnouncedPose)> + '_ {
+    heard.iter().map(|heard| (heard.sender, AnnouncedPose::from_word(heard.word)))
 }
 
-impl Place {
+impl AnnouncedPose {
     /// Returns the place after one of the standard actions, if nothing goes wrong.
-    fn after(self, action: ActionId) -> Self {
+    fn after_action(self, action: ActionId) -> Self {
         let (east, north) = HEADINGS[usize::from(self.heading % 4)];
         match action {
             FORWARD => Self { col: self.col + east, row: self.row + north, ..self },
@@ -64,7 +64,7 @@ impl Place {
     }
 
     /// Returns whether two squares share a box.
-    fn meets(self, other: Self) -> bool {
+    fn overlaps(self, other: Self) -> bool {
         let overlap = |a: i32, b: i32| a < b + other.size && b < a + self.size;
         overlap(self.col, other.col) && overlap(self.row, other.row)
     }
@@ -76,7 +76,7 @@ impl Place {
         parts.iter().rev().fold(0, |word, &part| word << 16 | u64::from(part))
     }
 
-    fn of_word(word: u64) -> Self {
+    fn from_word(word: u64) -> Self {
         let part = |k: u32| i32::from((word >> (16 * k)) as u16 as i16);
         Self { col: part(0), row: part(1), heading: (part(2) % 4) as u8, size: part(3) }
     }
@@ -92,12 +92,12 @@ mod tests {
     const EAST: u8 = 0;
     const WEST: u8 = 2;
 
-    fn place(col: i32, heading: u8) -> Place {
-        Place { col, row: 0, heading, size: 2 }
+    fn place(col: i32, heading: u8) -> AnnouncedPose {
+        AnnouncedPose { col, row: 0, heading, size: 2 }
     }
 
     /// Returns the decision of robot 5, which heads east from column 0 and senses nothing.
-    fn decide(heard: &[Heard]) -> Decision {
+    fn decide(heard: &[ReceivedMessage]) -> Decision {
         let percept = Percept {
             now: 0,
             id: 5,
@@ -114,14 +114,14 @@ mod tests {
         announce.decide(&percept, &mut Memory::default(), &mut draws)
     }
 
-    fn of(sender: u32, place: Place) -> Heard {
-        Heard { sender, word: place.word() }
+    fn of(sender: u32, place: AnnouncedPose) -> ReceivedMessage {
+        ReceivedMessage { sender, word: place.word() }
     }
 
     #[test]
     fn a_place_comes_back_from_its_word() {
         for (col, heading) in [(0, 0), (-1, 2), (32_759, 3)] {
-            assert_eq!(Place::of_word(place(col, heading).word()), place(col, heading));
+            assert_eq!(AnnouncedPose::from_word(place(col, heading).word()), place(col, heading));
         }
     }
 
@@ -129,7 +129,7 @@ mod tests {
     fn a_robot_announces_where_its_action_is_meant_to_end() {
         let decision = decide(&[]);
         assert_eq!(decision.action, FORWARD);
-        assert_eq!(decision.broadcast.map(Place::of_word), Some(place(1, EAST)));
+        assert_eq!(decision.broadcast.map(AnnouncedPose::from_word), Some(place(1, EAST)));
     }
 
     #[test]

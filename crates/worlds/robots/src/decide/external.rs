@@ -1,8 +1,8 @@
 //! Actions that a caller orders.
 
-use super::{Behaviour, Decision, Memory, Percept, Trip};
+use super::{Behaviour, Decision, Memory, Percept, TripEvent};
 use crate::effector::{ActionId, STAY};
-use sidestep_kernel::column::Shared;
+use sidestep_kernel::column::AtomicCell;
 use sidestep_kernel::stream::Draws;
 
 /// Follows the order that the caller gave before the cycle; stays when there is none.
@@ -25,7 +25,7 @@ impl External {
     pub const BROADCAST: &'static str = "broadcast";
 
     /// Notes an order; it takes the place of one of the same name.
-    pub(crate) fn order(memory: &[Shared<u32>; 4], order: &str, value: u64) {
+    pub(crate) fn record_order(memory: &[AtomicCell<u32>; 4], order: &str, value: u64) {
         let first = memory[0].get();
         match order {
             Self::ACTION => memory[0].set(first & !0xff | (value as u32 + 1)),
@@ -49,8 +49,8 @@ impl Behaviour for External {
             order => (order - 1) as ActionId,
         };
         let trip = match first >> TRIP_SHIFT & 0xff {
-            1 => Some(Trip::Begun),
-            2 => Some(Trip::Done),
+            1 => Some(TripEvent::Started),
+            2 => Some(TripEvent::Completed),
             _ => None,
         };
         let word = u64::from(high) << 32 | u64::from(low);

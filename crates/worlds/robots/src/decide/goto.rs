@@ -1,9 +1,9 @@
 //! Going somewhere: along shortest ways on the static map, and past obstacles.
 
-use super::plan::{Planner, Way};
-use super::sidestep::{Trust, sidestep};
+use super::plan::{CurrentGoal, Planner};
+use super::sidestep::{SensorTrust, sidestep};
 use super::touch::follow;
-use super::{Behaviour, Decision, Memory, Percept, Trip};
+use super::{Behaviour, Decision, Memory, Percept, TripEvent};
 use crate::effector::{ActionId, STAY};
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
@@ -15,7 +15,7 @@ pub enum Avoidance {
     /// Plans around the things that it senses, and makes room for others.
     Plan(Arc<Planner>),
     /// Steps aside from near things that its sensors report.
-    Sidestep(Trust),
+    Sidestep(SensorTrust),
     /// Keeps to its way until it touches something, then waits or steps aside at random.
     Touch,
 }
@@ -23,7 +23,7 @@ pub enum Avoidance {
 impl Avoidance {
     fn step(
         &self,
-        way: Way<'_>,
+        way: CurrentGoal<'_>,
         percept: &Percept<'_>,
         memory: &mut Memory,
         draws: &mut Draws,
@@ -37,7 +37,7 @@ impl Avoidance {
         }
     }
 
-    fn asks(&self) -> bool {
+    fn has_requests(&self) -> bool {
         matches!(self, Self::Plan(_))
     }
 }
@@ -64,26 +64,30 @@ pub struct Shuttle {
 
 /// Word 0: number of goals reached (wraps at the length for a repeated list). The other words belong
 /// to the avoidance.
-const REACHED: usize = 0;
+const GOALS_REACHED_WORD: usize = 0;
 
 impl Goto {
     /// Counts the goals that are reached here, and returns the way to the next one; none where all
     /// goals of a repeated list are here.
-    fn next(&self, percept: &Percept<'_>, memory: &mut Memory) -> (Option<Way<'_>>, Option<Trip>) {
+    fn next_goal(
+        &self,
+        percept: &Percept<'_>,
+        memory: &mut Memory,
+    ) -> (Option<CurrentGoal<'_>>, Option<TripEvent>) {
         let (mut trip, n) = (None, self.goals.len());
         loop {
-            let reached = memory.words[REACHED] as usize;
+            let reached = memory.words[GOALS_REACHED_WORD] as usize;
             let Some(field) = self.goals.get(reached) else {
                 let last = self.goals.last();
-                return (last.map(|field| Way { field, is_done: true }), trip);
+                return (last.map(|field| CurrentGoal { field, is_done: true }), trip);
             };
             if !field.is_goal(percept.at.0, percept.at.1) {
-                return (Some(Way { field, is_done: false }), trip);
+                return (Some(CurrentGoal { field, is_done: false }), trip);
             }
-            trip = Some(Trip::Done);
-            memory.words[REACHED] += 1;
+            trip = Some(TripEvent::Completed);
+            memory.words[GOALS_REACHED_WORD] += 1;
             if self.repeat && reached + 1 == n {
-                memory.words[REACHED] = 0;
+                memory.words[GOALS_REACHED_WORD] = 0;
                 // Stop here, because a list with all of its goals here would loop forever.
                 return (None, trip);
             }
@@ -93,42 +97,46 @@ impl Goto {
 
 impl Behaviour for Goto {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let (way, trip) = self.next(percept, memory);
+        let (way, trip) = self.next_goal(percept, memory);
         let action = way.map_or(STAY, |way| self.avoidance.step(way, percept, memory, draws));
         Decision { trip, ..action.into() }
     }
 
-    fn asks(&self) -> bool {
-        self.avoidance.asks()
+    fn has_requests(&self) -> bool {
+        self.avoidance.has_requests()
     }
 
-    fn ways(&self) -> &[Arc<FlowField>] {
+    fn flow_fields(&self) -> &[Arc<FlowField>] {
         &self.goals
     }
 }
 
 impl Behaviour for Shuttle {
-    fn ways(&self) -> &[Arc<FlowField>] {
+    fn flow_fields(&self) -> &[Arc<FlowField>] {
         &self.ends
     }
 
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let mut trip = None;
-        let mut target = (memory.words[REACHED] % 2) as usize;
+        let mut target = (memory.words[GOALS_REACHED_WORD] % 2) as usize;
         if self.ends[target].is_goal(percept.at.0, percept.at.1) {
-            memory.words[REACHED] = memory.words[REACHED].wrapping_add(1);
+            memory.words[GOALS_REACHED_WORD] = memory.words[GOALS_REACHED_WORD].wrapping_add(1);
             if target == 0 {
                 // The first arrival at end 0 only starts the first trip.
-                trip = Some(if memory.words[REACHED] > 1 { Trip::Done } else { Trip::Begun });
+                trip = Some(if memory.words[GOALS_REACHED_WORD] > 1 {
+                    TripEvent::Completed
+                } else {
+                    TripEvent::Started
+                });
             }
             target = 1 - target;
         }
-        let way = Way { field: &self.ends[target], is_done: false };
+        let way = CurrentGoal { field: &self.ends[target], is_done: false };
         let action = self.avoidance.step(way, percept, memory, draws);
         Decision { trip, ..action.into() }
     }
 
-    fn asks(&self) -> bool {
-        self.avoidance.asks()
+    fn has_requests(&self) -> bool {
+        self.avoidance.has_requests()
     }
 }

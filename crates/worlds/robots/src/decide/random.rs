@@ -10,12 +10,12 @@ use sidestep_kernel::stream::Draws;
 /// is a Markov chain over its poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Random {
-    usual: Row,
-    after_contact: Row,
+    usual: ActionDistribution,
+    after_contact: ActionDistribution,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Row {
+struct ActionDistribution {
     probabilities: Vec<f64>,
     distribution: Categorical,
 }
@@ -27,25 +27,31 @@ impl Random {
     /// # Errors
     /// When a row is not a distribution.
     pub fn new(usual: Vec<f64>, after_contact: Vec<f64>) -> Result<Self, RowError> {
-        Ok(Self { usual: Row::new(usual)?, after_contact: Row::new(after_contact)? })
+        Ok(Self {
+            usual: ActionDistribution::new(usual)?,
+            after_contact: ActionDistribution::new(after_contact)?,
+        })
     }
 
     /// Returns the behavior that draws each standard action with equal probability.
     pub fn uniform() -> Self {
-        let row = Row::over(&[0, 1, 2, 3]);
+        let row = ActionDistribution::uniform_over(&[0, 1, 2, 3]);
         Self { usual: row.clone(), after_contact: row }
     }
 
     /// Returns the behavior that always chooses the same action.
     pub fn always(action: ActionId) -> Self {
-        let row = Row::over(&[action]);
+        let row = ActionDistribution::uniform_over(&[action]);
         Self { usual: row.clone(), after_contact: row }
     }
 
     /// Returns the behavior that goes ahead, and after a contact makes a quarter turn to either
     /// side, as [`Wander`](super::Wander) does without sensors and without voluntary turns.
     pub fn bounce() -> Self {
-        Self { usual: Row::over(&[FORWARD]), after_contact: Row::over(&[LEFT, RIGHT]) }
+        Self {
+            usual: ActionDistribution::uniform_over(&[FORWARD]),
+            after_contact: ActionDistribution::uniform_over(&[LEFT, RIGHT]),
+        }
     }
 
     /// Returns the probability of each action, by action id, after a contact or without.
@@ -54,23 +60,23 @@ impl Random {
     }
 
     /// Returns whether a contact changes the probabilities.
-    pub fn minds_contacts(&self) -> bool {
+    pub fn depends_on_contact(&self) -> bool {
         self.usual.probabilities != self.after_contact.probabilities
     }
 
-    fn row(&self, after_contact: bool) -> &Row {
+    fn row(&self, after_contact: bool) -> &ActionDistribution {
         if after_contact { &self.after_contact } else { &self.usual }
     }
 }
 
-impl Row {
+impl ActionDistribution {
     fn new(probabilities: Vec<f64>) -> Result<Self, RowError> {
         let distribution = Categorical::new(&probabilities)?;
         Ok(Self { probabilities, distribution })
     }
 
     /// Returns equal shares for `actions`.
-    fn over(actions: &[ActionId]) -> Self {
+    fn uniform_over(actions: &[ActionId]) -> Self {
         let longest = actions.iter().max().map_or(0, |&a| usize::from(a) + 1);
         let mut row = vec![0.0; longest.max(STANDARD_ACTIONS.len())];
         actions.iter().for_each(|&a| row[usize::from(a)] = 1.0 / actions.len() as f64);
@@ -131,7 +137,7 @@ mod tests {
         assert_eq!((forward, stay), (0, 0));
         assert!(left.abs_diff(right) < 320, "{left} {right}");
         assert_eq!(counts(&Random::bounce(), None), [4000, 0, 0, 0]);
-        assert!(Random::bounce().minds_contacts() && !Random::uniform().minds_contacts());
+        assert!(Random::bounce().depends_on_contact() && !Random::uniform().depends_on_contact());
     }
 
     #[test]

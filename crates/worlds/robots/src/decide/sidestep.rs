@@ -1,7 +1,7 @@
 //! Stepping aside from near things that the sensors report, and trusting them more or less.
 //!
 //! The paper's robot avoids obstacles and follows corridors by its sonar; this does the same on the
-//! way to a goal, and [`Trust`] says how far it believes a beam.
+//! way to a goal, and [`SensorTrust`] says how far it believes a beam.
 
 use super::{Memory, Percept, Sector};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STAY, Side};
@@ -11,7 +11,7 @@ use sidestep_map::planning::FlowField;
 
 /// The condition for believing that something is near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trust {
+pub enum SensorTrust {
     /// One beam of a sector that reports it is enough.
     OneBeam,
     /// Ahead, where a miss costs a contact, as soon as one beam reports it; at the sides only if
@@ -21,17 +21,17 @@ pub enum Trust {
 }
 
 /// Word 1: a sidestep under way: heading in the low two bits, boxes left to go above them.
-const SIDESTEP: usize = 1;
+const SIDESTEP_WORD: usize = 1;
 /// Word 2: near reports of the last cycle, a byte per sector (ahead, left, right), and in the
 /// fourth byte its heading plus 1.
-const SEEN: usize = 2;
+const LAST_REPORTS_WORD: usize = 2;
 
-/// The sectors that matter, in the order of the bytes of `SEEN`.
+/// The sectors that matter, in the order of the bytes of `LAST_REPORTS_WORD`.
 const SECTORS: [Sector; 3] = [Sector::Ahead, Sector::Left, Sector::Right];
 
 /// The sides on which something is believed to be near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Near {
+struct NearSides {
     ahead: bool,
     left: bool,
     right: bool,
@@ -39,35 +39,35 @@ struct Near {
 
 /// Returns one action along the way, or of a sidestep.
 pub(super) fn sidestep(
-    trust: Trust,
+    trust: SensorTrust,
     field: &FlowField,
     percept: &Percept<'_>,
     memory: &mut Memory,
     draws: &mut Draws,
 ) -> ActionId {
-    let near = believed_near(trust, percept, memory);
-    if let Some(action) = go_on(percept, near, memory) {
+    let near = near_sides(trust, percept, memory);
+    if let Some(action) = resume_sidestep(percept, near, memory) {
         return action;
     }
     match field.direction(percept.at.0, percept.at.1) {
-        Some(course) if course != percept.heading => turn(percept.heading, course, draws),
-        _ => go(percept, near, memory, draws),
+        Some(course) if course != percept.heading => turn_toward(percept.heading, course, draws),
+        _ => follow_course(percept, near, memory, draws),
     }
 }
 
 /// Returns the sides believed to be near something after this percept.
-fn believed_near(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> Near {
+fn near_sides(trust: SensorTrust, percept: &Percept<'_>, memory: &mut Memory) -> NearSides {
     let now = SECTORS.map(|sector| near_reports(percept, sector));
     let heading = percept.heading + 1;
-    let [ahead, left, right, seen_heading] = memory.words[SEEN].to_le_bytes();
-    memory.words[SEEN] = u32::from_le_bytes([now[0], now[1], now[2], heading]);
+    let [ahead, left, right, seen_heading] = memory.words[LAST_REPORTS_WORD].to_le_bytes();
+    memory.words[LAST_REPORTS_WORD] = u32::from_le_bytes([now[0], now[1], now[2], heading]);
     let before = if seen_heading == heading { [ahead, left, right] } else { [0; 3] };
     let believed = |k: usize| match trust {
-        Trust::TwoReports if k > 0 => now[k].saturating_add(before[k]) > 1,
+        SensorTrust::TwoReports if k > 0 => now[k].saturating_add(before[k]) > 1,
         _ => now[k] > 0,
     };
     let touched = |side| percept.contact.is_some_and(|contact| contact.side == side);
-    Near {
+    NearSides {
         ahead: believed(0) || touched(Side::Front),
         left: believed(1) || touched(Side::Left),
         right: believed(2) || touched(Side::Right),
@@ -75,8 +75,12 @@ fn believed_near(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> Ne
 }
 
 /// Goes on with a sidestep, unless there is none or its way is blocked.
-fn go_on(percept: &Percept<'_>, near: Near, memory: &mut Memory) -> Option<ActionId> {
-    let word = &mut memory.words[SIDESTEP];
+fn resume_sidestep(
+    percept: &Percept<'_>,
+    near: NearSides,
+    memory: &mut Memory,
+) -> Option<ActionId> {
+    let word = &mut memory.words[SIDESTEP_WORD];
     let (heading, boxes) = ((*word % 4) as u8, *word / 4);
     if boxes == 0 {
         return None;
@@ -102,26 +106,31 @@ fn near_reports(percept: &Percept<'_>, sector: Sector) -> u8 {
     near.count().min(255) as u8
 }
 
-fn turn(heading: u8, course: u8, draws: &mut Draws) -> ActionId {
+fn turn_toward(heading: u8, course: u8, draws: &mut Draws) -> ActionId {
     match (4 + course - heading) % 4 {
         1 => LEFT,
         3 => RIGHT,
-        _ => either(draws),
+        _ => random_turn(draws),
     }
 }
 
 /// Goes ahead on course, around obstacles nearby, and away from a wall on one side.
-fn go(percept: &Percept<'_>, near: Near, memory: &mut Memory, draws: &mut Draws) -> ActionId {
+fn follow_course(
+    percept: &Percept<'_>,
+    near: NearSides,
+    memory: &mut Memory,
+    draws: &mut Draws,
+) -> ActionId {
     let (away, boxes) = match near {
         // Two robots that meet must not mirror each other, so wait or step aside by a fair draw.
-        Near { ahead: true, .. } if draws.below(4) == 0 => return STAY,
-        Near { ahead: true, .. } => (freer_side(percept, draws), 1 + draws.below(3)),
-        Near { left: true, right: false, .. } => (RIGHT, 1),
-        Near { left: false, right: true, .. } => (LEFT, 1),
+        NearSides { ahead: true, .. } if draws.uniform_below(4) == 0 => return STAY,
+        NearSides { ahead: true, .. } => (freer_side(percept, draws), 1 + draws.uniform_below(3)),
+        NearSides { left: true, right: false, .. } => (RIGHT, 1),
+        NearSides { left: false, right: true, .. } => (LEFT, 1),
         _ => return FORWARD,
     };
     let quarter = if away == LEFT { 1 } else { 3 };
-    memory.words[SIDESTEP] = boxes * 4 + u32::from((percept.heading + quarter) % 4);
+    memory.words[SIDESTEP_WORD] = boxes * 4 + u32::from((percept.heading + quarter) % 4);
     away
 }
 
@@ -130,18 +139,18 @@ fn freer_side(percept: &Percept<'_>, draws: &mut Draws) -> ActionId {
     match clear(Sector::Left).cmp(&clear(Sector::Right)) {
         std::cmp::Ordering::Greater => LEFT,
         std::cmp::Ordering::Less => RIGHT,
-        std::cmp::Ordering::Equal => either(draws),
+        std::cmp::Ordering::Equal => random_turn(draws),
     }
 }
 
-fn either(draws: &mut Draws) -> ActionId {
-    if draws.below(2) == 0 { LEFT } else { RIGHT }
+fn random_turn(draws: &mut Draws) -> ActionId {
+    if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decide::{Contact, nearest_in};
+    use crate::decide::{Contact, nearest_by_sector};
     use crate::sensor::Reading;
     use sidestep_kernel::Seed;
     use sidestep_kernel::stream::{Purpose, Streams};
@@ -152,7 +161,7 @@ mod tests {
     const ALL: [Sector; 4] = [Sector::Ahead, Sector::Ahead, Sector::Left, Sector::Right];
 
     fn percept(heading: u8, readings: &[Reading; 4], contact: Option<Contact>) -> Percept<'_> {
-        let nearest_in = nearest_in(readings, &ALL);
+        let nearest_in = nearest_by_sector(readings, &ALL);
         Percept {
             now: 0,
             id: 0,
@@ -167,9 +176,9 @@ mod tests {
     }
 
     /// Decides in a corridor of 9 x 3 boxes with the goal at its end in the west.
-    fn decide(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> ActionId {
+    fn decide(trust: SensorTrust, percept: &Percept<'_>, memory: &mut Memory) -> ActionId {
         let free = FreeSpace::new(9, 3, |_, _| true);
-        let field = FlowField::toward(&free, 1, &[(0, 0), (0, 1), (0, 2)]);
+        let field = FlowField::to_nearest(&free, 1, &[(0, 0), (0, 1), (0, 2)]);
         let mut draws = Streams::new(Seed(1)).draws(0, percept.now, Purpose(0));
         sidestep(trust, &field, percept, memory, &mut draws)
     }
@@ -179,13 +188,14 @@ mod tests {
         let beside = [NOTHING_SEEN, NOTHING_SEEN, NEAR, NOTHING_SEEN];
         let at = percept(2, &beside, None);
         let first = |trust| decide(trust, &at, &mut Memory::default());
-        assert_eq!(first(Trust::OneBeam), RIGHT);
-        assert_eq!(first(Trust::TwoReports), FORWARD);
+        assert_eq!(first(SensorTrust::OneBeam), RIGHT);
+        assert_eq!(first(SensorTrust::TwoReports), FORWARD);
         let mut memory = Memory::default();
-        decide(Trust::TwoReports, &at, &mut memory);
-        assert_eq!(decide(Trust::TwoReports, &at, &mut memory), RIGHT, "twice in a row");
+        decide(SensorTrust::TwoReports, &at, &mut memory);
+        assert_eq!(decide(SensorTrust::TwoReports, &at, &mut memory), RIGHT, "twice in a row");
         let ahead = [NEAR, NOTHING_SEEN, NOTHING_SEEN, NOTHING_SEEN];
-        let action = decide(Trust::TwoReports, &percept(2, &ahead, None), &mut Memory::default());
+        let action =
+            decide(SensorTrust::TwoReports, &percept(2, &ahead, None), &mut Memory::default());
         assert_ne!(action, FORWARD);
     }
 
@@ -193,10 +203,10 @@ mod tests {
     fn a_sidestep_survives_a_turn_that_fails() {
         let (free, mut memory) = ([NOTHING_SEEN; 4], Memory::default());
         let touched = Some(Contact { kind: 1, side: Side::Left });
-        let action = decide(Trust::OneBeam, &percept(2, &free, touched), &mut memory);
+        let action = decide(SensorTrust::OneBeam, &percept(2, &free, touched), &mut memory);
         assert_eq!(action, RIGHT, "away from the wall");
         let mut next =
-            |heading| decide(Trust::OneBeam, &percept(heading, &free, None), &mut memory);
+            |heading| decide(SensorTrust::OneBeam, &percept(heading, &free, None), &mut memory);
         assert_eq!(next(2), RIGHT, "again, since the turn has failed");
         assert_eq!(next(1), FORWARD);
         assert_eq!(next(1), LEFT, "back to course");

@@ -19,9 +19,9 @@ impl Default for Wander {
 }
 
 /// Word 0 of the memory: actions left until the next voluntary turn, plus 1; 0 = not drawn.
-const STRIDE: usize = 0;
+const STRIDE_WORD: usize = 0;
 /// Word 1: the turn of the last avoidance plus 1, kept while the way stays blocked.
-const AVOIDING: usize = 1;
+const AVOIDANCE_WORD: usize = 1;
 
 impl Behaviour for Wander {
     #[inline]
@@ -31,12 +31,14 @@ impl Behaviour for Wander {
         if ahead == 0 || percept.contact.is_some() {
             return avoid(left, right, memory, draws).into();
         }
-        memory.words[AVOIDING] = 0;
-        if self.stride_is_over(memory, draws) {
+        memory.words[AVOIDANCE_WORD] = 0;
+        if self.is_stride_over(memory, draws) {
             let open = [(left, LEFT), (right, RIGHT)];
             let mut open = open.iter().filter(|(class, _)| *class > 0).map(|&(_, turn)| turn);
             match (open.next(), open.next()) {
-                (Some(a), Some(b)) => return if draws.below(2) == 0 { a } else { b }.into(),
+                (Some(a), Some(b)) => {
+                    return if draws.uniform_below(2) == 0 { a } else { b }.into();
+                }
                 (Some(only), None) => return only.into(),
                 _ => {}
             }
@@ -49,21 +51,21 @@ impl Wander {
     /// Counts down one action of the stride, and returns whether it is over; then it draws the
     /// next.
     #[inline]
-    fn stride_is_over(self, memory: &mut Memory, draws: &mut Draws) -> bool {
-        let stride = &mut memory.words[STRIDE];
+    fn is_stride_over(self, memory: &mut Memory, draws: &mut Draws) -> bool {
+        let stride = &mut memory.words[STRIDE_WORD];
         if *stride > 1 {
             *stride -= 1;
             return false;
         }
         let first = *stride == 0;
-        *stride = draws.below(self.turn_every.saturating_mul(2)).saturating_add(2);
+        *stride = draws.uniform_below(self.turn_every.saturating_mul(2)).saturating_add(2);
         !first
     }
 }
 
 /// Turns to the freer side, and keeps turning that way until the way is free.
 fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionId {
-    let turn = match memory.words[AVOIDING] {
+    let turn = match memory.words[AVOIDANCE_WORD] {
         0 if left != right => {
             if left > right {
                 LEFT
@@ -72,7 +74,7 @@ fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionI
             }
         }
         0 => {
-            if draws.below(2) == 0 {
+            if draws.uniform_below(2) == 0 {
                 LEFT
             } else {
                 RIGHT
@@ -80,6 +82,6 @@ fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionI
         }
         kept => (kept - 1) as ActionId,
     };
-    memory.words[AVOIDING] = u32::from(turn) + 1;
+    memory.words[AVOIDANCE_WORD] = u32::from(turn) + 1;
     turn
 }

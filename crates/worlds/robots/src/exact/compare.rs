@@ -1,8 +1,8 @@
 //! The simulator against the exact chain: a test of the distribution of final poses.
 
-use super::Model;
-use super::chain::total_variation;
-use super::obstacle::Pose;
+use super::MarkovModel;
+use super::markov_chain::total_variation;
+use super::obstacle::GridPose;
 use crate::RobotsRun;
 use crate::decide::Random;
 use crate::purpose;
@@ -45,7 +45,7 @@ pub struct Comparison {
 /// The runs are independent, so the limit holds whether or not the chain mixes.
 ///
 /// # Errors
-/// When the scenario is not a chain, see [`Model::new`], or `runs` is 0.
+/// When the scenario is not a chain, see [`MarkovModel::new`], or `runs` is 0.
 pub fn compare(
     compiled: &Compiled,
     source: &Source,
@@ -56,23 +56,23 @@ pub fn compare(
     if runs == 0 {
         return Err(InputError::new("--runs", "no run at all", "give 1000 or more"));
     }
-    let model = Model::new(compiled)?;
+    let model = MarkovModel::new(compiled)?;
     let chain = model.chain(policy)?;
-    let exact = chain.over_poses(&chain.distribution_after(model.actions_in(cycles)));
-    let counts = last_poses(compiled, source, policy, cycles, runs);
+    let exact = chain.pose_distribution(&chain.distribution_after(model.actions_in(cycles)));
+    let counts = count_final_poses(compiled, source, policy, cycles, runs);
     Ok(Comparison::new(&exact, &counts, cycles, runs))
 }
 
 impl Comparison {
     fn new(
-        exact: &BTreeMap<Pose, f64>,
-        counts: &BTreeMap<Pose, u32>,
+        exact: &BTreeMap<GridPose, f64>,
+        counts: &BTreeMap<GridPose, u32>,
         cycles: u64,
         runs: u32,
     ) -> Self {
         // Poses that the model does not know count in full, because their exact probability is 0.
         let unknown = counts.keys().filter(|pose| !exact.contains_key(pose));
-        let poses: Vec<Pose> = exact.keys().chain(unknown).copied().collect();
+        let poses: Vec<GridPose> = exact.keys().chain(unknown).copied().collect();
         let expected: Vec<f64> =
             poses.iter().map(|p| exact.get(p).copied().unwrap_or(0.0)).collect();
         let share = |pose| f64::from(counts.get(pose).copied().unwrap_or(0)) / f64::from(runs);
@@ -100,34 +100,34 @@ pub fn sampling_limit(distribution: &[f64], samples: f64, significance: f64) -> 
 }
 
 /// Counts how often each pose is the final one.
-fn last_poses(
+fn count_final_poses(
     compiled: &Compiled,
     source: &Source,
     policy: &Random,
     cycles: u64,
     runs: u32,
-) -> BTreeMap<Pose, u32> {
+) -> BTreeMap<GridPose, u32> {
     let mut world = (*compiled.world).clone();
-    follow(&mut world, policy);
+    set_policy(&mut world, policy);
     let mut counts = BTreeMap::new();
     for run in 0..u64::from(runs) {
-        world.streams = Streams::new(seed_of(compiled.seed, run));
+        world.streams = Streams::new(run_seed(compiled.seed, run));
         let compiled = Compiled { world: Arc::new(world.clone()), ..compiled.clone() };
         let mut simulation = compiled.start(source, 1);
         simulation.advance(cycles);
-        *counts.entry(pose(&simulation)).or_insert(0) += 1;
+        *counts.entry(robot_pose(&simulation)).or_insert(0) += 1;
     }
     counts
 }
 
 /// Returns the seed of a run. It is drawn, because scenarios with neighboring seeds would share
 /// runs if it were counted up from theirs.
-fn seed_of(seed: u64, run: u64) -> Seed {
+fn run_seed(seed: u64, run: u64) -> Seed {
     Seed(Streams::new(Seed(seed)).draws(0, run, purpose::RUN).next_u64())
 }
 
 /// Gives the robots another behavior.
-fn follow(world: &mut RobotsWorld, policy: &Random) {
+fn set_policy(world: &mut RobotsWorld, policy: &Random) {
     for ty in &mut world.types {
         if let Role::Robot(model) = &mut ty.role {
             model.behaviour = Arc::new(policy.clone());
@@ -135,22 +135,22 @@ fn follow(world: &mut RobotsWorld, policy: &Random) {
     }
 }
 
-fn pose(simulation: &RobotsRun) -> Pose {
+fn robot_pose(simulation: &RobotsRun) -> GridPose {
     let (world, state) = (simulation.world(), simulation.state());
     let slot = world.robots()[0];
-    let (col, row) = world.map_position(state.at(slot));
+    let (col, row) = world.map_position(state.position(slot));
     let heading = state.bodies[slot as usize].facing.get().heading();
-    Pose { col: col as i32, row: row as i32, heading }
+    GridPose { col: col as i32, row: row as i32, heading }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::seed_of;
+    use super::run_seed;
     use std::collections::BTreeSet;
 
     #[test]
     fn scenarios_with_neighboring_seeds_share_no_run() {
-        let runs = |seed| (0..2000).map(move |run| seed_of(seed, run).0);
+        let runs = |seed| (0..2000).map(move |run| run_seed(seed, run).0);
         let all: BTreeSet<u64> = (1..=3).flat_map(runs).collect();
         assert_eq!(all.len(), 3 * 2000);
     }

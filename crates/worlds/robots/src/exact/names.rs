@@ -23,10 +23,10 @@ const RESERVED: [&str; 16] = [
 ];
 
 /// Returns valid names, all different, as close to the given ones as possible.
-pub(super) fn valid(names: impl IntoIterator<Item = String>) -> Vec<String> {
+pub(super) fn valid_names(names: impl IntoIterator<Item = String>) -> Vec<String> {
     let mut used = BTreeSet::new();
     let unique = |name: String| {
-        let base = valid_one(&name);
+        let base = valid_name(&name);
         let numbered = (2..).map(|k| format!("{base}-{k}"));
         let free = std::iter::once(base.clone()).chain(numbered).find(|n| !used.contains(n));
         let free = free.unwrap_or(base);
@@ -36,7 +36,7 @@ pub(super) fn valid(names: impl IntoIterator<Item = String>) -> Vec<String> {
     names.into_iter().map(unique).collect()
 }
 
-fn valid_one(name: &str) -> String {
+fn valid_name(name: &str) -> String {
     let is_valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let mut valid: String = name.chars().map(|c| if is_valid(c) { c } else { '-' }).collect();
     if !valid.starts_with(|c: char| c.is_ascii_alphabetic()) {
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn names_become_valid_and_stay_different() {
         let names = ["forward", "spin left", "spin-left", "4x", "", "reset", "é"];
-        let valid = valid(names.map(String::from));
+        let valid = valid_names(names.map(String::from));
         assert_eq!(valid, ["forward", "spin-left", "spin-left-2", "n4x", "n", "reset-", "n-"]);
     }
 }

@@ -1,14 +1,14 @@
 //! The reports of a robot's beams at a pose, with their probabilities.
 
-use super::Model;
-use super::building::Building;
-use super::obstacle::Pose;
+use super::MarkovModel;
+use super::obstacle::GridPose;
+use super::static_map::StaticMap;
 use crate::ray::{Crossing, crossings, turn_crossing};
 use crate::sensor::Reading;
 use crate::state::FREE;
 use crate::world::MountedSensor;
 use sidestep_kernel::InputError;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 
 /// A beam of one of the robot's sensors.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub(super) struct MountedBeam<'a> {
 }
 
 impl<'a> MountedBeam<'a> {
-    pub(super) fn new(model: &'a Model, beam: &Beam) -> Result<Self, InputError> {
+    pub(super) fn new(model: &'a MarkovModel, beam: &Beam) -> Result<Self, InputError> {
         let sensors = &model.robot.body.sensors;
         let found = sensors.iter().find(|s| s.model.name == beam.sensor);
         let sensor = found.ok_or_else(|| unknown_sensor(&beam.sensor, sensors))?;
@@ -47,14 +47,14 @@ impl<'a> MountedBeam<'a> {
 
     /// Returns `P(reading
     /// pose)`; readings of probability 0 are left out.
-    pub(super) fn readings(&self, building: &Building, pose: Pose) -> Vec<(Reading, f64)> {
+    pub(super) fn readings(&self, building: &StaticMap, pose: GridPose) -> Vec<(Reading, f64)> {
         let mut row = self.sensor.model.reading_row(self.truth(building, pose), self.reliable);
         row.retain(|reading| reading.1 > 0.0);
         row
     }
 
     /// Returns the beam's true reading.
-    fn truth(&self, building: &Building, pose: Pose) -> Reading {
+    fn truth(&self, building: &StaticMap, pose: GridPose) -> Reading {
         let kind_at = |c: &Crossing| building.kind_at(pose.col + c.dx, pose.row + c.dy);
         let mut met = self.crossed[usize::from(pose.heading)].iter().map(|c| (c, kind_at(c)));
         let model = &self.sensor.model;
@@ -67,12 +67,12 @@ impl<'a> MountedBeam<'a> {
 
 fn unknown_sensor(name: &str, sensors: &[MountedSensor]) -> InputError {
     let known: Vec<&str> = sensors.iter().map(|s| s.model.name.as_str()).collect();
-    let remedy = nearest(name, &known);
+    let remedy = suggestion(name, &known);
     InputError::new("--sensor", format!("the robot has no sensor `{name}`"), remedy)
 }
 
 /// Returns the beam of the first sensor that points most nearly ahead, if there is a sensor.
-pub(super) fn ahead(model: &Model) -> Option<Beam> {
+pub(super) fn forward_beam(model: &MarkovModel) -> Option<Beam> {
     let sensor = &model.robot.body.sensors.first()?.model;
     let off_ahead = |deg: f64| (deg - 360.0 * (deg / 360.0).round()).abs();
     let by_bearing =

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Place and heading of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Pose {
+pub struct GridPose {
     /// Column of its lower-left box, from the west.
     pub col: i32,
     /// Row of its lower-left box, from the south.
@@ -20,17 +20,17 @@ pub struct Pose {
 
 /// The end of an action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Outcome {
+pub struct ActionOutcome {
     /// The pose of the body afterwards.
-    pub pose: Pose,
+    pub pose: GridPose,
     /// Kind of the obstacle that stopped it, and the side of the body that touched it.
     pub contact: Option<(u8, Side)>,
 }
 
-impl Pose {
+impl GridPose {
     /// Returns the pose one box farther to `side`.
     fn shifted(self, side: Side) -> Self {
-        let (dx, dy) = unit(self.heading, side);
+        let (dx, dy) = unit_vector(self.heading, side);
         Self { col: self.col + dx, row: self.row + dy, ..self }
     }
 
@@ -40,9 +40,9 @@ impl Pose {
 
     /// Returns the boxes next to a `size` x `size` body on `side`, from left to right as seen
     /// looking that way.
-    fn beside(self, size: u32, side: Side) -> impl Iterator<Item = (i32, i32)> {
+    fn adjacent_boxes(self, size: u32, side: Side) -> impl Iterator<Item = (i32, i32)> {
         let last = size as i32 - 1;
-        let (dx, dy) = unit(self.heading, side);
+        let (dx, dy) = unit_vector(self.heading, side);
         // The body's own boxes on that side lie on the line through this corner ...
         let corner = (self.col + last * i32::from(dx > 0), self.row + last * i32::from(dy > 0));
         // ... along the direction a quarter to the right, which may start at its far end.
@@ -59,15 +59,15 @@ impl Pose {
 /// `transitions` hold in free space; `kind_at(col, row)` is the kind of a box's occupant, 0 for an
 /// empty box, and does not count the body itself. Equal outcomes are merged, and sorted by their
 /// poses. Probabilities are those of `transitions`, so they sum to 1 when those do.
-pub fn here_and_now(
+pub fn outcome_distribution(
     transitions: &[Transition],
     size: u32,
-    from: Pose,
+    from: GridPose,
     rule: ObstacleRule,
     kind_at: impl Fn(i32, i32) -> u8,
-) -> Vec<(Outcome, f64)> {
+) -> Vec<(ActionOutcome, f64)> {
     let possible = transitions.iter().filter(|t| t.p > 0.0);
-    let walked: Vec<(Outcome, f64)> =
+    let walked: Vec<(ActionOutcome, f64)> =
         possible.map(|t| (walk(t, size, from, rule, &kind_at), t.p)).collect();
     match rule {
         ObstacleRule::Cut | ObstacleRule::Stay => merged(walked),
@@ -79,25 +79,26 @@ pub fn here_and_now(
 fn walk(
     transition: &Transition,
     size: u32,
-    from: Pose,
+    from: GridPose,
     rule: ObstacleRule,
     kind_at: impl Fn(i32, i32) -> u8,
-) -> Outcome {
+) -> ActionOutcome {
     let mut at = from;
     for &side in &transition.path {
-        let met = at.beside(size, side).map(|(col, row)| kind_at(col, row)).find(|&k| k != FREE);
+        let met =
+            at.adjacent_boxes(size, side).map(|(col, row)| kind_at(col, row)).find(|&k| k != FREE);
         if let Some(kind) = met {
             let pose = if rule == ObstacleRule::Cut { at } else { from };
-            return Outcome { pose, contact: Some((kind, side)) };
+            return ActionOutcome { pose, contact: Some((kind, side)) };
         }
         at = at.shifted(side);
     }
-    Outcome { pose: at.turned(transition.turn), contact: None }
+    ActionOutcome { pose: at.turned(transition.turn), contact: None }
 }
 
 /// Removes the blocked outcomes and rescales the rest; keeps the first contact when none is left.
-fn renormalised(walked: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
-    let free = |w: &&(Outcome, f64)| w.0.contact.is_none();
+fn renormalised(walked: Vec<(ActionOutcome, f64)>) -> Vec<(ActionOutcome, f64)> {
+    let free = |w: &&(ActionOutcome, f64)| w.0.contact.is_none();
     let left: f64 = walked.iter().filter(free).map(|w| w.1).sum();
     if left > 0.0 {
         return merged(walked.iter().filter(free).map(|&(o, p)| (o, p / left)).collect());
@@ -105,7 +106,7 @@ fn renormalised(walked: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
     walked.first().map(|&(outcome, _)| vec![(outcome, 1.0)]).unwrap_or_default()
 }
 
-fn merged(outcomes: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
+fn merged(outcomes: Vec<(ActionOutcome, f64)>) -> Vec<(ActionOutcome, f64)> {
     let mut sums = BTreeMap::new();
     for (outcome, p) in outcomes {
         *sums.entry(outcome).or_insert(0.0) += p;
@@ -114,7 +115,7 @@ fn merged(outcomes: Vec<(Outcome, f64)>) -> Vec<(Outcome, f64)> {
 }
 
 /// Returns the unit vector to a side of a body with this heading.
-fn unit(heading: u8, side: Side) -> (i32, i32) {
+fn unit_vector(heading: u8, side: Side) -> (i32, i32) {
     match (heading + side as u8) % 4 {
         0 => (1, 0),
         1 => (0, 1),
@@ -128,7 +129,7 @@ mod tests {
     use super::*;
 
     fn beside(heading: u8, side: Side) -> Vec<(i32, i32)> {
-        Pose { col: 5, row: 7, heading }.beside(2, side).collect()
+        GridPose { col: 5, row: 7, heading }.adjacent_boxes(2, side).collect()
     }
 
     #[test]

@@ -11,11 +11,11 @@
 
 mod text;
 
-use super::observe::{Beam, MountedBeam, ahead};
-use super::sparse::Sparse;
-use super::{Arrival, Model, names};
+use super::observe::{Beam, MountedBeam, forward_beam};
+use super::sparse::SparseMatrix;
+use super::{MarkovModel, ModelTransition, names};
 use crate::effector::Side;
-use crate::perceive::name_of;
+use crate::perceive::reading_names;
 use crate::rows::HEADING_NAMES;
 use crate::sensor::Reading;
 use serde::Serialize;
@@ -71,38 +71,38 @@ pub struct Pomdp {
     actions: Vec<String>,
     observations: Vec<String>,
     /// Successors, in row `state * actions + action`.
-    transitions: Sparse<(u32, f64)>,
+    transitions: SparseMatrix<(u32, f64)>,
     /// Observations, in row `state`.
-    readings: Sparse<(u32, f64)>,
+    readings: SparseMatrix<(u32, f64)>,
     /// States at the goal.
     goals: Vec<u32>,
 }
 
-type Contact = Option<(u8, Side)>;
+type PomdpContact = Option<(u8, Side)>;
 /// A contact and the (observation, class) of each beam.
-type Observation = (Contact, Vec<(u8, u8)>);
+type Observation = (PomdpContact, Vec<(u8, u8)>);
 /// Index of a pose, and the contact in which the last action ended there.
-type State = (u32, Contact);
+type PomdpState = (u32, PomdpContact);
 
 impl Pomdp {
-    pub(super) fn new(model: &Model, options: &PomdpOptions) -> Result<Self, InputError> {
+    pub(super) fn new(model: &MarkovModel, options: &PomdpOptions) -> Result<Self, InputError> {
         check_discount(options.discount)?;
         let beams = beams(model, options)?;
         let (states, order) = states(model, options.contacts);
         let transitions = transitions(model, options.contacts, &states, &order);
         check_lines(model, transitions.len())?;
-        let (observations, readings) = observed(model, &beams, &order)?;
+        let (observations, readings) = observation_matrix(model, &beams, &order)?;
         Ok(Self {
             place: model.place.clone(),
             discount: options.discount,
-            states: names::valid(order.iter().map(|state| state_name(model, state))),
-            actions: names::valid(model.actions().iter().cloned()),
-            observations: names::valid(
+            states: names::valid_names(order.iter().map(|state| state_name(model, state))),
+            actions: names::valid_names(model.actions().iter().cloned()),
+            observations: names::valid_names(
                 observations.iter().map(|o| observation_name(model, &beams, options.contacts, o)),
             ),
             transitions,
             readings,
-            goals: goals(model, options.goal, &order)?,
+            goals: goal_states(model, options.goal, &order)?,
         })
     }
 
@@ -126,7 +126,7 @@ fn check_discount(discount: f64) -> Result<(), InputError> {
     Err(InputError::new("--discount", cause, "give a number above 0 and below 1, e.g. 0.95"))
 }
 
-fn check_lines(model: &Model, lines: usize) -> Result<(), InputError> {
+fn check_lines(model: &MarkovModel, lines: usize) -> Result<(), InputError> {
     if lines <= MAX_LINES {
         return Ok(());
     }
@@ -134,10 +134,13 @@ fn check_lines(model: &Model, lines: usize) -> Result<(), InputError> {
     Err(InputError::new(&model.place, cause, "observe fewer beams, or use a smaller map"))
 }
 
-fn beams<'a>(model: &'a Model, options: &PomdpOptions) -> Result<Vec<MountedBeam<'a>>, InputError> {
+fn beams<'a>(
+    model: &'a MarkovModel,
+    options: &PomdpOptions,
+) -> Result<Vec<MountedBeam<'a>>, InputError> {
     let chosen = match &options.beams {
         Some(beams) => beams.clone(),
-        None => ahead(model).into_iter().collect(),
+        None => forward_beam(model).into_iter().collect(),
     };
     if chosen.len() > MAX_BEAMS {
         let cause = format!("{} beams", chosen.len());
@@ -147,7 +150,7 @@ fn beams<'a>(model: &'a Model, options: &PomdpOptions) -> Result<Vec<MountedBeam
 }
 
 /// Returns the number of each state, and the states in that order; the start is the first.
-fn states(model: &Model, contacts: bool) -> (BTreeMap<State, u32>, Vec<State>) {
+fn states(model: &MarkovModel, contacts: bool) -> (BTreeMap<PomdpState, u32>, Vec<PomdpState>) {
     let start = (0, None);
     let (mut numbers, mut order) = (BTreeMap::from([(start, 0)]), vec![start]);
     for arrival in model.outcomes.rows().flatten() {
@@ -160,21 +163,21 @@ fn states(model: &Model, contacts: bool) -> (BTreeMap<State, u32>, Vec<State>) {
     (numbers, order)
 }
 
-fn state_after(arrival: &Arrival, contacts: bool) -> State {
+fn state_after(arrival: &ModelTransition, contacts: bool) -> PomdpState {
     (arrival.to, arrival.contact.filter(|_| contacts))
 }
 
 fn transitions(
-    model: &Model,
+    model: &MarkovModel,
     contacts: bool,
-    states: &BTreeMap<State, u32>,
-    order: &[State],
-) -> Sparse<(u32, f64)> {
-    let mut rows = Sparse::default();
+    states: &BTreeMap<PomdpState, u32>,
+    order: &[PomdpState],
+) -> SparseMatrix<(u32, f64)> {
+    let mut rows = SparseMatrix::default();
     for &(pose, _) in order {
         for action in 0..model.actions().len() {
             let mut row = BTreeMap::new();
-            for arrival in model.arrivals(pose as usize, action) {
+            for arrival in model.model_transitions(pose as usize, action) {
                 let to = states[&state_after(arrival, contacts)];
                 *row.entry(to).or_insert(0.0) += arrival.p;
             }
@@ -185,17 +188,17 @@ fn transitions(
 }
 
 /// The observations that occur, and each state's distribution over them.
-type Observed = (Vec<Observation>, Sparse<(u32, f64)>);
+type ObservationMatrix = (Vec<Observation>, SparseMatrix<(u32, f64)>);
 
-fn observed(
-    model: &Model,
+fn observation_matrix(
+    model: &MarkovModel,
     beams: &[MountedBeam<'_>],
-    order: &[State],
-) -> Result<Observed, InputError> {
+    order: &[PomdpState],
+) -> Result<ObservationMatrix, InputError> {
     let mut numbers: BTreeMap<Observation, u32> = BTreeMap::new();
-    let mut rows = Sparse::default();
+    let mut rows = SparseMatrix::default();
     for &(pose, contact) in order {
-        let row = joint(model, beams, pose);
+        let row = joint_readings(model, beams, pose);
         check_lines(model, rows.len() + row.len())?;
         let mut numbered = Vec::with_capacity(row.len());
         for (readings, p) in row {
@@ -211,7 +214,11 @@ fn observed(
 
 /// Returns the readings of all beams at a pose: a product, because they are independent given the
 /// pose.
-fn joint(model: &Model, beams: &[MountedBeam<'_>], pose: u32) -> Vec<(Vec<(u8, u8)>, f64)> {
+fn joint_readings(
+    model: &MarkovModel,
+    beams: &[MountedBeam<'_>],
+    pose: u32,
+) -> Vec<(Vec<(u8, u8)>, f64)> {
     let pose = model.poses[pose as usize];
     let mut joint = vec![(Vec::new(), 1.0)];
     for beam in beams {
@@ -227,9 +234,13 @@ fn joint(model: &Model, beams: &[MountedBeam<'_>], pose: u32) -> Vec<(Vec<(u8, u
     joint
 }
 
-fn goals(model: &Model, goal: Option<(u32, u32)>, order: &[State]) -> Result<Vec<u32>, InputError> {
+fn goal_states(
+    model: &MarkovModel,
+    goal: Option<(u32, u32)>,
+    order: &[PomdpState],
+) -> Result<Vec<u32>, InputError> {
     let Some((col, row)) = goal else { return Ok(Vec::new()) };
-    let is_there = |state: &State| {
+    let is_there = |state: &PomdpState| {
         let pose = model.poses[state.0 as usize];
         (i64::from(pose.col), i64::from(pose.row)) == (i64::from(col), i64::from(row))
     };
@@ -243,7 +254,7 @@ fn goals(model: &Model, goal: Option<(u32, u32)>, order: &[State]) -> Result<Vec
     Ok(states)
 }
 
-fn state_name(model: &Model, state: &State) -> String {
+fn state_name(model: &MarkovModel, state: &PomdpState) -> String {
     let &(pose, contact) = state;
     let pose = model.poses[pose as usize];
     let heading = HEADING_NAMES[usize::from(pose.heading)];
@@ -252,12 +263,12 @@ fn state_name(model: &Model, state: &State) -> String {
     format!("c{}r{}-{heading}{contact}", pose.col, pose.row)
 }
 
-fn contact_name(model: &Model, kind: u8, side: Side) -> String {
+fn contact_name(model: &MarkovModel, kind: u8, side: Side) -> String {
     format!("{}-{}", side.name(), model.kinds[usize::from(kind)])
 }
 
 fn observation_name(
-    model: &Model,
+    model: &MarkovModel,
     beams: &[MountedBeam<'_>],
     contacts: bool,
     observation: &Observation,
@@ -266,7 +277,7 @@ fn observation_name(
     let felt = contact.map_or("free".into(), |(kind, side)| contact_name(model, kind, side));
     let readings = readings.iter().zip(beams).map(|(&(observation, class), beam)| {
         let reading = Reading { observation, class };
-        match name_of(reading, &beam.sensor.model) {
+        match reading_names(reading, &beam.sensor.model) {
             (seen, _) if observation == 0 => seen.to_string(),
             (seen, class) => format!("{seen}-{class}"),
         }

@@ -2,18 +2,18 @@
 
 /// A matrix by rows; an entry is any type that holds its column and value.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sparse<T> {
+pub(super) struct SparseMatrix<T> {
     ends: Vec<usize>,
     entries: Vec<T>,
 }
 
-impl<T> Default for Sparse<T> {
+impl<T> Default for SparseMatrix<T> {
     fn default() -> Self {
         Self { ends: Vec::new(), entries: Vec::new() }
     }
 }
 
-impl<T> Sparse<T> {
+impl<T> SparseMatrix<T> {
     /// Appends a row.
     pub(super) fn push(&mut self, row: impl IntoIterator<Item = T>) {
         self.entries.extend(row);
@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn rows_come_back_as_they_were_pushed() {
-        let mut sparse = Sparse::default();
+        let mut sparse = SparseMatrix::default();
         sparse.push([1, 2]);
         sparse.push([]);
         sparse.push([3]);

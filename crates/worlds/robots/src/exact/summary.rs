@@ -1,7 +1,7 @@
 //! The command's report of a model.
 
-use super::chain::{Convergence, Stationary};
-use super::{Chain, Comparison, Model, PomdpSize};
+use super::markov_chain::{Convergence, StationaryDistribution};
+use super::{Comparison, MarkovChain, MarkovModel, PomdpSize};
 use crate::decide::Random;
 use serde::Serialize;
 use sidestep_kernel::InputError;
@@ -41,7 +41,7 @@ pub struct VisitedBox {
     pub share: f64,
 }
 
-impl Model {
+impl MarkovModel {
     /// Summarizes the model under `policy`, named `name`, with the `top` most visited boxes.
     ///
     /// # Errors
@@ -64,9 +64,13 @@ impl Model {
 }
 
 /// Returns the boxes by falling share; equal ones by row and column.
-fn most_visited(chain: &Chain, stationary: &Stationary, top: usize) -> Vec<VisitedBox> {
+fn most_visited(
+    chain: &MarkovChain,
+    stationary: &StationaryDistribution,
+    top: usize,
+) -> Vec<VisitedBox> {
     let mut shares = BTreeMap::new();
-    for (pose, p) in chain.over_poses(&stationary.distribution) {
+    for (pose, p) in chain.pose_distribution(&stationary.distribution) {
         *shares.entry((pose.row, pose.col)).or_insert(0.0) += p;
     }
     let visited = shares.into_iter().map(|((row, col), share)| VisitedBox { col, row, share });

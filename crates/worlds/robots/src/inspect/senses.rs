@@ -1,17 +1,17 @@
 //! Percepts, memory and decisions of a robot.
 
-use super::Looking;
+use super::Inspector;
 use crate::Scratch;
-use crate::decide::{Decision, Memory, Sector, Trip};
+use crate::decide::{Decision, Memory, Sector, TripEvent};
 use crate::sensor::{NOTHING, Reading};
-use crate::view::{beyond_boundary_m, to_boundary_m};
+use crate::view::{center_to_boundary_m, class_middle_m};
 use crate::world::{MountedSensor, RobotModel, Role};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::view::{self, Kind, MarkShape, Section, Table, Value, Who};
+use sidestep_kernel::view::{self, BodyId, BodyKind, FactSection, FactTable, FactValue, MarkShape};
 
 /// One beam.
-struct Beam<'a, T> {
+struct BeamReading<'a, T> {
     sensor: &'a MountedSensor,
     bearing_deg: f64,
     sector: Sector,
@@ -21,27 +21,27 @@ struct Beam<'a, T> {
     reported: Reading,
 }
 
-impl<T: BoxWord> Looking<'_, T> {
+impl<T: BoxWord> Inspector<'_, T> {
     /// Tells the percept and the decision of a robot; nothing of other bodies, which have neither.
-    pub(super) fn perceives(&mut self, scratch: &mut Scratch) {
+    pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
         let cell = self.scene.cell(self.slot);
         let Role::Robot(model) = &self.scene.type_of(cell).role else { return };
         let is_due = self.scene.world.bodies[self.id as usize].is_due(self.scene.now);
         let before = super::super::perceive::memory_of(cell);
         let (decision, after) = self.scene.decision(model, self.slot, scratch);
-        self.sees(model, &scratch.readings);
-        self.hears(scratch);
+        self.add_readings(model, &scratch.readings);
+        self.add_messages(scratch);
         let after = if is_due { after } else { before };
-        self.remembers(before, after);
-        let section = Section::new("Decides");
-        self.told.tell(match is_due {
-            true => said(section, model, decision),
+        self.add_memory(before, after);
+        let section = FactSection::new("Decides");
+        self.inspection.add_section(match is_due {
+            true => with_decision(section, model, decision),
             false => section.fact("action", "none: it is not its turn"),
         });
     }
 
-    fn sees(&mut self, model: &RobotModel, readings: &[Reading]) {
-        let mut table = Table::new([
+    fn add_readings(&mut self, model: &RobotModel, readings: &[Reading]) {
+        let mut table = FactTable::new([
             "sensor",
             "bearing",
             "sector",
@@ -55,17 +55,17 @@ impl<T: BoxWord> Looking<'_, T> {
         ]);
         let mut k = 0;
         for sensor in &model.body.sensors {
-            let met = self.scene.met(sensor, self.scene.cell(self.slot));
+            let met = self.scene.beam_hits(sensor, self.scene.cell(self.slot));
             for (&bearing_deg, met) in sensor.model.bearings_deg.iter().zip(met) {
                 let (reported, sector) = (readings[k], model.body.sectors[k]);
                 k += 1;
                 let truth = self.truth(sensor, met);
-                let beam = Beam { sensor, bearing_deg, sector, met, truth, reported };
-                table.row(self.row(&beam));
-                self.draw(&beam);
+                let beam = BeamReading { sensor, bearing_deg, sector, met, truth, reported };
+                table.push_row(self.row(&beam));
+                self.draw_beam(&beam);
             }
         }
-        self.told.tell(Section::new("Perceives").table(table));
+        self.inspection.add_section(FactSection::new("Perceives").table(table));
     }
 
     fn truth(&self, sensor: &MountedSensor, met: Option<(T, f64)>) -> Reading {
@@ -74,84 +74,94 @@ impl<T: BoxWord> Looking<'_, T> {
         sensor.truth(self.scene.state.kind_of(word), class)
     }
 
-    fn row(&self, beam: &Beam<'_, T>) -> [Value; 10] {
-        let Beam { sensor, truth, reported, .. } = *beam;
+    fn row(&self, beam: &BeamReading<'_, T>) -> [FactValue; 10] {
+        let BeamReading { sensor, truth, reported, .. } = *beam;
         let sector = ["ahead", "left", "behind", "right"][beam.sector as usize];
-        let names = |reading| crate::perceive::name_of(reading, &sensor.model);
+        let names = |reading| crate::perceive::reading_names(reading, &sensor.model);
         let row = sensor.model.reading_row(truth, sensor.is_reliable());
         let chance = row.iter().filter(|(reading, _)| *reading == reported).map(|(_, p)| p).sum();
         [
             sensor.model.name.as_str().into(),
-            Value::number(beam.bearing_deg, "°"),
+            FactValue::number(beam.bearing_deg, "°"),
             sector.into(),
             names(truth).0.into(),
             names(truth).1.into(),
-            Value::meters(self.true_m(beam)),
+            FactValue::meters(self.true_range_m(beam)),
             names(reported).0.into(),
             names(reported).1.into(),
-            Value::meters(beyond_boundary_m(&sensor.model, reported)),
-            Value::Share(chance),
+            FactValue::meters(class_middle_m(&sensor.model, reported)),
+            FactValue::Share(chance),
         ]
     }
 
     /// Returns the distance from the body's boundary to the thing that a beam meets, whether seen or not.
-    fn true_m(&self, beam: &Beam<'_, T>) -> f64 {
+    fn true_range_m(&self, beam: &BeamReading<'_, T>) -> f64 {
         beam.met.map_or(f64::INFINITY, |(_, boxes)| boxes * self.scene.world.map.box_size_m)
     }
 
-    fn draw(&mut self, beam: &Beam<'_, T>) {
+    fn draw_beam(&mut self, beam: &BeamReading<'_, T>) {
         let (world, cell) = (self.scene.world, self.scene.cell(self.slot));
         let bearing_rad = beam.bearing_deg.to_radians();
-        let to_boundary_m = to_boundary_m(world.side_m(self.id), bearing_rad);
+        let to_boundary_m = center_to_boundary_m(world.side_m(self.id), bearing_rad);
         let toward_rad = world.heading_rad(cell.facing.get().heading()) + bearing_rad;
-        let [x_m, y_m, z_m] = self.place();
+        let [x_m, y_m, z_m] = self.position_m();
         let line = |beyond_m: f64| {
             let reach_m = to_boundary_m + beyond_m.min(beam.sensor.model.range_m);
             let end_m = [x_m + reach_m * cos(toward_rad), y_m + reach_m * sin(toward_rad), z_m];
             MarkShape::Line { points_m: vec![[x_m, y_m, z_m], end_m] }
         };
-        let name = |reading| crate::perceive::name_of(reading, &beam.sensor.model).0;
-        let true_m = self.true_m(beam);
+        let name = |reading| crate::perceive::reading_names(reading, &beam.sensor.model).0;
+        let true_m = self.true_range_m(beam);
         let weight = |is_there: bool| if is_there { 1.0 } else { 0.25 };
         let (is_met, is_reported) = (true_m.is_finite(), beam.reported.observation != NOTHING);
-        let said_m = beyond_boundary_m(&beam.sensor.model, beam.reported);
-        self.told.weigh(view::Role::True, name(beam.truth), weight(is_met), line(true_m));
+        let said_m = class_middle_m(&beam.sensor.model, beam.reported);
+        self.inspection.add_weighted_mark(
+            view::MarkRole::True,
+            name(beam.truth),
+            weight(is_met),
+            line(true_m),
+        );
         let label = name(beam.reported);
-        self.told.weigh(view::Role::Reported, label, weight(is_reported), line(said_m));
+        self.inspection.add_weighted_mark(
+            view::MarkRole::Reported,
+            label,
+            weight(is_reported),
+            line(said_m),
+        );
     }
 
-    fn hears(&mut self, scratch: &Scratch) {
-        let mut table = Table::new(["sender", "word"]);
+    fn add_messages(&mut self, scratch: &Scratch) {
+        let mut table = FactTable::new(["sender", "word"]);
         for heard in &scratch.heard {
-            let sender = Who::new(Kind::Robot, heard.sender, None);
-            table.row([sender.into(), format!("{:#018x}", heard.word).into()]);
+            let sender = BodyId::new(BodyKind::Robot, heard.sender, None);
+            table.push_row([sender.into(), format!("{:#018x}", heard.word).into()]);
         }
         if self.scene.world.radio.is_some() {
-            let said = self.scene.state.voices.heard(self.id, self.scene.now);
+            let said = self.scene.state.voices.last_broadcast(self.id, self.scene.now);
             let said = said.map(|word| format!("{word:#018x}"));
-            let heard = Value::count(scratch.heard.len());
-            self.told.tell(
-                Section::new("Radio").fact("hears", heard).fact("has said", said).table(table),
+            let heard = FactValue::count(scratch.heard.len());
+            self.inspection.add_section(
+                FactSection::new("Radio").fact("hears", heard).fact("has said", said).table(table),
             );
         }
     }
 
-    fn remembers(&mut self, before: Memory, after: Memory) {
-        let mut table = Table::new(["word", "now", "after deciding"]);
+    fn add_memory(&mut self, before: Memory, after: Memory) {
+        let mut table = FactTable::new(["word", "now", "after deciding"]);
         for (k, (before, after)) in before.words.into_iter().zip(after.words).enumerate() {
-            let number = |word: u32| Value::number(f64::from(word), "");
-            table.row([Value::count(k), number(before), number(after)]);
+            let number = |word: u32| FactValue::number(f64::from(word), "");
+            table.push_row([FactValue::count(k), number(before), number(after)]);
         }
-        self.told.tell(Section::new("Memory").table(table));
+        self.inspection.add_section(FactSection::new("Memory").table(table));
     }
 }
 
 /// Adds a decision in words.
-fn said(section: Section, model: &RobotModel, decision: Decision) -> Section {
+fn with_decision(section: FactSection, model: &RobotModel, decision: Decision) -> FactSection {
     let action = model.body.effector.actions.get(usize::from(decision.action)).cloned();
     let trip = decision.trip.map(|trip| match trip {
-        Trip::Begun => "begins",
-        Trip::Done => "is done, the next begins",
+        TripEvent::Started => "begins",
+        TripEvent::Completed => "is done, the next begins",
     });
     let broadcast = decision.broadcast.map(|word| format!("{word:#018x}"));
     section.fact("action", action).fact_if("trip", trip).fact_if("broadcasts", broadcast)

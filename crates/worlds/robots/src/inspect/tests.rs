@@ -1,6 +1,6 @@
 use crate::{RobotsRun, robots_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{Inspection, Kind, Role, Value, Who};
+use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole};
 use sidestep_scenario::Source;
 
 /// Two robots that want the box between them; the one with the smaller id goes first.
@@ -17,8 +17,8 @@ fn head_on() -> RobotsRun {
     robots_run(&Source::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn robot(id: u32) -> Who {
-    Who::new(Kind::Robot, id, None)
+fn robot(id: u32) -> BodyId {
+    BodyId::new(BodyKind::Robot, id, None)
 }
 
 fn told(run: &RobotsRun, id: u32) -> Inspection {
@@ -31,25 +31,25 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
     let second = told(&run, 1);
     let beams = second.section("Perceives").and_then(|s| s.table.as_ref()).expect("two beams");
     let column = |head| beams.column(head).expect("a column").cloned().collect::<Vec<_>>();
-    assert_eq!(column("bearing"), [Value::number(0.0, "°"), Value::number(90.0, "°")]);
+    assert_eq!(column("bearing"), [FactValue::number(0.0, "°"), FactValue::number(90.0, "°")]);
     assert_eq!(column("truth"), ["robot".into(), "wall".into()]);
     assert_eq!(column("true class"), ["far".into(), "near".into()]);
-    assert_eq!(column("true range"), [Value::meters(0.5), Value::meters(0.0)]);
+    assert_eq!(column("true range"), [FactValue::meters(0.5), FactValue::meters(0.0)]);
     assert_eq!(column("report"), column("truth"), "sensors are reliable");
-    assert_eq!(column("chance of the report"), [Value::Share(1.0), Value::Share(1.0)]);
+    assert_eq!(column("chance of the report"), [FactValue::Share(1.0), FactValue::Share(1.0)]);
     assert_eq!(second.value("Decides", "action"), Some(&"forward".into()));
-    assert_eq!(second.marks_of(Role::Claim).count(), 1);
-    assert_eq!(second.value("Conflict group", "bodies"), Some(&Value::count(2)));
-    assert_eq!(second.value("Conflict group", "turn"), Some(&Value::count(2)));
+    assert_eq!(second.marks_with_role(MarkRole::Claim).count(), 1);
+    assert_eq!(second.value("Conflict group", "bodies"), Some(&FactValue::count(2)));
+    assert_eq!(second.value("Conflict group", "turn"), Some(&FactValue::count(2)));
     let order = second.section("Conflict group").and_then(|s| s.table.as_ref()).expect("an order");
     let turns: Vec<_> = order.column("body").expect("a column").collect();
-    assert_eq!(turns, [&Value::Who(robot(0)), &Value::Who(robot(1))]);
-    assert_eq!(second.value("Outcome", "cut by"), Some(&Value::from(Some(robot(0)))));
-    assert_eq!(second.value("Outcome", "steps made"), Some(&Value::count(0)));
-    assert_eq!(second.value("Outcome", "probability"), Some(&Value::Share(1.0)));
+    assert_eq!(turns, [&FactValue::Who(robot(0)), &FactValue::Who(robot(1))]);
+    assert_eq!(second.value("Outcome", "cut by"), Some(&FactValue::from(Some(robot(0)))));
+    assert_eq!(second.value("Outcome", "steps made"), Some(&FactValue::count(0)));
+    assert_eq!(second.value("Outcome", "probability"), Some(&FactValue::Share(1.0)));
     assert_eq!(second.value("Outcome", "next place"), second.value("Now", "place"));
     let first = told(&run, 0);
-    assert_eq!(first.value("Outcome", "steps made"), Some(&Value::count(1)));
+    assert_eq!(first.value("Outcome", "steps made"), Some(&FactValue::count(1)));
     assert_eq!(first.value("Outcome", "cut by"), None);
     run.advance(1);
     let then = [0, 1].map(|id| told(&run, id));
@@ -62,9 +62,9 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
 fn nobody_is_told_of_who_is_not_there() {
     let run = head_on();
     for who in [
-        Who::new(Kind::Robot, 2, None),
-        Who::new(Kind::Person, 0, None),
-        Who::new(Kind::Robot, 0, Some(0)),
+        BodyId::new(BodyKind::Robot, 2, None),
+        BodyId::new(BodyKind::Person, 0, None),
+        BodyId::new(BodyKind::Robot, 0, Some(0)),
     ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }
@@ -95,11 +95,11 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
                 run.advance(5);
                 let bodies = run.world().bodies.len() as u32;
                 let all: Vec<Inspection> = (0..bodies)
-                    .map(|id| run.inspect(run.world().who(id)).expect("it is there"))
+                    .map(|id| run.inspect(run.world().body_id(id)).expect("it is there"))
                     .collect();
                 run.advance(1);
                 for (id, told) in (0..).zip(&all) {
-                    let then = run.inspect(run.world().who(id)).expect("it is there");
+                    let then = run.inspect(run.world().body_id(id)).expect("it is there");
                     for (now, next) in [("place", "next place"), ("heading", "next heading")] {
                         let (now, next) = (then.value("Now", now), told.value("Outcome", next));
                         // A body that goes straight is reported so before it turns at its next decision.

@@ -10,7 +10,7 @@ use sidestep_import::table::CsvTable;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
 use sidestep_scenario::Source;
-use sidestep_statistics::chi_square_p;
+use sidestep_statistics::chi_square_p_value;
 
 const CYCLES: u64 = 4000;
 
@@ -62,7 +62,7 @@ effector = "wheels"
 /// Runs the scenario and writes the table `name` that it recorded as CSV.
 fn recorded(name: &str) -> CsvTable {
     let mut run = robots_run(&scenario(), 2).unwrap();
-    run.begin_recording();
+    run.start_recording();
     let schemas = run.schemas();
     let mut recorder = MemoryRecorder::new(&schemas);
     while run.cycle() < CYCLES {
@@ -103,7 +103,7 @@ fn assert_recovered(estimates: &[Estimate], table: &str, known: &[(&str, &str, f
         fit.1 += 1;
     }
     for (row, (chi_square, columns)) in rows {
-        let p_value = chi_square_p(chi_square, columns - 1);
+        let p_value = chi_square_p_value(chi_square, columns - 1);
         assert!(p_value > 0.001, "{row}: chi-square {chi_square}, p = {p_value}");
     }
 }

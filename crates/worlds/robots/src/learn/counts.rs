@@ -10,7 +10,7 @@ use sidestep_statistics::{Interval, wilson};
 ///
 /// Serialized as `{row: {column: count}}` without empty cells and rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Counts {
+pub struct CountTable {
     name: String,
     rows: Vec<String>,
     columns: Vec<String>,
@@ -39,7 +39,7 @@ pub struct Estimate {
 
 /// A row that rests on few counts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ThinRow {
+pub struct LowCountRow {
     /// Name of the table of counts.
     pub table: String,
     /// The truth, or the command.
@@ -48,7 +48,7 @@ pub struct ThinRow {
     pub count: f64,
 }
 
-impl Counts {
+impl CountTable {
     /// Returns a table without counts.
     pub fn new(name: &str, rows: &[String], columns: &[String]) -> Self {
         Self {
@@ -122,10 +122,10 @@ impl Counts {
     }
 
     /// Returns the rows with fewer than `below` counts, including those with none.
-    pub fn thin(&self, below: u32) -> Vec<ThinRow> {
+    pub fn low_count_rows(&self, below: u32) -> Vec<LowCountRow> {
         let totals = self.rows.iter().enumerate().map(|(i, row)| (row, self.total(i)));
         let thin = totals.filter(|(_, total)| *total < f64::from(below));
-        thin.map(|(row, count)| ThinRow { table: self.name.clone(), row: row.clone(), count })
+        thin.map(|(row, count)| LowCountRow { table: self.name.clone(), row: row.clone(), count })
             .collect()
     }
 }
@@ -167,7 +167,7 @@ impl Serialize for Count {
 
 /// A table that is serialized as its bare numbers, shape `(rows, columns)`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CountMatrix(pub Counts);
+pub struct CountMatrix(pub CountTable);
 
 impl Serialize for CountMatrix {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -177,24 +177,24 @@ impl Serialize for CountMatrix {
 }
 
 /// The non-empty cells of one row.
-struct FilledCells<'a> {
+struct NonzeroCells<'a> {
     columns: &'a [String],
     cells: &'a [f64],
 }
 
-impl Serialize for FilledCells<'_> {
+impl Serialize for NonzeroCells<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let filled = self.columns.iter().zip(self.cells).filter(|(_, count)| **count != 0.0);
         serializer.collect_map(filled.map(|(column, &count)| (column, Count(count))))
     }
 }
 
-impl Serialize for Counts {
+impl Serialize for CountTable {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for (row, cells) in self.rows.iter().zip(&self.cells) {
             if cells.iter().any(|count| *count != 0.0) {
-                map.serialize_entry(row, &FilledCells { columns: &self.columns, cells })?;
+                map.serialize_entry(row, &NonzeroCells { columns: &self.columns, cells })?;
             }
         }
         map.end()
@@ -209,8 +209,8 @@ mod tests {
         names.iter().map(|name| name.to_string()).collect()
     }
 
-    fn small() -> Counts {
-        let mut counts = Counts::new("t", &names(&["a", "b"]), &names(&["x", "y"]));
+    fn small() -> CountTable {
+        let mut counts = CountTable::new("t", &names(&["a", "b"]), &names(&["x", "y"]));
         counts.add(0, 0, 3.0);
         counts.add(0, 1, 1.0);
         counts
@@ -233,9 +233,9 @@ mod tests {
             (3.0, 4.0, 0.75)
         );
         assert_eq!(estimates[0].interval, wilson(3.0, 4.0));
-        let thin = small().thin(4);
+        let thin = small().low_count_rows(4);
         assert_eq!((thin.len(), thin[0].row.as_str(), thin[0].count), (1, "b", 0.0));
-        assert_eq!(small().thin(5).len(), 2);
+        assert_eq!(small().low_count_rows(5).len(), 2);
     }
 
     #[test]

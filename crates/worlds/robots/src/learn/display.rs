@@ -2,28 +2,28 @@
 
 use std::fmt::{Formatter, Result};
 
-use super::holdout::Fit;
-use super::{Estimate, ThinRow};
-use sidestep_kernel::words::{LINE_COLS, fixed, wrapped};
+use super::holdout::HoldoutTest;
+use super::{Estimate, LowCountRow};
+use sidestep_kernel::text::{LINE_COLS, format_fixed, wrap};
 use sidestep_statistics::{Moments, holm};
 
 /// The names of a table's rows and columns.
-pub(super) struct Heading {
+pub(super) struct TableHeading {
     pub(super) row: &'static str,
     pub(super) column: &'static str,
 }
 
 /// Writes warnings, in lines that every terminal has room for.
-pub(super) fn warnings(f: &mut Formatter<'_>, warnings: &[String]) -> Result {
-    warnings.iter().try_for_each(|warning| writeln!(f, "{}", warned(warning)))
+pub(super) fn write_warnings(f: &mut Formatter<'_>, warnings: &[String]) -> Result {
+    warnings.iter().try_for_each(|warning| writeln!(f, "{}", warning_line(warning)))
 }
 
-fn warned(warning: &str) -> String {
-    wrapped(&format!("WARNING: {warning}"), LINE_COLS).join("\n")
+fn warning_line(warning: &str) -> String {
+    wrap(&format!("WARNING: {warning}"), LINE_COLS).join("\n")
 }
 
 /// Writes named moments, one per line; those without values are left out.
-pub(super) fn moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]) -> Result {
+pub(super) fn write_moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]) -> Result {
     if named.iter().all(|(_, moments)| moments.is_none()) {
         return Ok(());
     }
@@ -35,25 +35,29 @@ pub(super) fn moments(f: &mut Formatter<'_>, named: &[(String, Option<Moments>)]
         let Some(m) = m else { continue };
         write!(f, "{name:20} {:>5}", m.n)?;
         let values = [m.mean, m.sd, m.p01, m.p05, m.p50, m.p95, m.p99];
-        values.iter().try_for_each(|value| write!(f, " {:>6}", six(*value)))?;
+        values.iter().try_for_each(|value| write!(f, " {:>6}", format_in_six(*value)))?;
         writeln!(f)?;
     }
     Ok(())
 }
 
 /// Returns a number in six characters where it has room in them.
-fn six(value: f64) -> String {
+fn format_in_six(value: f64) -> String {
     let decimals = match value.abs() {
         a if a < 10.0 => 3,
         a if a < 100.0 => 2,
         a if a < 1000.0 => 1,
         _ => 0,
     };
-    fixed(value, decimals)
+    format_fixed(value, decimals)
 }
 
 /// Writes estimates, one table for each name; cells without counts are left out.
-pub(super) fn estimates(f: &mut Formatter<'_>, all: &[Estimate], heading: &Heading) -> Result {
+pub(super) fn write_estimates(
+    f: &mut Formatter<'_>,
+    all: &[Estimate],
+    heading: &TableHeading,
+) -> Result {
     let mut table = "";
     for estimate in all.iter().filter(|estimate| estimate.count > 0.0) {
         if estimate.table != table {
@@ -64,12 +68,12 @@ pub(super) fn estimates(f: &mut Formatter<'_>, all: &[Estimate], heading: &Headi
             let [count, of, probability, interval] = heads;
             writeln!(f, "  {row:12} {column:13} {count:>10} {of:>7}  {probability}  {interval}")?;
         }
-        line(f, estimate)?;
+        write_estimate(f, estimate)?;
     }
     Ok(())
 }
 
-fn line(f: &mut Formatter<'_>, e: &Estimate) -> Result {
+fn write_estimate(f: &mut Formatter<'_>, e: &Estimate) -> Result {
     // Counts of events that are spread over outcomes are fractional.
     let decimals = if e.count.fract() == 0.0 { 0 } else { 2 };
     writeln!(
@@ -80,7 +84,11 @@ fn line(f: &mut Formatter<'_>, e: &Estimate) -> Result {
 }
 
 /// Writes the rows with few counts.
-pub(super) fn thin(f: &mut Formatter<'_>, thin: &[ThinRow], below: u32) -> Result {
+pub(super) fn write_low_count_rows(
+    f: &mut Formatter<'_>,
+    thin: &[LowCountRow],
+    below: u32,
+) -> Result {
     if thin.is_empty() {
         return writeln!(f, "\nEvery row has at least {below} counts.");
     }
@@ -92,7 +100,7 @@ pub(super) fn thin(f: &mut Formatter<'_>, thin: &[ThinRow], below: u32) -> Resul
 }
 
 /// Writes how well a part of the events predicts the rest.
-pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
+pub(super) fn write_holdout_tests(f: &mut Formatter<'_>, fits: &[HoldoutTest]) -> Result {
     writeln!(f, "\nHold-out fit (same law in both parts? log-loss in nat per event)")?;
     let heads = ["table", "learned", "held out", "chi2", "df", "p", "log-loss", "floor"];
     let [table, learned, held, chi2, df, p, loss, floor] = heads;
@@ -112,7 +120,7 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
             fit.held_out,
             tested(format!("{:.2}", fit.chi_square)),
             fit.degrees_of_freedom,
-            tested(column_p(fit.p_value)),
+            tested(format_p_column(fit.p_value)),
             shown(fit.log_loss),
             shown(fit.log_loss_floor)
         )?;
@@ -121,21 +129,22 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
 }
 
 /// Largest probability, over all tables together, at which a difference is not taken for chance.
-const LEVEL: f64 = 0.05;
+const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 /// Returns the verdicts of the tests: a line for each table with parts that differ, or one for all.
-fn verdicts(fits: &[Fit]) -> Vec<String> {
-    let tested: Vec<&Fit> = fits.iter().filter(|fit| fit.degrees_of_freedom > 0).collect();
+fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
+    let tested: Vec<&HoldoutTest> = fits.iter().filter(|fit| fit.degrees_of_freedom > 0).collect();
     let adjusted = holm(&tested.iter().map(|fit| Some(fit.p_value)).collect::<Vec<_>>());
-    let differs = tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < LEVEL));
+    let differs =
+        tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < SIGNIFICANCE_LEVEL));
     let mut words: Vec<String> = differs
         .map(|(fit, _)| {
-            warned(&format!(
+            warning_line(&format!(
                 "{}: the parts of the log differ by more than chance (p {}). What was learned may \
                  not hold elsewhere: the robot or its place changed meanwhile, or events depend on \
                  each other.",
                 fit.table,
-                shown_p(fit.p_value)
+                format_p(fit.p_value)
             ))
         })
         .collect();
@@ -150,23 +159,23 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
 }
 
 /// Probabilities below it are not told apart, and none of them is 0.
-const LEAST_P: f64 = 0.0001;
+const MIN_P: f64 = 0.0001;
 
-fn shown_p(p: f64) -> String {
-    if p < LEAST_P { format!("< {LEAST_P}") } else { format!("= {p:.4}") }
+fn format_p(p: f64) -> String {
+    if p < MIN_P { format!("< {MIN_P}") } else { format!("= {p:.4}") }
 }
 
 /// Returns a probability for the column of a table.
-fn column_p(p: f64) -> String {
-    if p < LEAST_P { format!("<{LEAST_P}") } else { format!("{p:.4}") }
+fn format_p_column(p: f64) -> String {
+    if p < MIN_P { format!("<{MIN_P}") } else { format!("{p:.4}") }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn fit(p_value: f64, degrees_of_freedom: usize) -> Fit {
-        Fit {
+    fn fit(p_value: f64, degrees_of_freedom: usize) -> HoldoutTest {
+        HoldoutTest {
             table: "moves".into(),
             trained_on: 100.0,
             held_out: 100.0,
@@ -180,26 +189,27 @@ mod tests {
 
     #[test]
     fn a_small_p_is_a_verdict_and_chance_over_many_tables_is_not() {
-        let told = |fits: &[Fit]| verdicts(fits).join("\n");
+        let told = |fits: &[HoldoutTest]| verdicts(fits).join("\n");
         assert!(told(&[fit(0.0067, 4)]).contains("moves: the parts of the log differ"));
         let mut many = vec![fit(0.9, 4); 9];
         many.push(fit(0.0067, 4));
         assert!(told(&many).starts_with("Both parts of the log agree"), "{}", told(&many));
         assert_eq!(told(&[fit(1.0, 0)]), "Too few counts to test: 1 of 1 tables.");
-        let lines = told(&[Fit { table: "a_table_of_turns".into(), ..fit(0.00001, 4) }]);
+        let lines = told(&[HoldoutTest { table: "a_table_of_turns".into(), ..fit(0.00001, 4) }]);
         assert!(lines.lines().all(|line| line.chars().count() <= 80), "{lines}");
     }
 
     #[test]
     fn no_probability_is_told_as_none() {
-        assert_eq!([1e-9, 0.0001, 0.25].map(column_p), ["<0.0001", "0.0001", "0.2500"]);
-        assert_eq!(shown_p(0.0), "< 0.0001");
+        assert_eq!([1e-9, 0.0001, 0.25].map(format_p_column), ["<0.0001", "0.0001", "0.2500"]);
+        assert_eq!(format_p(0.0), "< 0.0001");
     }
 
     #[test]
     fn warnings_are_broken_into_lines_of_80_columns() {
-        let told =
-            warned(&"near obstacles outcomes are seen too rarely, so learn in the open ".repeat(4));
+        let told = warning_line(
+            &"near obstacles outcomes are seen too rarely, so learn in the open ".repeat(4),
+        );
         assert!(told.lines().count() > 3 && told.starts_with("WARNING: near"), "{told}");
         assert!(told.lines().all(|line| line.chars().count() <= 80), "{told}");
     }
@@ -207,7 +217,7 @@ mod tests {
     #[test]
     fn numbers_take_six_characters() {
         assert_eq!(
-            [0.02489, -0.2346, -90.0, 123.456, -1e-9].map(six),
+            [0.02489, -0.2346, -90.0, 123.456, -1e-9].map(format_in_six),
             ["0.025", "-0.235", "-90.00", "123.5", "0.000"]
         );
     }

@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-use super::counts::{Counts, smooth};
+use super::counts::{CountTable, smooth};
 use sidestep_kernel::math::ln;
-use sidestep_statistics::chi_square_p;
+use sidestep_statistics::chi_square_p_value;
 
 /// Cells expected to hold fewer counts than this are pooled before a chi-square test.
-const EXPECTED_MIN: f64 = 5.0;
+const MIN_EXPECTED_COUNT: f64 = 5.0;
 
 /// The agreement of held-out events with the table learned from the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fit {
+pub struct HoldoutTest {
     /// Name of the table of counts.
     pub table: String,
     /// Number of events used for learning.
@@ -44,20 +44,20 @@ pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
 }
 
 /// Compares two tables of the same shape.
-pub fn fit(trained: &Counts, held: &Counts, alpha: f64) -> Fit {
+pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> HoldoutTest {
     let n_rows = trained.rows().len();
     let tests: Vec<(f64, usize)> =
         (0..n_rows).map(|row| homogeneity(trained.row(row), held.row(row))).collect();
     let chi_square = tests.iter().map(|test| test.0).sum();
     let degrees_of_freedom = tests.iter().map(|test| test.1).sum();
-    let total = |counts: &Counts| (0..n_rows).map(|row| counts.total(row)).sum();
-    Fit {
+    let total = |counts: &CountTable| (0..n_rows).map(|row| counts.total(row)).sum();
+    HoldoutTest {
         table: trained.name().to_owned(),
         trained_on: total(trained),
         held_out: total(held),
         chi_square,
         degrees_of_freedom,
-        p_value: chi_square_p(chi_square, degrees_of_freedom),
+        p_value: chi_square_p_value(chi_square, degrees_of_freedom),
         log_loss: log_loss(trained, held, alpha),
         log_loss_floor: log_loss(held, held, 0.0),
     }
@@ -70,7 +70,7 @@ fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
         return (0.0, 0);
     }
     let share_of_smaller = n_a.min(n_b) / (n_a + n_b);
-    let cells = pool_rare(a, b, EXPECTED_MIN / share_of_smaller);
+    let cells = pool_rare(a, b, MIN_EXPECTED_COUNT / share_of_smaller);
     let deviation =
         |observed: f64, expected: f64| (observed - expected) * (observed - expected) / expected;
     let statistic = cells.iter().map(|&(in_a, in_b)| {
@@ -100,7 +100,7 @@ fn pool_rare(a: &[f64], b: &[f64], least: f64) -> Vec<(f64, f64)> {
     pooled
 }
 
-fn log_loss(trained: &Counts, held: &Counts, alpha: f64) -> Option<f64> {
+fn log_loss(trained: &CountTable, held: &CountTable, alpha: f64) -> Option<f64> {
     let (mut loss, mut events) = (0.0, 0.0);
     for row in 0..held.rows().len() {
         let probabilities = smooth(trained.row(row), alpha);
@@ -119,9 +119,9 @@ fn log_loss(trained: &Counts, held: &Counts, alpha: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn table(cells: &[f64]) -> Counts {
+    fn table(cells: &[f64]) -> CountTable {
         let columns: Vec<String> = (0..cells.len()).map(|i| i.to_string()).collect();
-        let mut counts = Counts::new("t", &["row".to_string()], &columns);
+        let mut counts = CountTable::new("t", &["row".to_string()], &columns);
         for (column, count) in cells.iter().enumerate() {
             counts.add(0, column, *count);
         }
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_test_is_pearsons_for_a_two_by_two_table() {
         // 30/20 against 20/30: chi-square 4, one degree of freedom, p = 0.0455.
-        let fit = fit(&table(&[30.0, 20.0]), &table(&[20.0, 30.0]), 0.0);
+        let fit = holdout_test(&table(&[30.0, 20.0]), &table(&[20.0, 30.0]), 0.0);
         assert!((fit.chi_square - 4.0).abs() < 1e-12);
         assert_eq!(fit.degrees_of_freedom, 1);
         assert!((fit.p_value - 0.045_500).abs() < 1e-6);
@@ -148,17 +148,17 @@ mod tests {
 
     #[test]
     fn rare_cells_are_pooled_and_an_empty_part_tests_nothing() {
-        let fit_rare = fit(&table(&[96.0, 3.0, 1.0]), &table(&[95.0, 2.0, 3.0]), 0.5);
+        let fit_rare = holdout_test(&table(&[96.0, 3.0, 1.0]), &table(&[95.0, 2.0, 3.0]), 0.5);
         assert_eq!(fit_rare.degrees_of_freedom, 0);
         assert_eq!(fit_rare.p_value, 1.0);
-        let empty = fit(&table(&[5.0, 5.0]), &table(&[0.0, 0.0]), 0.5);
+        let empty = holdout_test(&table(&[5.0, 5.0]), &table(&[0.0, 0.0]), 0.5);
         assert_eq!((empty.degrees_of_freedom, empty.log_loss), (0, None));
     }
 
     #[test]
     fn an_outcome_held_impossible_has_no_finite_loss_unless_smoothed() {
         let (trained, held) = (table(&[10.0, 0.0]), table(&[9.0, 1.0]));
-        assert_eq!(fit(&trained, &held, 0.0).log_loss, None);
-        assert!(fit(&trained, &held, 0.5).log_loss.unwrap() > 0.3);
+        assert_eq!(holdout_test(&trained, &held, 0.0).log_loss, None);
+        assert!(holdout_test(&trained, &held, 0.5).log_loss.unwrap() > 0.3);
     }
 }

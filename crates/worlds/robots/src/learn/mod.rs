@@ -1,6 +1,6 @@
 //! Learns a real robot's sensor and effector errors from its logs.
 //!
-//! Reads logs through [`sidestep_import`], counts ([`Counts`]), and writes the result as a profile
+//! Reads logs through [`sidestep_import`], counts ([`CountTable`]), and writes the result as a profile
 //! that a scenario loads by name ([`profile`]). [`sensor`] learns confusion, distance and
 //! detection; [`effector`] learns the real motion after a commanded move or turn.
 //!
@@ -22,14 +22,14 @@ mod closed_loop;
 #[cfg(test)]
 mod oracle;
 
-pub use counts::{CountMatrix, Counts, Estimate, ThinRow};
+pub use counts::{CountMatrix, CountTable, Estimate, LowCountRow};
 
 use serde::Serialize;
 
 use sidestep_kernel::InputError;
 
 /// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows overflow.
-pub const MOST_ALPHA: f64 = 1e9;
+pub const MAX_ALPHA: f64 = 1e9;
 
 /// The rule by which counts become probabilities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -54,11 +54,11 @@ impl EstimateOptions {
     /// Checks that the options are valid.
     ///
     /// # Errors
-    /// When `alpha` is negative or above [`MOST_ALPHA`], or `hold_out_every` is below 2.
+    /// When `alpha` is negative or above [`MAX_ALPHA`], or `hold_out_every` is below 2.
     pub fn check(&self) -> Result<(), InputError> {
-        if !(0.0..=MOST_ALPHA).contains(&self.alpha) {
+        if !(0.0..=MAX_ALPHA).contains(&self.alpha) {
             let cause = format!("{:?} cannot be added to a count", self.alpha);
-            let remedy = format!("give a number from 0 to {MOST_ALPHA}, such as 0.5");
+            let remedy = format!("give a number from 0 to {MAX_ALPHA}, such as 0.5");
             return Err(InputError::new("alpha", cause, remedy));
         }
         if self.hold_out_every < 2 {

@@ -1,14 +1,14 @@
 //! Poses over time and relative to each other (rule L1).
 
-use sidestep_import::mrclam::TruePose;
+use sidestep_import::mrclam::StampedPose2;
 use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 
 /// Motion capture with a wider gap than this says nothing about the time between.
-const BRACKET_SECS_MAX: f64 = 0.5;
+const MAX_INTERPOLATION_SECS: f64 = 0.5;
 
 /// A pose in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pose {
+pub(crate) struct Pose2 {
     pub(crate) x_m: f64,
     pub(crate) y_m: f64,
     pub(crate) heading_rad: f64,
@@ -16,36 +16,36 @@ pub(crate) struct Pose {
 
 /// A displacement in the frame of the pose it starts from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Motion {
+pub(crate) struct Displacement2 {
     pub(crate) ahead_m: f64,
     pub(crate) left_m: f64,
     /// The turn to the left, in [-pi, pi).
     pub(crate) turn_rad: f64,
 }
 
-impl From<[f64; 3]> for Pose {
+impl From<[f64; 3]> for Pose2 {
     fn from([x_m, y_m, heading_rad]: [f64; 3]) -> Self {
         Self { x_m, y_m, heading_rad }
     }
 }
 
-impl From<TruePose> for Pose {
-    fn from(TruePose { position_m: [x_m, y_m], heading_rad, .. }: TruePose) -> Self {
+impl From<StampedPose2> for Pose2 {
+    fn from(StampedPose2 { position_m: [x_m, y_m], heading_rad, .. }: StampedPose2) -> Self {
         Self { x_m, y_m, heading_rad }
     }
 }
 
-impl From<Pose> for [f64; 3] {
-    fn from(pose: Pose) -> Self {
+impl From<Pose2> for [f64; 3] {
+    fn from(pose: Pose2) -> Self {
         [pose.x_m, pose.y_m, pose.heading_rad]
     }
 }
 
-impl Pose {
+impl Pose2 {
     /// Returns the pose after a motion from here.
-    pub(crate) fn after(&self, motion: &Motion) -> Pose {
+    pub(crate) fn compose(&self, motion: &Displacement2) -> Pose2 {
         let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
-        Pose {
+        Pose2 {
             x_m: self.x_m + c * motion.ahead_m - s * motion.left_m,
             y_m: self.y_m + s * motion.ahead_m + c * motion.left_m,
             heading_rad: wrap_angle(self.heading_rad + motion.turn_rad),
@@ -53,10 +53,10 @@ impl Pose {
     }
 
     /// Returns the motion from here to `to`.
-    pub(crate) fn motion_to(&self, to: &Pose) -> Motion {
+    pub(crate) fn motion_to(&self, to: &Pose2) -> Displacement2 {
         let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
         let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));
-        Motion {
+        Displacement2 {
             ahead_m: c * dx + s * dy,
             left_m: c * dy - s * dx,
             turn_rad: wrap_angle(to.heading_rad - self.heading_rad),
@@ -64,7 +64,7 @@ impl Pose {
     }
 
     /// Returns the range in meters and the bearing in radians (+ = left) of a point.
-    pub(crate) fn sees(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+    pub(crate) fn range_and_bearing(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
         let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
         (hypot(dx, dy), wrap_angle(atan2(dy, dx) - self.heading_rad))
     }
@@ -72,21 +72,22 @@ impl Pose {
 
 /// Returns the pose at `t_secs`: linear between the two samples around it, the heading along the
 /// shorter arc. `None` outside the track and inside a gap wider than 0.5 s.
-pub(crate) fn pose_at(track: &[TruePose], t_secs: f64) -> Option<Pose> {
+pub(crate) fn pose_at(track: &[StampedPose2], t_secs: f64) -> Option<Pose2> {
     let after = track.partition_point(|sample| sample.t_secs < t_secs);
     let end = track.get(after)?;
     if after == 0 || end.t_secs == t_secs {
-        return (end.t_secs == t_secs).then(|| between(end, end, 0.0));
+        return (end.t_secs == t_secs).then(|| interpolate(end, end, 0.0));
     }
     let start = &track[after - 1];
     let gap_secs = end.t_secs - start.t_secs;
-    (gap_secs <= BRACKET_SECS_MAX).then(|| between(start, end, (t_secs - start.t_secs) / gap_secs))
+    (gap_secs <= MAX_INTERPOLATION_SECS)
+        .then(|| interpolate(start, end, (t_secs - start.t_secs) / gap_secs))
 }
 
-fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
+fn interpolate(start: &StampedPose2, end: &StampedPose2, fraction: f64) -> Pose2 {
     let mix = |a: f64, b: f64| a + fraction * (b - a);
     let arc_rad = wrap_angle(end.heading_rad - start.heading_rad);
-    Pose {
+    Pose2 {
         x_m: mix(start.position_m[0], end.position_m[0]),
         y_m: mix(start.position_m[1], end.position_m[1]),
         heading_rad: wrap_angle(start.heading_rad + fraction * arc_rad),
@@ -95,25 +96,25 @@ fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
 
 /// A step of a track is a gap when it is this many times the usual one, and longer than poses are interpolated
 /// across.
-const GAP_STEPS: f64 = 3.0;
+const GAP_FACTOR: f64 = 3.0;
 
 /// The gaps of a track: the times after which the next pose comes too late to interpolate between the two.
 pub(crate) struct Gaps(Vec<f64>);
 
 impl Gaps {
-    pub(crate) fn of(track: &[TruePose]) -> Self {
-        let step_secs = |pair: &[TruePose]| pair[1].t_secs - pair[0].t_secs;
+    pub(crate) fn from_track(track: &[StampedPose2]) -> Self {
+        let step_secs = |pair: &[StampedPose2]| pair[1].t_secs - pair[0].t_secs;
         let mut steps_secs: Vec<f64> = track.windows(2).map(step_secs).collect();
         steps_secs.sort_by(f64::total_cmp);
         // A simulation with a cycle a second has no gaps between its cycles.
         let usual_secs = steps_secs.get(steps_secs.len() / 2).copied().unwrap_or(0.0);
-        let most_secs = BRACKET_SECS_MAX.max(GAP_STEPS * usual_secs);
+        let most_secs = MAX_INTERPOLATION_SECS.max(GAP_FACTOR * usual_secs);
         let gaps = track.windows(2).filter(|pair| step_secs(pair) > most_secs);
         Self(gaps.map(|pair| pair[0].t_secs).collect())
     }
 
     /// Returns the number of gaps that begin before a time.
-    pub(crate) fn before(&self, t_secs: f64) -> usize {
+    pub(crate) fn count_before(&self, t_secs: f64) -> usize {
         self.0.partition_point(|begin| *begin < t_secs)
     }
 }
@@ -123,8 +124,8 @@ mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, PI};
 
-    fn sample(t_secs: f64, x_m: f64, heading_rad: f64) -> TruePose {
-        TruePose { t_secs, position_m: [x_m, 0.0], heading_rad }
+    fn sample(t_secs: f64, x_m: f64, heading_rad: f64) -> StampedPose2 {
+        StampedPose2 { t_secs, position_m: [x_m, 0.0], heading_rad }
     }
 
     #[test]
@@ -148,14 +149,14 @@ mod tests {
 
     #[test]
     fn motion_is_told_in_the_start_frame() {
-        let start = Pose::from([1.0, 1.0, FRAC_PI_2]);
-        let motion = start.motion_to(&Pose::from([0.0, 3.0, PI]));
+        let start = Pose2::from([1.0, 1.0, FRAC_PI_2]);
+        let motion = start.motion_to(&Pose2::from([0.0, 3.0, PI]));
         assert!((motion.ahead_m - 2.0).abs() < 1e-12);
         assert!((motion.left_m - 1.0).abs() < 1e-12);
         assert!((motion.turn_rad - FRAC_PI_2).abs() < 1e-12);
-        let end = start.after(&motion);
+        let end = start.compose(&motion);
         assert!((end.x_m - 0.0).abs() < 1e-12 && (end.y_m - 3.0).abs() < 1e-12, "{end:?}");
-        let (range_m, bearing_rad) = start.sees([0.0, 1.0]);
+        let (range_m, bearing_rad) = start.range_and_bearing([0.0, 1.0]);
         assert!((range_m - 1.0).abs() < 1e-12 && (bearing_rad - FRAC_PI_2).abs() < 1e-12);
     }
 }

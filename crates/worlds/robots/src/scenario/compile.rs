@@ -1,19 +1,19 @@
 //! Compilation of a scenario's text to an immutable world and the start of every body.
 
 mod bodies;
-pub(super) mod idle;
 mod map;
 mod people_and_doors;
 mod placer;
 mod remarks;
 mod robots;
+pub(super) mod unused_keys;
 
 use self::map::{load_map, padded};
-use self::placer::Placed;
+use self::placer::Placement;
 pub(super) use self::placer::Placer;
 use super::kinds::Kinds;
-use super::located::Located;
-use super::placing::{Floor, Obstacle};
+use super::located_section::LocatedSection;
+use super::placement_grid::{PlacementError, PlacementGrid};
 use super::random;
 use super::tables;
 use super::{
@@ -21,25 +21,25 @@ use super::{
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
 use crate::decide::{
-    Announce, Avoidance, Behaviour, External, Goto, Patient, Planner, Replay, Sector, Shuttle,
-    Trust, Wander,
+    Announce, Avoidance, Behaviour, External, Goto, Planner, Replay, Sector, SensorTrust, Shuttle,
+    StallDetector, Wander,
 };
 use crate::effector::{
-    Action, EffectorModel, FORWARD, MAX_PATH, ObstacleRule, Transition, own_boxes,
+    Action, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition, own_boxes,
 };
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
 use crate::world::{
-    BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, Regime, RobotBody, RobotModel,
-    RobotsWorld, Role, StorageOrder,
+    BEAM_CHUNK_BOXES, Body, BodyType, Door, MountedSensor, Mover, Radio, Regime, RobotBody,
+    RobotModel, RobotsWorld, Role, StorageOrder,
 };
-use sidestep_kernel::distr::Chance;
+use sidestep_kernel::distr::Bernoulli;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{Head, Remark, Source, Spanned, nearest};
+use sidestep_scenario::{Head, Remark, Source, Spanned, suggestion};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ use std::sync::Arc;
 /// Largest number of bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;
 /// Number of cycles of a run where the scenario does not give it.
-const CYCLES: u64 = 10_000;
+const DEFAULT_CYCLES: u64 = 10_000;
 const MAX_RANGE_BOXES: f64 = 4096.0;
 
 /// Behaviors that the library's user adds, by the name that a scenario gives them.
@@ -99,7 +99,7 @@ impl Compiled {
 impl Compiled {
     /// Returns whether every run draws: errors of sensors and effectors, people, doors, a radio, or places at the
     /// start, as far as another seed gives others.
-    pub(crate) fn draws_always(&self) -> bool {
+    pub(crate) fn is_always_random(&self) -> bool {
         let RobotsWorld { regime, types, radio, .. } = &*self.world;
         let is_robot = |ty: &BodyType| matches!(ty.role, Role::Robot(_));
         if *regime != Regime::Reliable || radio.is_some() || !types.iter().all(is_robot) {
@@ -144,12 +144,12 @@ impl<'a> Compiler<'a> {
         // Where the map is wrong as well, this is the error that is reported.
         check_names(&source, &file, &sensors, &effectors)?;
         let (map, office_doors) = load_map(&source, &file.map)?;
-        idle::refuse(&source, &file, own, !office_doors.is_empty())?;
+        unused_keys::refuse_unused(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
         remarks::refuse_other_boxes(&source, &file, map.box_size_m, &effectors)?;
-        let mut remarks = remarks::on_effectors(&file, &effectors);
-        remarks.extend(remarks::on_radio(&file));
+        let mut remarks = remarks::effector_remarks(&file, &effectors);
+        remarks.extend(remarks::radio_remark(&file));
         let streams = Streams::new(Seed(head.seed));
         let border = border(&file, &effectors);
         Ok(Self {
@@ -178,7 +178,7 @@ impl<'a> Compiler<'a> {
         let placer = Placer { source, map, groups, sizes };
         let placed = placer.place(&self.streams)?;
         let firsts = placer.first_ids();
-        self.warn_of_goals(placer.groups.iter().zip(firsts).take(robots), &placed);
+        self.warn_of_unreachable_goals(placer.groups.iter().zip(firsts).take(robots), &placed);
         self.finish(order, placer, placed)
     }
 
@@ -186,14 +186,14 @@ impl<'a> Compiler<'a> {
         self,
         order: StorageOrder,
         placer: Placer,
-        placed: Placed,
+        placed: Placement,
     ) -> Result<Compiled, InputError> {
         let is_robot = |b: &&Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
         let robots = placed.bodies.iter().filter(is_robot).map(|b| b.id).collect();
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
-        let has_asks = self.has_asks();
+        let has_asks = self.has_requests();
         let kind_rank = self.kind_rank()?;
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -217,13 +217,13 @@ impl<'a> Compiler<'a> {
         };
         world.teams = Arc::new(world.find_teams());
         let mut remarks = self.remarks;
-        remarks.extend(crate::law::no_contacts(&world));
+        remarks.extend(crate::contact_remarks::no_contact_remarks(&world));
         Ok(Compiled {
             world: Arc::new(world),
             start: placed.start.into(),
             name: self.head.name,
             seed: self.head.seed,
-            cycles: self.head.cycles.unwrap_or(CYCLES),
+            cycles: self.head.cycles.unwrap_or(DEFAULT_CYCLES),
             record: self.file.record,
             remarks,
             placer: Arc::new(placer),
@@ -235,8 +235,8 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns whether some robots ask each other to make room.
-    fn has_asks(&self) -> bool {
-        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
+    fn has_requests(&self) -> bool {
+        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.has_requests());
         self.types.iter().any(asks)
     }
 
@@ -268,7 +268,7 @@ fn border(file: &RobotsFile, effectors: &Effectors) -> u32 {
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
     let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
     let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.0.len());
-    steps.max().unwrap_or(1).clamp(BEAM_STEP, MAX_PATH) as u32
+    steps.max().unwrap_or(1).clamp(BEAM_CHUNK_BOXES, MAX_PATH_STEPS) as u32
 }
 
 /// Returns every action at every heading, see `BodyType::actions`.
@@ -290,8 +290,8 @@ fn check_tables(kinds: &Kinds, sensors: &Sensors, effectors: &Effectors) -> Resu
     effectors.iter().try_for_each(|(name, at)| tables::effector(name, at).map(drop))
 }
 
-type Sensors = BTreeMap<String, Located<SensorSection>>;
-type Effectors = BTreeMap<String, Located<EffectorSection>>;
+type Sensors = BTreeMap<String, LocatedSection<SensorSection>>;
+type Effectors = BTreeMap<String, LocatedSection<EffectorSection>>;
 
 /// Refuses robots with unknown sensors or effectors.
 fn check_names(
@@ -302,23 +302,23 @@ fn check_names(
 ) -> Result<(), InputError> {
     for robots in file.robots.0.iter().map(Spanned::get_ref) {
         let mut names = robots.sensors.iter();
-        names.try_for_each(|name| named(source, sensors, name, "sensor").map(drop))?;
+        names.try_for_each(|name| find_named(source, sensors, name, "sensor").map(drop))?;
         let mut name = robots.effector.iter();
-        name.try_for_each(|name| named(source, effectors, name, "effector").map(drop))?;
+        name.try_for_each(|name| find_named(source, effectors, name, "effector").map(drop))?;
     }
     Ok(())
 }
 
-fn named<'m, T>(
+fn find_named<'m, T>(
     source: &Source,
-    all: &'m BTreeMap<String, Located<T>>,
+    all: &'m BTreeMap<String, LocatedSection<T>>,
     name: &Spanned<String>,
     what: &str,
-) -> Result<&'m Located<T>, InputError> {
+) -> Result<&'m LocatedSection<T>, InputError> {
     all.get(name.get_ref()).ok_or_else(|| {
         let known: Vec<&str> = all.keys().map(String::as_str).collect();
         let cause = format!("unknown {what} `{}`", name.get_ref());
-        source.error(name.span(), cause, nearest(name.get_ref(), &known))
+        source.error(name.span(), cause, suggestion(name.get_ref(), &known))
     })
 }
 
@@ -334,7 +334,7 @@ fn known_tables(
         let profile = Source::read(&source.path(named.get_ref()), &[]);
         let added = profile
             .and_then(|profile| add_profile(Arc::new(profile), &mut sensors, &mut effectors));
-        added.map_err(|error| source.naming(named.span(), error))?;
+        added.map_err(|error| source.with_key_at(named.span(), error))?;
     }
     add_all(source, &file.sensors, &mut sensors);
     add_all(source, &file.effectors, &mut effectors);
@@ -360,10 +360,13 @@ fn add_profile(
 fn add_all<T: Clone>(
     source: &Arc<Source>,
     from: &BTreeMap<String, Spanned<T>>,
-    into: &mut BTreeMap<String, Located<T>>,
+    into: &mut BTreeMap<String, LocatedSection<T>>,
 ) {
     for (name, section) in from {
-        into.insert(name.clone(), Located { section: section.clone(), source: Arc::clone(source) });
+        into.insert(
+            name.clone(),
+            LocatedSection { section: section.clone(), source: Arc::clone(source) },
+        );
     }
 }
 

@@ -1,9 +1,9 @@
 //! The kinds of a scenario: the observation that each designates, and the kinds that a sensor can meet.
 
-use super::located::Located;
+use super::located_section::LocatedSection;
 use super::{RobotsFile, SensorSection};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{Source, Spanned, nearest};
+use sidestep_scenario::{Source, Spanned, suggestion};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ struct Kind {
 }
 
 /// A section of bodies of one kind.
-struct Bodies<'f> {
+struct BodySection<'f> {
     kind: &'f Spanned<String>,
     span: Range<usize>,
     are_there: bool,
@@ -46,7 +46,7 @@ impl Kinds {
             Self { source: Arc::clone(source), all: BUILT_IN.into_iter().map(named).collect() };
         kinds.all[WALL].is_met = true;
         for (name, section) in &file.kinds {
-            let k = kinds.own(name)?;
+            let k = kinds.own_index(name)?;
             let kind = &mut kinds.all[k];
             kind.span = Some(name.span());
             if let Some(observation) = &section.observation {
@@ -55,12 +55,12 @@ impl Kinds {
                 kind.span = Some(observation.span());
             }
         }
-        kinds.see(file)?;
+        kinds.record_used(file)?;
         Ok(kinds)
     }
 
     /// Returns the number of a kind with a section of its own, which may be new.
-    fn own(&mut self, name: &Spanned<String>) -> Result<usize, InputError> {
+    fn own_index(&mut self, name: &Spanned<String>) -> Result<usize, InputError> {
         let error = |cause: &str, remedy: &str| Err(self.source.error(name.span(), cause, remedy));
         if name.get_ref() == BUILT_IN[0] {
             return error("`free` is no kind", "name the kind otherwise");
@@ -77,9 +77,9 @@ impl Kinds {
     }
 
     /// Notes the kinds that occur, and refuses own kinds that no section names.
-    fn see(&mut self, file: &RobotsFile) -> Result<(), InputError> {
+    fn record_used(&mut self, file: &RobotsFile) -> Result<(), InputError> {
         let mut is_named = vec![false; self.all.len()];
-        for bodies in bodies(file) {
+        for bodies in body_sections(file) {
             let k = usize::from(self.number(bodies.kind)?);
             is_named[k] = true;
             let kind = &mut self.all[k];
@@ -90,7 +90,7 @@ impl Kinds {
         idle.map_or(Ok(()), |k| {
             let Kind { name, span, .. } = &self.all[k];
             let cause = format!("no body is of the kind `{name}`");
-            let remedy = format!("{}; or name it by `kind`", nearest(name, &BUILT_IN[WALL..]));
+            let remedy = format!("{}; or name it by `kind`", suggestion(name, &BUILT_IN[WALL..]));
             Err(self.source.error(span.clone(), cause, remedy))
         })
     }
@@ -106,7 +106,7 @@ impl Kinds {
         }
         let known: Vec<&str> = self.all.iter().skip(WALL).map(|kind| kind.name.as_str()).collect();
         let cause = format!("unknown kind `{}`", name.get_ref());
-        let remedy = nearest(name.get_ref(), &known) + "; new kinds are made by [kinds.NAME]";
+        let remedy = suggestion(name.get_ref(), &known) + "; new kinds are made by [kinds.NAME]";
         Err(self.source.error(name.span(), cause, remedy))
     }
 
@@ -120,10 +120,10 @@ impl Kinds {
     ///
     /// # Errors
     /// When it can meet a kind that it does not know.
-    pub(super) fn designated(
+    pub(super) fn designations(
         &self,
         sensor: &str,
-        at: &Located<SensorSection>,
+        at: &LocatedSection<SensorSection>,
         is_mounted: bool,
     ) -> Result<Vec<u8>, InputError> {
         let section = at.section.get_ref();
@@ -135,7 +135,9 @@ impl Kinds {
         };
         let designated = |kind: &Kind| match index(kind) {
             Some(index) => Ok(index as u8),
-            None if kind.is_met && is_mounted => Err(self.unknown_to(sensor, at, kind)),
+            None if kind.is_met && is_mounted => {
+                Err(self.no_observation_for_kind(sensor, at, kind))
+            }
             None => Ok(0),
         };
         let rest = self.all.iter().skip(WALL).map(designated);
@@ -144,15 +146,20 @@ impl Kinds {
 
     /// Returns the error for a kind that a sensor meets and does not know, at the key that names
     /// the wrong observation, or where one is missing.
-    fn unknown_to(&self, sensor: &str, at: &Located<SensorSection>, kind: &Kind) -> InputError {
+    fn no_observation_for_kind(
+        &self,
+        sensor: &str,
+        at: &LocatedSection<SensorSection>,
+        kind: &Kind,
+    ) -> InputError {
         let Kind { name, observation, .. } = kind;
         let list = &at.section.get_ref().observations;
         let known: Vec<&str> = list.get_ref().iter().map(String::as_str).collect();
         let cause =
             format!("sensor `{sensor}` has no observation `{observation}` for the kind `{name}`");
-        let nearest = nearest(observation, &known);
+        let nearest = suggestion(observation, &known);
         // Presets and profiles serve many scenarios, so they are not the place to change.
-        match (&kind.span, self.stand_in(at) && !kind.is_mapped) {
+        match (&kind.span, self.is_in_scenario(at) && !kind.is_mapped) {
             (Some(span), false) => {
                 let remedy = format!(
                     "{nearest}; write [kinds.{name}] with one of them as `observation`: \
@@ -171,7 +178,7 @@ impl Kinds {
     }
 
     /// Returns whether a table stands in the scenario itself.
-    pub(super) fn stand_in<T>(&self, at: &Located<T>) -> bool {
+    pub(super) fn is_in_scenario<T>(&self, at: &LocatedSection<T>) -> bool {
         Arc::ptr_eq(&at.source, &self.source)
     }
 
@@ -179,31 +186,34 @@ impl Kinds {
     ///
     /// # Errors
     /// When there is no such kind.
-    pub(super) fn check_designates(&self, at: &Located<SensorSection>) -> Result<(), InputError> {
+    pub(super) fn check_designates(
+        &self,
+        at: &LocatedSection<SensorSection>,
+    ) -> Result<(), InputError> {
         let known: Vec<&str> = self.all.iter().skip(WALL).map(|kind| kind.name.as_str()).collect();
         let own = at.section.get_ref().designates.keys();
         let unknown = own.into_iter().find(|kind| !known.contains(&kind.get_ref().as_str()));
         unknown.map_or(Ok(()), |kind| {
             let cause = format!("unknown kind `{}`", kind.get_ref());
-            Err(at.error(kind.span(), cause, &nearest(kind.get_ref(), &known)))
+            Err(at.error(kind.span(), cause, &suggestion(kind.get_ref(), &known)))
         })
     }
 }
 
 /// Returns the kinds of all sections of bodies.
-fn bodies(file: &RobotsFile) -> impl Iterator<Item = Bodies<'_>> {
+fn body_sections(file: &RobotsFile) -> impl Iterator<Item = BodySection<'_>> {
     let some = |count: &Option<Spanned<u32>>| count.as_ref().is_none_or(|n| *n.get_ref() > 0);
-    let robots = file.robots.0.iter().map(move |s| Bodies {
+    let robots = file.robots.0.iter().map(move |s| BodySection {
         kind: &s.get_ref().kind,
         span: s.span(),
         are_there: some(&s.get_ref().count),
     });
-    let people = file.people.0.iter().map(move |s| Bodies {
+    let people = file.people.0.iter().map(move |s| BodySection {
         kind: &s.get_ref().kind,
         span: s.span(),
         are_there: some(&s.get_ref().count),
     });
-    let doors = file.doors.0.iter().map(|s| Bodies {
+    let doors = file.doors.0.iter().map(|s| BodySection {
         kind: &s.get_ref().kind,
         span: s.span(),
         are_there: true,

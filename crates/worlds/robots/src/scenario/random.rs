@@ -2,15 +2,18 @@
 
 use super::BehaviourSection;
 use crate::decide::Random;
-use sidestep_scenario::nearest;
+use sidestep_scenario::suggestion;
 use std::collections::BTreeMap;
 
 /// Cause and remedy of an error in a behavior; the caller knows the place.
-pub(super) type Wrong = (String, String);
+pub(super) type UnlocatedError = (String, String);
 
 /// Returns the behavior. Without weights the standard actions are equally likely; after a contact
 /// the same weights hold unless others are given.
-pub(super) fn behaviour(s: &BehaviourSection, actions: &[String]) -> Result<Random, Wrong> {
+pub(super) fn behaviour(
+    s: &BehaviourSection,
+    actions: &[String],
+) -> Result<Random, UnlocatedError> {
     let Some(usual) = &s.weights else {
         return match &s.weights_after_contact {
             None => Ok(Random::uniform()),
@@ -26,7 +29,7 @@ pub(super) fn behaviour(s: &BehaviourSection, actions: &[String]) -> Result<Rand
 }
 
 /// Returns weights by the actions' names as probabilities by their ids.
-fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, Wrong> {
+fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, UnlocatedError> {
     let sum: f64 = weights.values().sum();
     if !(sum > 0.0 && sum.is_finite() && weights.values().all(|w| *w >= 0.0)) {
         let cause = "a negative weight, or weights that are all 0 or beyond all numbers";
@@ -40,10 +43,10 @@ fn row(weights: &BTreeMap<String, f64>, actions: &[String]) -> Result<Vec<f64>, 
 }
 
 /// Returns the index of an action among those of an effector.
-pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Wrong> {
+pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, UnlocatedError> {
     actions.iter().position(|action| action == name).ok_or_else(|| {
         let known: Vec<&str> = actions.iter().map(String::as_str).collect();
-        (format!("unknown action `{name}`"), nearest(name, &known))
+        (format!("unknown action `{name}`"), suggestion(name, &known))
     })
 }
 
@@ -51,7 +54,7 @@ pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Wrong> 
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Random, Wrong> {
+    fn read(text: &str) -> Result<Random, UnlocatedError> {
         let section: BehaviourSection = toml::from_str(text).expect("a section");
         behaviour(&section, &["forward", "left", "right", "stay", "spin"].map(String::from))
     }

@@ -1,6 +1,6 @@
 //! The JSON Schema of the sections.
 
-use super::compile::idle::BEHAVIOURS;
+use super::compile::unused_keys::BEHAVIOURS;
 use super::kinds::BUILT_IN;
 use super::{Behaviours, ProfileFile, RobotsFile, presets};
 use serde_json::Value;
@@ -8,18 +8,18 @@ use sidestep_scenario::{FORMAT, Source, schema};
 
 /// Returns the schema of a scenario's sections; `own` are behaviors beside the built-in ones.
 pub(crate) fn sections(own: &Behaviours) -> Value {
-    let mut sections = schema::of::<RobotsFile>();
+    let mut sections = schema::for_type::<RobotsFile>();
     let profile = Source::new("presets", presets(), "").parse::<ProfileFile>();
     let profile = profile.expect("the presets are read in a test");
     let sensors: Vec<&str> = profile.sensors.keys().map(String::as_str).collect();
     let effectors = profile.effectors.keys().map(String::as_str);
     let effectors: Vec<&str> = effectors.collect();
-    schema::names(&mut sections, "robots.sensors", "sensors", &sensors);
-    schema::names(&mut sections, "robots.effector", "effectors", &effectors);
+    schema::mark_as_names(&mut sections, "robots.sensors", "sensors", &sensors);
+    schema::mark_as_names(&mut sections, "robots.effector", "effectors", &effectors);
     for bodies in ["robots", "people", "doors"] {
-        schema::names(&mut sections, &format!("{bodies}.kind"), "kinds", &BUILT_IN[1..]);
+        schema::mark_as_names(&mut sections, &format!("{bodies}.kind"), "kinds", &BUILT_IN[1..]);
     }
-    schema::names(&mut sections, "kind_order", "kinds", &BUILT_IN[1..]);
+    schema::mark_as_names(&mut sections, "kind_order", "kinds", &BUILT_IN[1..]);
     let own = own.keys().map(String::as_str);
     let behaviours: Vec<&str> = BEHAVIOURS.iter().map(|(kind, _)| *kind).chain(own).collect();
     sections["$defs"]["BehaviourSection"]["properties"]["kind"]["enum"] = behaviours.into();
@@ -28,7 +28,7 @@ pub(crate) fn sections(own: &Behaviours) -> Value {
 
 /// Returns the schema of a profile, a file of sensors and effectors; `scenario` has the words for their keys.
 pub(crate) fn profile(scenario: &str) -> Value {
-    let mut keys = schema::of::<ProfileFile>();
+    let mut keys = schema::for_type::<ProfileFile>();
     keys["properties"]["format"]["const"] = FORMAT.into();
-    schema::of_file("A profile: sensors and effectors of robots", keys, scenario)
+    schema::for_file("A profile: sensors and effectors of robots", keys, scenario)
 }

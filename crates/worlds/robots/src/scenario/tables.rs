@@ -1,13 +1,13 @@
 //! Compilation of sensor and effector sections to checked models.
 
 use super::kinds::Kinds;
-use super::located::Located;
-use super::{EffectorSection, Rows, SensorSection, TransitionSection};
+use super::located_section::LocatedSection;
+use super::{EffectorSection, MatrixRows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
-use sidestep_scenario::{Spanned, nearest};
+use sidestep_scenario::{Spanned, suggestion};
 use std::collections::BTreeMap;
 
 /// Largest number of beams, observations, classes and actions, because readings name them with a
@@ -20,7 +20,7 @@ const MAX_BEAMS: usize = 1024;
 /// Checks a sensor and puts its rows in order.
 pub(super) fn sensor(
     name: &str,
-    at: &Located<SensorSection>,
+    at: &LocatedSection<SensorSection>,
     kinds: &Kinds,
     is_mounted: bool,
 ) -> Result<SensorModel, InputError> {
@@ -49,7 +49,7 @@ pub(super) fn sensor(
 /// Returns one matrix for each distance class and one beyond; a class without rows of its own has
 /// those that hold anywhere.
 fn confusion(
-    at: &Located<SensorSection>,
+    at: &LocatedSection<SensorSection>,
     observations: &[String],
     classes: &[String],
 ) -> Result<Vec<Vec<Vec<f64>>>, InputError> {
@@ -61,7 +61,7 @@ fn confusion(
         let index = names.position(|name| name == class.get_ref()).ok_or_else(|| {
             let known: Vec<&str> = classes.iter().map(String::as_str).collect();
             let cause = format!("unknown distance class `{}`", class.get_ref());
-            at.error(class.span(), cause, &nearest(class.get_ref(), &known))
+            at.error(class.span(), cause, &suggestion(class.get_ref(), &known))
         })?;
         for (row_name, row) in rows.get_ref() {
             let observation = position(at, "row", row_name, observations)?;
@@ -71,7 +71,7 @@ fn confusion(
     Ok(confusion)
 }
 
-fn observations(at: &Located<SensorSection>) -> Result<Vec<String>, InputError> {
+fn observations(at: &LocatedSection<SensorSection>) -> Result<Vec<String>, InputError> {
     let list = &at.section.get_ref().observations;
     let names = list.get_ref();
     if names.first().map(String::as_str) != Some("nothing") {
@@ -93,7 +93,7 @@ fn observations(at: &Located<SensorSection>) -> Result<Vec<String>, InputError> 
 }
 
 /// Returns edges and names of the distance classes; without edges there is one class, `near`.
-fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), InputError> {
+fn classes(at: &LocatedSection<SensorSection>) -> Result<(Vec<f64>, Vec<String>), InputError> {
     let s = at.section.get_ref();
     let edges = s.distance_edges_m.as_ref().map_or(vec![], |e| e.get_ref().clone());
     if let Some(list) = &s.distance_edges_m {
@@ -118,7 +118,10 @@ fn classes(at: &Located<SensorSection>) -> Result<(Vec<f64>, Vec<String>), Input
     Ok((edges, names))
 }
 
-fn check_class_names(at: &Located<SensorSection>, names: &[String]) -> Result<(), InputError> {
+fn check_class_names(
+    at: &LocatedSection<SensorSection>,
+    names: &[String],
+) -> Result<(), InputError> {
     let doubled = (1..names.len()).find(|&k| names[..k].contains(&names[k]));
     let cause = match doubled {
         _ if names.iter().any(|name| name == "beyond") => {
@@ -135,7 +138,7 @@ fn check_class_names(at: &Located<SensorSection>, names: &[String]) -> Result<()
 /// Returns rows over the classes. The row `beyond`, for spurious reports, may be left out and then
 /// puts all probability on the farthest class. Without any row every class is reported as it is.
 fn distance_confusion(
-    at: &Located<SensorSection>,
+    at: &LocatedSection<SensorSection>,
     classes: &[String],
 ) -> Result<Vec<Vec<f64>>, InputError> {
     let n = classes.len();
@@ -162,8 +165,8 @@ fn distance_confusion(
 }
 
 fn matrix(
-    at: &Located<SensorSection>,
-    rows: &Spanned<Rows>,
+    at: &LocatedSection<SensorSection>,
+    rows: &Spanned<MatrixRows>,
     row_names: &[String],
     columns: &[String],
 ) -> Result<Vec<Vec<f64>>, InputError> {
@@ -185,7 +188,7 @@ fn matrix(
 }
 
 fn position<T>(
-    at: &Located<T>,
+    at: &LocatedSection<T>,
     what: &str,
     name: &Spanned<String>,
     names: &[String],
@@ -195,13 +198,13 @@ fn position<T>(
         at.error(
             name.span(),
             format!("unknown {what} `{}`", name.get_ref()),
-            &nearest(name.get_ref(), &known),
+            &suggestion(name.get_ref(), &known),
         )
     })
 }
 
 fn checked_row<T>(
-    at: &Located<T>,
+    at: &LocatedSection<T>,
     name: &Spanned<String>,
     row: &Spanned<Vec<f64>>,
     columns: usize,
@@ -226,7 +229,7 @@ fn checked_row<T>(
 /// Returns this sensor's true observation of each kind.
 fn designates(
     sensor: &str,
-    at: &Located<SensorSection>,
+    at: &LocatedSection<SensorSection>,
     kinds: &Kinds,
     is_mounted: bool,
 ) -> Result<Vec<u8>, InputError> {
@@ -235,16 +238,16 @@ fn designates(
         position(at, "observation", observation, section.observations.get_ref())?;
     }
     // A profile may name kinds of other scenarios, but not a sensor in use.
-    if is_mounted || kinds.stand_in(at) {
+    if is_mounted || kinds.is_in_scenario(at) {
         kinds.check_designates(at)?;
     }
-    kinds.designated(sensor, at, is_mounted)
+    kinds.designations(sensor, at, is_mounted)
 }
 
 /// Checks an effector; `left`, `right` and `stay` are perfect where they are left out.
 pub(super) fn effector(
     name: &str,
-    at: &Located<EffectorSection>,
+    at: &LocatedSection<EffectorSection>,
 ) -> Result<EffectorModel, InputError> {
     let section = at.section.get_ref();
     let mut model = EffectorModel { name: name.into(), ..EffectorModel::perfect() };

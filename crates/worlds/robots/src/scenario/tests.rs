@@ -2,7 +2,7 @@
 
 use super::*;
 use sidestep_kernel::{InputError, Simulation as _};
-use sidestep_scenario::{Compiled as _, Remark, Severity, Source};
+use sidestep_scenario::{CompiledScenario as _, Remark, Severity, Source};
 use std::path::Path;
 
 const MAP: &str = "[map]\nascii = \".....\\n.....\\n.....\\n\"\nbox_size_m = 0.5\n";
@@ -23,7 +23,7 @@ fn assert_refused(text: &str, at: &str, words: &str) {
     let told = format!("{}; {}", error.cause(), error.remedy());
     assert!(told.contains(words), "{text}\n{told}");
     let offset = text.rfind(at).expect(at);
-    let wanted = InputError::new("", "", "").in_text(text, offset);
+    let wanted = InputError::new("", "", "").with_offset(text, offset);
     assert_eq!(error.position(), wanted.position(), "{text}\n{error}");
 }
 
@@ -229,7 +229,7 @@ fn seeds_decide_where_something_always_draws_and_otherwise_runs_tell() {
     let draws = |text: String| {
         let source = Source::new("s", text, "");
         let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
-        compiled.expect("valid").draws_always()
+        compiled.expect("valid").is_always_random()
     };
     let placed = "at = [[1, 1, 1], [9, 1, 2]]";
     assert!(!draws(text("reliable", placed, "")));

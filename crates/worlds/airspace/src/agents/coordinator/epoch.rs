@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 /// The largest number that an epoch or a hop may have: no talk comes near it, and a host that is
 /// told more has been told nonsense.
-const MOST: u32 = 1 << 24;
+const MAX_NUMBER: u32 = 1 << 24;
 
 /// The epoch of a coordinator: the same as long as its state only moves, and a newer one whenever
 /// it had to be brought back from a copy. It names the host that began it, so no two hosts begin the
@@ -32,38 +32,38 @@ impl PartialOrd for Epoch {
 
 impl Epoch {
     /// Returns the epoch in which all begin, without an election.
-    pub(super) fn first(owner: usize) -> Self {
+    pub(super) fn initial(owner: usize) -> Self {
         Self { number: 0, owner: owner as u16 }
     }
 
     /// Returns the start of the epoch, before the first hop.
-    pub(super) fn start(self) -> Position {
-        Position { epoch: self, hop: 0 }
+    pub(super) fn first_version(self) -> Version {
+        Version { epoch: self, hop: 0 }
     }
 
     /// Returns whether it can be an epoch of a group.
-    pub(super) fn is_of(self, group: usize) -> bool {
-        usize::from(self.owner) < group && self.number < MOST
+    pub(super) fn is_valid_for(self, group: usize) -> bool {
+        usize::from(self.owner) < group && self.number < MAX_NUMBER
     }
 }
 
 /// A point on a coordinator's journey: the epoch, and the number of hops in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub(super) struct Position {
+pub(super) struct Version {
     /// Its epoch.
     pub epoch: Epoch,
     /// Number of hops since the epoch began.
     pub hop: u32,
 }
 
-impl Position {
+impl Version {
     /// Returns the position after the next hop.
     pub(super) fn next(self) -> Self {
         Self { hop: self.hop + 1, ..self }
     }
 
-    pub(super) fn is_of(self, group: usize) -> bool {
-        self.epoch.is_of(group) && self.hop < MOST
+    pub(super) fn is_valid_for(self, group: usize) -> bool {
+        self.epoch.is_valid_for(group) && self.hop < MAX_NUMBER
     }
 }
 
@@ -84,7 +84,7 @@ mod tests {
         let mut all = [epoch(1, 2), epoch(0, 0), epoch(2, 3), epoch(1, 0), epoch(2, 1)];
         all.sort_unstable();
         assert_eq!(all, [epoch(0, 0), epoch(1, 2), epoch(1, 0), epoch(2, 3), epoch(2, 1)]);
-        assert!(epoch(1, 0).start() > epoch(1, 2).start().next());
+        assert!(epoch(1, 0).first_version() > epoch(1, 2).first_version().next());
     }
 
     #[test]

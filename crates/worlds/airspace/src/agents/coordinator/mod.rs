@@ -63,20 +63,20 @@
 //! copy, a delay beyond all patience) for a state in which (a), (b), (c) or (d) is wrong; `tests/chaos.rs` checks
 //! each tick on random networks; `tests/recovery.rs` measures how long it takes.
 
-mod aboard;
 mod check;
 mod election;
 mod epoch;
 mod host;
+mod hosted_aircraft;
+mod itinerary;
 mod messages;
-mod party;
-mod passenger;
-mod seat;
+mod migrating;
+mod participant;
+mod replica;
 mod state;
-mod tour;
 
-pub use party::Host;
-use passenger::{Here, Passenger, Rules, Ship, Step};
+use migrating::{CoordinatorStep, HostConfig, HostContext, HostServices, MigratingCoordinator};
+pub use participant::HostParticipant;
 
 #[cfg(test)]
 mod tests;

@@ -2,20 +2,20 @@
 //! algorithm on them.
 
 use super::epoch::Epoch;
-use crate::agents::contact::Beacon;
-use crate::agents::{Briefing, Decided, OwnShip};
+use crate::agents::traffic_state::StateBeacon;
+use crate::agents::{ActionChoice, CommonKnowledge, Ownship};
 use crate::flight::{Levels, Prediction};
-use crate::objective::{Options, couple, own_costs};
+use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
 use sidestep_kernel::interrupt;
 
 /// A coordinator's data about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Visited {
+pub(super) struct MemberData {
     /// Place of the airplane in the group.
     pub place: usize,
-    pub beacon: Option<Beacon>,
+    pub beacon: Option<StateBeacon>,
     /// Its learning player, when expectations are sampled.
     pub player: Option<Player>,
     /// Its samples of this round; the ways gathered in this tour are beside them.
@@ -27,23 +27,23 @@ pub(super) struct Visited {
     pub levels: Levels,
     /// Whether it could not be reached, so that its only way is presumed.
     pub is_presumed: bool,
-    pub decided: Option<Decided>,
+    pub decided: Option<ActionChoice>,
 }
 
 /// The data of a round, or of all of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Gathered {
+pub(super) struct RoundData {
     /// Number of rounds made, and of calm ones at the end of them.
     pub round: u32,
     pub calm: u32,
-    pub airplanes: Vec<Visited>,
+    pub airplanes: Vec<MemberData>,
     /// Whether the decisions are made.
     pub is_final: bool,
 }
 
 /// The next thing that a coordinator has to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Task {
+pub(super) enum CoordinatorTask {
     /// Visits the airplanes of its part from this one on.
     Gather(usize),
     /// Returns to the airplane that it comes from.
@@ -60,7 +60,7 @@ pub(super) enum Task {
 
 /// The data of a coordinator above others about their parts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Overview {
+pub(super) struct HierarchyData {
     /// The newest known epoch of each part's coordinator, which says where that one is at home.
     pub epochs: Vec<Epoch>,
     /// Whether each part is left out, because its coordinator cannot be found.
@@ -72,34 +72,34 @@ pub(super) struct Overview {
 /// A coordinator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Coordinator {
-    pub task: Task,
-    pub gathered: Gathered,
+    pub task: CoordinatorTask,
+    pub gathered: RoundData,
     /// Present only in the coordinator above others.
-    pub overview: Option<Overview>,
+    pub overview: Option<HierarchyData>,
 }
 
 /// Returns the number of samples in a round, where there are any.
-pub(super) fn block(briefing: &Briefing) -> Option<usize> {
+pub(super) fn samples_per_round(briefing: &CommonKnowledge) -> Option<usize> {
     match briefing.settings.estimator {
         Estimator::Exact => None,
         Estimator::Sampled { block, .. } => Some(block),
     }
 }
 
-impl Visited {
+impl MemberData {
     /// Returns an airplane that is not visited yet.
     pub(super) fn new(place: usize) -> Self {
         Self { place, ..Self::default() }
     }
 
     /// Reads the model of the airplane that the coordinator is on.
-    pub(super) fn see(&mut self, host: &OwnShip, round: u32) {
+    pub(super) fn record_model(&mut self, host: &Ownship, round: u32) {
         let options = &host.options;
         self.is_presumed = false;
         self.beacon = Some(host.beacon.clone());
         (self.separation_m, self.levels) = (options.separation_m, options.levels);
         let costs = own_costs(&host.briefing.objective, options);
-        let Some(block) = block(&host.briefing) else {
+        let Some(block) = samples_per_round(&host.briefing) else {
             self.ways.clone_from(&options.predictions);
             self.own_costs = costs;
             return;
@@ -111,8 +111,9 @@ impl Visited {
     }
 
     /// Presumes an airplane that is out of reach, as seen from another one.
-    pub(super) fn presume(&mut self, from: &OwnShip) {
-        let (options, block) = (from.presumed(self.place), block(&from.briefing));
+    pub(super) fn presume(&mut self, from: &Ownship) {
+        let (options, block) =
+            (from.presumed_predictions(self.place), samples_per_round(&from.briefing));
         self.is_presumed = true;
         (self.separation_m, self.levels) = (options.separation_m, options.levels);
         self.ways = vec![options.predictions[0].clone(); block.unwrap_or(1)];
@@ -121,17 +122,17 @@ impl Visited {
     }
 
     /// Forgets the ways and the results of samples, which are no longer needed after a round.
-    fn drop_ways(&mut self) {
+    fn clear_samples(&mut self) {
         self.ways.clear();
         self.own_costs.clear();
         self.samples.clear();
     }
 }
 
-impl Gathered {
+impl RoundData {
     /// Takes the step of the algorithm for which all have been visited. `is_late` says that time is
     /// nearly up, so that sampling ends.
-    pub(super) fn settle(&mut self, briefing: &Briefing, is_late: bool) {
+    pub(super) fn advance(&mut self, briefing: &CommonKnowledge, is_late: bool) {
         self.airplanes.sort_unstable_by_key(|airplane| airplane.place);
         match briefing.settings.estimator {
             Estimator::Exact => self.optimize(briefing),
@@ -139,18 +140,19 @@ impl Gathered {
                 self.sampled_round(briefing, block, ageing, is_late);
             }
         }
-        self.airplanes.iter_mut().for_each(Visited::drop_ways);
+        self.airplanes.iter_mut().for_each(MemberData::clear_samples);
     }
 
     /// Makes all rounds with exact expectations.
-    fn optimize(&mut self, briefing: &Briefing) {
-        let options = |a: &Visited| Options::new(a.ways.clone(), a.separation_m, a.levels);
-        let all: Vec<Options> = self.airplanes.iter().map(options).collect();
+    fn optimize(&mut self, briefing: &CommonKnowledge) {
+        let options =
+            |a: &MemberData| ActionPredictions::new(a.ways.clone(), a.separation_m, a.levels);
+        let all: Vec<ActionPredictions> = self.airplanes.iter().map(options).collect();
         let own = self.airplanes.iter().map(|airplane| airplane.own_costs.clone()).collect();
         let mut game = PairwiseGame::new(own);
         for i in 0..all.len() {
             for j in i + 1..all.len() {
-                couple(&mut game, &briefing.objective, [i, j], [&all[i], &all[j]]);
+                add_pair_costs(&mut game, &briefing.objective, [i, j], [&all[i], &all[j]]);
             }
         }
         let places: Vec<usize> = self.airplanes.iter().map(|a| a.place).collect();
@@ -159,24 +161,31 @@ impl Gathered {
         let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
         for (airplane, ((chosen, expected), chances)) in self.airplanes.iter_mut().zip(each) {
             let (rounds, converged) = (outcome.rounds, outcome.converged);
-            let decided = Decided { chosen, expected, rounds, converged, chances };
+            let decided = ActionChoice { chosen, expected, rounds, converged, chances };
             airplane.decided = (!airplane.is_presumed).then_some(decided);
         }
         self.is_final = true;
     }
 
     /// Makes a round with samples.
-    fn sampled_round(&mut self, briefing: &Briefing, block: usize, ageing: f64, is_late: bool) {
-        interrupt::look();
+    fn sampled_round(
+        &mut self,
+        briefing: &CommonKnowledge,
+        block: usize,
+        ageing: f64,
+        is_late: bool,
+    ) {
+        interrupt::check();
         let stop = briefing.settings.stop;
         let change = self.learn(briefing, block, ageing);
-        self.calm = stop.calm(self.calm, change);
+        self.calm = stop.count_calm_rounds(self.calm, change);
         self.round += 1;
         let is_over = self.calm >= stop.calm_rounds || self.round >= stop.max_rounds;
         if is_over || is_late {
             for airplane in self.airplanes.iter_mut().filter(|a| !a.is_presumed) {
                 let Some(player) = &airplane.player else { continue };
-                airplane.decided = briefing.decided(airplane.place, player, self.round, self.calm);
+                airplane.decided =
+                    briefing.action_choice(airplane.place, player, self.round, self.calm);
             }
             self.is_final = true;
         }
@@ -184,12 +193,12 @@ impl Gathered {
 
     /// Computes the costs once all ways of a round are known, summed in the same order as everywhere
     /// else, and updates every player. Returns the largest change of a probability.
-    fn learn(&mut self, briefing: &Briefing, block: usize, ageing: f64) -> f64 {
+    fn learn(&mut self, briefing: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
         let (objective, all) = (&briefing.objective, &self.airplanes);
         let part = |i: usize, k: usize| {
             let own = &all[i];
-            let minds = |other: &&Visited| {
-                other.place != own.place && other.levels.meets(&own.levels, objective.vertical_m)
+            let minds = |other: &&MemberData| {
+                other.place != own.place && other.levels.overlaps(&own.levels, objective.vertical_m)
             };
             all.iter().filter(minds).fold(own.own_costs[k], |sum, other| {
                 // Others are to keep farther away from one that is presumed.
@@ -201,8 +210,8 @@ impl Gathered {
         let total: Vec<f64> =
             (0..block).map(|k| (0..all.len()).fold(0.0, |sum, i| sum + part(i, k))).collect();
         let settings = briefing.settings;
-        let update = |airplane: &mut Visited| {
-            let Visited { player: Some(player), samples, .. } = airplane else { return 0.0 };
+        let update = |airplane: &mut MemberData| {
+            let MemberData { player: Some(player), samples, .. } = airplane else { return 0.0 };
             if samples.is_empty() {
                 return 0.0;
             }

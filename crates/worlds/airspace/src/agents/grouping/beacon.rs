@@ -1,22 +1,22 @@
 //! Beacons: messages of airplanes about themselves, before they know the others that they decide with.
 
-use crate::agents::party::{Unsound, are_places};
-use crate::flight::Pose;
-use crate::intruder::Intruder;
+use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
+use crate::flight::Pose2;
+use crate::non_cooperative::NonCooperative;
 use crate::shield::Side;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
 /// Bound on headings in messages, in radians.
-const FARTHEST_RAD: f64 = 1e6;
+const MAX_HEADING_RAD: f64 = 1e6;
 
 /// An airplane as others see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sighted {
+pub struct SurveillanceReport {
     /// The airplane.
     pub id: EntityId,
     /// Its pose, with the error of the cycle.
-    pub pose: Pose,
+    pub pose: Pose2,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// The side to which it turns, if it is seen to be on its stored orbit.
@@ -27,11 +27,11 @@ pub struct Sighted {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beacon {
     /// The sender, as all see it.
-    pub own: Sighted,
+    pub own: SurveillanceReport,
     /// Ids of those that it sees near it, rising.
     pub near: Vec<EntityId>,
     /// Airplanes near it that mind no other, by rising id.
-    pub intruders: Vec<Intruder>,
+    pub intruders: Vec<NonCooperative>,
 }
 
 /// A piece of knowledge about an airplane.
@@ -58,7 +58,7 @@ impl Item {
     }
 
     /// Checks its content, in a world of `airplanes` airplanes.
-    pub(super) fn check(&self, airplanes: usize) -> Result<(), Unsound> {
+    pub(super) fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
         let list = match self {
             Self::Beacon(beacon) => &beacon.near,
             Self::Report { heard, .. } => heard,
@@ -66,7 +66,7 @@ impl Item {
         let is_known = |id: EntityId| (id as usize) < airplanes;
         let rises = list.windows(2).all(|pair| pair[0] < pair[1]);
         let are_others = list.iter().all(|&id| is_known(id) && id != self.about());
-        Unsound::Airplane.unless(is_known(self.about()) && rises && are_others)?;
+        InvalidMessage::Airplane.unless(is_known(self.about()) && rises && are_others)?;
         match self {
             Self::Beacon(beacon) => beacon.check(airplanes),
             Self::Report { .. } => Ok(()),
@@ -75,19 +75,20 @@ impl Item {
 }
 
 impl Beacon {
-    fn check(&self, airplanes: usize) -> Result<(), Unsound> {
-        let Sighted { pose: Pose { at: [x, y], heading_rad }, altitude_m, .. } = self.own;
-        Unsound::Number.unless(heading_rad.abs() < FARTHEST_RAD)?;
-        Unsound::Number.unless(are_places([x, y, altitude_m]))?;
+    fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
+        let SurveillanceReport { pose: Pose2 { at: [x, y], heading_rad }, altitude_m, .. } =
+            self.own;
+        InvalidMessage::Number.unless(heading_rad.abs() < MAX_HEADING_RAD)?;
+        InvalidMessage::Number.unless(are_valid_coordinates([x, y, altitude_m]))?;
         let rises = self.intruders.windows(2).all(|pair| pair[0].slot < pair[1].slot);
         let are_known = self.intruders.iter().all(|one| (one.slot as usize) < airplanes);
-        Unsound::Airplane.unless(rises && are_known)?;
-        Unsound::Number.unless(self.intruders.iter().all(Intruder::is_sound))
+        InvalidMessage::Airplane.unless(rises && are_known)?;
+        InvalidMessage::Number.unless(self.intruders.iter().all(NonCooperative::is_valid))
     }
 }
 
 /// Returns the largest number of bytes of an item in a world of `airplanes` airplanes.
-pub(super) fn most_bytes(airplanes: usize) -> usize {
+pub(super) fn max_item_bytes(airplanes: usize) -> usize {
     // For each other airplane its id, and perhaps its observed flight.
     64 + airplanes * (5 + 96)
 }

@@ -11,12 +11,12 @@ pub(super) struct Roster {
     reports: BTreeMap<EntityId, Vec<EntityId>>,
     /// Whether all hear all that are near them, without a report.
     is_sure: bool,
-    settling: Settling,
+    chain_search: ChainSearch,
 }
 
 /// The chain from the own airplane, as far as all is known that it depends on.
 #[derive(Debug)]
-struct Settling {
+struct ChainSearch {
     from: EntityId,
     chain: BTreeSet<EntityId>,
     /// Those in it for which some that they have heard are not fully known yet, each with the number of those looked
@@ -24,7 +24,7 @@ struct Settling {
     due: Vec<(EntityId, usize)>,
 }
 
-impl Settling {
+impl ChainSearch {
     fn new(from: EntityId) -> Self {
         Self { from, chain: BTreeSet::from([from]), due: vec![(from, 0)] }
     }
@@ -33,14 +33,14 @@ impl Settling {
 impl Roster {
     /// Returns the roster of an airplane that has heard nothing yet.
     pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
-        let settling = Settling::new(own.own.id);
+        let settling = ChainSearch::new(own.own.id);
         let beacons = BTreeMap::from([(own.own.id, own)]);
-        Self { beacons, reports: BTreeMap::new(), is_sure, settling }
+        Self { beacons, reports: BTreeMap::new(), is_sure, chain_search: settling }
     }
 
     /// Notes a beacon. Returns whether there was none of the airplane; a beacon from the airplane itself counts for
     /// more than one that others pass on.
-    pub(super) fn note_beacon(&mut self, beacon: Beacon, is_own: bool) -> bool {
+    pub(super) fn add_beacon(&mut self, beacon: Beacon, is_own: bool) -> bool {
         let id = beacon.own.id;
         if !is_own && self.beacons.contains_key(&id) {
             return false;
@@ -48,13 +48,13 @@ impl Roster {
         let is_other = |known: &Beacon| known.near != beacon.near;
         if self.beacons.get(&id).is_some_and(is_other) {
             // Another airplane has lied about it, and all conclusions from that are void.
-            self.settling = Settling::new(self.settling.from);
+            self.chain_search = ChainSearch::new(self.chain_search.from);
         }
         self.beacons.insert(id, beacon).is_none()
     }
 
     /// Notes the airplanes that another one has heard. Returns whether that is new: the first report counts.
-    pub(super) fn note_report(&mut self, id: EntityId, heard: Vec<EntityId>) -> bool {
+    pub(super) fn add_report(&mut self, id: EntityId, heard: Vec<EntityId>) -> bool {
         let is_new = !self.reports.contains_key(&id);
         self.reports.entry(id).or_insert(heard);
         is_new
@@ -65,13 +65,13 @@ impl Roster {
     }
 
     /// Returns whether the beacon of an airplane is known.
-    pub(super) fn knows(&self, id: EntityId) -> bool {
+    pub(super) fn has_beacon(&self, id: EntityId) -> bool {
         self.beacons.contains_key(&id)
     }
 
     /// Returns whether everything that there is to know of an airplane is known.
-    pub(super) fn is_known(&self, id: EntityId) -> bool {
-        self.knows(id) && self.heard_by(id).is_some()
+    pub(super) fn is_fully_known(&self, id: EntityId) -> bool {
+        self.has_beacon(id) && self.heard_by(id).is_some()
     }
 
     /// Returns an item about an airplane.
@@ -84,9 +84,9 @@ impl Roster {
     }
 
     /// Returns whether one airplane does not hear another one's items from itself, as far as is known.
-    pub(super) fn lacks(&self, id: EntityId, about: EntityId) -> bool {
+    pub(super) fn is_missing(&self, id: EntityId, about: EntityId) -> bool {
         let has_not_heard = |heard: &Vec<EntityId>| heard.binary_search(&about).is_err();
-        !self.sees(about, id) || self.reports.get(&id).is_some_and(has_not_heard)
+        !self.can_see(about, id) || self.reports.get(&id).is_some_and(has_not_heard)
     }
 
     /// Returns those near an airplane that it has heard, if that is known.
@@ -97,17 +97,17 @@ impl Roster {
         }
     }
 
-    fn sees(&self, id: EntityId, other: EntityId) -> bool {
+    fn can_see(&self, id: EntityId, other: EntityId) -> bool {
         self.beacons.get(&id).is_some_and(|beacon| beacon.near.binary_search(&other).is_ok())
     }
 
-    fn hears(&self, id: EntityId, other: EntityId) -> bool {
+    fn can_hear(&self, id: EntityId, other: EntityId) -> bool {
         self.heard_by(id).is_some_and(|heard| heard.binary_search(&other).is_ok())
     }
 
     /// Returns whether two airplanes hear each other.
     fn is_linked(&self, a: EntityId, b: EntityId) -> bool {
-        self.knows(a) && self.knows(b) && self.hears(a, b) && self.hears(b, a)
+        self.has_beacon(a) && self.has_beacon(b) && self.can_hear(a, b) && self.can_hear(b, a)
     }
 
     /// Returns all to which a chain of airplanes that hear each other leads from one, itself among them, and whether
@@ -115,9 +115,9 @@ impl Roster {
     fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
         let (mut chain, mut due, mut is_complete) = (BTreeSet::from([from]), vec![from], true);
         while let Some(id) = due.pop() {
-            is_complete &= self.is_known(id);
+            is_complete &= self.is_fully_known(id);
             for &other in self.heard_by(id).unwrap_or_default() {
-                is_complete &= self.is_known(other);
+                is_complete &= self.is_fully_known(other);
                 if self.is_linked(id, other) && chain.insert(other) {
                     due.push(other);
                 }
@@ -128,22 +128,22 @@ impl Roster {
 
     /// Returns the same as [`Self::is_complete`] for the own airplane, and goes on from where it stopped before: each
     /// link is looked at once, however often incomplete knowledge comes in.
-    pub(super) fn settle(&mut self) -> bool {
-        let mut settling = std::mem::replace(&mut self.settling, Settling::new(0));
-        let is_complete = self.settle_from(&mut settling);
-        self.settling = settling;
+    pub(super) fn update_chain(&mut self) -> bool {
+        let mut settling = std::mem::replace(&mut self.chain_search, ChainSearch::new(0));
+        let is_complete = self.extend_chain(&mut settling);
+        self.chain_search = settling;
         is_complete
     }
 
-    fn settle_from(&self, Settling { chain, due, .. }: &mut Settling) -> bool {
+    fn extend_chain(&self, ChainSearch { chain, due, .. }: &mut ChainSearch) -> bool {
         while let Some(&(id, looked_at)) = due.last() {
-            let heard = self.heard_by(id).filter(|_| self.knows(id));
+            let heard = self.heard_by(id).filter(|_| self.has_beacon(id));
             let Some(heard) = heard else { return false };
             let Some(&other) = heard.get(looked_at) else {
                 due.pop();
                 continue;
             };
-            if !self.is_known(other) {
+            if !self.is_fully_known(other) {
                 return false;
             }
             // The items of two airplanes no longer change, nor does whether they hear each other.

@@ -1,7 +1,7 @@
 //! Agents that look for their groups, over links of which some never carry anything.
 
 use super::*;
-use crate::flight::Pose;
+use crate::flight::Pose2;
 use crate::shield::Side;
 use link::Agent as _;
 use proptest::prelude::*;
@@ -41,10 +41,10 @@ impl Links {
         chain.into_iter().map(id).collect()
     }
 
-    fn agent(&self, i: usize, certainty: Certainty) -> Agent {
+    fn agent(&self, i: usize, certainty: PlanCertainty) -> GroupingAgent {
         let near: Vec<usize> =
             (0..self.near.len()).filter(|&j| j == i || self.near[i][j]).collect();
-        Agent::new(Start {
+        GroupingAgent::new(GroupingInput {
             me: near.iter().position(|&j| j == i).expect("it is among them"),
             expected: vec![true; near.len()],
             near: near.into_iter().map(sighted).collect(),
@@ -61,16 +61,25 @@ fn id(place: usize) -> EntityId {
     3 * place as EntityId + 1
 }
 
-fn sighted(place: usize) -> Sighted {
-    let pose = Pose { at: [1000.0 * place as f64, 0.0], heading_rad: 0.1 };
-    Sighted { id: id(place), pose, altitude_m: 0.0, orbit: (place == 1).then_some(Side::Left) }
+fn sighted(place: usize) -> SurveillanceReport {
+    let pose = Pose2 { at: [1000.0 * place as f64, 0.0], heading_rad: 0.1 };
+    SurveillanceReport {
+        id: id(place),
+        pose,
+        altitude_m: 0.0,
+        orbit: (place == 1).then_some(Side::Left),
+    }
 }
 
 /// Lets all look for their groups; messages come in any order. Returns the group that each has found, and the number
 /// of messages sent.
-fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<EntityId>>, usize) {
+fn found(
+    links: &Links,
+    certainty: PlanCertainty,
+    draws: &mut Draws,
+) -> (Vec<Vec<EntityId>>, usize) {
     let n = links.near.len();
-    let mut agents: Vec<Agent> = (0..n).map(|i| links.agent(i, certainty)).collect();
+    let mut agents: Vec<GroupingAgent> = (0..n).map(|i| links.agent(i, certainty)).collect();
     let (mut due, mut sent) = (Vec::new(), 0);
     let mut say = |due: &mut Vec<(usize, usize, Vec<Item>)>, from: usize, said: Vec<Vec<Item>>| {
         for items in said {
@@ -85,8 +94,8 @@ fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<Ent
     }
     loop {
         while !due.is_empty() {
-            let (from, to, items) = due.swap_remove(draws.below(due.len() as u32) as usize);
-            let seen = &agents[to].start.near;
+            let (from, to, items) = due.swap_remove(draws.uniform_below(due.len() as u32) as usize);
+            let seen = &agents[to].input.near;
             let place = seen.binary_search_by_key(&id(from), |one| one.id).expect("near");
             agents[to].check(place, &items).expect("sound");
             let said = agents[to].on_message(place, items);
@@ -96,21 +105,21 @@ fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<Ent
             break;
         }
         // One that is there answers that it waits, too, and is not given up.
-        let never_answers = |i: usize, agent: &Agent| {
+        let never_answers = |i: usize, agent: &GroupingAgent| {
             let is_cut = |&place: &usize| {
-                let other = (0..n).find(|&j| id(j) == agent.start.near[place].id).expect("near");
+                let other = (0..n).find(|&j| id(j) == agent.input.near[place].id).expect("near");
                 !links.hears[i][other] || !links.hears[other][i]
             };
-            agent.awaits().into_iter().find(is_cut)
+            agent.awaited_members().into_iter().find(is_cut)
         };
         let mut all = agents.iter().enumerate();
         let (i, place) = all
             .find_map(|(i, agent)| Some((i, never_answers(i, agent)?)))
             .expect("nobody waits for what never comes");
-        let said = agents[i].without(place, false);
+        let said = agents[i].on_peer_gone(place, false);
         say(&mut due, i, said);
     }
-    let members = |agent: &Agent| {
+    let members = |agent: &GroupingAgent| {
         let found = agent.outcome().expect("done");
         found.members.iter().map(|one| one.id).collect()
     };
@@ -125,7 +134,7 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(904));
         let links = Links::drawn(n, near, heard, &mut draws);
-        let (groups, _) = found(&links, Certainty::Mixable, &mut draws);
+        let (groups, _) = found(&links, PlanCertainty::Mixable, &mut draws);
         for (i, group) in groups.iter().enumerate() {
             prop_assert_eq!(group, &links.chain(i), "airplane {}", i);
         }
@@ -137,7 +146,7 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(905));
         let links = Links::drawn(n, near, 1.0, &mut draws);
-        let (groups, _) = found(&links, Certainty::Sure, &mut draws);
+        let (groups, _) = found(&links, PlanCertainty::Sure, &mut draws);
         for (i, group) in groups.iter().enumerate() {
             prop_assert_eq!(group, &links.chain(i), "airplane {}", i);
         }
@@ -157,15 +166,15 @@ proptest! {
         let beacon = |i: usize| Beacon { own: sighted(i), near: ids(&links.near[i]), intruders: Vec::new() };
         let mut roster = Roster::new(beacon(0), is_sure);
         for _ in 0..12 * n {
-            let i = draws.below(n as u32) as usize;
+            let i = draws.uniform_below(n as u32) as usize;
             let lie = Beacon { near: Vec::new(), ..beacon(i) };
             // Whether it is new does not matter here.
-            let _ = match draws.below(4) {
-                0 if i > 0 => roster.note_beacon(lie, false),
-                0 | 1 => roster.note_report(id(i), ids(&links.hears[i])),
-                _ => roster.note_beacon(beacon(i), i > 0 && draws.below(2) == 0),
+            let _ = match draws.uniform_below(4) {
+                0 if i > 0 => roster.add_beacon(lie, false),
+                0 | 1 => roster.add_report(id(i), ids(&links.hears[i])),
+                _ => roster.add_beacon(beacon(i), i > 0 && draws.uniform_below(2) == 0),
             };
-            prop_assert_eq!(roster.settle(), roster.is_complete(id(0)));
+            prop_assert_eq!(roster.update_chain(), roster.is_complete(id(0)));
         }
     }
 }
@@ -177,7 +186,7 @@ fn a_crowd_of_hundreds_is_found_at_once() {
     let n = 600;
     let all: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| i != j).collect()).collect();
     let links = Links { near: all.clone(), hears: all };
-    let mut agent = links.agent(0, Certainty::Sure);
+    let mut agent = links.agent(0, PlanCertainty::Sure);
     agent.start();
     let near = |i: usize| (0..n).filter(|&j| j != i).map(id).collect();
     for i in (1..n).rev() {
@@ -193,14 +202,14 @@ fn a_crowd_of_hundreds_is_found_at_once() {
 fn among_those_that_all_see_each_other_nothing_is_passed_on() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(906));
     let links = Links::drawn(6, 1.0, 1.0, &mut draws);
-    assert_eq!(found(&links, Certainty::Sure, &mut draws).1, 6 * 5, "a beacon to each");
-    assert_eq!(found(&links, Certainty::Mixable, &mut draws).1, 2 * 6 * 5, "and a report");
+    assert_eq!(found(&links, PlanCertainty::Sure, &mut draws).1, 6 * 5, "a beacon to each");
+    assert_eq!(found(&links, PlanCertainty::Mixable, &mut draws).1, 2 * 6 * 5, "and a report");
 }
 
 #[test]
 fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(907));
-    let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, Certainty::Mixable);
+    let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, PlanCertainty::Mixable);
     let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], intruders: Vec::new() };
     let check = |beacon: &Beacon| agent.check(1, &vec![Item::Beacon(beacon.clone())]);
     assert_eq!(check(&right), Ok(()));
@@ -209,9 +218,9 @@ fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
         alter(&mut beacon);
         check(&beacon)
     };
-    assert_eq!(altered(|beacon| beacon.own.pose.at[0] += 1.0), Err(Unsound::Plan));
-    assert_eq!(altered(|beacon| beacon.own.altitude_m = f64::NAN), Err(Unsound::Number));
-    assert_eq!(altered(|beacon| beacon.near = vec![7, 1]), Err(Unsound::Airplane));
-    assert_eq!(altered(|beacon| beacon.near = vec![beacon.own.id]), Err(Unsound::Airplane));
-    assert_eq!(agent.check(1, &Vec::new()), Err(Unsound::Length));
+    assert_eq!(altered(|beacon| beacon.own.pose.at[0] += 1.0), Err(InvalidMessage::Plan));
+    assert_eq!(altered(|beacon| beacon.own.altitude_m = f64::NAN), Err(InvalidMessage::Number));
+    assert_eq!(altered(|beacon| beacon.near = vec![7, 1]), Err(InvalidMessage::Airplane));
+    assert_eq!(altered(|beacon| beacon.near = vec![beacon.own.id]), Err(InvalidMessage::Airplane));
+    assert_eq!(agent.check(1, &Vec::new()), Err(InvalidMessage::Length));
 }

@@ -1,46 +1,50 @@
 //! Checks of the others' messages, before an agent takes them.
 
-use super::{Agent, Message};
-use crate::agents::party::{Unsound, are_places};
+use super::{InformedAgent, InformedMessage};
+use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use sidestep_collectives::Estimator;
 
-impl Agent {
+impl InformedAgent {
     /// Checks a message of the agent at place `from`.
-    pub(super) fn checked(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+    pub(super) fn validate(
+        &self,
+        from: usize,
+        message: &InformedMessage,
+    ) -> Result<(), InvalidMessage> {
         let briefing = &*self.own.briefing;
         let filed = &briefing.filed[from];
         let actions = filed.actions.len();
         match message {
-            Message::Ways { beacon, ways } => {
-                Unsound::Kind.unless(!self.by_model)?;
-                briefing.admits(from, beacon)?;
-                briefing.admits_ways(ways, actions)
+            InformedMessage::Ways { beacon, ways } => {
+                InvalidMessage::Kind.unless(!self.by_model)?;
+                briefing.check_beacon(from, beacon)?;
+                briefing.check_predictions(ways, actions)
             }
-            Message::Model { beacon, next, mission, airplane, orders, altitude_m } => {
-                Unsound::Kind.unless(self.by_model)?;
-                Unsound::Airplane.unless(*airplane == briefing.ids[from])?;
-                briefing.admits(from, beacon)?;
-                let is_short = mission.len() <= filed.most_way_points;
-                Unsound::Length.unless(is_short && *next as usize <= mission.len())?;
-                Unsound::Plan.unless(*orders as usize <= filed.orders)?;
+            InformedMessage::Model { beacon, next, mission, airplane, orders, altitude_m } => {
+                InvalidMessage::Kind.unless(self.by_model)?;
+                InvalidMessage::Airplane.unless(*airplane == briefing.ids[from])?;
+                briefing.check_beacon(from, beacon)?;
+                let is_short = mission.len() <= filed.max_way_points;
+                InvalidMessage::Length.unless(is_short && *next as usize <= mission.len())?;
+                InvalidMessage::Plan.unless(*orders as usize <= filed.orders)?;
                 let told_m = mission.as_flattened().iter().chain([altitude_m]);
-                Unsound::Number.unless(are_places(told_m.copied()))
+                InvalidMessage::Number.unless(are_valid_coordinates(told_m.copied()))
             }
-            Message::Samples { round, change, samples } => {
+            InformedMessage::Samples { round, change, samples } => {
                 let Estimator::Sampled { block, .. } = self.own.settings().estimator else {
-                    return Err(Unsound::Kind);
+                    return Err(InvalidMessage::Kind);
                 };
-                briefing.admits_round(*round, *change)?;
-                Unsound::Length.unless(samples.len() == block)?;
-                Unsound::Number.unless(samples.iter().all(|&x| usize::from(x) < actions))
+                briefing.check_round(*round, *change)?;
+                InvalidMessage::Length.unless(samples.len() == block)?;
+                InvalidMessage::Number.unless(samples.iter().all(|&x| usize::from(x) < actions))
             }
-            Message::Distribution { round, change, q } => {
-                Unsound::Kind.unless(self.is_exact())?;
-                briefing.admits_round(*round, *change)?;
-                Unsound::Length.unless(q.len() == actions)?;
+            InformedMessage::Distribution { round, change, q } => {
+                InvalidMessage::Kind.unless(self.is_exact())?;
+                briefing.check_round(*round, *change)?;
+                InvalidMessage::Length.unless(q.len() == actions)?;
                 let is_share = |p: &f64| (0.0..=1.0).contains(p);
                 let is_whole = (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
-                Unsound::Number.unless(is_whole && q.iter().all(is_share))
+                InvalidMessage::Number.unless(is_whole && q.iter().all(is_share))
             }
         }
     }

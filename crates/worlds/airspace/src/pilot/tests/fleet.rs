@@ -2,7 +2,7 @@
 //! of their controls is computed again from those that it had.
 
 use super::*;
-use sidestep_kernel::control::ControlBook;
+use sidestep_kernel::control::ControlLog;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder, TableSchema, Values};
 
 const FOUR: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 4\nradius_m = 2600.0\n";
@@ -14,7 +14,7 @@ fn flown(
     cycles: Cycle,
     mut before: impl FnMut(&mut AirspaceRun),
 ) -> MemoryRecorder {
-    run.begin_recording();
+    run.start_recording();
     let mut rows = MemoryRecorder::new(&run.schemas());
     for _ in 0..cycles {
         before(run);
@@ -37,11 +37,11 @@ fn metrics(run: &AirspaceRun) -> crate::metrics::Metrics {
 fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut AirspaceRun)) {
     let (mut own, mut driven) = (run(airspace, airplanes), run(airspace, airplanes));
     let mut expected = flown(&mut own, CYCLES, &mut orders);
-    let mut crew = Crew::of(&driven);
+    let mut crew = TestPilots::from_run(&driven);
     let mut found = flown(&mut driven, CYCLES, |run| {
         orders(run);
         let controls = crew.decide(run);
-        run.control(controls.iter().map(over_the_wire).collect()).expect("what pilots decide");
+        run.submit(controls.iter().map(over_the_wire).collect()).expect("what pilots decide");
     });
     assert_eq!(driven.digest(), own.digest(), "{airspace}");
     assert_eq!(metrics(&driven), metrics(&own), "{airspace}");
@@ -49,7 +49,7 @@ fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut A
     // Packets of one that believes in another group are refused, and so are those that come too
     // early to be kept.
     let may_disagree = airspace.contains("heard") && airspace.contains("loss");
-    let is_sound = |pilot: &Pilot| may_disagree || pilot.refused().total() == 0;
+    let is_sound = |pilot: &Pilot| may_disagree || pilot.drop_counts().total() == 0;
     assert!(crew.pilots.iter().all(is_sound), "{airspace}");
 }
 
@@ -95,11 +95,12 @@ fn pilots_that_find_their_groups_fly_the_run_that_flies_itself() {
 
 #[test]
 fn what_was_ordered_from_outside_is_in_the_sight() {
-    use crate::wish::Wish;
+    use crate::external_action::ExternalAction;
     use sidestep_kernel::control::Orders;
     let order = |run: &mut AirspaceRun| {
         let turn = if run.cycle().is_multiple_of(2) { 0.03 } else { -0.02 };
-        let orders = Orders { order: Wish::TURN_RATE, agents: &[0, 2], values: &[turn, -turn] };
+        let orders =
+            Orders { order: ExternalAction::TURN_RATE, agents: &[0, 2], values: &[turn, -turn] };
         run.order(&orders).expect("right");
     };
     is_flown_alike("deployment = \"team\"\nmethod = \"external\"", FOUR, order);
@@ -138,25 +139,25 @@ fn a_run_with_missing_controls_is_computed_again_to_its_digest() {
     for network in ["", "network = { loss = 0.1 }\n"] {
         let airspace = format!("deployment = \"team\"\n{network}");
         let mut driven = run(&airspace, FOUR);
-        let mut crew = Crew::of(&driven);
+        let mut crew = TestPilots::from_run(&driven);
         let rows = flown(&mut driven, CYCLES, |run| {
             let controls = with_gaps(run, crew.decide(run));
-            run.control(controls).expect("what pilots decide");
+            run.submit(controls).expect("what pilots decide");
         });
-        let absent = driven.books().ledger.events[&crate::events::EventKind::Absent];
+        let absent = driven.collector().counters.events[&crate::events::EventKind::Absent];
         assert!(absent > 8, "{absent}");
         assert_eq!(driven.metrics().losses_of_separation, 0);
         driven.advance(3);
-        let book = ControlBook::recorded(&rows).expect("controls are recorded");
+        let book = ControlLog::from_recorder(&rows).expect("controls are recorded");
         let mut again = run(&airspace, FOUR);
-        again.retrace(book.clone());
+        again.replay_controls(book.clone());
         again.advance(5);
         let checkpoint = again.checkpoint();
         again.advance(CYCLES + 3 - 5);
         assert_eq!(again.digest(), driven.digest(), "{network}");
-        assert_eq!(again.books().ledger, driven.books().ledger, "{network}");
+        assert_eq!(again.collector().counters, driven.collector().counters, "{network}");
         let mut resumed = run(&airspace, FOUR);
-        resumed.retrace(book);
+        resumed.replay_controls(book);
         resumed.restore(&checkpoint).expect("the same scenario");
         resumed.advance(CYCLES + 3 - 5);
         assert_eq!(resumed.digest(), driven.digest(), "{network}");
@@ -166,9 +167,9 @@ fn a_run_with_missing_controls_is_computed_again_to_its_digest() {
 #[test]
 fn a_checkpoint_has_the_controls_that_were_handed_over() {
     let mut driven = run("deployment = \"team\"", FOUR);
-    let mut crew = Crew::of(&driven);
+    let mut crew = TestPilots::from_run(&driven);
     let controls = crew.decide(&driven);
-    driven.control(controls[1..].to_vec()).expect("what pilots decide");
+    driven.submit(controls[1..].to_vec()).expect("what pilots decide");
     let mut resumed = run("deployment = \"team\"", FOUR);
     resumed.restore(&driven.checkpoint()).expect("the same scenario");
     assert_eq!(resumed.digest(), driven.digest());
@@ -179,16 +180,16 @@ fn a_checkpoint_has_the_controls_that_were_handed_over() {
 #[test]
 fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
     let mut driven = run("deployment = \"team\"\nnetwork = {}", FOUR);
-    let good = Crew::of(&driven).decide(&driven);
+    let good = TestPilots::from_run(&driven).decide(&driven);
     let before = driven.digest();
     let changed = |change: &dyn Fn(&mut Control)| {
         let mut controls = good.clone();
         change(&mut controls[1]);
         controls
     };
-    let way = |omegas_rad_s: Vec<f64>| Course::Way {
+    let way = |omegas_rad_s: Vec<f64>| Maneuver::Way {
         wish: 0,
-        way: crate::shield::Way { omegas_rad_s },
+        way: crate::shield::TurnProfile { omegas_rad_s },
         side: crate::shield::Side::Left,
     };
     let wrong: [(Vec<Control>, &str); 7] = [
@@ -204,15 +205,15 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         ([good.clone(), good.clone()].concat(), "there are two of it"),
     ];
     for (controls, cause) in wrong {
-        let error = driven.control(controls).expect_err("refused").to_string();
+        let error = driven.submit(controls).expect_err("refused").to_string();
         assert!(error.contains(cause), "{error}");
         assert_eq!(driven.digest(), before, "nothing was taken");
     }
     let garbage = vec![(0, vec![0; 3])];
-    let error = driven.hand_over(&garbage).expect_err("refused").to_string();
+    let error = driven.submit_controls(&garbage).expect_err("refused").to_string();
     assert!(error.contains("its bytes are none of a control"), "{error}");
     let mut direct = run("", FOUR);
-    let error = direct.control(Vec::new()).expect_err("refused").to_string();
+    let error = direct.submit(Vec::new()).expect_err("refused").to_string();
     assert!(error.contains("one process decides for all"), "{error}");
 }
 
@@ -221,7 +222,7 @@ fn a_run_that_is_recorded_without_its_controls_takes_none() {
     let text = "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"team\"\n\
                 [airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
     let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("a scenario");
-    run.begin_recording();
-    let error = run.control(Vec::new()).expect_err("refused").to_string();
+    run.start_recording();
+    let error = run.submit(Vec::new()).expect_err("refused").to_string();
     assert!(error.contains("set record.controls = true"), "{error}");
 }

@@ -1,10 +1,10 @@
 //! Arbitrary bytes: they are counted and dropped, and no pilot breaks off.
 
 use super::*;
-use crate::agents::packet::Seal;
+use crate::agents::packet::PacketHeader;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
-use sidestep_kernel::network::{Draft, open};
+use sidestep_kernel::network::{PacketBuffer, parse_packet};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use std::collections::VecDeque;
 
@@ -30,16 +30,16 @@ const KINDS: [&str; 14] = [
 /// Changes some bytes, or cuts some off, or adds some.
 fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    for _ in 0..1 + draws.below(4) {
-        let at = draws.below(bytes.len().max(1) as u32) as usize;
-        match draws.below(6) {
+    for _ in 0..1 + draws.uniform_below(4) {
+        let at = draws.uniform_below(bytes.len().max(1) as u32) as usize;
+        match draws.uniform_below(6) {
             0 => bytes.truncate(at),
-            1 => bytes.extend((0..draws.below(40)).map(|k| k as u8)),
+            1 => bytes.extend((0..draws.uniform_below(40)).map(|k| k as u8)),
             2 if at < bytes.len() => drop(bytes.remove(at)),
             // Lengths, numbers of rounds, and parts of floats: large, or one off.
             3 if at < bytes.len() => bytes[at] = 0xFF,
             4 if at < bytes.len() => bytes[at] = bytes[at].wrapping_add(1),
-            _ if at < bytes.len() => bytes[at] ^= 1 << draws.below(8),
+            _ if at < bytes.len() => bytes[at] ^= 1 << draws.uniform_below(8),
             _ => {}
         }
     }
@@ -49,23 +49,24 @@ fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
 /// Returns a packet that is well formed and says something else.
 fn forged(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (seal, message) = open::<Topic>(payload, fingerprint).expect("a real packet");
-    Draft::of_bytes(&changed(message, draws)).sealed(&seal)
+    let (seal, message) = parse_packet::<Protocol>(payload, fingerprint).expect("a real packet");
+    PacketBuffer::from_bytes(&changed(message, draws)).into_packet(&seal)
 }
 
 /// Returns a packet with a right message and a wrong head.
 fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (mut seal, message) = open::<Topic>(payload, fingerprint).expect("a real packet");
-    let Seal { talk, .. } = &mut seal;
-    match draws.below(5) {
-        0 => talk.cycle = talk.cycle.wrapping_add(2 + u64::from(draws.below(1000))),
+    let (mut seal, message) =
+        parse_packet::<Protocol>(payload, fingerprint).expect("a real packet");
+    let PacketHeader { conversation: talk, .. } = &mut seal;
+    match draws.uniform_below(5) {
+        0 => talk.cycle = talk.cycle.wrapping_add(2 + u64::from(draws.uniform_below(1000))),
         1 => talk.members ^= 1,
-        2 => seal.sender = draws.below(9) + 3,
+        2 => seal.sender = draws.uniform_below(9) + 3,
         3 => seal.fingerprint ^= 4,
         _ => talk.cycle = u64::MAX,
     }
-    Draft::of_bytes(message).sealed(&seal)
+    PacketBuffer::from_bytes(message).into_packet(&seal)
 }
 
 /// Lets pilots talk in one cycle, and hands each of them `more` made of every packet before the packet itself.
@@ -75,9 +76,9 @@ fn told_more(
     mut more: impl FnMut(&[u8]) -> Vec<u8>,
 ) -> u64 {
     let (mut due, mut tick, mut told) = (VecDeque::new(), 0, 0);
-    for sight in run.sights() {
+    for sight in run.percepts() {
         let own = sight.own.id as usize;
-        pilots[own].begin(sight, tick);
+        pilots[own].start(sight, tick);
     }
     loop {
         for pilot in &mut *pilots {
@@ -113,18 +114,18 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(902));
         let run = run(KINDS[kind], THREE);
-        let (mut alone, mut beset) = (Crew::of(&run), Crew::of(&run));
+        let (mut alone, mut beset) = (TestPilots::from_run(&run), TestPilots::from_run(&run));
         told_more(&run, &mut alone.pilots, <[u8]>::to_vec);
         let told = told_more(&run, &mut beset.pilots, |payload| match is_damaged {
             true => {
                 let mut bytes = payload.to_vec();
-                let at = draws.below(bytes.len() as u32) as usize;
-                bytes[at] ^= 1 << draws.below(8);
+                let at = draws.uniform_below(bytes.len() as u32) as usize;
+                bytes[at] ^= 1 << draws.uniform_below(8);
                 bytes
             }
             false => misplaced(payload, &mut draws),
         });
-        let refused: u64 = beset.pilots.iter().map(|pilot| pilot.refused().total()).sum();
+        let refused: u64 = beset.pilots.iter().map(|pilot| pilot.drop_counts().total()).sum();
         prop_assert!(told > 0);
         prop_assert_eq!(refused, told, "each is counted");
         for (found, expected) in beset.pilots.iter().zip(&alone.pilots) {
@@ -141,27 +142,27 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(903));
         let run = run(KINDS[kind], THREE);
-        let mut crew = Crew::of(&run);
+        let mut crew = TestPilots::from_run(&run);
         let mut real = Vec::new();
         told_more(&run, &mut crew.pilots, |payload| {
             real.push(payload.to_vec());
             forged(payload, &mut draws)
         });
         // The same again to pilots that hear nothing else, in any order.
-        let mut crew = Crew::of(&run);
-        let sights = run.sights();
+        let mut crew = TestPilots::from_run(&run);
+        let sights = run.percepts();
         for sight in sights.iter().filter(|_| is_only) {
-            crew.pilots[sight.own.id as usize].begin(sight.clone(), 0);
+            crew.pilots[sight.own.id as usize].start(sight.clone(), 0);
         }
         for _ in 0..200 {
-            let payload = &real[draws.below(real.len() as u32) as usize];
+            let payload = &real[draws.uniform_below(real.len() as u32) as usize];
             let bytes = forged(payload, &mut draws);
             let from = EntityId::from(payload[28]);
-            let to = (from as usize + 1 + draws.below(2) as usize) % 3;
+            let to = (from as usize + 1 + draws.uniform_below(2) as usize) % 3;
             crew.pilots[to].on_packet(from, &bytes, 1);
         }
         for sight in sights {
-            crew.pilots[sight.own.id as usize].begin(sight, 1);
+            crew.pilots[sight.own.id as usize].start(sight, 1);
         }
     }
 }
@@ -169,74 +170,76 @@ proptest! {
 #[test]
 fn who_floods_a_pilot_fills_no_memory() {
     let run = run("deployment = \"team\"", THREE);
-    let mut crew = Crew::of(&run);
-    let sight = run.sights().swap_remove(0);
-    crew.pilots[0].begin(sight.clone(), 0);
-    let seal = |cycle: Cycle, sequence: u32| Seal {
+    let mut crew = TestPilots::from_run(&run);
+    let sight = run.percepts().swap_remove(0);
+    crew.pilots[0].start(sight.clone(), 0);
+    let seal = |cycle: Cycle, sequence: u32| PacketHeader {
         fingerprint: run.world().fingerprint,
-        talk: TalkId::new(cycle, Topic::Shield, &sight.members()),
+        conversation: ConversationId::new(cycle, Protocol::Shield, &sight.members()),
         sender: 1,
         sequence,
     };
     let large = vec![7; 1 << 18];
     for k in 0..100 {
-        let packet = Draft::of_bytes(&large).sealed(&seal(u64::from(k) % 2, k));
+        let packet = PacketBuffer::from_bytes(&large).into_packet(&seal(u64::from(k) % 2, k));
         crew.pilots[0].on_packet(1, &packet, 0);
     }
-    let refused = crew.pilots[0].refused();
-    assert!(refused.of(Refusal::NoRoom) > 80, "{refused:?}");
-    let of_this = TalkId::new(0, Topic::Decision, &sight.members());
-    let packet = Draft::of_bytes(&large).sealed(&Seal { talk: of_this, ..seal(0, 0) });
+    let refused = crew.pilots[0].drop_counts();
+    assert!(refused.get(DropReason::NoRoom) > 80, "{refused:?}");
+    let of_this = ConversationId::new(0, Protocol::Decision, &sight.members());
+    let packet = PacketBuffer::from_bytes(&large)
+        .into_packet(&PacketHeader { conversation: of_this, ..seal(0, 0) });
     crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].refused().of(Refusal::TooLarge), 1);
+    assert_eq!(crew.pilots[0].drop_counts().get(DropReason::TooLarge), 1);
 }
 
 /// Each reason on its own.
 #[test]
 fn every_reason_is_told_from_the_others() {
     let run = run("deployment = \"compact-team\"", THREE);
-    let mut crew = Crew::of(&run);
-    for sight in run.sights() {
+    let mut crew = TestPilots::from_run(&run);
+    for sight in run.percepts() {
         let own = sight.own.id as usize;
-        crew.pilots[own].begin(sight, 0);
+        crew.pilots[own].start(sight, 0);
     }
     let packet = crew.pilots[1].take_packets().swap_remove(0).payload;
-    let (seal, message) = open::<Topic>(&packet, run.world().fingerprint).expect("a real packet");
-    let with = |change: &dyn Fn(&mut Seal)| {
+    let (seal, message) =
+        parse_packet::<Protocol>(&packet, run.world().fingerprint).expect("a real packet");
+    let with = |change: &dyn Fn(&mut PacketHeader)| {
         let mut seal = seal;
         change(&mut seal);
-        Draft::of_bytes(message).sealed(&seal)
+        PacketBuffer::from_bytes(message).into_packet(&seal)
     };
     let bent = |at: usize, to: u8| {
         let mut bytes = packet.clone();
         bytes[at] = to;
         bytes
     };
-    let said = |bytes: &[u8]| Draft::of_bytes(bytes).sealed(&seal);
+    let said = |bytes: &[u8]| PacketBuffer::from_bytes(bytes).into_packet(&seal);
     let cases = [
-        (packet[..43].to_vec(), Refusal::NoPacket),
-        (bent(0, 0), Refusal::NoPacket),
-        (bent(2, 9), Refusal::Version),
-        (bent(60, 0xEE), Refusal::Damaged),
-        (with(&|seal| seal.fingerprint += 1), Refusal::Fingerprint),
-        (with(&|seal| seal.sender = 2), Refusal::Sender),
-        (with(&|seal| seal.talk.members += 1), Refusal::OtherGroup),
-        (with(&|seal| seal.talk.cycle = 7), Refusal::NoRoom),
-        (said(&[9, 9, 9]), Refusal::Unreadable),
-        (said(&[message, &[0]].concat()), Refusal::Unreadable),
+        (packet[..43].to_vec(), DropReason::NoPacket),
+        (bent(0, 0), DropReason::NoPacket),
+        (bent(2, 9), DropReason::Version),
+        (bent(60, 0xEE), DropReason::Damaged),
+        (with(&|seal| seal.fingerprint += 1), DropReason::Fingerprint),
+        (with(&|seal| seal.sender = 2), DropReason::Sender),
+        (with(&|seal| seal.conversation.members += 1), DropReason::OtherGroup),
+        (with(&|seal| seal.conversation.cycle = 7), DropReason::NoRoom),
+        (said(&[9, 9, 9]), DropReason::Unreadable),
+        (said(&[message, &[0]].concat()), DropReason::Unreadable),
         // A message with a number beyond all possible ones.
-        (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), Refusal::Unsound),
+        (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), DropReason::Unsound),
     ];
     for (bytes, why) in cases {
-        let before = crew.pilots[0].refused();
+        let before = crew.pilots[0].drop_counts();
         crew.pilots[0].on_packet(1, &bytes, 0);
-        let after = crew.pilots[0].refused();
+        let after = crew.pilots[0].drop_counts();
         assert_eq!(
-            (after.of(why), after.total()),
-            (before.of(why) + 1, before.total() + 1),
+            (after.get(why), after.total()),
+            (before.get(why) + 1, before.total() + 1),
             "{why:?}"
         );
     }
     crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].refused().total(), 11, "the real one is taken");
+    assert_eq!(crew.pilots[0].drop_counts().total(), 11, "the real one is taken");
 }

@@ -6,26 +6,28 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 
 /// Something that a pilot has yet to learn.
-enum Due {
-    Sight(Box<Sight>),
+enum PilotInput {
+    Sight(Box<Percept>),
     Packet(EntityId, Vec<u8>),
 }
 
 /// Lets pilots decide a cycle. The next input of any of them is drawn, so that packets overtake each other and some
 /// are in the second talk before others have begun the first.
-fn decided(pilots: &mut [Pilot], sights: Vec<Sight>, draws: &mut Draws) -> Vec<Control> {
+fn decided(pilots: &mut [Pilot], sights: Vec<Percept>, draws: &mut Draws) -> Vec<Control> {
     let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
-    let mut due: Vec<(EntityId, Due)> =
-        sights.into_iter().map(|sight| (sight.own.id, Due::Sight(Box::new(sight)))).collect();
+    let mut due: Vec<(EntityId, PilotInput)> = sights
+        .into_iter()
+        .map(|sight| (sight.own.id, PilotInput::Sight(Box::new(sight))))
+        .collect();
     while !due.is_empty() {
-        let (id, next) = due.swap_remove(draws.below(due.len() as u32) as usize);
+        let (id, next) = due.swap_remove(draws.uniform_below(due.len() as u32) as usize);
         let pilot = &mut pilots[id as usize];
         match next {
-            Due::Sight(sight) => pilot.begin(*sight, 0),
-            Due::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
+            PilotInput::Sight(sight) => pilot.start(*sight, 0),
+            PilotInput::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
         }
         for Packet { to, payload, .. } in pilot.take_packets() {
-            due.extend(to.iter().map(|&other| (other, Due::Packet(id, payload.clone()))));
+            due.extend(to.iter().map(|&other| (other, PilotInput::Packet(id, payload.clone()))));
         }
     }
     let control = |&id: &EntityId| pilots[id as usize].control().expect("nobody waits any more");
@@ -56,17 +58,17 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(901));
         let (mut own, mut driven) = (run(airspace, TROUBLE), run(airspace, TROUBLE));
-        let mut crew = Crew::of(&driven);
+        let mut crew = TestPilots::from_run(&driven);
         own.advance(6);
         for _ in 0..6 {
-            let controls = decided(&mut crew.pilots, driven.sights(), &mut draws);
-            driven.control(controls).expect("what pilots decide");
+            let controls = decided(&mut crew.pilots, driven.percepts(), &mut draws);
+            driven.submit(controls).expect("what pilots decide");
             driven.advance(1);
         }
         prop_assert_eq!(driven.digest(), own.digest());
         prop_assert_eq!(driven.metrics().messages, own.metrics().messages);
         for pilot in &crew.pilots {
-            prop_assert_eq!(pilot.refused().total(), 0);
+            prop_assert_eq!(pilot.drop_counts().total(), 0);
         }
     }
 }

@@ -2,8 +2,8 @@
 //! the joints put them.
 
 use crate::arms::kinematics::SerialChain;
-use crate::run::ChainRun;
-use crate::scenario::Compiled;
+use crate::scenario::ChainScenario;
+use crate::world_impl::ChainRun;
 use sidestep_import::urdf::Model;
 use sidestep_kernel::geometry::distance;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
@@ -25,7 +25,7 @@ fn arm(urdf: &str, rest: &str, task: &str) -> ChainRun<3> {
          radius_m = 0.02\nrod_radius_m = 0.01\n[[chains.tasks]]\n{task}"
     );
     let source = Source::new("s.toml", &text, root());
-    Compiled::<3>::new(&source).expect("valid").start(&source, 1)
+    ChainScenario::<3>::new(&source).expect("valid").start(&source, 1)
 }
 
 fn joints(run: &ChainRun<3>) -> Vec<f64> {
@@ -44,14 +44,14 @@ fn assert_joints_keep_their_laws(run: &mut ChainRun<3>, most: u64, case: &str) {
             let most = speed * run.world().dt_s * (1.0 + 1e-9);
             assert!((b - a).abs() <= most, "{case}: {} in cycle {}", b - a, run.cycle());
         }
-        let places = arm.places::<3>(&now);
+        let places = arm.connector_positions::<3>(&now);
         assert_eq!(places, run.state().body(0).chain.points(), "{case}");
         before = now;
     }
 }
 
 fn assert_all_is_reached(run: &ChainRun<3>, case: &str) {
-    let metrics = run.world().metrics_of(run.state(), 0);
+    let metrics = run.world().chain_metrics(run.state(), 0);
     assert!(metrics.tally.given_up.is_empty(), "{case}: {:?}", metrics.tally.given_up);
     assert_eq!(metrics.progress, 1.0, "{case}");
 }
@@ -60,10 +60,10 @@ fn assert_all_is_reached(run: &ChainRun<3>, case: &str) {
 fn the_shipped_arm_visits_its_places_inside_the_limits_and_speeds_of_its_joints() {
     let path = root().join("scenarios/chain/arm.toml");
     let source = Source::read(&path, &[]).expect("a scenario");
-    let mut run = Compiled::<3>::new(&source).expect("valid").start(&source, 1);
+    let mut run = ChainScenario::<3>::new(&source).expect("valid").start(&source, 1);
     assert_joints_keep_their_laws(&mut run, 3000, "arm.toml");
     assert_all_is_reached(&run, "arm.toml");
-    let metrics = run.world().metrics_of(run.state(), 0);
+    let metrics = run.world().chain_metrics(run.state(), 0);
     assert_eq!(metrics.tally.penetrations, 0);
     assert_eq!(metrics.joints.expect("told").len(), 7);
 }
@@ -115,7 +115,7 @@ fn a_script_leads_a_tool_exactly_and_is_told_what_its_joints_cannot_do() {
     let script = "kind = \"script\"\nconnector = 3\nscript = \"goto 2, 0, 0.5\"\npatience_s = 1.0";
     let mut run = arm(&shipped(), "[chain]\ndimensions = 3", script);
     assert_joints_keep_their_laws(&mut run, 2000, "too far");
-    let metrics = run.world().metrics_of(run.state(), 0);
+    let metrics = run.world().chain_metrics(run.state(), 0);
     assert!(run.is_over() && metrics.tally.given_up.len() == 1, "{metrics:?}");
 }
 
@@ -125,7 +125,7 @@ fn an_arm_gets_out_of_the_way_at_the_speeds_of_its_joints() {
                 patrol_m = [[1.2, 0.05, 0.6], [0.25, 0.05, 0.6]]\nspeed_m_s = 0.15";
     let mut run = arm(&shipped(), ball, "kind = \"rest\"\nlasts_s = 20.0");
     assert_joints_keep_their_laws(&mut run, 1000, "ball");
-    let tally = run.world().metrics_of(run.state(), 0).tally;
+    let tally = run.world().chain_metrics(run.state(), 0).tally;
     assert!(tally.escapes.moves > 0, "it gives way");
     assert_eq!(tally.penetrations, 0);
 }

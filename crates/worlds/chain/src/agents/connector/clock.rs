@@ -1,11 +1,11 @@
 //! The clock of an agent, its packets on their way out, and the end of its cycle.
 
-use super::{ConnectorAgent, Outgoing};
-use crate::agents::control::{Control, Goes};
+use super::{ConnectorAgent, OutgoingPacket};
+use crate::agents::control::{ConnectorMove, Control};
 use crate::agents::link::Link;
-use crate::agents::message::{Motion, Packet};
+use crate::agents::message::{MotionProtocol, Packet};
 use crate::agents::side::Side;
-use sidestep_kernel::network::{Seal, TalkId};
+use sidestep_kernel::network::{ConversationId, PacketHeader};
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Looks at the clock: sends unconfirmed messages again, and gives up a neighbor that never confirms.
@@ -14,20 +14,20 @@ impl<const D: usize> ConnectorAgent<D> {
         for side in Side::ALL {
             let link = self.links[side].as_mut().filter(|_| !self.is_silent);
             if link.is_some_and(|link| link.on_timer(tick)) {
-                self.misses(side, side.of(self.me, self.n));
+                self.mark_missing(side, side.neighbor(self.me, self.n));
             }
         }
         if !self.is_done() && self.deadline().is_some_and(|deadline| deadline <= tick) {
-            self.close();
+            self.end_cycle();
         }
-        self.run();
+        self.process();
     }
 
     /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
-    fn close(&mut self) {
+    fn end_cycle(&mut self) {
         for side in Side::ALL {
             if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
-                self.misses(side, side.of(self.me, self.n));
+                self.mark_missing(side, side.neighbor(self.me, self.n));
             }
         }
         self.give_up_leading();
@@ -42,7 +42,7 @@ impl<const D: usize> ConnectorAgent<D> {
             return None;
         }
         let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        links.filter_map(Link::due).chain(self.deadline()).min()
+        links.filter_map(Link::next_retry).chain(self.deadline()).min()
     }
 
     /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
@@ -51,26 +51,27 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Returns the packets that it sends now.
-    pub fn take_packets(&mut self) -> Vec<Outgoing> {
+    pub fn take_packets(&mut self) -> Vec<OutgoingPacket> {
         let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
         let mut out = Vec::new();
         for side in Side::ALL {
-            let Some(neighbor) = side.of(self.me, self.n) else { continue };
+            let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
             let missing = self.missing[side.other()];
-            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.parcel(self.now))
+            let Some(parcel) =
+                self.links[side].as_mut().and_then(|link| link.next_parcel(self.now))
             else {
                 continue;
             };
             let sequence = self.traffic.messages as u32;
-            let talk = TalkId { cycle, topic: Motion, members: self.members };
+            let talk = ConversationId { cycle, topic: MotionProtocol, members: self.members };
             let (fingerprint, sender) = (self.fingerprint, self.id());
-            let seal = Seal { fingerprint, talk, sender, sequence };
-            let payload = Packet { missing, parcel }.draft().sealed(&seal);
+            let seal = PacketHeader { fingerprint, conversation: talk, sender, sequence };
+            let payload = Packet { missing, parcel }.encode().into_packet(&seal);
             self.traffic.count(payload.len());
             if let Some(link) = &mut self.links[side] {
-                link.note_size(payload.len());
+                link.record_size(payload.len());
             }
-            out.push(Outgoing { to: self.first_id + neighbor, sequence, payload });
+            out.push(OutgoingPacket { to: self.first_id + neighbor, sequence, payload });
         }
         out
     }
@@ -86,11 +87,11 @@ impl<const D: usize> ConnectorAgent<D> {
         let cycle = self.cycle.filter(|_| self.is_done())?;
         let doubt = self.following.as_ref().filter(|following| following.has_consented);
         let goes = match (self.goes_in, doubt) {
-            (Some(request), _) => Goes::To { request, to: self.place.settled },
+            (Some(request), _) => ConnectorMove::To { request, to: self.place.settled },
             (None, Some(following)) => {
-                Goes::WithItsMaster { request: following.request, to: self.place.now }
+                ConnectorMove::WithItsMaster { request: following.request, to: self.place.now }
             }
-            (None, None) => Goes::Stays,
+            (None, None) => ConnectorMove::Stays,
         };
         Some(Control {
             connector: self.me,

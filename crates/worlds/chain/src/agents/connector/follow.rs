@@ -1,18 +1,18 @@
 //! A connector as a slave: it reacts to its master, and is the master of the next one.
 
 use super::ConnectorAgent;
-use crate::agents::message::{Consent, Message, Objection, Prepare};
+use crate::agents::message::{Consent, Message, Prepare, VetoMessage};
 use crate::agents::side::Side;
 use crate::rods::chain::Rod;
 use crate::rods::geometry::distance;
-use crate::rods::propagate::alone::{Alone, Pull, Reaction};
-use crate::rods::scene::Refusal;
-use crate::rods::veto::Reason;
-use crate::rods::wire::Place;
+use crate::rods::motion_context::PendingVeto;
+use crate::rods::propagate::local_solver::{LocalSolver, MasterMotion, Reaction};
+use crate::rods::serde_point::WirePoint;
+use crate::rods::veto::VetoReason;
 
 /// A motion in which a connector is a slave.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Following {
+pub(super) struct SlaveMotion {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     sub_step: u32,
@@ -34,10 +34,10 @@ impl<const D: usize> ConnectorAgent<D> {
         let Some(rod) = self.rods[from].filter(|_| self.leading.is_none()) else { return };
         let before = self.following.take().filter(|f| f.request == prepare.request);
         if before.is_none() {
-            self.begin_motion();
+            self.start_motion();
         }
         if before.as_ref().is_none_or(|f| f.sub_step != prepare.sub_step) {
-            self.accept();
+            self.accept_sub_step();
         }
         if let Some(master) = &mut self.beside[from] {
             (master.base, master.now) = (prepare.mo, prepare.mn);
@@ -47,9 +47,9 @@ impl<const D: usize> ConnectorAgent<D> {
                 self.follow(from, prepare, &reaction, before.is_some_and(|f| f.has_asked));
             }
             Err(refusal) => {
-                self.place.take_back();
-                self.following = before.map(|f| Following { has_consented: false, ..f });
-                self.object(from, refusal, Alone::<D>::may_go_elsewhere(rod));
+                self.place.revert();
+                self.following = before.map(|f| SlaveMotion { has_consented: false, ..f });
+                self.send_veto(from, refusal, LocalSolver::<D>::has_more_places(rod));
             }
         }
     }
@@ -67,7 +67,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.place.now = at;
         let onward = from.other();
         let asks = !ends && self.rods[onward].is_some();
-        self.following = Some(Following {
+        self.following = Some(SlaveMotion {
             request: prepare.request,
             sub_step: prepare.sub_step,
             master: from,
@@ -79,13 +79,13 @@ impl<const D: usize> ConnectorAgent<D> {
             has_turned,
         });
         if asks {
-            let (mo, mn, prev) = (self.place.base, at, Some(Place(prepare.mn)));
+            let (mo, mn, prev) = (self.place.base, at, Some(WirePoint(prepare.mn)));
             let max_bend_rad = self.alone.max_bend_rad();
-            self.say(onward, Message::Prepare(Prepare { mo, mn, prev, max_bend_rad, ..*prepare }));
+            self.send(onward, Message::Prepare(Prepare { mo, mn, prev, max_bend_rad, ..*prepare }));
         } else {
             let nobody = Consent { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
-            let consent = if ends { nobody } else { self.joined(&nobody, rotated) };
-            self.say(from, Message::Consent(consent));
+            let consent = if ends { nobody } else { self.merged_consent(&nobody, rotated) };
+            self.send(from, Message::Consent(consent));
         }
     }
 
@@ -94,10 +94,10 @@ impl<const D: usize> ConnectorAgent<D> {
         from: Side,
         rod: Rod,
         prepare: &Prepare<D>,
-    ) -> Result<Reaction<D>, Refusal> {
+    ) -> Result<Reaction<D>, PendingVeto> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
-        let pull = Pull {
+        let pull = MasterMotion {
             mo: prepare.mo,
             mn: prepare.mn,
             prev: prepare.prev.map(|place| place.0),
@@ -108,15 +108,15 @@ impl<const D: usize> ConnectorAgent<D> {
         self.alone.react(self.place.base, rod, next, &self.obstacles, &pull)
     }
 
-    fn object(&mut self, to: Side, refusal: Refusal, may_go_elsewhere: bool) {
-        let Refusal { reason, obstacle } = refusal;
+    fn send_veto(&mut self, to: Side, refusal: PendingVeto, may_go_elsewhere: bool) {
+        let PendingVeto { reason, obstacle } = refusal;
         let by = self.me;
-        let objection = Objection { by, reason, obstacle, has_turned: false, may_go_elsewhere };
-        self.say(to, Message::Object(objection));
+        let objection = VetoMessage { by, reason, obstacle, has_turned: false, may_go_elsewhere };
+        self.send(to, Message::Object(objection));
     }
 
     /// Adds this connector's part to the sums of a consent.
-    fn joined(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
+    fn merged_consent(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
         let way_m = distance(self.place.base, self.place.now);
         Consent {
             at: self.place.now,
@@ -133,15 +133,15 @@ impl<const D: usize> ConnectorAgent<D> {
         if let Some(following) = waiting {
             (following.waits, following.has_consented) = (false, true);
             let (master, rotated) = (following.master, following.rotated);
-            self.is_beside(from, consent);
-            let joined = self.joined(consent, rotated);
-            self.say(master, Message::Consent(joined));
-        } else if self.is_led_past(from, consent) {
-            self.is_beside(from, consent);
+            self.record_neighbor(from, consent);
+            let joined = self.merged_consent(consent, rotated);
+            self.send(master, Message::Consent(joined));
+        } else if self.receive_consent(from, consent) {
+            self.record_neighbor(from, consent);
         }
     }
 
-    fn is_beside(&mut self, side: Side, consent: &Consent<D>) {
+    fn record_neighbor(&mut self, side: Side, consent: &Consent<D>) {
         if let Some(beside) = &mut self.beside[side] {
             beside.now = consent.at;
         }
@@ -149,55 +149,55 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Passes an objection on to its master, or to the motion that it leads. Where this connector could have
     /// gone elsewhere, it is the search for a way that has ended.
-    pub(super) fn on_objection(&mut self, from: Side, objection: Objection) {
+    pub(super) fn on_veto(&mut self, from: Side, objection: VetoMessage) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
-        let Some(following) = waiting else { return self.is_led_against(from, &objection) };
+        let Some(following) = waiting else { return self.receive_veto(from, &objection) };
         following.waits = false;
-        let Following { master, has_others, has_turned, .. } = *following;
-        self.place.take_back();
+        let SlaveMotion { master, has_others, has_turned, .. } = *following;
+        self.place.revert();
         if let Some(beside) = &mut self.beside[from] {
-            beside.take_back();
+            beside.revert();
         }
-        let may_go_elsewhere = self.rods[master].is_some_and(Alone::<D>::may_go_elsewhere);
-        let reason = if has_others { Reason::Limit } else { objection.reason };
-        let objection = Objection {
+        let may_go_elsewhere = self.rods[master].is_some_and(LocalSolver::<D>::has_more_places);
+        let reason = if has_others { VetoReason::Limit } else { objection.reason };
+        let objection = VetoMessage {
             reason,
             has_turned: objection.has_turned || has_turned,
             may_go_elsewhere: objection.may_go_elsewhere || may_go_elsewhere,
             ..objection
         };
-        self.say(master, Message::Object(objection));
+        self.send(master, Message::Object(objection));
     }
 
     /// Goes, or stays where it was before the motion, and passes that on.
     pub(super) fn on_settle(&mut self, from: Side, request: u32, goes: bool) {
-        let is_its = |f: &mut Following| {
+        let is_its = |f: &mut SlaveMotion| {
             (f.request, f.master) == (request, from) && (f.has_consented || !goes)
         };
         let Some(following) = self.following.take_if(is_its) else { return };
         self.settle_motion(goes.then_some(request));
         if following.has_asked {
-            self.say(from.other(), Message::Settle { request, goes });
+            self.send(from.other(), Message::Settle { request, goes });
         }
     }
 
     /// Begins another motion, from the places where all are.
-    pub(super) fn begin_motion(&mut self) {
-        self.place.begin();
-        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.begin()));
+    pub(super) fn start_motion(&mut self) {
+        self.place.start();
+        self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.start()));
     }
 
     /// Accepts the present sub-step of a motion.
-    pub(super) fn accept(&mut self) {
+    pub(super) fn accept_sub_step(&mut self) {
         self.place.accept();
-        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.accept()));
+        self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.accept()));
     }
 
     /// Ends a motion, which is carried out if it has a number here.
     pub(super) fn settle_motion(&mut self, request: Option<u32>) {
         let goes = request.is_some();
-        self.place.settle(goes);
-        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.settle(goes)));
+        self.place.finish(goes);
+        self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.finish(goes)));
         self.goes_in = request.or(self.goes_in);
     }
 }

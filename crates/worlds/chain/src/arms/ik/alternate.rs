@@ -7,14 +7,14 @@
 
 use super::dls::bow;
 use super::limb::Span;
-use crate::rods::geometry::{Point, add, along, distance, first_axis, norm, sub};
+use crate::rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
 
 /// Most double passes before the search is given up.
 pub(super) const MAX_DOUBLE_PASSES: usize = 1000;
 /// Double passes in a row with hardly any gain before the search is given up.
-const MAX_IDLE: usize = 8;
+const MAX_IDLE_PASSES: usize = 8;
 /// Least part of the error that a double pass must remove to count as gain.
-const LEAST_GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 
 /// Alternates passes over `points`, the first of which is the base, until the last is at `target`.
 /// Returns the number of double passes and the remaining error.
@@ -28,23 +28,23 @@ pub(super) fn solve<const D: usize>(
     let mut error_m = distance(points[tip], target);
     let mut idle = 0;
     for double_passes in 0..MAX_DOUBLE_PASSES {
-        if error_m <= tolerance_m || idle == MAX_IDLE {
+        if error_m <= tolerance_m || idle == MAX_IDLE_PASSES {
             return (double_passes, error_m);
         }
         points[tip] = target;
         let mut master = target;
         for (slave, span) in points[..tip].iter_mut().zip(spans).rev() {
-            master = followed(master, *slave, *span);
+            master = slave_position(master, *slave, *span);
             *slave = master;
         }
         points[0] = base;
         master = base;
         for (slave, span) in points[1..].iter_mut().zip(spans) {
-            master = followed(master, *slave, *span);
+            master = slave_position(master, *slave, *span);
             *slave = master;
         }
         let now_m = distance(master, target);
-        idle = if now_m > error_m * (1.0 - LEAST_GAIN) { idle + 1 } else { 0 };
+        idle = if now_m > error_m * (1.0 - MIN_GAIN) { idle + 1 } else { 0 };
         error_m = now_m;
     }
     (MAX_DOUBLE_PASSES, error_m)
@@ -52,19 +52,19 @@ pub(super) fn solve<const D: usize>(
 
 /// Returns the slave's place after a push, pull or resize.
 #[inline(always)]
-fn followed<const D: usize>(master: Point<D>, slave: Point<D>, span: Span) -> Point<D> {
+fn slave_position<const D: usize>(master: Point<D>, slave: Point<D>, span: Span) -> Point<D> {
     let g = sub(slave, master);
     let d = norm(g);
     if d > 0.0 {
-        along(master, g, span.nearest_m(d) / d)
+        add_scaled(master, g, span.nearest_m(d) / d)
     } else {
-        along(master, first_axis(), span.min_m)
+        add_scaled(master, first_axis(), span.min_m)
     }
 }
 
 /// Solves like [`solve`], for rod vectors from a base at the origin. A limb that lies in one line
 /// with the target, where passes get stuck, is bowed once.
-pub(super) fn by_vectors<const D: usize>(
+pub(super) fn solve_vectors<const D: usize>(
     vectors: &mut [Point<D>],
     spans: &[Span],
     target: Point<D>,

@@ -8,31 +8,32 @@
 
 use super::limb::{Shell, Span};
 use crate::rods::geometry::{
-    Point, along, dot, first_axis, norm, perpendicular, scaled, sub, unit,
+    Point, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 
 /// Lays `vectors` so that their sum is `target`, or as near as possible. Lengths of rods are kept
 /// if the target allows it.
 pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], target: Point<D>) {
-    let target = Shell::of(spans).nearest(target);
+    let target = Shell::from_spans(spans).nearest(target);
     let far_m = norm(target);
-    let toward = unit(target).unwrap_or(first_axis());
+    let toward = normalized(target).unwrap_or(first_axis());
     let side = perpendicular(toward);
     let mut lengths_m: Vec<f64> =
         vectors.iter().zip(spans).map(|(v, span)| span.nearest_m(norm(*v))).collect();
-    fit(&mut lengths_m, spans, far_m);
-    let middle = middle(&lengths_m);
+    fit_lengths(&mut lengths_m, spans, far_m);
+    let middle = middle_rod(&lengths_m);
     let before_m: f64 = lengths_m[..middle].iter().sum();
     let behind_m: f64 = lengths_m[middle + 1..].iter().sum();
     // The bend behind the middle rod is as far from the base as both triangles allow.
     let diagonal_m = (before_m + lengths_m[middle]).min(behind_m + far_m);
     let second = apex(toward, side, far_m, [diagonal_m, behind_m]);
-    let arm = unit(second).unwrap_or(toward);
-    let first = apex(arm, turned(arm, toward, side), diagonal_m, [before_m, lengths_m[middle]]);
+    let arm = normalized(second).unwrap_or(toward);
+    let first =
+        apex(arm, bend_direction(arm, toward, side), diagonal_m, [before_m, lengths_m[middle]]);
     let straight = [
-        unit(first).unwrap_or(arm),
-        unit(sub(second, first)).unwrap_or(arm),
-        unit(sub(target, second)).unwrap_or(toward),
+        normalized(first).unwrap_or(arm),
+        normalized(sub(second, first)).unwrap_or(arm),
+        normalized(sub(target, second)).unwrap_or(toward),
     ];
     for (i, (v, length_m)) in vectors.iter_mut().zip(&lengths_m).enumerate() {
         let part = usize::from(i >= middle) + usize::from(i > middle);
@@ -41,7 +42,7 @@ pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], ta
 }
 
 /// Changes lengths as little as possible so that they allow the tip's distance.
-fn fit(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
+fn fit_lengths(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
     let sum_m: f64 = lengths_m.iter().sum();
     let longest =
         (0..lengths_m.len()).max_by(|&i, &j| lengths_m[i].total_cmp(&lengths_m[j])).unwrap_or(0);
@@ -62,7 +63,7 @@ fn fit(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
 }
 
 /// Returns the rod that holds the middle of the whole length.
-fn middle(lengths_m: &[f64]) -> usize {
+fn middle_rod(lengths_m: &[f64]) -> usize {
     let half_m = 0.5 * lengths_m.iter().sum::<f64>();
     let mut until_m = 0.0;
     let holds = |length_m: &f64| {
@@ -86,11 +87,11 @@ fn apex<const D: usize>(
         0.0
     };
     let height_m = ((a_m - x_m) * (a_m + x_m)).max(0.0).sqrt();
-    along(scaled(u, x_m), side, height_m)
+    add_scaled(scaled(u, x_m), side, height_m)
 }
 
 /// Returns the unit vector across `u` in the plane of `toward` and `side`, so that both bends turn
 /// the same way.
-fn turned<const D: usize>(u: Point<D>, toward: Point<D>, side: Point<D>) -> Point<D> {
-    along(scaled(toward, -dot(u, side)), side, dot(u, toward))
+fn bend_direction<const D: usize>(u: Point<D>, toward: Point<D>, side: Point<D>) -> Point<D> {
+    add_scaled(scaled(toward, -dot(u, side)), side, dot(u, toward))
 }

@@ -17,28 +17,28 @@
 
 use super::limb::Span;
 use crate::rods::geometry::{
-    Point, add, along, first_axis, norm, perpendicular, scaled, sub, unit,
+    Point, add, add_scaled, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 
 /// Newton steps with hardly any gain before the posture becomes the new reference.
-const POOR_STEPS: usize = 3;
+const MAX_POOR_STEPS: usize = 3;
 /// Largest part of the error that a good step leaves.
-const GOOD: f64 = 0.5;
+const GOOD_STEP_FRACTION: f64 = 0.5;
 /// New references before the search is given up.
-const REFERENCES: usize = 32;
+const MAX_REFERENCES: usize = 32;
 /// Number of references after which the limb is bowed anew, in case it is in line with the target.
-const BOW_EVERY: usize = 6;
+const BOW_INTERVAL: usize = 6;
 /// The first damping, in parts of the mean of the matrix's diagonal.
-const FIRST_DAMPING: f64 = 1e-3;
+const INITIAL_DAMPING: f64 = 1e-3;
 /// Least part to which a step that did not help is shortened.
-const LEAST_PART: f64 = 0.1;
+const MIN_STEP_FRACTION: f64 = 0.1;
 /// Part of the greatest length beyond which a limb is straight, and may buckle to any side.
-const STRAIGHT: f64 = 0.9;
+const STRAIGHT_FRACTION: f64 = 0.9;
 /// Distance to go, as a part of the greatest length, from which on a straight limb is bowed first.
-const FAR: f64 = 0.03;
+const FAR_FRACTION: f64 = 0.03;
 
 /// The tip's position for a multiplier.
-struct Pulled<const D: usize> {
+struct TipPosition<const D: usize> {
     /// The remaining vector to the target.
     error: Point<D>,
     error_m: f64,
@@ -57,17 +57,17 @@ pub(super) fn solve<const D: usize>(
     let longest_m: f64 = spans.iter().map(|s| s.max_m).sum();
     let mut steps = 0;
     let mut error_m = f64::INFINITY;
-    for reference in 0..REFERENCES {
-        let mut start = pulled(vectors, spans, [0.0; D], target);
-        let is_straight = norm(sub(target, start.error)) > STRAIGHT * longest_m
-            && start.error_m > FAR * longest_m;
-        let is_stuck = reference % BOW_EVERY == BOW_EVERY / 2;
+    for reference in 0..MAX_REFERENCES {
+        let mut start = tip_position(vectors, spans, [0.0; D], target);
+        let is_straight = norm(sub(target, start.error)) > STRAIGHT_FRACTION * longest_m
+            && start.error_m > FAR_FRACTION * longest_m;
+        let is_stuck = reference % BOW_INTERVAL == BOW_INTERVAL / 2;
         if is_stuck || (reference == 0 && is_straight) {
             bow(vectors, target);
-            start = pulled(vectors, spans, [0.0; D], target);
+            start = tip_position(vectors, spans, [0.0; D], target);
         }
-        let (y, left_m) = pull(vectors, spans, target, tolerance_m, start, &mut steps);
-        settle(vectors, spans, y);
+        let (y, left_m) = solve_multiplier(vectors, spans, target, tolerance_m, start, &mut steps);
+        adopt(vectors, spans, y);
         error_m = left_m;
         if error_m <= tolerance_m {
             break;
@@ -77,40 +77,40 @@ pub(super) fn solve<const D: usize>(
 }
 
 /// Applies Newton's method to the multiplier.
-fn pull<const D: usize>(
+fn solve_multiplier<const D: usize>(
     vectors: &[Point<D>],
     spans: &[Span],
     target: Point<D>,
     tolerance_m: f64,
-    start: Pulled<D>,
+    start: TipPosition<D>,
     steps: &mut usize,
 ) -> (Point<D>, f64) {
-    let (mut y, mut at, mut damping) = ([0.0; D], start, FIRST_DAMPING);
-    let mut step = damped(&at.slope, at.error, damping);
+    let (mut y, mut at, mut damping) = ([0.0; D], start, INITIAL_DAMPING);
+    let mut step = solve_damped(&at.slope, at.error, damping);
     let mut poor = 0;
-    while at.error_m > tolerance_m && poor < POOR_STEPS {
+    while at.error_m > tolerance_m && poor < MAX_POOR_STEPS {
         *steps += 1;
         let next_y = add(y, step);
-        let next = pulled(vectors, spans, next_y, target);
-        poor += usize::from(next.error_m > GOOD * at.error_m);
+        let next = tip_position(vectors, spans, next_y, target);
+        poor += usize::from(next.error_m > GOOD_STEP_FRACTION * at.error_m);
         if next.error_m < at.error_m {
             (y, at, damping) = (next_y, next, 0.3 * damping);
-            step = damped(&at.slope, at.error, damping);
+            step = solve_damped(&at.slope, at.error, damping);
         } else {
             let (before, after) = (at.error_m * at.error_m, next.error_m * next.error_m);
-            step = scaled(step, (before / (before + after)).max(LEAST_PART));
+            step = scaled(step, (before / (before + after)).max(MIN_STEP_FRACTION));
         }
     }
     (y, at.error_m)
 }
 
 #[inline]
-fn pulled<const D: usize>(
+fn tip_position<const D: usize>(
     vectors: &[Point<D>],
     spans: &[Span],
     y: Point<D>,
     target: Point<D>,
-) -> Pulled<D> {
+) -> TipPosition<D> {
     let mut tip = [0.0; D];
     let mut slope = [[0.0; D]; D];
     for (v, span) in vectors.iter().zip(spans) {
@@ -119,7 +119,7 @@ fn pulled<const D: usize>(
         let length_m = span.nearest_m(r);
         let per_m = 1.0 / r;
         let u = scaled(w, per_m);
-        tip = along(tip, u, length_m);
+        tip = add_scaled(tip, u, length_m);
         // A rod within its limits follows in every direction, one at a limit only across itself.
         let across = length_m * per_m;
         let lengthwise = if span.min_m < r && r < span.max_m { 1.0 } else { 0.0 };
@@ -131,12 +131,12 @@ fn pulled<const D: usize>(
         }
     }
     let error = sub(target, tip);
-    Pulled { error, error_m: norm(error), slope }
+    TipPosition { error, error_m: norm(error), slope }
 }
 
 /// Solves `(slope + damping) x = error` by Cholesky decomposition.
 #[inline]
-fn damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) -> Point<D> {
+fn solve_damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) -> Point<D> {
     let mean = (0..D).map(|i| slope[i][i]).sum::<f64>() / D as f64;
     let floor = f64::MIN_POSITIVE.sqrt().max(1e-14 * mean);
     let mut l = *slope;
@@ -164,11 +164,11 @@ fn damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) 
 }
 
 /// Adopts the posture of a multiplier.
-fn settle<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
+fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
     for (v, span) in vectors.iter_mut().zip(spans) {
         let w = add(*v, y);
         let r = norm(w);
-        let u = if r > 0.0 { scaled(w, 1.0 / r) } else { unit(*v).unwrap_or(first_axis()) };
+        let u = if r > 0.0 { scaled(w, 1.0 / r) } else { normalized(*v).unwrap_or(first_axis()) };
         *v = scaled(u, span.nearest_m(r));
     }
 }
@@ -176,10 +176,10 @@ fn settle<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>)
 /// Bends the limb to an arc, to the side given by `perpendicular`.
 pub(super) fn bow<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
     let total = vectors.iter().fold([0.0; D], |sum, v| add(sum, *v));
-    let side = perpendicular(unit(total).or(unit(target)).unwrap_or(first_axis()));
+    let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(first_axis()));
     let n = vectors.len() as f64;
     for (i, v) in vectors.iter_mut().enumerate() {
         let lean = 1.0 - (2 * i + 1) as f64 / n;
-        *v = along(*v, side, lean * norm(*v));
+        *v = add_scaled(*v, side, lean * norm(*v));
     }
 }

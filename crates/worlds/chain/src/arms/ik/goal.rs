@@ -36,7 +36,7 @@ impl Engine {
 
 /// A target for a connector.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal<const D: usize> {
+pub struct ChainIkGoal<const D: usize> {
     /// The connector.
     pub k: usize,
     /// The connector that keeps its place.
@@ -55,7 +55,7 @@ pub struct Goal<const D: usize> {
     pub motion_only: bool,
 }
 
-impl<const D: usize> Goal<D> {
+impl<const D: usize> ChainIkGoal<D> {
     /// Returns a goal for connector `k` at `target` to 1e-6 m, with 100 restarts.
     pub fn new(k: usize, base: usize, target: Point<D>) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl<const D: usize> Goal<D> {
 
 /// The kind of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum SolutionKind {
     /// A motion: the chain can go there from its present posture, and every state on the way has been
     /// checked.
     Motion,
@@ -83,7 +83,7 @@ pub enum Kind {
 
 /// The answer to a goal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answer<const D: usize> {
+pub struct ChainIkResult<const D: usize> {
     /// Whether the posture meets the goal and all constraints.
     pub reached: bool,
     /// Distance of the connector from the target, meters.
@@ -95,14 +95,14 @@ pub struct Answer<const D: usize> {
     /// The engine that found the posture.
     pub engine: Engine,
     /// Whether a motion leads to it.
-    pub kind: Kind,
+    pub kind: SolutionKind,
     /// The reason why the goal is not met; `None` if it is.
-    pub reason: Option<Unreached<D>>,
+    pub reason: Option<ChainIkFailure<D>>,
 }
 
 /// The reason why a goal is not met.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Unreached<const D: usize> {
+pub enum ChainIkFailure<const D: usize> {
     /// The rods are too short.
     TooFar {
         /// Distance of the target from the base, meters.
@@ -129,7 +129,7 @@ pub enum Unreached<const D: usize> {
     },
 }
 
-impl<const D: usize> fmt::Display for Unreached<D> {
+impl<const D: usize> fmt::Display for ChainIkFailure<D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFar { far_m, reach_m } => {

@@ -21,7 +21,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    pub(super) fn of(rod: &Rod) -> Self {
+    pub(super) fn from_rod(rod: &Rod) -> Self {
         Self { min_m: rod.min_m, max_m: rod.max_m }
     }
 
@@ -42,7 +42,7 @@ pub struct Shell {
 
 impl Shell {
     /// Returns the shell of limbs with these rods.
-    pub(super) fn of(spans: &[Span]) -> Self {
+    pub(super) fn from_spans(spans: &[Span]) -> Self {
         let reach_m: f64 = spans.iter().map(|s| s.max_m).sum();
         // Take one rod as short as possible, against all others as long as possible.
         let longest_m = spans.iter().map(|s| s.min_m + s.max_m).fold(0.0, f64::max);
@@ -77,17 +77,17 @@ impl<const D: usize> Limb<D> {
         self.vectors.clear();
         let rods = chain.rods();
         if k > base {
-            self.spans.extend(rods[base..k].iter().map(Span::of));
+            self.spans.extend(rods[base..k].iter().map(Span::from_rod));
             self.vectors.extend(points[base..=k].windows(2).map(|p| sub(p[1], p[0])));
         } else {
-            self.spans.extend(rods[k..base].iter().rev().map(Span::of));
+            self.spans.extend(rods[k..base].iter().rev().map(Span::from_rod));
             self.vectors.extend(points[k..=base].windows(2).rev().map(|p| sub(p[0], p[1])));
         }
     }
 }
 
 /// Returns the connector nearest to `k` on the way to `base` that never moves: the effective base.
-pub(super) fn nearest_still<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
+pub(super) fn nearest_fixed<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
     let still = |&i: &usize| i != k && chain.connectors()[i].is_still();
     let (lo, hi) = (base.min(k), base.max(k));
     let found = if k > base { (lo..=hi).rev().find(still) } else { (lo..=hi).find(still) };
@@ -95,7 +95,7 @@ pub(super) fn nearest_still<const D: usize>(chain: &Chain<D>, base: usize, k: us
 }
 
 /// Returns whether all connectors except the base move and bend without limit.
-pub(super) fn is_free<const D: usize>(chain: &Chain<D>, base: usize) -> bool {
+pub(super) fn is_unconstrained<const D: usize>(chain: &Chain<D>, base: usize) -> bool {
     let is_plain = |i: usize| {
         let c = &chain.connectors()[i];
         c.mobility == Mobility::Free && !c.failed && c.max_bend_rad >= std::f64::consts::PI

@@ -14,14 +14,14 @@
 //! If nothing constrains the connectors every target within reach is reached: the remaining error
 //! of an engine is removed in closed form. Guarded chains are first *moved* there by the rules of
 //! propagation, every state on the way checked; if that fails, postures are searched that are good
-//! in themselves, and [`Kind`] says which of the two an answer is.
+//! in themselves, and [`SolutionKind`] says which of the two an answer is.
 
 mod alternate;
+mod constraint_search;
+pub(super) mod constraints;
 mod direct;
 mod dls;
 mod goal;
-mod guarded;
-pub(super) mod legal;
 mod limb;
 mod motion;
 mod relax;
@@ -29,11 +29,11 @@ mod starts;
 #[cfg(test)]
 mod tests;
 
-pub use goal::{Answer, Engine, Goal, Kind, Unreached};
+pub use goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, Engine, SolutionKind};
 pub use limb::Shell;
 
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, along, distance, first_axis, is_finite, norm, sub};
+use crate::rods::geometry::{Point, add, add_scaled, distance, first_axis, is_finite, norm, sub};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::propagate::Propagator;
 use crate::rods::rules::Rules;
@@ -41,23 +41,23 @@ use limb::{Limb, Span};
 use sidestep_kernel::InputError;
 
 /// Number of rods up to which the chain's own rule is faster (bench `ik`, part `free`).
-const FEW_RODS: usize = 10;
+const MAX_CHAIN_RULE_RODS: usize = 10;
 
 /// Solves goals. It owns the buffers, and remembers nothing from one goal to the next.
 #[derive(Debug, Clone, Default)]
-pub struct Solver<const D: usize> {
+pub struct IkSolver<const D: usize> {
     propagator: Propagator<D>,
     limb: Limb<D>,
     points: Vec<Point<D>>,
 }
 
 /// Result of an engine.
-struct Solved {
+struct EngineResult {
     iterations: usize,
     engine: Engine,
 }
 
-impl<const D: usize> Solver<D> {
+impl<const D: usize> IkSolver<D> {
     /// Returns a solver for chains that react by `rules`; of these only self-collision concerns
     /// postures, the others concern motions.
     pub fn new(rules: Rules) -> Self {
@@ -75,69 +75,74 @@ impl<const D: usize> Solver<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        goal: &Goal<D>,
-    ) -> Result<Answer<D>, InputError> {
+        goal: &ChainIkGoal<D>,
+    ) -> Result<ChainIkResult<D>, InputError> {
         check(chain, goal)?;
-        let base = limb::nearest_still(chain, goal.base, goal.k);
-        let goal = &Goal { base, ..*goal };
+        let base = limb::nearest_fixed(chain, goal.base, goal.k);
+        let goal = &ChainIkGoal { base, ..*goal };
         self.limb.read(chain, chain.points(), base, goal.k);
-        let shell = Shell::of(&self.limb.spans);
+        let shell = Shell::from_spans(&self.limb.spans);
         let home = chain.points()[base];
         let wanted = add(home, shell.nearest(sub(goal.target, home)));
         let is_guarded = !obstacles.is_empty()
             || self.propagator.rules.self_collision
-            || !limb::is_free(chain, base);
+            || !limb::is_unconstrained(chain, base);
         let answer = if is_guarded {
-            guarded::solve(self, chain, obstacles, &Goal { target: wanted, ..*goal })?
+            constraint_search::solve(
+                self,
+                chain,
+                obstacles,
+                &ChainIkGoal { target: wanted, ..*goal },
+            )?
         } else {
-            self.solve_free(chain, &Goal { target: wanted, ..*goal })
+            self.solve_free(chain, &ChainIkGoal { target: wanted, ..*goal })
         };
-        Ok(answer.against(goal, &shell, home))
+        Ok(answer.relative_to(goal, &shell, home))
     }
 
     /// Solves a goal without constraints.
-    fn solve_free(&mut self, chain: &Chain<D>, goal: &Goal<D>) -> Answer<D> {
+    fn solve_free(&mut self, chain: &Chain<D>, goal: &ChainIkGoal<D>) -> ChainIkResult<D> {
         self.points.clear();
         self.points.extend_from_slice(chain.points());
-        let Solved { iterations, engine } = self.free_posture(goal);
-        self.write(goal);
+        let EngineResult { iterations, engine } = self.free_posture(goal);
+        self.write_points(goal);
         follow_beyond(&mut self.points, chain, goal);
-        Answer {
+        ChainIkResult {
             reached: true,
             error_m: 0.0,
             points: self.points.clone(),
             iterations,
             engine,
-            kind: Kind::Posture,
+            kind: SolutionKind::Posture,
             reason: None,
         }
     }
 
     /// Brings `self.limb` to the target, which is within its reach.
-    fn free_posture(&mut self, goal: &Goal<D>) -> Solved {
+    fn free_posture(&mut self, goal: &ChainIkGoal<D>) -> EngineResult {
         let Self { limb: Limb { spans, vectors }, points, .. } = self;
         let target = sub(goal.target, points[goal.base]);
         let engines: &[Engine] = match goal.engine {
-            Engine::Auto if spans.len() <= FEW_RODS => &[Engine::Chain, Engine::Dls],
+            Engine::Auto if spans.len() <= MAX_CHAIN_RULE_RODS => &[Engine::Chain, Engine::Dls],
             Engine::Auto | Engine::Dls => &[Engine::Dls],
             Engine::Chain => &[Engine::Chain],
             Engine::Direct => &[],
         };
         let mut iterations = 0;
         for &engine in engines {
-            let by = if engine == Engine::Chain { alternate::by_vectors } else { dls::solve };
+            let by = if engine == Engine::Chain { alternate::solve_vectors } else { dls::solve };
             let (more, left_m) = by(vectors, spans, target, goal.tolerance_m);
             iterations += more;
             if left_m <= goal.tolerance_m {
-                return Solved { iterations, engine };
+                return EngineResult { iterations, engine };
             }
         }
         direct::solve(vectors, spans, target);
-        Solved { iterations, engine: Engine::Direct }
+        EngineResult { iterations, engine: Engine::Direct }
     }
 
     /// Writes the limb's positions from the base on.
-    fn write(&mut self, goal: &Goal<D>) {
+    fn write_points(&mut self, goal: &ChainIkGoal<D>) {
         let mut at = self.points[goal.base];
         for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
             at = add(at, *v);
@@ -147,23 +152,23 @@ impl<const D: usize> Solver<D> {
 }
 
 /// Pushes and pulls the connectors beyond the goal's along with it.
-fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &Goal<D>) {
+fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &ChainIkGoal<D>) {
     let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
     let mut master = goal.k;
     for slave in limb::path(goal.k, end).skip(1) {
-        let span = Span::of(&chain.rod_between(master, slave));
+        let span = Span::from_rod(&chain.rod_between(master, slave));
         let g = sub(points[slave], points[master]);
         let d = norm(g);
         points[slave] = if d > 0.0 {
-            along(points[master], g, span.nearest_m(d) / d)
+            add_scaled(points[master], g, span.nearest_m(d) / d)
         } else {
-            along(points[master], first_axis(), span.min_m)
+            add_scaled(points[master], first_axis(), span.min_m)
         };
         master = slave;
     }
 }
 
-fn check<const D: usize>(chain: &Chain<D>, goal: &Goal<D>) -> Result<(), InputError> {
+fn check<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> Result<(), InputError> {
     let n = chain.points().len();
     if goal.k >= n {
         let cause = format!("is connector {}, of {n}", goal.k);
@@ -189,20 +194,20 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &Goal<D>) -> Result<(), InputEr
     Ok(())
 }
 
-impl<const D: usize> Answer<D> {
+impl<const D: usize> ChainIkResult<D> {
     /// Returns the answer compared with the goal as it was given, which may be out of reach.
-    fn against(mut self, goal: &Goal<D>, shell: &Shell, home: Point<D>) -> Self {
+    fn relative_to(mut self, goal: &ChainIkGoal<D>, shell: &Shell, home: Point<D>) -> Self {
         self.error_m = distance(self.points[goal.k], goal.target);
         self.reached = self.error_m <= goal.tolerance_m && self.reason.is_none();
         if !self.reached {
             let far_m = distance(goal.target, home);
             let Shell { hole_m, reach_m } = *shell;
             if far_m > reach_m + goal.tolerance_m {
-                self.reason = Some(Unreached::TooFar { far_m, reach_m });
+                self.reason = Some(ChainIkFailure::TooFar { far_m, reach_m });
             } else if far_m < hole_m - goal.tolerance_m {
-                self.reason = Some(Unreached::TooNear { far_m, hole_m });
+                self.reason = Some(ChainIkFailure::TooNear { far_m, hole_m });
             }
-            self.reason = self.reason.or(Some(Unreached::NotFound { tries: 1 }));
+            self.reason = self.reason.or(Some(ChainIkFailure::NotFound { tries: 1 }));
         }
         self
     }

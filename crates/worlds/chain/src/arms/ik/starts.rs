@@ -1,9 +1,9 @@
 //! Postures to start from: the present one, its mirror image, and random ones.
 
-use super::Goal;
+use super::ChainIkGoal;
 use super::limb;
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, along, dot, first_axis, scaled, sub, unit};
+use crate::rods::geometry::{Point, add, add_scaled, dot, first_axis, normalized, scaled, sub};
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
@@ -15,7 +15,7 @@ const START: Purpose = Purpose(0x1C);
 /// base to target, the others are random walks of random stiffness.
 pub(super) fn start<const D: usize>(
     chain: &Chain<D>,
-    goal: &Goal<D>,
+    goal: &ChainIkGoal<D>,
     index: usize,
 ) -> Vec<Point<D>> {
     let mut points = chain.points().to_vec();
@@ -23,39 +23,39 @@ pub(super) fn start<const D: usize>(
     match index {
         0 => {}
         1 => mirror(&mut points, goal, end),
-        _ => walk(&mut points, chain, goal, end, index),
+        _ => random_walk(&mut points, chain, goal, end, index),
     }
     points
 }
 
-fn mirror<const D: usize>(points: &mut [Point<D>], goal: &Goal<D>, end: usize) {
+fn mirror<const D: usize>(points: &mut [Point<D>], goal: &ChainIkGoal<D>, end: usize) {
     let home = points[goal.base];
-    let u = unit(sub(goal.target, home)).unwrap_or(first_axis());
+    let u = normalized(sub(goal.target, home)).unwrap_or(first_axis());
     for i in limb::path(goal.base, end).skip(1) {
         let v = sub(points[i], home);
-        points[i] = along(add(home, scaled(u, 2.0 * dot(v, u))), v, -1.0);
+        points[i] = add_scaled(add(home, scaled(u, 2.0 * dot(v, u))), v, -1.0);
     }
 }
 
-fn walk<const D: usize>(
+fn random_walk<const D: usize>(
     points: &mut [Point<D>],
     chain: &Chain<D>,
-    goal: &Goal<D>,
+    goal: &ChainIkGoal<D>,
     end: usize,
     index: usize,
 ) {
     let mut draws = Streams::new(Seed(goal.seed)).draws(0, index as u64, START);
-    let spread = [0.15, 0.4, 0.8, 1.5][draws.below(4) as usize];
-    let mut u = direction(&mut draws);
+    let spread = [0.15, 0.4, 0.8, 1.5][draws.uniform_below(4) as usize];
+    let mut u = random_direction(&mut draws);
     let mut inner = goal.base;
     for i in limb::path(goal.base, end).skip(1) {
-        points[i] = along(points[inner], u, chain.length_m(inner.min(i)));
-        u = unit(along(u, direction(&mut draws), spread)).unwrap_or(u);
+        points[i] = add_scaled(points[inner], u, chain.length_m(inner.min(i)));
+        u = normalized(add_scaled(u, random_direction(&mut draws), spread)).unwrap_or(u);
         inner = i;
     }
 }
 
-fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
+fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     let drawn: Point<D> = std::array::from_fn(|_| normal(draws));
-    unit(drawn).unwrap_or(first_axis())
+    normalized(drawn).unwrap_or(first_axis())
 }

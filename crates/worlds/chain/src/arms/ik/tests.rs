@@ -1,9 +1,9 @@
 use super::alternate;
 use super::*;
 use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{angle_rad, nearest_on_segment, unit};
+use crate::rods::geometry::{angle_rad, nearest_on_segment, normalized};
 use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::Reason;
+use crate::rods::veto::VetoReason;
 use proptest::prelude::*;
 
 const ENGINES: [Engine; 4] = [Engine::Auto, Engine::Chain, Engine::Dls, Engine::Direct];
@@ -13,9 +13,9 @@ fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
     let mut points = vec![std::array::from_fn(|i| 0.3 * i as f64 - 0.1)];
     let mut rods = Vec::new();
     for (i, turn) in turns.iter().enumerate() {
-        let u = unit(std::array::from_fn(|k| turn[k])).unwrap_or(first_axis());
+        let u = normalized(std::array::from_fn(|k| turn[k])).unwrap_or(first_axis());
         let length_m = 0.4 + 0.6 * (turn[2].abs() * 7.0).fract();
-        points.push(along(points[i], u, length_m));
+        points.push(add_scaled(points[i], u, length_m));
         let (min_m, max_m) = (length_m * (1.0 - slack), length_m * (1.0 + slack));
         rods.push(Rod { min_m, max_m, radius_m: 0.0 });
     }
@@ -25,16 +25,16 @@ fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
 
 /// The point at a part of the shell's thickness from the base, in a direction.
 fn target_of<const D: usize>(chain: &Chain<D>, part: f64, toward: [f64; 3]) -> Point<D> {
-    let spans: Vec<Span> = chain.rods().iter().map(Span::of).collect();
-    let Shell { hole_m, reach_m } = Shell::of(&spans);
-    let u = unit(std::array::from_fn(|k| toward[k])).unwrap_or(first_axis());
-    along(chain.points()[0], u, hole_m + part * (reach_m - hole_m))
+    let spans: Vec<Span> = chain.rods().iter().map(Span::from_rod).collect();
+    let Shell { hole_m, reach_m } = Shell::from_spans(&spans);
+    let u = normalized(std::array::from_fn(|k| toward[k])).unwrap_or(first_axis());
+    add_scaled(chain.points()[0], u, hole_m + part * (reach_m - hole_m))
 }
 
 fn is_met<const D: usize>(
     chain: &Chain<D>,
-    goal: &Goal<D>,
-    answer: &Answer<D>,
+    goal: &ChainIkGoal<D>,
+    answer: &ChainIkResult<D>,
 ) -> Result<(), TestCaseError> {
     prop_assert!(answer.reached, "{:?} {:?}", answer.reason, answer.error_m);
     prop_assert!(answer.reason.is_none());
@@ -48,11 +48,11 @@ fn is_met<const D: usize>(
 
 fn every_engine_meets<const D: usize>(
     chain: &Chain<D>,
-    goal: Goal<D>,
+    goal: ChainIkGoal<D>,
 ) -> Result<(), TestCaseError> {
     for engine in ENGINES {
-        let goal = Goal { engine, ..goal };
-        let answer = Solver::default().solve(chain, &Obstacles::default(), &goal).expect("right");
+        let goal = ChainIkGoal { engine, ..goal };
+        let answer = IkSolver::default().solve(chain, &Obstacles::default(), &goal).expect("right");
         is_met(chain, &goal, &answer)?;
     }
     Ok(())
@@ -72,10 +72,10 @@ proptest! {
     ) {
         let plane = chain_of::<2>(&turns, slack);
         let target = target_of(&plane, part, toward);
-        every_engine_meets(&plane, Goal::new(turns.len(), 0, target))?;
+        every_engine_meets(&plane, ChainIkGoal::new(turns.len(), 0, target))?;
         let space = chain_of::<3>(&turns, slack);
         let target = target_of(&space, part, toward);
-        every_engine_meets(&space, Goal::new(turns.len(), 0, target))?;
+        every_engine_meets(&space, ChainIkGoal::new(turns.len(), 0, target))?;
     }
 
     #[test]
@@ -90,12 +90,12 @@ proptest! {
         let n = chain.points().len();
         let (base, k) = (base % n, k % n);
         prop_assume!(base != k);
-        let spans: Vec<Span> = chain.rods()[base.min(k)..base.max(k)].iter().map(Span::of).collect();
-        let Shell { hole_m, reach_m } = Shell::of(&spans);
-        let u = unit(toward).unwrap_or(first_axis());
-        let target = along(chain.points()[base], u, hole_m + part * (reach_m - hole_m));
-        let goal = Goal::new(k, base, target);
-        let answer = Solver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
+        let spans: Vec<Span> = chain.rods()[base.min(k)..base.max(k)].iter().map(Span::from_rod).collect();
+        let Shell { hole_m, reach_m } = Shell::from_spans(&spans);
+        let u = normalized(toward).unwrap_or(first_axis());
+        let target = add_scaled(chain.points()[base], u, hole_m + part * (reach_m - hole_m));
+        let goal = ChainIkGoal::new(k, base, target);
+        let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
         is_met(&chain, &goal, &answer)?;
         for i in 0..n {
             let is_behind = if k > base { i <= base } else { i >= base };
@@ -123,12 +123,12 @@ proptest! {
             .enumerate()
             .map(|(i, v)| {
                 let shift = if i % 2 == 0 { nudge } else { scaled_by(nudge, -0.3) };
-                scaled_by(unit(add(*v, shift)).expect("not zero"), norm(*v))
+                scaled_by(normalized(add(*v, shift)).expect("not zero"), norm(*v))
             })
             .collect();
         let target = other.iter().fold(chain.points()[0], |at, v| add(at, *v));
-        let goal = Goal { tolerance_m: 1e-10, engine: Engine::Dls, ..Goal::new(n, 0, target) };
-        let answer = Solver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
+        let goal = ChainIkGoal { tolerance_m: 1e-10, engine: Engine::Dls, ..ChainIkGoal::new(n, 0, target) };
+        let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
         let way = |new: &[Point<3>]| -> f64 {
             new.iter().zip(&old).map(|(a, b)| distance(*a, *b) * distance(*a, *b)).sum()
         };
@@ -161,7 +161,7 @@ fn one_double_pass_is_one_iteration_of_fabrik() {
             std::array::from_fn(|k| (1.0 - lambda) * expected[i][k] + lambda * expected[i + 1][k]);
     }
     let mut points = chain.points().to_vec();
-    let spans: Vec<Span> = chain.rods().iter().map(Span::of).collect();
+    let spans: Vec<Span> = chain.rods().iter().map(Span::from_rod).collect();
     let after_one = distance(expected[3], target);
     let (passes, left_m) = alternate::solve(&mut points, &spans, target, after_one + 1e-12);
     assert_eq!(passes, 1);
@@ -180,7 +180,7 @@ fn straight_and_folded_chains_are_no_trap() {
     let folded = Chain::new(zigzag, vec![Connector::free(0.0); 11], vec![rod; 10]).expect("right");
     for chain in [&straight, &folded] {
         for x in [-10.0, -7.0, 0.0, 0.5, 3.0, 9.999, 10.0] {
-            every_engine_meets(chain, Goal::new(10, 0, [x, 0.0])).expect("met");
+            every_engine_meets(chain, ChainIkGoal::new(10, 0, [x, 0.0])).expect("met");
         }
     }
 }
@@ -190,43 +190,43 @@ fn out_of_reach_is_told_with_the_nearest_point() {
     let chain = chain_of::<3>(&[[1.0, 0.2, 0.3], [0.3, 1.0, 0.5], [0.2, 0.1, 1.0]], 0.0);
     let reach_m: f64 = (0..3).map(|i| chain.length_m(i)).sum();
     let base = chain.points()[0];
-    let target = along(base, [0.0, 1.0, 0.0], reach_m + 0.5);
-    let solve = |chain: &Chain<3>, goal: Goal<3>| {
-        Solver::default().solve(chain, &Obstacles::default(), &goal).expect("right")
+    let target = add_scaled(base, [0.0, 1.0, 0.0], reach_m + 0.5);
+    let solve = |chain: &Chain<3>, goal: ChainIkGoal<3>| {
+        IkSolver::default().solve(chain, &Obstacles::default(), &goal).expect("right")
     };
-    let answer = solve(&chain, Goal::new(3, 0, target));
+    let answer = solve(&chain, ChainIkGoal::new(3, 0, target));
     assert!(!answer.reached && (answer.error_m - 0.5).abs() < 1e-6, "{answer:?}");
-    assert!(matches!(answer.reason, Some(Unreached::TooFar { .. })), "{answer:?}");
+    assert!(matches!(answer.reason, Some(ChainIkFailure::TooFar { .. })), "{answer:?}");
 
     let rods = vec![Rod::fixed(3.0, 0.0), Rod::fixed(1.0, 0.0)];
     let points = vec![[0.0; 3], [3.0, 0.0, 0.0], [3.0, 1.0, 0.0]];
     let long = Chain::new(points, vec![Connector::free(0.0); 3], rods).expect("right");
-    let answer = solve(&long, Goal::new(2, 0, [0.0, 0.5, 0.0]));
+    let answer = solve(&long, ChainIkGoal::new(2, 0, [0.0, 0.5, 0.0]));
     assert!(!answer.reached && (answer.error_m - 1.5).abs() < 1e-6, "{answer:?}");
-    assert!(matches!(answer.reason, Some(Unreached::TooNear { .. })), "{answer:?}");
+    assert!(matches!(answer.reason, Some(ChainIkFailure::TooNear { .. })), "{answer:?}");
     assert!(answer.reason.expect("a reason").to_string().contains("no nearer than 2"));
 }
 
 #[test]
 fn wrong_goals_are_named() {
     let chain = chain_of::<2>(&[[1.0, 0.0, 0.2]; 3], 0.0);
-    let right = Goal::new(3, 0, [1.0, 0.0]);
+    let right = ChainIkGoal::new(3, 0, [1.0, 0.0]);
     for (goal, place) in [
-        (Goal { k: 4, ..right }, "tip"),
-        (Goal { base: 3, ..right }, "base"),
-        (Goal { base: 9, ..right }, "base"),
-        (Goal { target: [f64::NAN, 0.0], ..right }, "target"),
-        (Goal { target: [1e300, 0.0], ..right }, "target"),
-        (Goal { tolerance_m: 0.0, ..right }, "tolerance"),
-        (Goal { tolerance_m: f64::NAN, ..right }, "tolerance"),
+        (ChainIkGoal { k: 4, ..right }, "tip"),
+        (ChainIkGoal { base: 3, ..right }, "base"),
+        (ChainIkGoal { base: 9, ..right }, "base"),
+        (ChainIkGoal { target: [f64::NAN, 0.0], ..right }, "target"),
+        (ChainIkGoal { target: [1e300, 0.0], ..right }, "target"),
+        (ChainIkGoal { tolerance_m: 0.0, ..right }, "tolerance"),
+        (ChainIkGoal { tolerance_m: f64::NAN, ..right }, "tolerance"),
     ] {
         let error =
-            Solver::default().solve(&chain, &Obstacles::default(), &goal).expect_err("wrong");
+            IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect_err("wrong");
         assert_eq!(error.place(), place);
     }
     let mut still = chain;
     still.set_failed(3, true);
-    assert!(Solver::default().solve(&still, &Obstacles::default(), &right).is_err());
+    assert!(IkSolver::default().solve(&still, &Obstacles::default(), &right).is_err());
 }
 
 #[test]
@@ -234,8 +234,8 @@ fn a_failed_connector_on_the_way_is_the_base_that_counts() {
     let mut chain = chain_of::<2>(&[[1.0, 0.3, 0.2]; 6], 0.0);
     chain.set_failed(2, true);
     let target = add(chain.points()[2], [0.5, 1.0]);
-    let goal = Goal::new(6, 0, target);
-    let answer = Solver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
+    let goal = ChainIkGoal::new(6, 0, target);
+    let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
     assert!(answer.reached, "{:?}", answer.reason);
     assert_eq!(answer.points[..3], chain.points()[..3]);
 }
@@ -266,8 +266,8 @@ fn arms_among_discs_reach_without_touching_them() {
     }
     let mut kinds = Vec::new();
     for target in [[5.0, 4.0], [-4.0, 4.0], [-5.0, -2.0], [0.5, 5.0], [6.0, -3.0]] {
-        let goal = Goal::new(8, 0, target);
-        let solve = || Solver::default().solve(&chain, &obstacles, &goal).expect("right");
+        let goal = ChainIkGoal::new(8, 0, target);
+        let solve = || IkSolver::default().solve(&chain, &obstacles, &goal).expect("right");
         let answer = solve();
         is_met(&chain, &goal, &answer).expect("met");
         assert!(is_clear(&answer.points, &discs), "{target:?} {:?}", answer.kind);
@@ -279,16 +279,19 @@ fn arms_among_discs_reach_without_touching_them() {
         assert_eq!(answer, solve(), "the same seed gives the same bits");
         kinds.push(answer.kind);
     }
-    assert!(kinds.contains(&Kind::Motion) && kinds.contains(&Kind::Posture), "{kinds:?}");
+    assert!(
+        kinds.contains(&SolutionKind::Motion) && kinds.contains(&SolutionKind::Posture),
+        "{kinds:?}"
+    );
 }
 
 #[test]
 fn what_blocks_the_target_is_named() {
     let (chain, obstacles, _) = scene();
-    let goal = Goal { restarts: 3, ..Goal::new(8, 0, [3.0, 1.5]) };
-    let answer = Solver::default().solve(&chain, &obstacles, &goal).expect("right");
+    let goal = ChainIkGoal { restarts: 3, ..ChainIkGoal::new(8, 0, [3.0, 1.5]) };
+    let answer = IkSolver::default().solve(&chain, &obstacles, &goal).expect("right");
     assert!(!answer.reached);
-    let Some(Unreached::Blocked { veto }) = answer.reason else { panic!("{answer:?}") };
+    let Some(ChainIkFailure::Blocked { veto }) = answer.reason else { panic!("{answer:?}") };
     assert_eq!((veto.obstacle, veto.from), (Some(0), 8));
     assert!(answer.reason.expect("a reason").to_string().contains("obstacle 0"));
 
@@ -296,19 +299,19 @@ fn what_blocks_the_target_is_named() {
     for i in 1..8 {
         stiff.set_max_bend_rad(i, 0.1).expect("right");
     }
-    let goal = Goal { restarts: 3, ..Goal::new(8, 0, [1.0, -1.0]) };
-    let answer = Solver::default().solve(&stiff, &Obstacles::default(), &goal).expect("right");
-    let Some(Unreached::Blocked { veto }) = answer.reason else { panic!("{answer:?}") };
-    assert_eq!(veto.reason, Reason::BendLimit);
+    let goal = ChainIkGoal { restarts: 3, ..ChainIkGoal::new(8, 0, [1.0, -1.0]) };
+    let answer = IkSolver::default().solve(&stiff, &Obstacles::default(), &goal).expect("right");
+    let Some(ChainIkFailure::Blocked { veto }) = answer.reason else { panic!("{answer:?}") };
+    assert_eq!(veto.reason, VetoReason::BendLimit);
 }
 
 #[test]
 fn whoever_wants_a_motion_gets_no_mere_posture() {
     let (chain, obstacles, _) = scene();
     for target in [[5.0, 4.0], [-4.0, 4.0], [-5.0, -2.0]] {
-        let goal = Goal { motion_only: true, ..Goal::new(8, 0, target) };
-        let answer = Solver::default().solve(&chain, &obstacles, &goal).expect("right");
-        assert_eq!(answer.kind, Kind::Motion);
+        let goal = ChainIkGoal { motion_only: true, ..ChainIkGoal::new(8, 0, target) };
+        let answer = IkSolver::default().solve(&chain, &obstacles, &goal).expect("right");
+        assert_eq!(answer.kind, SolutionKind::Motion);
     }
 }
 
@@ -319,8 +322,9 @@ fn a_chain_that_minds_itself_does_not_cross_itself() {
         Chain::<2>::straight([0.0, 0.0], [1.0, 0.0], 10, rod, Connector::free(0.1)).expect("right");
     let rules = Rules { self_collision: true, ..Rules::default() };
     for target in [[0.6, 0.6], [-3.0, 1.0], [2.0, -2.0]] {
-        let goal = Goal::new(10, 0, target);
-        let answer = Solver::new(rules).solve(&chain, &Obstacles::default(), &goal).expect("right");
+        let goal = ChainIkGoal::new(10, 0, target);
+        let answer =
+            IkSolver::new(rules).solve(&chain, &Obstacles::default(), &goal).expect("right");
         is_met(&chain, &goal, &answer).expect("met");
         let p = &answer.points;
         for i in 0..10 {

@@ -6,14 +6,14 @@
 
 use std::f64::consts::PI;
 
-use super::pose::Vector;
-use super::serial::{Motion, SerialChain};
+use super::serial::{JointMotion, SerialChain};
 use super::skeleton::Skeleton;
-use sidestep_kernel::geometry::{across, cross, dot, norm, scaled, sub};
+use super::transform::Vector;
+use sidestep_kernel::geometry::{cross, dot, norm, rejection, scaled, sub};
 use sidestep_kernel::math::{acos, atan2, cos, wrap_angle};
 
 /// Angles that differ by less count as equal, because models are written with some ten digits.
-const SAME_ANGLE_RAD: f64 = 1e-9;
+const ANGLE_TOLERANCE_RAD: f64 = 1e-9;
 
 /// A limit of the bend at a connector.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,14 +50,14 @@ impl SerialChain {
             return None;
         }
         let joint = &self.joints[held_by];
-        if joint.motion != Motion::Turn || !joint.drive.is_own() {
+        if joint.motion != JointMotion::Turn || !joint.drive.is_own() {
             return None;
         }
         let after = sub(next.position_m(&frames), here_m);
         let bend = Bend::new(before, after, joint.line(&frames.links[held_by]).along)?;
         let (max_bend_rad, is_exact) = match joint.limits {
             Some(limits) => bend.limit(limits.lower, limits.upper),
-            None => (bend.largest_rad(), bend.can_be_straight()),
+            None => (bend.max_rad(), bend.can_be_straight()),
         };
         Some(BendLimit { joint: joint.name.clone(), max_bend_rad, is_exact })
     }
@@ -75,9 +75,9 @@ impl Bend {
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
         let before = scaled(before, 1.0 / norm(before));
         let after = scaled(after, 1.0 / norm(after));
-        let (u, v) = (across(before, axis), across(after, axis));
+        let (u, v) = (rejection(before, axis), rejection(after, axis));
         let product = norm(u) * norm(v);
-        if product < SAME_ANGLE_RAD {
+        if product < ANGLE_TOLERANCE_RAD {
             return None;
         }
         let from_u_to_v_rad = atan2(dot(cross(u, v), axis), dot(u, v));
@@ -89,25 +89,25 @@ impl Bend {
     }
 
     fn at(&self, from_straight_rad: f64) -> f64 {
-        if self.can_be_straight() && self.along.abs() < SAME_ANGLE_RAD {
+        if self.can_be_straight() && self.along.abs() < ANGLE_TOLERANCE_RAD {
             return wrap_angle(from_straight_rad).abs();
         }
         acos((self.along + self.across * cos(from_straight_rad)).clamp(-1.0, 1.0))
     }
 
-    fn largest_rad(&self) -> f64 {
+    fn max_rad(&self) -> f64 {
         self.at(PI)
     }
 
     fn can_be_straight(&self) -> bool {
-        (1.0 - self.along - self.across).abs() < SAME_ANGLE_RAD
+        (1.0 - self.along - self.across).abs() < ANGLE_TOLERANCE_RAD
     }
 
     /// Returns the largest bend within limits of the joint, and whether it is equivalent to them.
     fn limit(&self, lower_rad: f64, upper_rad: f64) -> (f64, bool) {
         let half_rad = 0.5 * (upper_rad - lower_rad);
         let middle_rad = wrap_angle(0.5 * (upper_rad + lower_rad) - self.straight_rad);
-        let is_exact = middle_rad.abs() < SAME_ANGLE_RAD && self.can_be_straight();
+        let is_exact = middle_rad.abs() < ANGLE_TOLERANCE_RAD && self.can_be_straight();
         let farthest_rad = (middle_rad.abs() + half_rad).min(PI);
         (self.at(farthest_rad), is_exact)
     }

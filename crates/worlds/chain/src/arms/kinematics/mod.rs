@@ -22,26 +22,26 @@
 //! reports which joints that leaves open, and refuses with a reason if points do not determine the
 //! joints at all.
 
+mod arm_selection;
 mod bend;
 mod body;
-mod chosen;
 mod inverse;
-mod pose;
 mod recover;
 mod serial;
 mod skeleton;
 #[cfg(test)]
 mod tests;
+mod transform;
 
+pub use arm_selection::{ArmFiles, ArmSelection};
 pub use bend::BendLimit;
 pub use body::ArmBody;
-pub use chosen::{ArmFiles, ChosenArm};
 pub use inverse::{
-    Against, ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Part, Posture,
-    Sphere, Turn,
+    ArmGoal, ArmPart, Axis, CollidesWith, Collision, IkFailure, IkResult, IkSolution,
+    MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere,
 };
-pub(crate) use inverse::{Aim, Follower};
-pub use pose::{Pose, Vector};
-pub use recover::{RecoverError, Recovered};
-pub use serial::{Frames, Motion, SerialChain, Variable};
-pub use skeleton::{Rod, Skeleton};
+pub(crate) use inverse::{ConnectorTarget, JointTracker};
+pub use recover::{RecoverError, RecoveredJoints};
+pub use serial::{Dof, Frames, JointMotion, SerialChain};
+pub use skeleton::{Skeleton, SkeletonRod};
+pub use transform::{Transform, Vector};

@@ -9,25 +9,25 @@
 
 use std::f64::consts::TAU;
 
-use super::pose::{Line, Pose, Vector};
-use super::serial::{Motion, MovingJoint, SerialChain};
+use super::serial::{JointMotion, MovingJoint, SerialChain};
 use super::skeleton::Skeleton;
+use super::transform::{Line, Transform, Vector};
 use sidestep_import::urdf::Limits;
-use sidestep_kernel::geometry::{across, add, cross, dot, norm, scaled, sub};
+use sidestep_kernel::geometry::{add, cross, dot, norm, rejection, scaled, sub};
 use sidestep_kernel::math::{atan2, wrap_angle};
 
 /// Largest distance between a connector and its nearest possible place, as a share of the reach.
-const FITS: f64 = 1e-6;
+const FIT_TOLERANCE: f64 = 1e-6;
 
 /// Distance from an axis, as a share of the reach, within which a point is on it: no turn moves it.
-const ON_AXIS: f64 = 1e-10;
+const ON_AXIS_TOLERANCE: f64 = 1e-10;
 
 /// Joint values tried before the search gives up; an arm of 7 joints needs at most some 20.
 const MAX_TRIES: usize = 20_000;
 
 /// Joint values that reproduce the connectors' positions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recovered {
+pub struct RecoveredJoints {
     /// One for each variable, inside its limits, in rad or m.
     pub values: Vec<f64>,
     /// The largest distance between a connector and its place by forward kinematics, in m.
@@ -104,7 +104,7 @@ impl SerialChain {
         skeleton: &Skeleton,
         positions_m: &[Vector],
         reference: &[f64],
-    ) -> Result<Recovered, RecoverError> {
+    ) -> Result<RecoveredJoints, RecoverError> {
         assert_eq!(reference.len(), self.variables.len(), "one value for each variable");
         let finite = positions_m.iter().filter(|p| p.iter().all(|x| x.is_finite())).count();
         let expected = skeleton.connectors.len();
@@ -116,7 +116,7 @@ impl SerialChain {
             return Err(RecoverError::Mimics { joint: joint.name.clone() });
         }
         self.check_solvable(skeleton)?;
-        let mut search = Search {
+        let mut search = JointSearch {
             chain: self,
             skeleton,
             positions_m,
@@ -126,7 +126,7 @@ impl SerialChain {
             tries: 0,
             best_failure: None,
         };
-        if !search.place(0, 0, Pose::IDENTITY) {
+        if !search.place_connectors(0, 0, Transform::IDENTITY) {
             return Err(search.best_failure.expect("a search that fails says why").1);
         }
         Ok(search.finish())
@@ -139,7 +139,7 @@ impl SerialChain {
             let joints = &self.joints[known.min(anchor.first)..anchor.first];
             let solvable = match joints {
                 [] | [_] => true,
-                [a, b] => a.motion == Motion::Turn && b.motion == Motion::Turn,
+                [a, b] => a.motion == JointMotion::Turn && b.motion == JointMotion::Turn,
                 _ => false,
             };
             if !solvable {
@@ -153,7 +153,7 @@ impl SerialChain {
 }
 
 /// A depth-first search over the solutions of each step.
-struct Search<'a> {
+struct JointSearch<'a> {
     chain: &'a SerialChain,
     skeleton: &'a Skeleton,
     positions_m: &'a [Vector],
@@ -163,20 +163,20 @@ struct Search<'a> {
     open: Vec<bool>,
     tries: usize,
     /// The failure of the branch that got farthest.
-    best_failure: Option<(Progress, RecoverError)>,
+    best_failure: Option<(SearchProgress, RecoverError)>,
 }
 
 /// The progress of a branch of a search; a limit is more informative than a misfit.
 #[derive(PartialEq, PartialOrd)]
-struct Progress {
+struct SearchProgress {
     connector: usize,
     fits: bool,
 }
 
-impl Search<'_> {
+impl JointSearch<'_> {
     /// Places the connectors from `connector` on, with the first `known` joints decided and the
     /// link behind them at `link`. Returns whether that worked.
-    fn place(&mut self, connector: usize, known: usize, link: Pose) -> bool {
+    fn place_connectors(&mut self, connector: usize, known: usize, link: Transform) -> bool {
         let Some(anchor) = self.skeleton.connectors.get(connector) else { return true };
         let target_m = self.positions_m[connector];
         let until = anchor.first.max(known);
@@ -184,7 +184,7 @@ impl Search<'_> {
             // This connector is fixed in a link that is already placed.
             let frames = self.chain.forward(&self.values);
             return self.fits(connector, sub(anchor.position_m(&frames), target_m))
-                && self.place(connector + 1, known, link);
+                && self.place_connectors(connector + 1, known, link);
         }
         let joints = &self.chain.joints[known..until];
         for turn in self.solutions(joints, known, &link, anchor.point_m, target_m) {
@@ -200,25 +200,36 @@ impl Search<'_> {
     }
 
     /// Decides the joints from `known` on, and goes on from there.
-    fn try_values(&mut self, connector: usize, known: usize, link: Pose, found: &[Value]) -> bool {
+    fn try_values(
+        &mut self,
+        connector: usize,
+        known: usize,
+        link: Transform,
+        found: &[CandidateValue],
+    ) -> bool {
         let mut outer = link;
         for (i, value) in found.iter().enumerate() {
             let joint = &self.chain.joints[known + i];
             self.values[known + i] = value.value;
             self.open[known + i] = value.is_open;
-            outer = outer.then(&joint.origin).then(&joint.moved(value.value));
+            outer = outer.compose(&joint.origin).compose(&joint.transform(value.value));
         }
         let anchor = &self.skeleton.connectors[connector];
-        self.fits(connector, sub(outer.point(anchor.point_m), self.positions_m[connector]))
-            && self.are_legal(connector, known, found)
-            && self.place(connector + 1, known + found.len(), outer)
+        self.fits(
+            connector,
+            sub(outer.transform_point(anchor.point_m), self.positions_m[connector]),
+        ) && self.are_valid(connector, known, found)
+            && self.place_connectors(connector + 1, known + found.len(), outer)
     }
 
     /// Returns whether the joints from `known` on may have these values.
-    fn are_legal(&mut self, connector: usize, known: usize, found: &[Value]) -> bool {
+    fn are_valid(&mut self, connector: usize, known: usize, found: &[CandidateValue]) -> bool {
         for (joint, found) in self.chain.joints[known..].iter().zip(found) {
-            if let Some(limits) = joint.limits.filter(|l| !l.contain(found.value)) {
-                self.fail(Progress { connector, fits: true }, outside(joint, found.value, limits));
+            if let Some(limits) = joint.limits.filter(|l| !l.contains(found.value)) {
+                self.record_failure(
+                    SearchProgress { connector, fits: true },
+                    outside_limits_error(joint, found.value, limits),
+                );
                 return false;
             }
         }
@@ -227,15 +238,15 @@ impl Search<'_> {
 
     fn fits(&mut self, connector: usize, error_m: Vector) -> bool {
         let distance_m = norm(error_m);
-        let fits = distance_m <= FITS * self.skeleton.reach_m;
+        let fits = distance_m <= FIT_TOLERANCE * self.skeleton.reach_m;
         if !fits {
             let failure = RecoverError::DoesNotFit { connector, distance_m };
-            self.fail(Progress { connector, fits: false }, failure);
+            self.record_failure(SearchProgress { connector, fits: false }, failure);
         }
         fits
     }
 
-    fn fail(&mut self, progress: Progress, failure: RecoverError) {
+    fn record_failure(&mut self, progress: SearchProgress, failure: RecoverError) {
         if self.best_failure.as_ref().is_none_or(|(best, _)| progress > *best) {
             self.best_failure = Some((progress, failure));
         }
@@ -247,94 +258,98 @@ impl Search<'_> {
         &self,
         joints: &[MovingJoint],
         known: usize,
-        link: &Pose,
+        link: &Transform,
         p_m: Vector,
         target_m: Vector,
-    ) -> Vec<Vec<Value>> {
+    ) -> Vec<Vec<CandidateValue>> {
         let reference = &self.reference[known..known + joints.len()];
         match joints {
-            [joint] => vec![vec![self.one(joint, link, p_m, target_m, reference[0])]],
+            [joint] => vec![vec![self.solve_one(joint, link, p_m, target_m, reference[0])]],
             [inner, outer] => {
-                let mut found = self.two(inner, outer, link, p_m, target_m, reference);
-                found.sort_by(|a, b| away(a, reference).total_cmp(&away(b, reference)));
+                let mut found = self.solve_two(inner, outer, link, p_m, target_m, reference);
+                found.sort_by(|a, b| {
+                    total_change(a, reference).total_cmp(&total_change(b, reference))
+                });
                 found
             }
             _ => unreachable!("check_solvable refuses more"),
         }
     }
 
-    fn one(
+    fn solve_one(
         &self,
         joint: &MovingJoint,
-        link: &Pose,
+        link: &Transform,
         p_m: Vector,
         target_m: Vector,
         reference: f64,
-    ) -> Value {
+    ) -> CandidateValue {
         let line = joint.line(link);
-        let p_m = link.then(&joint.origin).point(p_m);
+        let p_m = link.compose(&joint.origin).transform_point(p_m);
         match joint.motion {
-            Motion::Slide => Value::found(dot(sub(target_m, p_m), line.along)),
-            Motion::Turn => self.turn(joint, &line, p_m, target_m, reference),
+            JointMotion::Slide => CandidateValue::new(dot(sub(target_m, p_m), line.along)),
+            JointMotion::Turn => self.solve_turn(joint, &line, p_m, target_m, reference),
         }
     }
 
     /// Returns the turn about `line` that brings `p_m` to the direction of `target_m`.
-    fn turn(
+    fn solve_turn(
         &self,
         joint: &MovingJoint,
         line: &Line,
         p_m: Vector,
         target_m: Vector,
         reference: f64,
-    ) -> Value {
-        let on_axis_m = ON_AXIS * self.skeleton.reach_m;
+    ) -> CandidateValue {
+        let on_axis_m = ON_AXIS_TOLERANCE * self.skeleton.reach_m;
         let (from, to) = (
-            across(sub(p_m, line.through_m), line.along),
-            across(sub(target_m, line.through_m), line.along),
+            rejection(sub(p_m, line.through_m), line.along),
+            rejection(sub(target_m, line.through_m), line.along),
         );
         if norm(from) <= on_axis_m || norm(to) <= on_axis_m {
-            return Value { value: reference, is_open: true };
+            return CandidateValue { value: reference, is_open: true };
         }
         let angle_rad = atan2(dot(cross(from, to), line.along), dot(from, to));
-        Value::found(nearest_turn(angle_rad, reference, joint.limits))
+        CandidateValue::new(nearest_turn(angle_rad, reference, joint.limits))
     }
 
     /// Returns two turns: the inner one brings to `target_m` the point that the outer one leaves at
     /// `z`, which is on the circle that the outer axis draws through `p_m` and on the one that the
     /// inner axis draws through `target_m`.
-    fn two(
+    fn solve_two(
         &self,
         inner: &MovingJoint,
         outer: &MovingJoint,
-        link: &Pose,
+        link: &Transform,
         p_m: Vector,
         target_m: Vector,
         reference: &[f64],
-    ) -> Vec<Vec<Value>> {
-        let (first, at_zero) = (inner.line(link), link.then(&inner.origin));
+    ) -> Vec<Vec<CandidateValue>> {
+        let (first, at_zero) = (inner.line(link), link.compose(&inner.origin));
         let second = outer.line(&at_zero);
-        let p_m = at_zero.then(&outer.origin).point(p_m);
+        let p_m = at_zero.compose(&outer.origin).transform_point(p_m);
         let pair = |z: Vector| {
-            let q1 = self.turn(inner, &first, z, target_m, reference[0]);
+            let q1 = self.solve_turn(inner, &first, z, target_m, reference[0]);
             // An open first turn is at its reference, and the second has to fit it.
-            let back = inner.moved(-q1.value);
+            let back = inner.transform(-q1.value);
             let z = if q1.is_open {
-                at_zero.point(back.point(at_zero.point_inside(target_m)))
+                at_zero.transform_point(
+                    back.transform_point(at_zero.inverse_transform_point(target_m)),
+                )
             } else {
                 z
             };
-            vec![q1, self.turn(outer, &second, p_m, z, reference[1])]
+            vec![q1, self.solve_turn(outer, &second, p_m, z, reference[1])]
         };
         meeting_points(&first, target_m, &second, p_m).into_iter().map(pair).collect()
     }
 
-    fn finish(self) -> Recovered {
+    fn finish(self) -> RecoveredJoints {
         let frames = self.chain.forward(&self.values);
         let found = self.chain.connectors(self.skeleton, &frames);
         let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| norm(sub(a, b)));
         let variables = self.chain.variables.iter().zip(&self.open);
-        Recovered {
+        RecoveredJoints {
             residual_m: errors.fold(0.0, f64::max),
             open: variables.filter(|(_, open)| **open).map(|(v, _)| v.name.clone()).collect(),
             values: self.values,
@@ -344,22 +359,22 @@ impl Search<'_> {
 
 /// A joint's value.
 #[derive(Debug, Clone, Copy)]
-struct Value {
+struct CandidateValue {
     value: f64,
     is_open: bool,
 }
 
-impl Value {
-    fn found(value: f64) -> Self {
+impl CandidateValue {
+    fn new(value: f64) -> Self {
         Self { value, is_open: false }
     }
 }
 
-fn away(values: &[Value], reference: &[f64]) -> f64 {
+fn total_change(values: &[CandidateValue], reference: &[f64]) -> f64 {
     values.iter().zip(reference).map(|(v, r)| (v.value - r).abs()).sum()
 }
 
-fn outside(joint: &MovingJoint, value: f64, limits: Limits) -> RecoverError {
+fn outside_limits_error(joint: &MovingJoint, value: f64, limits: Limits) -> RecoverError {
     let Limits { lower, upper } = limits;
     RecoverError::OutsideLimits { joint: joint.name.clone(), value, lower, upper }
 }
@@ -369,7 +384,7 @@ fn outside(joint: &MovingJoint, value: f64, limits: Limits) -> RecoverError {
 fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f64 {
     let nearest = reference_rad + wrap_angle(angle_rad - reference_rad);
     let turns = [nearest, nearest - TAU, nearest + TAU];
-    let legal = |value: &f64| limits.is_none_or(|limits| limits.contain(*value));
+    let legal = |value: &f64| limits.is_none_or(|limits| limits.contains(*value));
     turns.into_iter().find(legal).unwrap_or_else(|| {
         // Distant references end up here: bring the angle near to the middle of the limits.
         let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
@@ -388,11 +403,11 @@ fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vect
     let center = second.nearest(b);
     let radius = norm(sub(b, center));
     let n2 = second.along;
-    let (n1, d1) = match first.feet(second) {
+    let (n1, d1) = match first.common_perpendicular(second) {
         Some(_) => (first.along, dot(first.along, sub(a, center))),
         None => {
             let other = first.nearest(a);
-            let between = across(sub(other, center), n2);
+            let between = rejection(sub(other, center), n2);
             let radius_1 = norm(sub(a, other));
             let d = dot(between, between);
             (between, 0.5 * (d + radius * radius - radius_1 * radius_1))

@@ -1,6 +1,6 @@
 //! A model's joints from base to tip, and forward kinematics.
 
-use super::pose::{Line, Pose, Vector};
+use super::transform::{Line, Transform, Vector};
 use sidestep_import::urdf::{JointKind, Limits, Model};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::scaled;
@@ -16,20 +16,20 @@ pub struct SerialChain {
     /// Name of the tip link.
     pub tip: String,
     /// The variables, in the order from base to tip.
-    pub variables: Vec<Variable>,
+    pub variables: Vec<Dof>,
     pub(super) joints: Vec<MovingJoint>,
     /// The tip in the last link.
-    pub(super) to_tip: Pose,
+    pub(super) to_tip: Transform,
 }
 
 /// A variable of a posture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Variable {
+pub struct Dof {
     /// The joint whose value it is. The joint need not be between base and tip if one that is
     /// mimics it.
     pub name: String,
     /// Whether the value is an angle in rad or a displacement in m.
-    pub motion: Motion,
+    pub motion: JointMotion,
     /// Lowest and highest value; none for continuous joints.
     pub limits: Option<Limits>,
     /// Highest speed, in rad/s or m/s; none where the model gives none.
@@ -38,16 +38,16 @@ pub struct Variable {
 
 /// The kind of a joint's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
+pub enum JointMotion {
     /// About its axis, in rad.
     Turn,
     /// Along its axis, in m.
     Slide,
 }
 
-impl Motion {
+impl JointMotion {
     /// Returns the motion of joints of a kind that a single value moves.
-    pub(super) fn of(kind: JointKind) -> Option<Self> {
+    pub(super) fn from_kind(kind: JointKind) -> Option<Self> {
         match kind {
             JointKind::Revolute | JointKind::Continuous => Some(Self::Turn),
             JointKind::Prismatic => Some(Self::Slide),
@@ -56,10 +56,10 @@ impl Motion {
     }
 
     /// Returns the motion by `value` about or along the unit vector `axis`.
-    pub(super) fn moved(self, axis: Vector, value: f64) -> Pose {
+    pub(super) fn transform(self, axis: Vector, value: f64) -> Transform {
         match self {
-            Self::Turn => Pose::turn(axis, value),
-            Self::Slide => Pose::shift(scaled(axis, value)),
+            Self::Turn => Transform::from_axis_angle(axis, value),
+            Self::Slide => Transform::from_translation(scaled(axis, value)),
         }
     }
 
@@ -76,24 +76,24 @@ impl Motion {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MovingJoint {
     pub(super) name: String,
-    pub(super) motion: Motion,
+    pub(super) motion: JointMotion,
     /// The joint's frame in the link before it.
-    pub(super) origin: Pose,
+    pub(super) origin: Transform,
     pub(super) axis: Vector,
     pub(super) limits: Option<Limits>,
     pub(super) max_speed: Option<f64>,
-    pub(super) drive: Drive,
+    pub(super) drive: JointCoupling,
 }
 
 /// A joint's value: `multiplier * values[variable] + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Drive {
+pub(super) struct JointCoupling {
     pub(super) variable: usize,
     pub(super) multiplier: f64,
     pub(super) offset: f64,
 }
 
-impl Drive {
+impl JointCoupling {
     pub(super) fn value(&self, values: &[f64]) -> f64 {
         self.multiplier * values[self.variable] + self.offset
     }
@@ -105,14 +105,14 @@ impl Drive {
 
 impl MovingJoint {
     /// Returns the motion of the joint at `value`.
-    pub(super) fn moved(&self, value: f64) -> Pose {
-        self.motion.moved(self.axis, value)
+    pub(super) fn transform(&self, value: f64) -> Transform {
+        self.motion.transform(self.axis, value)
     }
 
     /// Returns its axis, if the link before it stands at `before`.
-    pub(super) fn line(&self, before: &Pose) -> Line {
-        let frame = before.then(&self.origin);
-        Line { through_m: frame.origin_m, along: frame.direction(self.axis) }
+    pub(super) fn line(&self, before: &Transform) -> Line {
+        let frame = before.compose(&self.origin);
+        Line { through_m: frame.origin_m, along: frame.transform_direction(self.axis) }
     }
 }
 
@@ -120,9 +120,9 @@ impl MovingJoint {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
     /// Link 0 (the base), then the link that each joint carries.
-    pub links: Vec<Pose>,
+    pub links: Vec<Transform>,
     /// The tip.
-    pub tip: Pose,
+    pub tip: Transform,
 }
 
 impl SerialChain {
@@ -133,7 +133,7 @@ impl SerialChain {
     /// When the tip is not attached to the base, or only through a joint that no single value
     /// moves.
     pub fn new(model: &Model, base: usize, tip: usize, place: &str) -> Result<Self, InputError> {
-        let way = model.way(base, tip).ok_or_else(|| {
+        let way = model.joint_path(base, tip).ok_or_else(|| {
             let cause = format!("`{}` does not hang on `{}`", model.links[tip], model.links[base]);
             InputError::new(place, cause, "name a link that is further from the root")
         })?;
@@ -142,7 +142,7 @@ impl SerialChain {
             tip: model.links[tip].clone(),
             variables: Vec::new(),
             joints: Vec::new(),
-            to_tip: Pose::IDENTITY,
+            to_tip: Transform::IDENTITY,
         };
         let mut drivers = Vec::new();
         for joint in way {
@@ -160,20 +160,20 @@ impl SerialChain {
         place: &str,
     ) -> Result<(), InputError> {
         let joint = &model.joints[index];
-        let origin = self.to_tip.then(&Pose::from_origin(&joint.origin));
+        let origin = self.to_tip.compose(&Transform::from_origin(&joint.origin));
         if joint.kind == JointKind::Fixed {
             self.to_tip = origin;
             return Ok(());
         }
-        let motion = Motion::of(joint.kind).ok_or_else(|| {
+        let motion = JointMotion::from_kind(joint.kind).ok_or_else(|| {
             let cause = format!("joint `{}` moves in more than one way", joint.name);
             InputError::new(place, cause, "choose base and tip on one side of it")
         })?;
-        let (driver, multiplier, offset) = driver(model, index);
+        let (driver, multiplier, offset) = mimic_source(model, index);
         let known = drivers.iter().position(|&known| known == driver);
         let variable = known.unwrap_or_else(|| {
             drivers.push(driver);
-            self.variables.push(variable(model, driver));
+            self.variables.push(to_dof(model, driver));
             drivers.len() - 1
         });
         self.joints.push(MovingJoint {
@@ -183,19 +183,19 @@ impl SerialChain {
             axis: joint.axis,
             limits: joint.limits,
             max_speed: joint.max_speed,
-            drive: Drive { variable, multiplier, offset },
+            drive: JointCoupling { variable, multiplier, offset },
         });
-        self.to_tip = Pose::IDENTITY;
+        self.to_tip = Transform::IDENTITY;
         Ok(())
     }
 
     /// Returns how a joint of the model, on the way to the tip or beside it, follows the variables;
     /// none if it does not.
-    pub(super) fn drive(&self, model: &Model, joint: usize) -> Option<Drive> {
-        let (driver, multiplier, offset) = driver(model, joint);
+    pub(super) fn coupling(&self, model: &Model, joint: usize) -> Option<JointCoupling> {
+        let (driver, multiplier, offset) = mimic_source(model, joint);
         let name = &model.joints[driver].name;
         let variable = self.variables.iter().position(|variable| variable.name == *name)?;
-        Some(Drive { variable, multiplier, offset })
+        Some(JointCoupling { variable, multiplier, offset })
     }
 
     /// Computes forward kinematics: the poses of links and tip at these values of the variables,
@@ -206,28 +206,28 @@ impl SerialChain {
     pub fn forward(&self, values: &[f64]) -> Frames {
         assert_eq!(values.len(), self.variables.len(), "one value for each variable");
         let mut links = Vec::with_capacity(self.joints.len() + 1);
-        let mut link = Pose::IDENTITY;
+        let mut link = Transform::IDENTITY;
         links.push(link);
         for joint in &self.joints {
-            link = link.then(&joint.origin).then(&joint.moved(joint.drive.value(values)));
+            link = link.compose(&joint.origin).compose(&joint.transform(joint.drive.value(values)));
             links.push(link);
         }
-        Frames { tip: link.then(&self.to_tip), links }
+        Frames { tip: link.compose(&self.to_tip), links }
     }
 
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
     /// rest. Of several values for one joint the last one holds.
     pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
-        let said = |variable: &Variable| {
+        let said = |variable: &Dof| {
             posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
         };
-        let at_rest = self.variables.iter().zip(self.rest());
+        let at_rest = self.variables.iter().zip(self.rest_values());
         at_rest.map(|(variable, rest)| said(variable).map_or(rest, |(_, value)| *value)).collect()
     }
 
     /// Returns the values nearest to zero that are inside the limits.
-    pub fn rest(&self) -> Vec<f64> {
-        let nearest = |v: &Variable| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
+    pub fn rest_values(&self) -> Vec<f64> {
+        let nearest = |v: &Dof| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
         self.variables.iter().map(nearest).collect()
     }
 
@@ -288,7 +288,7 @@ impl SerialChain {
     fn outside<'a>(
         &'a self,
         values: &'a [f64],
-    ) -> impl Iterator<Item = (&'a str, Motion, Limits, f64)> {
+    ) -> impl Iterator<Item = (&'a str, JointMotion, Limits, f64)> {
         let of_variables = self
             .variables
             .iter()
@@ -299,7 +299,7 @@ impl SerialChain {
             .iter()
             .map(|j| (j.name.as_str(), j.motion, j.limits, j.drive.value(values)));
         of_variables.chain(of_joints).filter_map(|(name, motion, limits, value)| {
-            let limits = limits.filter(|limits| !limits.contain(value))?;
+            let limits = limits.filter(|limits| !limits.contains(value))?;
             Some((name, motion, limits, value))
         })
     }
@@ -307,7 +307,7 @@ impl SerialChain {
 
 /// Returns the joint at the end of the mimicry from `joint`, and `joint`'s value as a function of
 /// its.
-fn driver(model: &Model, joint: usize) -> (usize, f64, f64) {
+fn mimic_source(model: &Model, joint: usize) -> (usize, f64, f64) {
     let (mut driver, mut multiplier, mut offset) = (joint, 1.0, 0.0);
     // Models contain no cycles of mimicry.
     while let Some(mimic) = &model.joints[driver].mimic {
@@ -318,12 +318,12 @@ fn driver(model: &Model, joint: usize) -> (usize, f64, f64) {
     (driver, multiplier, offset)
 }
 
-fn variable(model: &Model, joint: usize) -> Variable {
+fn to_dof(model: &Model, joint: usize) -> Dof {
     let joint = &model.joints[joint];
     let motion = match joint.kind {
-        JointKind::Prismatic => Motion::Slide,
-        _ => Motion::Turn,
+        JointKind::Prismatic => JointMotion::Slide,
+        _ => JointMotion::Turn,
     };
     let (limits, max_speed) = (joint.limits, joint.max_speed);
-    Variable { name: joint.name.clone(), motion, limits, max_speed }
+    Dof { name: joint.name.clone(), motion, limits, max_speed }
 }

@@ -5,12 +5,12 @@
 //! the one farthest out that shares a link with the last one, so that points between which no joint
 //! bends (such as the elbow offsets of a Panda) drop out.
 
-use super::pose::{Line, Pose, Vector};
-use super::serial::{Frames, Motion, SerialChain};
-use sidestep_kernel::geometry::{across, add, dot, norm, scaled, sub};
+use super::serial::{Frames, JointMotion, SerialChain};
+use super::transform::{Line, Transform, Vector};
+use sidestep_kernel::geometry::{add, dot, norm, rejection, scaled, sub};
 
 /// Points nearer to each other than this share of the arm's reach count as one.
-const SAME: f64 = 1e-9;
+const SAME_POINT_TOLERANCE: f64 = 1e-9;
 
 /// An arm as a chain of rods.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Skeleton {
     /// The connectors, one more than rods; the last is the tip.
     pub(super) connectors: Vec<Anchor>,
     /// The rods between them.
-    pub rods: Vec<Rod>,
+    pub rods: Vec<SkeletonRod>,
     /// Unit vector in the base's frame along the first joint's axis, from which the bend at the
     /// first connector is measured. None if that joint slides or the connector is not on it.
     pub base_direction: Option<Vector>,
@@ -28,7 +28,7 @@ pub struct Skeleton {
 
 /// Lengths that a rod can have.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rod {
+pub struct SkeletonRod {
     /// Shortest length in m. It is zero if a prismatic joint can bring its ends together.
     pub min_m: f64,
     /// Longest length in m; infinite if a prismatic joint has no limits.
@@ -46,7 +46,7 @@ pub(super) struct Anchor {
 
 impl Anchor {
     pub(super) fn position_m(&self, frames: &Frames) -> Vector {
-        frames.links[self.first].point(self.point_m)
+        frames.links[self.first].transform_point(self.point_m)
     }
 }
 
@@ -55,7 +55,7 @@ impl SerialChain {
     pub fn skeleton(&self) -> Skeleton {
         let frames = self.forward(&vec![0.0; self.variables.len()]);
         let reach_m = self.reach_m();
-        let builder = Builder { chain: self, lines: self.lines(&frames), frames, reach_m };
+        let builder = SkeletonBuilder { chain: self, lines: self.lines(&frames), frames, reach_m };
         let connectors = builder.connectors();
         let rods = connectors.windows(2).map(|pair| builder.rod(&pair[0], &pair[1])).collect();
         Skeleton { rods, base_direction: builder.base_direction(&connectors), reach_m, connectors }
@@ -74,7 +74,7 @@ impl SerialChain {
         Self {
             tip: format!("connector {k}"),
             joints: self.joints[..anchor.first].to_vec(),
-            to_tip: Pose::shift(anchor.point_m),
+            to_tip: Transform::from_translation(anchor.point_m),
             ..self.clone()
         }
     }
@@ -86,7 +86,7 @@ impl SerialChain {
 
     fn reach_m(&self) -> f64 {
         let slide = |j: &super::serial::MovingJoint| match (j.motion, j.limits) {
-            (Motion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+            (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
             _ => 0.0,
         };
         let links = self.joints.iter().map(|joint| norm(joint.origin.origin_m) + slide(joint));
@@ -94,7 +94,7 @@ impl SerialChain {
     }
 }
 
-struct Builder<'a> {
+struct SkeletonBuilder<'a> {
     chain: &'a SerialChain,
     /// The posture in which points are compared.
     frames: Frames,
@@ -102,24 +102,25 @@ struct Builder<'a> {
     reach_m: f64,
 }
 
-impl Builder<'_> {
+impl SkeletonBuilder<'_> {
     fn connectors(&self) -> Vec<Anchor> {
         let tip_link = self.chain.joints.len();
         let tip = self.anchor(self.frames.tip.origin_m, tip_link);
         let candidates = self.candidates();
-        let Some(&base) = candidates.iter().filter(|c| c.first == 0).reduce(further) else {
+        let Some(&base) = candidates.iter().filter(|c| c.first == 0).reduce(outer_anchor) else {
             return self.without_joints(tip);
         };
         let mut connectors = vec![base];
         let mut last = base;
-        while !self.adjacent(&last, &tip) {
-            let next = candidates.iter().filter(|c| c.last > last.last && self.adjacent(&last, c));
+        while !self.is_adjacent(&last, &tip) {
+            let next =
+                candidates.iter().filter(|c| c.last > last.last && self.is_adjacent(&last, c));
             // Far from the origin rounding may part a connector from its axis; the rest of the arm is then one rod.
-            let Some(next) = next.reduce(further) else { break };
+            let Some(next) = next.reduce(outer_anchor) else { break };
             last = *next;
             connectors.push(last);
         }
-        if !self.coincide(&last, &tip) {
+        if !self.is_coincident(&last, &tip) {
             connectors.push(tip);
         }
         connectors
@@ -128,7 +129,7 @@ impl Builder<'_> {
     /// Returns the anchors of a single rigid body: its base and its tip.
     fn without_joints(&self, tip: Anchor) -> Vec<Anchor> {
         let base = self.anchor([0.0; 3], 0);
-        if self.coincide(&base, &tip) { vec![tip] } else { vec![base, tip] }
+        if self.is_coincident(&base, &tip) { vec![tip] } else { vec![base, tip] }
     }
 
     /// Returns points on the axes, from the base out: feet of the common perpendiculars of
@@ -137,12 +138,13 @@ impl Builder<'_> {
         let Some(first) = self.lines.first() else { return Vec::new() };
         let mut candidates = Vec::new();
         let mut entry = first.through_m;
-        let is_slide = |joint: usize| self.chain.joints[joint].motion == Motion::Slide;
+        let is_slide = |joint: usize| self.chain.joints[joint].motion == JointMotion::Slide;
         if self.lines.len() == 1 || is_slide(0) {
             candidates.push(self.anchor(entry, 0));
         }
         for (joint, pair) in self.lines.windows(2).enumerate() {
-            let (near, far) = pair[0].feet(&pair[1]).unwrap_or((entry, pair[1].nearest(entry)));
+            let (near, far) =
+                pair[0].common_perpendicular(&pair[1]).unwrap_or((entry, pair[1].nearest(entry)));
             candidates.push(self.anchor(near, joint + 1));
             candidates.push(self.anchor(far, joint + 1));
             entry = far;
@@ -153,8 +155,8 @@ impl Builder<'_> {
     /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
     fn anchor(&self, p_m: Vector, link: usize) -> Anchor {
         let on_axis = |joint: usize| {
-            self.chain.joints[joint].motion == Motion::Turn
-                && self.lines[joint].distance_m(p_m) <= SAME * self.reach_m
+            self.chain.joints[joint].motion == JointMotion::Turn
+                && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
         };
         let (mut first, mut last) = (link, link);
         while first > 0 && on_axis(first - 1) {
@@ -163,17 +165,17 @@ impl Builder<'_> {
         while last < self.lines.len() && on_axis(last) {
             last += 1;
         }
-        Anchor { point_m: self.frames.links[first].point_inside(p_m), first, last }
+        Anchor { point_m: self.frames.links[first].inverse_transform_point(p_m), first, last }
     }
 
     /// Returns whether a rod can join two points: fixed in one link, or on either side of a slide.
-    fn adjacent(&self, inner: &Anchor, outer: &Anchor) -> bool {
+    fn is_adjacent(&self, inner: &Anchor, outer: &Anchor) -> bool {
         outer.first <= inner.last || self.slide_between(inner, outer).is_some()
     }
 
     fn slide_between(&self, inner: &Anchor, outer: &Anchor) -> Option<usize> {
-        let slides =
-            outer.first == inner.last + 1 && self.chain.joints[inner.last].motion == Motion::Slide;
+        let slides = outer.first == inner.last + 1
+            && self.chain.joints[inner.last].motion == JointMotion::Slide;
         slides.then_some(inner.last)
     }
 
@@ -181,28 +183,28 @@ impl Builder<'_> {
         sub(outer.position_m(&self.frames), inner.position_m(&self.frames))
     }
 
-    fn coincide(&self, inner: &Anchor, outer: &Anchor) -> bool {
+    fn is_coincident(&self, inner: &Anchor, outer: &Anchor) -> bool {
         self.slide_between(inner, outer).is_none()
-            && norm(self.between_m(inner, outer)) <= SAME * self.reach_m
+            && norm(self.between_m(inner, outer)) <= SAME_POINT_TOLERANCE * self.reach_m
     }
 
-    fn rod(&self, inner: &Anchor, outer: &Anchor) -> Rod {
+    fn rod(&self, inner: &Anchor, outer: &Anchor) -> SkeletonRod {
         let v = self.between_m(inner, outer);
         let Some(joint) = self.slide_between(inner, outer) else {
-            return Rod { min_m: norm(v), max_m: norm(v) };
+            return SkeletonRod { min_m: norm(v), max_m: norm(v) };
         };
         let axis = self.lines[joint].along;
-        let offset_m = norm(across(v, axis));
+        let offset_m = norm(rejection(v, axis));
         let joint = &self.chain.joints[joint];
         // The frames of the builder have every variable at zero, a mimic joint at its offset.
         let zero = joint.drive.offset;
         let length_m = |q: f64| norm([offset_m, dot(v, axis) + q - zero, 0.0]);
         let Some(limits) = joint.limits else {
-            return Rod { min_m: offset_m, max_m: f64::INFINITY };
+            return SkeletonRod { min_m: offset_m, max_m: f64::INFINITY };
         };
         let ends = [length_m(limits.lower), length_m(limits.upper)];
         let passes = (limits.lower..=limits.upper).contains(&(zero - dot(v, axis)));
-        Rod {
+        SkeletonRod {
             min_m: if passes { offset_m } else { ends[0].min(ends[1]) },
             max_m: ends[0].max(ends[1]),
         }
@@ -217,6 +219,6 @@ impl Builder<'_> {
 }
 
 /// Returns the anchor that is fixed farther out; of several the first.
-fn further<'a>(a: &'a Anchor, b: &'a Anchor) -> &'a Anchor {
+fn outer_anchor<'a>(a: &'a Anchor, b: &'a Anchor) -> &'a Anchor {
     if b.last > a.last { b } else { a }
 }

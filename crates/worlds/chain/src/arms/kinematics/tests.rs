@@ -62,7 +62,7 @@ fn hand_computed_poses() {
     let turned =
         serial(&[("prismatic", [0.0, 0.0, 1.0], [FRAC_PI_2, 0.0, FRAC_PI_2], X, [0.0, 1.0])]);
     assert_near(turned.forward(&[0.5]).tip.origin_m, [0.0, 0.5, 1.0], 1e-15);
-    assert_near(turned.forward(&[0.5]).tip.direction(Y), Z, 1e-15);
+    assert_near(turned.forward(&[0.5]).tip.transform_direction(Y), Z, 1e-15);
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn every_shared_arm_has_rods_of_its_lengths_in_every_posture() {
     }
 }
 
-fn check_rotation(pose: &Pose) {
+fn check_rotation(pose: &Transform) {
     let [x, y, z] = pose.rotation;
     for (a, b, expected) in
         [(x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (y, z, 0.0), (z, x, 0.0)]
@@ -122,7 +122,7 @@ fn check_rotation(pose: &Pose) {
 fn posture(chain: &SerialChain, seed: u32) -> Vec<f64> {
     let share =
         |k: usize| (0.5 + (f64::from(seed) * 1.7 + k as f64 + 1.0) * 0.618_033_988_75).fract();
-    let value = |(k, v): (usize, &Variable)| {
+    let value = |(k, v): (usize, &Dof)| {
         let (lower, upper) = v.limits.map_or((-PI, PI), |l| (l.lower, l.upper));
         lower + share(k) * (upper - lower)
     };
@@ -193,7 +193,7 @@ fn a_prismatic_joint_is_a_rod_of_variable_length_also_off_its_axis() {
     assert!((rod.max_m - (0.25 + 0.81f64).sqrt()).abs() < 1e-12, "{rod:?}");
 }
 
-fn check_recovery(chain: &SerialChain, values: &[f64], reference: &[f64]) -> Recovered {
+fn check_recovery(chain: &SerialChain, values: &[f64], reference: &[f64]) -> RecoveredJoints {
     let skeleton = chain.skeleton();
     let connectors = chain.connectors(&skeleton, &chain.forward(values));
     let found = chain.recover(&skeleton, &connectors, reference).expect("joint values");
@@ -230,7 +230,7 @@ fn joint_values_come_back_from_connectors_where_they_are_determined() {
 fn straight_arms_are_recovered_too() {
     for name in ["chain/iiwa7.urdf", "chain/ur5.urdf"] {
         let Some(chain) = shared_chain(name, None) else { return };
-        let rest = chain.rest();
+        let rest = chain.rest_values();
         let found = check_recovery(&chain, &rest, &rest);
         assert!(!found.open.is_empty(), "{found:?}");
         let mut other = rest.clone();
@@ -243,7 +243,7 @@ fn straight_arms_are_recovered_too() {
 fn what_cannot_be_recovered_has_a_reason() {
     let Some(panda) = shared_chain("chain/panda.urdf", Some("panda_link8")) else { return };
     let skeleton = panda.skeleton();
-    let values = panda.rest();
+    let values = panda.rest_values();
     let connectors = panda.connectors(&skeleton, &panda.forward(&values));
     let error = panda.recover(&skeleton, &connectors, &values).expect_err("offsets");
     assert!(
@@ -276,7 +276,7 @@ fn mimic_joints_follow_their_driver() {
     let Some(hand) = shared_chain("chain/panda.urdf", Some("panda_rightfinger")) else { return };
     assert_eq!(hand.variables.last().expect("eight").name, "panda_finger_joint1");
     assert_eq!(hand.variables.len(), 8);
-    let mut values = hand.rest();
+    let mut values = hand.rest_values();
     let closed = hand.forward(&values).tip.origin_m;
     values[7] = 0.03;
     assert!((norm(sub(hand.forward(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12);
@@ -386,7 +386,7 @@ fn arms_far_from_their_base_have_connectors_from_base_to_tip() {
     for offset in ["1e3", "1e4", "1e5", "1e6", "-1e6", "123456.789"] {
         let arm = chain_of(&mimic([offset, "-1", "1", "1"]).expect("a model"), None);
         let skeleton = arm.skeleton();
-        let places = arm.connectors(&skeleton, &arm.forward(&arm.rest()));
+        let places = arm.connectors(&skeleton, &arm.forward(&arm.rest_values()));
         assert_eq!(places.len(), skeleton.rods.len() + 1, "{offset}");
         assert!(places.iter().flatten().all(|x| x.is_finite()), "{offset}");
     }

@@ -16,7 +16,7 @@ mod space;
 mod tests;
 mod tree;
 
-use super::ik::{Goal, Solver};
+use super::ik::{ChainIkGoal, IkSolver};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
@@ -27,14 +27,14 @@ use sidestep_kernel::stream::Draws;
 pub(crate) use space::RodSpace;
 
 /// Most postures at the target from which the second tree grows, and searches for them.
-const GOALS: usize = 4;
-const SEARCHES: usize = 12;
+const MAX_GOALS: usize = 4;
+const MAX_SEARCHES: usize = 12;
 /// Restarts of the search for one of them.
-const RESTARTS: usize = 25;
+const MAX_RESTARTS: usize = 25;
 
 /// The target of a way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Errand<const D: usize> {
+pub(crate) struct PlanningQuery<const D: usize> {
     /// The connector that is to move,
     pub(crate) k: usize,
     /// where to,
@@ -44,10 +44,10 @@ pub(crate) struct Errand<const D: usize> {
 }
 
 /// A posture: the places of all connectors.
-pub(crate) type Posture<const D: usize> = Vec<Point<D>>;
+pub(crate) type ChainPosture<const D: usize> = Vec<Point<D>>;
 
 /// The postures of a body that moves from one to another.
-pub(crate) trait Postures {
+pub(crate) trait ConfigurationSpace {
     type Posture: Clone;
 
     /// Returns the present posture.
@@ -57,40 +57,40 @@ pub(crate) trait Postures {
     fn length_m(&self) -> f64;
 
     /// Returns the longest way of a connector between two postures, or a bound on it, meters.
-    fn apart_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
+    fn distance_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
     /// Returns a measure of nearness: the sum of the squared ways of all moving parts.
-    fn spread2(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
+    fn squared_spread(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
     /// Returns the posture at a part of the straight way from one to another: all parts turn and change their lengths
     /// evenly.
-    fn at(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
+    fn interpolate(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
 
     /// Returns whether a posture is good in itself.
     fn is_free(&self, posture: &Self::Posture) -> bool;
 
     /// Returns whether the straight way from one good posture to another is free.
-    fn is_way_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
+    fn is_path_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
 
     /// Returns any posture, good or not.
-    fn any(&self, draws: &mut Draws) -> Self::Posture;
+    fn sample(&self, draws: &mut Draws) -> Self::Posture;
 }
 
 /// Finds a way of a chain to a target: the postures after the present one, between any two of which
 /// the straight way is free; none if the search found none.
 ///
 /// # Errors
-/// As [`Solver::solve`]; also when no connector of the chain keeps its place.
+/// As [`IkSolver::solve`]; also when no connector of the chain keeps its place.
 pub(crate) fn plan<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     rules: Rules,
-    errand: &Errand<D>,
+    errand: &PlanningQuery<D>,
     draws: &mut Draws,
-) -> Result<Option<Vec<Posture<D>>>, InputError> {
+) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
     let space = RodSpace::new(chain, obstacles, rules.self_collision, errand.k)?;
     let goals = goals(&space, rules, errand, draws)?;
-    Ok(way_to(&space, goals, draws))
+    Ok(find_path(&space, goals, draws))
 }
 
 /// Finds a way of an arm to a target, as [`plan`] does: the joint values after the present ones.
@@ -99,14 +99,14 @@ pub(crate) fn plan<const D: usize>(
 /// As [`SerialChain::solve`](crate::kinematics::SerialChain::solve).
 pub(crate) fn plan_joints<const D: usize>(
     space: &JointSpace<'_, D>,
-    errand: &Errand<D>,
+    errand: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<Vec<f64>>>, InputError> {
     let goals = space.goals(errand, draws)?;
-    Ok(way_to(space, goals, draws))
+    Ok(find_path(space, goals, draws))
 }
 
-fn way_to<S: Postures>(
+fn find_path<S: ConfigurationSpace>(
     space: &S,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
@@ -114,8 +114,8 @@ fn way_to<S: Postures>(
     if goals.is_empty() {
         return None;
     }
-    let way = tree::way(space, goals, draws)?;
-    Some(tree::shortened(space, way, draws))
+    let way = tree::find_path(space, goals, draws)?;
+    Some(tree::shorten(space, way, draws))
 }
 
 /// Returns good postures that reach the target: the first sought from the present posture, the others
@@ -123,28 +123,28 @@ fn way_to<S: Postures>(
 fn goals<const D: usize>(
     space: &RodSpace<'_, D>,
     rules: Rules,
-    errand: &Errand<D>,
+    errand: &PlanningQuery<D>,
     draws: &mut Draws,
-) -> Result<Vec<Posture<D>>, InputError> {
-    let mut solver = Solver::new(rules);
+) -> Result<Vec<ChainPosture<D>>, InputError> {
+    let mut solver = IkSolver::new(rules);
     let mut from = space.chain().clone();
-    let mut goals: Vec<Posture<D>> = Vec::new();
-    for search in 1..=SEARCHES {
-        let goal = Goal {
+    let mut goals: Vec<ChainPosture<D>> = Vec::new();
+    for search in 1..=MAX_SEARCHES {
+        let goal = ChainIkGoal {
             tolerance_m: errand.tolerance_m,
-            restarts: RESTARTS,
+            restarts: MAX_RESTARTS,
             seed: draws.next_u64(),
-            ..Goal::new(errand.k, space.base(), errand.target)
+            ..ChainIkGoal::new(errand.k, space.base(), errand.target)
         };
         let answer = solver.solve(&from, space.obstacles(), &goal)?;
         if answer.reached && space.is_free(&answer.points) && !goals.contains(&answer.points) {
             goals.push(answer.points);
         }
         // Where the first searches find nothing, further ones hardly would.
-        if goals.len() == GOALS || goals.is_empty() && search == GOALS {
+        if goals.len() == MAX_GOALS || goals.is_empty() && search == MAX_GOALS {
             break;
         }
-        from.points_mut().copy_from_slice(&space.any(draws));
+        from.points_mut().copy_from_slice(&space.sample(draws));
     }
     Ok(goals)
 }

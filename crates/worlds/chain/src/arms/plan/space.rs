@@ -1,10 +1,10 @@
 //! Postures of a chain with a fixed base, and the straight way between two.
 
-use super::{Posture, Postures};
-use crate::arms::ik::legal::Judge;
+use super::{ChainPosture, ConfigurationSpace};
+use crate::arms::ik::constraints::ConstraintChecker;
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{
-    Point, add, along, between, distance, first_axis, norm, norm2, scaled, sub, unit,
+    Point, add, add_scaled, distance, first_axis, lerp, norm, norm_squared, normalized, scaled, sub,
 };
 use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::distr::normal;
@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
 pub(crate) struct RodSpace<'a, const D: usize> {
-    judge: Judge<'a, D>,
+    judge: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
     k: usize,
@@ -44,7 +44,7 @@ impl<'a, const D: usize> RodSpace<'a, D> {
                 return Err(InputError::new("planner", "the chain has no fixed base", remedy));
             }
         };
-        let judge = Judge { chain, obstacles, self_collision };
+        let judge = ConstraintChecker { chain, obstacles, self_collision };
         Ok(Self { judge, limb, k, step_m: chain.step_m() })
     }
 
@@ -61,10 +61,10 @@ impl<'a, const D: usize> RodSpace<'a, D> {
     }
 }
 
-impl<const D: usize> Postures for RodSpace<'_, D> {
-    type Posture = Posture<D>;
+impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
+    type Posture = ChainPosture<D>;
 
-    fn present(&self) -> Posture<D> {
+    fn present(&self) -> ChainPosture<D> {
         self.judge.chain.points().to_vec()
     }
 
@@ -73,15 +73,15 @@ impl<const D: usize> Postures for RodSpace<'_, D> {
         rods.map(|pair| self.judge.chain.rod_between(pair[0], pair[1]).max_m).sum()
     }
 
-    fn apart_m(&self, a: &Posture<D>, b: &Posture<D>) -> f64 {
+    fn distance_m(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
         self.limb.iter().map(|&i| distance(a[i], b[i])).fold(0.0, f64::max)
     }
 
-    fn spread2(&self, a: &Posture<D>, b: &Posture<D>) -> f64 {
-        self.limb.iter().map(|&i| norm2(sub(a[i], b[i]))).sum()
+    fn squared_spread(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
+        self.limb.iter().map(|&i| norm_squared(sub(a[i], b[i]))).sum()
     }
 
-    fn at(&self, a: &Posture<D>, b: &Posture<D>, part: f64) -> Posture<D> {
+    fn interpolate(&self, a: &ChainPosture<D>, b: &ChainPosture<D>, part: f64) -> ChainPosture<D> {
         if part >= 1.0 {
             return b.clone();
         }
@@ -90,42 +90,42 @@ impl<const D: usize> Postures for RodSpace<'_, D> {
             let [inner, outer] = [pair[0], pair[1]];
             let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
             let [from_m, to_m] = [norm(from), norm(to)];
-            let mean = between(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), part);
+            let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), part);
             // Opposite directions have no mean; just beside it they turn one way or the other.
-            let u = unit(mean).or(unit(from)).unwrap_or(first_axis());
-            posture[outer] = along(posture[inner], u, from_m + part * (to_m - from_m));
+            let u = normalized(mean).or(normalized(from)).unwrap_or(first_axis());
+            posture[outer] = add_scaled(posture[inner], u, from_m + part * (to_m - from_m));
         }
         posture
     }
 
-    fn is_free(&self, posture: &Posture<D>) -> bool {
-        self.judge.objection(posture, self.k).is_none()
+    fn is_free(&self, posture: &ChainPosture<D>) -> bool {
+        self.judge.find_veto(posture, self.k).is_none()
     }
 
-    fn is_way_free(&self, a: &Posture<D>, b: &Posture<D>) -> bool {
-        let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
+    fn is_path_free(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> bool {
+        let n = (self.distance_m(a, b) / self.step_m).ceil().max(1.0) as usize;
         let mut before = a.clone();
         (1..=n).all(|step| {
-            interrupt::look();
-            let next = self.at(a, b, step as f64 / n as f64);
+            interrupt::check();
+            let next = self.interpolate(a, b, step as f64 / n as f64);
             // Rods that nearly turn around jump in between.
-            let is_near = self.apart_m(&before, &next) <= MOST_STEPS * self.step_m;
+            let is_near = self.distance_m(&before, &next) <= MAX_STEPS * self.step_m;
             before = next;
             is_near && self.is_free(&before)
         })
     }
 
-    fn any(&self, draws: &mut Draws) -> Posture<D> {
+    fn sample(&self, draws: &mut Draws) -> ChainPosture<D> {
         let mut posture = self.present();
-        let stiffness = STIFFNESS[draws.below(STIFFNESS.len() as u32) as usize];
+        let stiffness = STIFFNESS[draws.uniform_below(STIFFNESS.len() as u32) as usize];
         let mut u: Point<D> = direction(draws);
         for pair in self.limb.windows(2) {
             let [inner, outer] = [pair[0], pair[1]];
             let rod = self.judge.chain.rod_between(inner, outer);
             let length_m = rod.min_m + draws.uniform() * (rod.max_m - rod.min_m);
-            posture[outer] = along(posture[inner], u, length_m);
+            posture[outer] = add_scaled(posture[inner], u, length_m);
             let side = scaled(direction(draws), stiffness * PI);
-            u = unit(add(u, side)).unwrap_or(u);
+            u = normalized(add(u, side)).unwrap_or(u);
         }
         posture
     }
@@ -133,11 +133,11 @@ impl<const D: usize> Postures for RodSpace<'_, D> {
 
 /// Longest way of a connector between two postures that are checked, in steps: turning evenly, the
 /// middle of a wide turn is faster than its ends.
-const MOST_STEPS: f64 = 3.0;
+const MAX_STEPS: f64 = 3.0;
 /// The largest angle by which a rod of a random posture may differ in direction from the one before.
 const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     let drawn: Point<D> = std::array::from_fn(|_| normal(draws));
-    unit(drawn).unwrap_or(first_axis())
+    normalized(drawn).unwrap_or(first_axis())
 }

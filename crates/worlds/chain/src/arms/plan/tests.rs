@@ -1,9 +1,9 @@
 //! Ways among obstacles, each checked posture by posture by another measure than the planner's.
 
 use super::*;
+use crate::fixtures::clearance_m;
 use crate::rods::chain::{Connector, Mobility, Rod};
 use crate::rods::obstacle::Obstacle;
-use crate::scenes::clearance_m;
 use sidestep_kernel::Seed;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -27,7 +27,7 @@ fn wall() -> Obstacles<2> {
     Obstacles::new(vec![wall], 1.0).unwrap()
 }
 
-const BEHIND: Errand<2> = Errand { k: 5, target: [1.0, 0.9], tolerance_m: 1e-3 };
+const BEHIND: PlanningQuery<2> = PlanningQuery { k: 5, target: [1.0, 0.9], tolerance_m: 1e-3 };
 
 #[test]
 fn a_way_round_a_wall_is_found_and_free_all_along() {
@@ -40,7 +40,11 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
         for next in &way {
             let from = at.points().to_vec();
             for part in 1..=200 {
-                at.points_mut().copy_from_slice(&space.at(&from, next, f64::from(part) / 200.0));
+                at.points_mut().copy_from_slice(&space.interpolate(
+                    &from,
+                    next,
+                    f64::from(part) / 200.0,
+                ));
                 assert!(clearance_m(&at, &obstacles) > -5e-3, "{seed}");
                 assert!(at.max_rod_violation_m() < 1e-9 && at.points()[0] == [0.0; 2], "{seed}");
             }
@@ -62,7 +66,7 @@ fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
     let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();
     let rules = Rules { self_collision: true, ..Rules::default() };
-    let errand = Errand { k: 3, target: [0.630_251_8, 0.731_368_6], tolerance_m: 5e-4 };
+    let errand = PlanningQuery { k: 3, target: [0.630_251_8, 0.731_368_6], tolerance_m: 5e-4 };
     for seed in 0..10 {
         let way = plan(&arm, &Obstacles::default(), rules, &errand, &mut draws(seed)).unwrap();
         assert!(way.is_some(), "{seed}: no way");
@@ -79,7 +83,7 @@ fn the_same_draws_give_the_same_way() {
 #[test]
 fn no_way_leads_into_an_obstacle_or_out_of_reach() {
     for target in [[1.0, 0.35], [0.0, 3.0]] {
-        let errand = Errand { target, ..BEHIND };
+        let errand = PlanningQuery { target, ..BEHIND };
         let way = plan(&arm(), &wall(), Rules::default(), &errand, &mut draws(1)).unwrap();
         assert_eq!(way, None);
     }
@@ -98,9 +102,9 @@ fn a_search_heeds_an_interrupt() {
     let interrupt = Interrupt::default();
     interrupt.raise();
     let search = || {
-        let _heeded = interrupt.heeded_here();
+        let _heeded = interrupt.attach();
         plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(1))
     };
     let payload = catch_unwind(AssertUnwindSafe(search)).expect_err("it unwinds");
-    assert!(interrupt.explains(payload.as_ref()));
+    assert!(interrupt.caused(payload.as_ref()));
 }

@@ -1,32 +1,32 @@
 //! Two trees of postures that grow toward each other.
 
-use super::Postures;
+use super::ConfigurationSpace;
 use sidestep_kernel::interrupt;
 use sidestep_kernel::stream::Draws;
 
 /// Most random postures that the trees grow toward.
-const MOST_DRAWN: usize = 2_000;
+const MAX_SAMPLES: usize = 2_000;
 /// Longest way of a connector between two postures of a tree, in lengths of the chain.
-const STRIDE: f64 = 0.1;
+const MAX_STRIDE: f64 = 0.1;
 /// Longest straight way of a connector, in lengths of the chain.
-const MOST_WAY: f64 = 4.0;
+const MAX_SEGMENT: f64 = 4.0;
 /// Attempts to shorten a way.
-const SHORTCUTS: usize = 120;
+const MAX_SHORTCUTS: usize = 120;
 
 /// Postures, each with the one that it grew from.
-struct Tree<S: Postures> {
+struct Tree<S: ConfigurationSpace> {
     postures: Vec<S::Posture>,
     from: Vec<Option<usize>>,
 }
 
-impl<S: Postures> Tree<S> {
+impl<S: ConfigurationSpace> Tree<S> {
     fn new(roots: Vec<S::Posture>) -> Self {
         Self { from: vec![None; roots.len()], postures: roots }
     }
 
     /// Returns the posture nearest to another; of equal ones the first.
     fn nearest(&self, space: &S, to: &S::Posture) -> usize {
-        let spread2 = |i: usize| space.spread2(&self.postures[i], to);
+        let spread2 = |i: usize| space.squared_spread(&self.postures[i], to);
         let all = (0..self.postures.len()).map(|i| (spread2(i), i));
         all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, i)| i)
     }
@@ -43,9 +43,9 @@ impl<S: Postures> Tree<S> {
         let mut last = self.nearest(space, to);
         for stride in 0..most {
             let from = &self.postures[last];
-            let part = stride_m / space.apart_m(from, to).max(f64::MIN_POSITIVE);
-            let next = space.at(from, to, part);
-            if !space.is_way_free(from, &next) {
+            let part = stride_m / space.distance_m(from, to).max(f64::MIN_POSITIVE);
+            let next = space.interpolate(from, to, part);
+            if !space.is_path_free(from, &next) {
                 return (stride > 0).then_some((last, false));
             }
             self.postures.push(next);
@@ -59,7 +59,7 @@ impl<S: Postures> Tree<S> {
     }
 
     /// Returns the postures from one back to its root.
-    fn back(&self, mut i: usize) -> Vec<S::Posture> {
+    fn path_to_root(&self, mut i: usize) -> Vec<S::Posture> {
         let mut way = vec![self.postures[i].clone()];
         while let Some(from) = self.from[i] {
             i = from;
@@ -70,31 +70,31 @@ impl<S: Postures> Tree<S> {
 }
 
 /// Returns postures from the present one to one of the goals, both included.
-pub(super) fn way<S: Postures>(
+pub(super) fn find_path<S: ConfigurationSpace>(
     space: &S,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
     let present = space.present();
-    let stride_m = STRIDE * space.length_m();
-    let most = (MOST_WAY / STRIDE).ceil() as usize;
+    let stride_m = MAX_STRIDE * space.length_m();
+    let most = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
     let mut trees = [Tree::new(vec![present.clone()]), Tree::new(goals.clone())];
     let towards_goals = goals.into_iter().map(|goal| (goal, most));
-    let drawn = std::iter::repeat_with(|| None).take(MOST_DRAWN);
+    let drawn = std::iter::repeat_with(|| None).take(MAX_SAMPLES);
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
-        interrupt::look();
+        interrupt::check();
         // The trees take turns; the first tries are straight to the goals.
         let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
-        let (to, strides) = toward.unwrap_or_else(|| (space.any(draws), 1));
+        let (to, strides) = toward.unwrap_or_else(|| (space.sample(draws), 1));
         let Some((tip, _)) = trees[one].grow(space, &to, stride_m, strides) else { continue };
         let tip_posture = trees[one].postures[tip].clone();
         let Some((meeting, true)) = trees[other].grow(space, &tip_posture, stride_m, most) else {
             continue;
         };
         let ends = if one == 0 { [tip, meeting] } else { [meeting, tip] };
-        let mut way = trees[0].back(ends[0]);
+        let mut way = trees[0].path_to_root(ends[0]);
         way.reverse();
-        way.extend(trees[1].back(ends[1]).into_iter().skip(1));
+        way.extend(trees[1].path_to_root(ends[1]).into_iter().skip(1));
         return Some(way);
     }
     None
@@ -102,18 +102,18 @@ pub(super) fn way<S: Postures>(
 
 /// Returns the way after its first posture, with straight ways between random places of it where
 /// they are free.
-pub(super) fn shortened<S: Postures>(
+pub(super) fn shorten<S: ConfigurationSpace>(
     space: &S,
     mut way: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Vec<S::Posture> {
-    for _ in 0..SHORTCUTS {
+    for _ in 0..MAX_SHORTCUTS {
         if way.len() < 3 {
             break;
         }
-        let [i, j] = [0, 1].map(|_| draws.below(way.len() as u32) as usize);
+        let [i, j] = [0, 1].map(|_| draws.uniform_below(way.len() as u32) as usize);
         let [i, j] = [i.min(j), i.max(j)];
-        if j > i + 1 && space.is_way_free(&way[i], &way[j]) {
+        if j > i + 1 && space.is_path_free(&way[i], &way[j]) {
             way.drain(i + 1..j);
         }
     }

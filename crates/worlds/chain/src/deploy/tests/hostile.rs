@@ -1,17 +1,19 @@
 //! Bytes that no agent sends: they are counted and dropped in any case, and never cause a panic.
 
 use super::{network, sights};
-use crate::agents::{ConnectorAgent, Motion, Outgoing, Sight, Wish};
-use crate::motion::replan::{Memory, Rungs, Situation};
+use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol, OutgoingPacket};
+use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, Situation};
 use crate::rods::chain::{Chain, Connector, Rod};
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
-use crate::rods::veto::Source;
-use crate::rods::wire::Place;
+use crate::rods::serde_point::WirePoint;
+use crate::rods::veto::RequestSource;
 use proptest::prelude::*;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::network::{Draft, Refusal, Seal, TalkId, open};
+use sidestep_kernel::network::{
+    ConversationId, DropReason, PacketBuffer, PacketHeader, parse_packet,
+};
 
 const N: usize = 5;
 
@@ -20,12 +22,12 @@ fn chain() -> Chain<2> {
     Chain::straight([0.0, 0.0], [-1.0, 0.0], N - 1, rod, Connector::free(0.05)).expect("a chain")
 }
 
-fn shown(to: Point<2>) -> Vec<Sight<2>> {
-    let wish = Wish {
-        to: Place(to),
-        source: Source::Autonomous,
+fn shown(to: Point<2>) -> Vec<ConnectorPercept<2>> {
+    let wish = Intention {
+        to: WirePoint(to),
+        source: RequestSource::Autonomous,
         situation: Situation::default(),
-        memory: Memory::default(),
+        memory: RecoveryMemory::default(),
         is_empty: false,
         is_open: false,
     };
@@ -35,18 +37,21 @@ fn shown(to: Point<2>) -> Vec<Sight<2>> {
 fn agents() -> Vec<ConnectorAgent<2>> {
     let network = network(0.1, 0.0, 0.0, 500.0);
     let rules = Rules { backtracks: 0, ..Rules::default() };
-    let agent = |k| ConnectorAgent::of(&chain(), k, &rules, Rungs::default()).on(Some(&network));
+    let agent = |k| {
+        ConnectorAgent::from_chain(&chain(), k, &rules, RecoveryLimits::default())
+            .with_network(Some(&network))
+    };
     (0..N as u32).map(agent).collect()
 }
 
 /// All packets of a talk without losses, with their senders.
-fn packets() -> Vec<(u32, Outgoing)> {
+fn packets() -> Vec<(u32, OutgoingPacket)> {
     let mut agents = agents();
     let mut all = Vec::new();
     for (k, sight) in shown([-0.8, 0.6]).into_iter().enumerate() {
-        agents[k].begin(sight, 0).expect("a sight");
+        agents[k].start(sight, 0).expect("a sight");
     }
-    let mut waiting: Vec<(u32, Outgoing)> = Vec::new();
+    let mut waiting: Vec<(u32, OutgoingPacket)> = Vec::new();
     loop {
         for agent in &mut agents {
             let id = agent.id();
@@ -64,15 +69,20 @@ fn packets() -> Vec<(u32, Outgoing)> {
 
 /// A packet around any bytes, as one of the chain would send it in a cycle.
 fn sealed(sender: u32, cycle: Cycle, message: &[u8]) -> Vec<u8> {
-    let talk = TalkId::new(cycle, Motion, &[0, 1, 2, 3, 4]);
-    Draft::of_bytes(message).sealed(&Seal { fingerprint: 0, talk, sender, sequence: 0 })
+    let talk = ConversationId::new(cycle, MotionProtocol, &[0, 1, 2, 3, 4]);
+    PacketBuffer::from_bytes(message).into_packet(&PacketHeader {
+        fingerprint: 0,
+        conversation: talk,
+        sender,
+        sequence: 0,
+    })
 }
 
 #[test]
 fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     let mut agent = agents().remove(2);
     let sight = shown([-0.8, 0.6]).remove(2);
-    agent.begin(sight, 0).expect("a sight");
+    agent.start(sight, 0).expect("a sight");
     let (from, out) = packets().remove(0);
     for (from, bytes) in
         [(1, vec![]), (1, vec![7; 40]), (1, vec![1; 100_000]), (0, out.payload.clone())]
@@ -84,8 +94,9 @@ fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     agent.on_packet(from.max(1), &longer, 1);
     agent.on_timer(1_000_000);
     assert_eq!(agent.control().expect("time is up").traffic.dropped, 5);
-    let refused = agent.refused();
-    let counts = [Refusal::NoPacket, Refusal::Sender, Refusal::Damaged].map(|why| refused.of(why));
+    let refused = agent.drop_counts();
+    let counts =
+        [DropReason::NoPacket, DropReason::Sender, DropReason::Damaged].map(|why| refused.get(why));
     assert_eq!(counts, [3, 1, 1]);
 }
 
@@ -94,7 +105,7 @@ fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
 fn a_flood_takes_a_bounded_room() {
     let mut agent = agents().remove(4);
     let neighbor = agents().remove(3).id();
-    agent.begin(shown([-0.8, 0.6]).remove(4), 0).expect("a sight");
+    agent.start(shown([-0.8, 0.6]).remove(4), 0).expect("a sight");
     let flood = |k: u32| {
         let mut bytes = vec![0];
         bytes.extend(postcard::to_stdvec(&(3 * k, 0u32)).expect("numbers"));
@@ -122,7 +133,7 @@ proptest! {
     ) {
         let mut agent = agents().remove(k);
         if begins {
-            agent.begin(shown([-0.8, 0.6]).remove(k), 0).expect("a sight");
+            agent.start(shown([-0.8, 0.6]).remove(k), 0).expect("a sight");
         }
         agent.on_packet(from, &bytes, 1);
         agent.on_packet(from, &sealed(from, 5, &bytes), 1);
@@ -140,18 +151,18 @@ proptest! {
         let real = packets();
         let mut agents = agents();
         for (k, sight) in shown([-0.8, 0.6]).into_iter().enumerate() {
-            agents[k].begin(sight, 0).expect("a sight");
+            agents[k].start(sight, 0).expect("a sight");
             agents[k].take_packets();
         }
         for (tick, (packet, at, byte, to)) in (1..).zip(changes) {
             let (_, out) = &real[packet.index(real.len())];
-            let (seal, message) = open::<Motion>(&out.payload, 0).expect("a real packet");
+            let (seal, message) = parse_packet::<MotionProtocol>(&out.payload, 0).expect("a real packet");
             let mut message = message.to_vec();
             let at = at.index(message.len());
             message[at] ^= byte;
             for from in [to.checked_sub(1), Some(to + 1)].into_iter().flatten() {
                 let sender = from as u32;
-                let payload = Draft::of_bytes(&message).sealed(&Seal { sender, ..seal });
+                let payload = PacketBuffer::from_bytes(&message).into_packet(&PacketHeader { sender, ..seal });
                 agents[to].on_packet(sender, &payload, tick);
                 agents[to].on_timer(tick);
                 agents[to].take_packets();
@@ -162,7 +173,7 @@ proptest! {
             prop_assert!(agent.control().is_some());
         }
         let controls: Vec<_> = agents.iter().map(ConnectorAgent::control).collect();
-        if let Some(points) = crate::deploy::settled(&chain(), &controls) {
+        if let Some(points) = crate::deploy::final_positions(&chain(), &controls) {
             let mut moved = chain();
             moved.points_mut().copy_from_slice(&points);
             prop_assert!(moved.max_rod_violation_m() < 1.1e-9, "no rod is torn, whoever lies");

@@ -1,12 +1,12 @@
 //! Whole scenarios, deployed as a team and as one process.
 
-use crate::agents::{ConnectorAgent, Handed};
-use crate::scenario::Compiled;
+use crate::agents::{ChainControls, ConnectorAgent};
+use crate::scenario::ChainScenario;
 use crate::{ChainRun, chain_run};
 use serde_json::Value;
-use sidestep_kernel::control::ControlBook;
+use sidestep_kernel::control::ControlLog;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
-use sidestep_kernel::view::Look;
+use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Digest, Simulation};
 use sidestep_scenario::Source;
 
@@ -108,14 +108,14 @@ fn a_network_that_loses_packets_costs_packets_and_moves_nobody_elsewhere() {
     }
 }
 
-fn compiled(text: &str) -> Compiled<2> {
-    Compiled::new(&Source::new("s", text.to_string(), "")).expect("a scenario")
+fn compiled(text: &str) -> ChainScenario<2> {
+    ChainScenario::new(&Source::new("s", text.to_string(), "")).expect("a scenario")
 }
 
 /// Agents that are handed their packets one by one, in any order that keeps each link's own.
 fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
     loop {
-        let shown = run.world().sights_at(run.state(), cycle);
+        let shown = run.world().percepts_at(run.state(), cycle);
         if shown.is_empty() {
             return;
         }
@@ -126,7 +126,7 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
             let first = agents[0].id();
             // The last begins first: one that has not begun yet keeps the packets sent to it.
             for (k, sight) in sights.into_iter().enumerate().rev() {
-                agents[k].begin(sight, 0).expect("a sight");
+                agents[k].start(sight, 0).expect("a sight");
                 let sent = agents[k].take_packets();
                 waiting.extend(sent.into_iter().map(|out| (agents[k].id(), out)));
                 while let Some((from, out)) = waiting.pop() {
@@ -137,8 +137,8 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
                 }
             }
             let controls = agents.iter().map(ConnectorAgent::control).collect();
-            let handed = Handed { cycle, controls, gone: Vec::new() };
-            run.world().hand_over(run.state(), chain, handed).expect("decisions");
+            let handed = ChainControls { cycle, controls, gone: Vec::new() };
+            run.world().submit_controls(run.state(), chain, handed).expect("decisions");
         }
     }
 }
@@ -172,12 +172,12 @@ fn hand_over(run: &mut ChainRun<2>) {
             // Some come too late, and of some the process is gone.
             match (cycle * 7 + u64::from(id)) % 61 {
                 0 => {}
-                1 => controls.push((id, Handed::<2>::GONE.to_vec())),
+                1 => controls.push((id, ChainControls::<2>::ABSENT_CONTROL.to_vec())),
                 _ => controls.extend(control.map(|one| (id, bytes(one)))),
             }
         }
     }
-    Simulation::hand_over(run, &controls).expect("decisions");
+    Simulation::submit_controls(run, &controls).expect("decisions");
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn a_recorded_run_with_missing_decisions_is_computed_again_to_its_digest() {
     let text = format!("{}[record]\ncontrols = true\n", text("team", TWO));
     let start = || compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
     let mut driven = start();
-    driven.begin_recording();
+    driven.start_recording();
     let mut rows = MemoryRecorder::new(&driven.schemas());
     for _ in 0..60 {
         hand_over(&mut driven);
@@ -193,15 +193,15 @@ fn a_recorded_run_with_missing_decisions_is_computed_again_to_its_digest() {
         driven.record(&mut rows).expect("memory suffices");
     }
     rows.finish().expect("memory suffices");
-    let book = ControlBook::recorded(&rows).expect("controls are recorded");
+    let book = ControlLog::from_recorder(&rows).expect("controls are recorded");
     let mut again = start();
-    again.retrace(book.clone());
+    again.replay_controls(book.clone());
     again.advance(25);
     let checkpoint = again.checkpoint();
     again.advance(35);
     assert_eq!(again.digest(), driven.digest());
     let mut resumed = start();
-    resumed.retrace(book);
+    resumed.replay_controls(book);
     resumed.restore(&checkpoint).expect("the same scenario");
     resumed.advance(35);
     assert_eq!(resumed.digest(), driven.digest());
@@ -222,7 +222,8 @@ fn a_checkpoint_has_the_decisions_that_were_handed_over() {
     driven.advance(2);
     resumed.advance(2);
     assert_eq!(resumed.digest(), driven.digest());
-    let wrong = Simulation::hand_over(&mut driven, &[(0, vec![1, 2, 3])]).expect_err("no decision");
+    let wrong =
+        Simulation::submit_controls(&mut driven, &[(0, vec![1, 2, 3])]).expect_err("no decision");
     assert!(wrong.to_string().contains("connector 0 of chain 0"), "{wrong}");
 }
 
@@ -233,19 +234,19 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
     talk_elsewhere(&elsewhere, 0);
     elsewhere.advance(1);
     let before = elsewhere.state().body(0).chain.points().to_vec();
-    let (chain, sights) = elsewhere.world().sights_at(elsewhere.state(), 1).remove(0);
+    let (chain, sights) = elsewhere.world().percepts_at(elsewhere.state(), 1).remove(0);
     let world = elsewhere.world().clone();
-    let nothing = Handed::nothing(1, sights.len());
-    world.hand_over(elsewhere.state(), chain, nothing).expect("no decisions");
+    let nothing = ChainControls::empty(1, sights.len());
+    world.submit_controls(elsewhere.state(), chain, nothing).expect("no decisions");
     elsewhere.advance(1);
     assert_eq!(elsewhere.state().body(0).chain.points(), before);
     talk_elsewhere(&elsewhere, 2);
     elsewhere.advance(1);
     assert_ne!(elsewhere.state().body(0).chain.points(), before, "and goes on");
-    let nothing = || Handed::nothing(3, 0);
-    let wrong = world.hand_over(elsewhere.state(), 7, nothing()).expect_err("no such chain");
+    let nothing = || ChainControls::empty(3, 0);
+    let wrong = world.submit_controls(elsewhere.state(), 7, nothing()).expect_err("no such chain");
     assert!(wrong.to_string().contains("count from 0"), "{wrong}");
-    let few = world.hand_over(elsewhere.state(), 0, nothing()).expect_err("too few");
+    let few = world.submit_controls(elsewhere.state(), 0, nothing()).expect_err("too few");
     assert!(few.to_string().contains("0 decisions for 12"), "{few}");
 }
 
@@ -257,14 +258,16 @@ fn hand_over_without(run: &mut ChainRun<2>, gone: &[u32]) {
     let mut controls = Vec::new();
     for (id, control) in (0..).zip(handed.controls) {
         match control {
-            _ if gone.contains(&id) => controls.push((id, Handed::<2>::GONE.to_vec())),
+            _ if gone.contains(&id) => {
+                controls.push((id, ChainControls::<2>::ABSENT_CONTROL.to_vec()))
+            }
             Some(control) => {
                 controls.push((id, postcard::to_stdvec(&control).expect("plain data")));
             }
             None => {}
         }
     }
-    Simulation::hand_over(run, &controls).expect("decisions");
+    Simulation::submit_controls(run, &controls).expect("decisions");
 }
 
 #[test]
@@ -273,7 +276,7 @@ fn a_chain_stands_in_a_cycle_in_which_an_agent_is_gone_says_whose_and_goes_on() 
     for more in [FIELD, &network] {
         let text = text("team", more);
         let mut run = compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
-        run.watch();
+        run.enable_events();
         run.advance(3);
         let points = |run: &ChainRun<2>| run.state().body(0).chain.points().to_vec();
         let before = points(&run);
@@ -282,7 +285,7 @@ fn a_chain_stands_in_a_cycle_in_which_an_agent_is_gone_says_whose_and_goes_on() 
         run.advance(1);
         assert_eq!(points(&run), before, "{more}");
         let said = |run: &mut ChainRun<2>| {
-            let log = run.frame(Look::BODIES).log;
+            let log = run.frame(FrameOptions::WITHOUT_SCANS).log;
             log.into_iter().map(|entry| format!("{entry:?}")).collect::<Vec<_>>().join("\n")
         };
         let lost = said(&mut run);
@@ -301,14 +304,14 @@ fn bytes_that_are_no_decision_are_refused_and_connectors_are_known_by_their_ids(
     let text = text("team", TWO);
     let run = compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
     let world = run.world();
-    assert_eq!(world.id_of(1, 3), Some(11));
-    assert_eq!(world.connector_of(11), Some((1, 3)));
-    assert_eq!((world.id_of(1, 8), world.id_of(2, 0)), (None, None));
-    assert_eq!((world.connector_of(15), world.connector_of(16)), (Some((1, 7)), None));
+    assert_eq!(world.connector_id(1, 3), Some(11));
+    assert_eq!(world.find_connector(11), Some((1, 3)));
+    assert_eq!((world.connector_id(1, 8), world.connector_id(2, 0)), (None, None));
+    assert_eq!((world.find_connector(15), world.find_connector(16)), (Some((1, 7)), None));
     let refused = |id, bytes: &[u8]| world.read_control(0, id, bytes).expect_err("no decision");
-    assert!(refused(16, Handed::<2>::GONE).contains("no such connector"));
+    assert!(refused(16, ChainControls::<2>::ABSENT_CONTROL).contains("no such connector"));
     assert!(refused(3, &[1, 2, 3]).contains("none of a decision of this build"));
-    assert_eq!(world.read_control(0, 3, Handed::<2>::GONE), Ok(None));
+    assert_eq!(world.read_control(0, 3, ChainControls::<2>::ABSENT_CONTROL), Ok(None));
     talk_elsewhere(&run, 0);
     let handed = run.state().body(1).handed.clone().expect("it has talked");
     let control = handed.controls[3].clone().expect("a decision");

@@ -2,17 +2,17 @@
 //! torn, no connector moves on a veto, and all go on when those are back.
 
 use super::{compared_on, network, talked};
-use crate::agents::{Ended, Goes};
+use crate::agents::{ConnectorMove, LeaderOutcome};
 use crate::chain_run;
-use crate::deploy::settled;
+use crate::deploy::final_positions;
 use crate::rods::chain::LENGTH_TOLERANCE_M;
 use crate::rods::propagate::tests::random_worlds::AnyWorld;
 use crate::rods::rules::Rules;
-use crate::rods::veto::{Motion, Request, Source};
+use crate::rods::veto::{Motion, Request, RequestSource};
 use proptest::prelude::*;
 use sidestep_kernel::Simulation;
-use sidestep_kernel::network::{Network, OneWay, Silence, While};
-use sidestep_kernel::view::{Happening, Look};
+use sidestep_kernel::network::{Network, RadioOutage, TimeWindow, UnidirectionalLink};
+use sidestep_kernel::view::{FrameOptions, LogEventKind};
 use sidestep_scenario::Source as Text;
 
 /// A chain of slack or fixed rods that is led along, with a network of some keys.
@@ -25,13 +25,17 @@ fn led(network: &str, rod: &str) -> Box<dyn Simulation> {
          [[chains.tasks]]\nkind = \"script\"\nscript = \"forward 9\"\n"
     );
     let mut run = chain_run(&Text::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"));
-    run.watch();
+    run.enable_events();
     run
 }
 
 /// Kinds of events since the last look, with their connectors.
-fn told(run: &mut dyn Simulation) -> Vec<(Happening, Option<u32>)> {
-    run.frame(Look::first(0)).log.iter().map(|entry| (entry.kind, entry.who.part)).collect()
+fn told(run: &mut dyn Simulation) -> Vec<(LogEventKind, Option<u32>)> {
+    run.frame(FrameOptions::with_first_scans(0))
+        .log
+        .iter()
+        .map(|entry| (entry.kind, entry.who.part))
+        .collect()
 }
 
 #[test]
@@ -42,16 +46,16 @@ fn a_chain_stands_within_a_cycle_says_who_is_lost_and_goes_on() {
         let mut run = led(&network, rod);
         run.advance(40);
         let moving = told(&mut *run);
-        assert!(!moving.iter().any(|(kind, _)| *kind == Happening::Unheard), "{moving:?}");
+        assert!(!moving.iter().any(|(kind, _)| *kind == LogEventKind::Unheard), "{moving:?}");
         run.advance(1);
-        assert_eq!(told(&mut *run), [(Happening::Unheard, Some(6))], "loss {loss}, rods {rod}");
+        assert_eq!(told(&mut *run), [(LogEventKind::Unheard, Some(6))], "loss {loss}, rods {rod}");
         // A motion agreed with the leader by then may have been carried out; from now on none is.
         let stands = run.poses().text;
         run.advance(39);
         assert_eq!(run.poses().text, stands, "loss {loss}, rods {rod}");
         assert_eq!(told(&mut *run), []);
         run.advance(1);
-        assert_eq!(told(&mut *run), [(Happening::Heard, Some(6))]);
+        assert_eq!(told(&mut *run), [(LogEventKind::Heard, Some(6))]);
         run.advance(1);
         assert_ne!(run.poses().text, stands, "it goes on");
         let metrics = run.metrics();
@@ -71,7 +75,7 @@ fn a_link_that_works_one_way_only_stops_the_chain_as_well() {
         run.advance(22);
         let lost: Vec<u32> = told(&mut *run)
             .iter()
-            .filter(|t| t.0 == Happening::Unheard)
+            .filter(|t| t.0 == LogEventKind::Unheard)
             .filter_map(|t| t.1)
             .collect();
         // The receiver's packets get lost: its sender misses it.
@@ -89,8 +93,9 @@ fn a_partition_and_a_radio_that_does_not_reach_stop_the_chain() {
     let cut = "partitions = [{ from_s = 1.0, until_s = 2.0, sides = [[0, 1, 2, 3], [4, 5]] }]";
     let mut run = led(cut, "0.5");
     run.advance(22);
-    let lost: Vec<_> = told(&mut *run).into_iter().filter(|t| t.0 == Happening::Unheard).collect();
-    assert_eq!(lost, [3, 4].map(|k| (Happening::Unheard, Some(k))));
+    let lost: Vec<_> =
+        told(&mut *run).into_iter().filter(|t| t.0 == LogEventKind::Unheard).collect();
+    assert_eq!(lost, [3, 4].map(|k| (LogEventKind::Unheard, Some(k))));
     let stands = run.poses().text;
     run.advance(18);
     assert_eq!(run.poses().text, stands);
@@ -127,7 +132,7 @@ fn a_motion_that_takes_longer_than_a_cycle_is_not_carried_out_and_told() {
     assert_eq!(run.poses().text, stands);
     let told = told(&mut *run);
     assert!(
-        told.iter().all(|(kind, _)| *kind == Happening::Deadline) && told.len() == 5,
+        told.iter().all(|(kind, _)| *kind == LogEventKind::Deadline) && told.len() == 5,
         "{told:?}"
     );
     assert_eq!(run.metrics()["deadlines_missed"], 5);
@@ -152,14 +157,14 @@ fn faulty(
     silent: Option<u32>,
     cut: Option<(u32, bool)>,
 ) -> Network {
-    let whole = |agent| Silence { agent, during: While::ALWAYS };
+    let whole = |agent| RadioOutage { agent, window: TimeWindow::ALWAYS };
     let one_way = |(k, up): (u32, bool)| {
         let (sender, receiver) = if up { (k, k + 1) } else { (k + 1, k) };
-        OneWay { sender, receiver, during: While::ALWAYS }
+        UnidirectionalLink { sender, receiver, window: TimeWindow::ALWAYS }
     };
     Network {
-        silences: silent.into_iter().map(whole).collect(),
-        one_ways: cut.into_iter().map(one_way).collect(),
+        radio_outages: silent.into_iter().map(whole).collect(),
+        unidirectional_links: cut.into_iter().map(one_way).collect(),
         ..network(loss, delay, 0.1, deadline)
     }
 }
@@ -174,23 +179,24 @@ fn all_or_nothing<const D: usize>(seed: u64, network: &Network) -> Result<bool, 
         return Ok(false);
     };
     let (chain, obstacles) = (&world.chain, &world.obstacles);
-    let told = (k, to, Source::Operator);
+    let told = (k, to, RequestSource::Operator);
     let controls = talked((chain, obstacles, &rules), told, Some(network), seed);
     prop_assert!(controls.iter().all(Option::is_some), "everybody comes to a decision");
     let led = controls.iter().flatten().find_map(|control| control.led);
-    let points = settled(chain, &controls);
+    let points = final_positions(chain, &controls);
     prop_assert_eq!(points.is_some(), led.is_some(), "what is led is carried out by all");
     for control in controls.iter().flatten() {
-        let is_within =
-            |led: crate::agents::Led| (led.first..=led.last).contains(&control.connector);
-        if let Goes::To { to, .. } = control.goes {
+        let is_within = |led: crate::agents::ExecutedMotion| {
+            (led.first..=led.last).contains(&control.connector)
+        };
+        if let ConnectorMove::To { to, .. } = control.goes {
             let stays = to == chain.points()[control.connector as usize];
             prop_assert!(stays || led.is_some_and(is_within), "nobody goes alone");
         }
     }
     let vetoed = matches!(
         controls[k].as_ref().and_then(|control| control.ended.clone()),
-        Some(Ended::Climbed { objection: Some(_), .. })
+        Some(LeaderOutcome::Climbed { objection: Some(_), .. })
     );
     prop_assert!(!vetoed || points.is_none(), "nobody moves on a veto");
     if let Some(points) = points {

@@ -6,23 +6,25 @@
 //! part that only this limit keeps from escaping is reported.
 
 use super::threat::{Nearness, Threat, collect, gap_m, nearness};
-use super::{Escape, Escaped, Left, Margin, Part, Tick};
+use super::{ChainPart, EscapeReport, EscapeRules, EscapeTick, Margin, TrappedPart};
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, along, distance, dot, perpendicular, scaled, sub, unit};
+use crate::rods::geometry::{
+    Point, add_scaled, distance, dot, normalized, perpendicular, scaled, sub,
+};
+use crate::rods::motion_context::TOLERANCE_M;
 use crate::rods::obstacle::Obstacle;
-use crate::rods::own_body::OwnBody;
-use crate::rods::reach::{Reach, Reached, reach};
-use crate::rods::scene::TOLERANCE_M;
-use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
+use crate::rods::reach::{ReachOutcome, ReachRequest, reach};
+use crate::rods::rod_bvh::RodBvh;
+use crate::rods::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
 /// Leads parts out of the way one after the other.
 #[derive(Debug, Clone)]
-pub(super) struct Literal<const D: usize> {
-    rules: Escape,
-    body: OwnBody<D>,
+pub(super) struct LiteralEscape<const D: usize> {
+    rules: EscapeRules,
+    body: RodBvh<D>,
     threats: Vec<Threat>,
     vetoes: Vec<(Threat, Veto<D>)>,
     /// The chain as it was before the motion under trial.
@@ -30,31 +32,34 @@ pub(super) struct Literal<const D: usize> {
 }
 
 /// Distance by which a push goes beyond the depth, meters.
-const BEYOND_M: f64 = 1e-6;
+const PUSH_MARGIN_M: f64 = 1e-6;
 /// Least gain of a helpful motion, as a part of its length.
-const LEAST_GAIN: f64 = 0.05;
+const MIN_GAIN: f64 = 0.05;
 /// Least motion of the point of contact, as a part of the way of a rod's end, for a helpful end.
-const LEAST_LEVER: f64 = 0.1;
+const MIN_LEVER: f64 = 0.1;
 /// Parts of the push that are tried, each in all directions.
-const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
+const PUSH_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.25];
 /// Directions that are tried, rad, from straight away to nearly across; the first of both signs
 /// leads off the obstacle's way.
-const TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
+const PUSH_TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
 
-impl<const D: usize> Literal<D> {
+impl<const D: usize> LiteralEscape<D> {
     /// Returns an escape that remembers nothing yet.
-    pub(super) fn new(rules: Escape) -> Self {
+    pub(super) fn new(rules: EscapeRules) -> Self {
         let (body, threats, vetoes, before) = Default::default();
         Self { rules, body, threats, vetoes, before }
     }
 
     /// Moves the parts that are too near to a moving obstacle.
-    pub(super) fn escape(&mut self, tick: &mut Tick<'_, D>) -> Result<Escaped<D>, InputError> {
-        let ahead = self.rules.look_ahead();
-        let reach_m = 2.0 * self.longest_way_m(tick);
-        let within_m = |o: &Obstacle<D>| ahead.around(o) + reach_m;
+    pub(super) fn escape(
+        &mut self,
+        tick: &mut EscapeTick<'_, D>,
+    ) -> Result<EscapeReport<D>, InputError> {
+        let ahead = self.rules.look_ahead_margin();
+        let reach_m = 2.0 * self.max_travel_m(tick);
+        let within_m = |o: &Obstacle<D>| ahead.required_gap_m(o) + reach_m;
         collect(tick.chain, tick.obstacles, &mut self.body, within_m, &mut self.threats);
-        let mut told = Escaped::default();
+        let mut told = EscapeReport::default();
         if self.threats.is_empty() {
             return Ok(told);
         }
@@ -62,34 +67,34 @@ impl<const D: usize> Literal<D> {
         self.before.extend_from_slice(tick.chain.points());
         let mut tries = self.rules.most / 2;
         if ahead != Margin::NONE {
-            self.round(tick, ahead, &mut tries, &mut told)?;
+            self.relieve_round(tick, ahead, &mut tries, &mut told)?;
         }
         tries += self.rules.most.div_ceil(2);
-        self.round(tick, Margin::NONE, &mut tries, &mut told)?;
-        self.tell_what_is_left(tick, &mut told);
+        self.relieve_round(tick, Margin::NONE, &mut tries, &mut told)?;
+        self.report_trapped(tick, &mut told);
         Ok(told)
     }
 
     /// Returns the greatest distance from its start that a connector may have, or already has, meters.
-    fn longest_way_m(&self, tick: &Tick<'_, D>) -> f64 {
+    fn max_travel_m(&self, tick: &EscapeTick<'_, D>) -> f64 {
         let ways_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
-        ways_m.fold(self.rules.most_m(), f64::max)
+        ways_m.fold(self.rules.max_step_m(), f64::max)
     }
 
     /// Relieves violations of one margin, the deepest first.
-    fn round(
+    fn relieve_round(
         &mut self,
-        tick: &mut Tick<'_, D>,
+        tick: &mut EscapeTick<'_, D>,
         margin: Margin,
         tries: &mut usize,
-        told: &mut Escaped<D>,
+        told: &mut EscapeReport<D>,
     ) -> Result<(), InputError> {
         self.vetoes.clear();
         self.measure_all(tick, margin);
         while *tries > 0 {
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
-            interrupt::look();
+            interrupt::check();
             match self.relieve(tick, deepest)? {
                 Ok(touched) => {
                     self.measure(tick, &touched);
@@ -100,7 +105,7 @@ impl<const D: usize> Literal<D> {
                 }
                 Err(veto) => {
                     told.vetoes += 1;
-                    told.capped += usize::from(veto.reason == Reason::StepLimit);
+                    told.capped += usize::from(veto.reason == VetoReason::StepLimit);
                     self.threats[deepest].given_up = true;
                     self.vetoes.push((self.threats[deepest], veto));
                 }
@@ -110,18 +115,18 @@ impl<const D: usize> Literal<D> {
     }
 
     /// Measures all threats in a margin; none counts as given up after that.
-    fn measure_all(&mut self, tick: &Tick<'_, D>, margin: Margin) {
+    fn measure_all(&mut self, tick: &EscapeTick<'_, D>, margin: Margin) {
         for threat in &mut self.threats {
             threat.given_up = false;
-            threat.margin_m = margin.around(&tick.obstacles.moving()[threat.mover]);
-            threat.depth_m = depth_of(tick, threat);
+            threat.margin_m = margin.required_gap_m(&tick.obstacles.moving()[threat.mover]);
+            threat.depth_m = threat_depth(tick, threat);
         }
     }
 
     /// Measures the threats of some connectors and their rods again; all others are as deep as before.
-    fn measure(&mut self, tick: &Tick<'_, D>, touched: &Range<usize>) {
+    fn measure(&mut self, tick: &EscapeTick<'_, D>, touched: &Range<usize>) {
         for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
-            threat.depth_m = depth_of(tick, threat);
+            threat.depth_m = threat_depth(tick, threat);
         }
     }
 
@@ -141,22 +146,23 @@ impl<const D: usize> Literal<D> {
     /// elbows of an arm get out of the way too.
     fn relieve(
         &mut self,
-        tick: &mut Tick<'_, D>,
+        tick: &mut EscapeTick<'_, D>,
         which: usize,
     ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let threat = self.threats[which];
         let mover = tick.obstacles.moving()[threat.mover];
         let near = nearness(tick.chain, threat.part, &mover);
-        let mut why = nobody(tick.chain, threat.part, mover.id);
-        for (k, lever) in agents(tick.chain, threat.part, &near).into_iter().flatten() {
-            let push_m = ((threat.depth_m + BEYOND_M) / lever).min(self.room_m(tick, k));
-            for way in ways(near.away, mover.velocity_m_s) {
-                let to = along(tick.chain.points()[k], way, push_m);
+        let mut why = no_agent_veto(tick.chain, threat.part, mover.id);
+        for (k, lever) in movable_connectors(tick.chain, threat.part, &near).into_iter().flatten() {
+            let push_m =
+                ((threat.depth_m + PUSH_MARGIN_M) / lever).min(self.max_distance_m(tick, k));
+            for way in push_directions(near.away, mover.velocity_m_s) {
+                let to = add_scaled(tick.chain.points()[k], way, push_m);
                 match self.attempt(tick, which, k, to)? {
                     Ok(touched) => return Ok(Ok(touched)),
                     // If the speed limit was the only obstacle, that is more informative than any other
                     // reason.
-                    Err(veto) if why.reason != Reason::StepLimit => why = veto,
+                    Err(veto) if why.reason != VetoReason::StepLimit => why = veto,
                     Err(_) => (),
                 }
             }
@@ -166,45 +172,46 @@ impl<const D: usize> Literal<D> {
 
     /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
     /// far as it already is.
-    fn room_m(&self, tick: &Tick<'_, D>, k: usize) -> f64 {
-        self.rules.most_m().max(distance(tick.start[k], self.before[k]))
+    fn max_distance_m(&self, tick: &EscapeTick<'_, D>, k: usize) -> f64 {
+        self.rules.max_step_m().max(distance(tick.start[k], self.before[k]))
     }
 
     /// Moves one connector, if that helps; otherwise every bit is as before. Returns the connectors that may have moved.
     fn attempt(
         &mut self,
-        tick: &mut Tick<'_, D>,
+        tick: &mut EscapeTick<'_, D>,
         which: usize,
         k: usize,
         to: Point<D>,
     ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let at = tick.chain.points()[k];
-        let to = clipped(tick.start[k], to, self.room_m(tick, k));
+        let to = clamp_to_ball(tick.start[k], to, self.max_distance_m(tick, k));
         if distance(to, at) <= TOLERANCE_M {
-            return Ok(Err(objection(tick.chain, k, Reason::StepLimit, None)));
+            return Ok(Err(make_veto(tick.chain, k, VetoReason::StepLimit, None)));
         }
         let request = Request {
             motion: Motion::Connector { k, to },
-            source: Source::Autonomous,
-            mode: Mode::AsFarAsPossible,
+            source: RequestSource::Autonomous,
+            mode: VetoEffect::AsFarAsPossible,
         };
         let touched = match tick.propagator.propagate(tick.chain, tick.obstacles, &request)? {
             Outcome::Moved(moved) => moved.touched,
             Outcome::Vetoed(veto)
                 if veto.by != k && tick.chain.connectors()[veto.by].is_still() =>
             {
-                let order = Reach { k, target: to, base: veto.by, tolerance_m: 0.5 * BEYOND_M };
+                let order =
+                    ReachRequest { k, target: to, base: veto.by, tolerance_m: 0.5 * PUSH_MARGIN_M };
                 match reach(tick.propagator, tick.chain, tick.obstacles, &order)? {
-                    Reached::There { .. } => 0..tick.start.len(),
-                    Reached::Short { .. } => return Ok(Err(veto)),
+                    ReachOutcome::There { .. } => 0..tick.start.len(),
+                    ReachOutcome::Short { .. } => return Ok(Err(veto)),
                 }
             }
             Outcome::Vetoed(veto) => return Ok(Err(veto)),
         };
         let refused = self
-            .too_far(tick, touched.clone())
-            .map(|by| Veto { by, ..objection(tick.chain, k, Reason::StepLimit, None) })
-            .or_else(|| self.no_help(tick, &touched, which, k, distance(to, at)));
+            .first_too_far(tick, touched.clone())
+            .map(|by| Veto { by, ..make_veto(tick.chain, k, VetoReason::StepLimit, None) })
+            .or_else(|| self.check_gain(tick, &touched, which, k, distance(to, at)));
         let run = touched.clone();
         let (from, to) = match refused {
             Some(_) => (&self.before[run.clone()], &mut tick.chain.points_mut()[run]),
@@ -215,38 +222,38 @@ impl<const D: usize> Literal<D> {
     }
 
     /// Returns the first connector that went farther than its speed allows.
-    fn too_far(&self, tick: &Tick<'_, D>, touched: Range<usize>) -> Option<usize> {
+    fn first_too_far(&self, tick: &EscapeTick<'_, D>, touched: Range<usize>) -> Option<usize> {
         touched.into_iter().find(|&i| {
-            distance(tick.start[i], tick.chain.points()[i]) > self.room_m(tick, i) + 1e-12
+            distance(tick.start[i], tick.chain.points()[i]) > self.max_distance_m(tick, i) + 1e-12
         })
     }
 
     /// Returns an objection if a motion did not bring the part farther away, or brought another as
     /// deep.
-    fn no_help(
+    fn check_gain(
         &self,
-        tick: &Tick<'_, D>,
+        tick: &EscapeTick<'_, D>,
         touched: &Range<usize>,
         which: usize,
         k: usize,
         way_m: f64,
     ) -> Option<Veto<D>> {
         let depth_m = self.threats[which].depth_m;
-        let bound_m = depth_m - LEAST_GAIN * way_m.min(depth_m);
+        let bound_m = depth_m - MIN_GAIN * way_m.min(depth_m);
         // Untouched parts are as deep as before.
         let all = self.threats.iter().enumerate();
         let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
         let worse = changed.find(|(i, threat)| {
             let allowed_m = if *i == which { bound_m } else { threat.depth_m.max(bound_m) };
-            depth_of(tick, threat) > allowed_m
+            threat_depth(tick, threat) > allowed_m
         });
         worse.map(|(_, threat)| {
             let id = tick.obstacles.moving()[threat.mover].id;
-            objection(tick.chain, k, Reason::TargetBlocked, id)
+            make_veto(tick.chain, k, VetoReason::TargetBlocked, id)
         })
     }
 
-    fn tell_what_is_left(&mut self, tick: &Tick<'_, D>, told: &mut Escaped<D>) {
+    fn report_trapped(&mut self, tick: &EscapeTick<'_, D>, told: &mut EscapeReport<D>) {
         self.measure_all(tick, Margin::NONE);
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
@@ -257,79 +264,83 @@ impl<const D: usize> Literal<D> {
             .find(|(t, _)| (t.part, t.mover) == (threat.part, threat.mover))
             .map(|(_, veto)| *veto);
         let obstacle = tick.obstacles.moving()[threat.mover].id;
-        told.left = Some(Left { part: threat.part, obstacle, veto });
+        told.left = Some(TrappedPart { part: threat.part, obstacle, veto });
     }
 }
 
-fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat) -> f64 {
+fn threat_depth<const D: usize>(tick: &EscapeTick<'_, D>, threat: &Threat) -> f64 {
     threat.margin_m - gap_m(tick.chain, threat.part, &tick.obstacles.moving()[threat.mover])
 }
 
 /// Returns the connectors that may move for a part, and the share of their way that the point of
 /// contact moves: for a rod the end nearer to the contact, then the other.
-fn agents<const D: usize>(
+fn movable_connectors<const D: usize>(
     chain: &Chain<D>,
-    part: Part,
+    part: ChainPart,
     near: &Nearness<D>,
 ) -> [Option<(usize, f64)>; 2] {
     let a = near.along_rod;
     let ends = match part {
-        Part::Connector(i) => [Some((i, 1.0)), None],
-        Part::Rod(i) if a < 0.5 => [Some((i, 1.0 - a)), Some((i + 1, a))],
-        Part::Rod(i) => [Some((i + 1, a)), Some((i, 1.0 - a))],
+        ChainPart::Connector(i) => [Some((i, 1.0)), None],
+        ChainPart::Rod(i) if a < 0.5 => [Some((i, 1.0 - a)), Some((i + 1, a))],
+        ChainPart::Rod(i) => [Some((i + 1, a)), Some((i, 1.0 - a))],
     };
     let may_move =
-        |&(k, lever): &(usize, f64)| lever >= LEAST_LEVER && !chain.connectors()[k].is_still();
+        |&(k, lever): &(usize, f64)| lever >= MIN_LEVER && !chain.connectors()[k].is_still();
     ends.map(|end| end.filter(may_move))
 }
 
 /// Returns the objection of a part without a connector that may move.
-fn nobody<const D: usize>(chain: &Chain<D>, part: Part, obstacle: u32) -> Veto<D> {
-    let (Part::Connector(k) | Part::Rod(k)) = part;
-    let reason = if chain.connectors()[k].failed { Reason::Failed } else { Reason::Fixed };
-    objection(chain, k, reason, obstacle)
+fn no_agent_veto<const D: usize>(chain: &Chain<D>, part: ChainPart, obstacle: u32) -> Veto<D> {
+    let (ChainPart::Connector(k) | ChainPart::Rod(k)) = part;
+    let reason = if chain.connectors()[k].failed { VetoReason::Failed } else { VetoReason::Fixed };
+    make_veto(chain, k, reason, obstacle)
 }
 
 /// Returns the ways that are tried, as parts of the push: all of it in every direction, then half.
-fn ways<const D: usize>(away: Point<D>, velocity: Point<D>) -> impl Iterator<Item = Point<D>> {
-    let planes = planes(away, velocity);
+fn push_directions<const D: usize>(
+    away: Point<D>,
+    velocity: Point<D>,
+) -> impl Iterator<Item = Point<D>> {
+    let planes = turn_planes(away, velocity);
     let turned = move |turn_rad: f64| {
         let n = if turn_rad == 0.0 { 1 } else { D - 1 };
         planes
             .into_iter()
             .take(n)
-            .map(move |across| along(scaled(away, cos(turn_rad)), across, sin(turn_rad)))
+            .map(move |across| add_scaled(scaled(away, cos(turn_rad)), across, sin(turn_rad)))
     };
-    let all = move |part: f64| TURNS_RAD.into_iter().flat_map(turned).map(move |u| scaled(u, part));
-    PARTS.into_iter().flat_map(all)
+    let all =
+        move |part: f64| PUSH_TURNS_RAD.into_iter().flat_map(turned).map(move |u| scaled(u, part));
+    PUSH_FRACTIONS.into_iter().flat_map(all)
 }
 
 /// Returns directions across `away`, to turn it toward: the first off the obstacle's way.
-fn planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
-    let off = unit(velocity)
-        .map(|v| along(away, v, -dot(away, v)))
-        .and_then(|off| unit(along(off, away, -dot(off, away))));
+fn turn_planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
+    let off = normalized(velocity)
+        .map(|v| add_scaled(away, v, -dot(away, v)))
+        .and_then(|off| normalized(add_scaled(off, away, -dot(off, away))));
     let first = off.unwrap_or_else(|| perpendicular(away));
-    [first, across(away, first)]
+    [first, cross_product(away, first)]
 }
 
 /// Returns the vector across two that are perpendicular; in the plane there is none, and the result
 /// is not used.
-fn across<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
+fn cross_product<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
     let at = |i: usize| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D];
     std::array::from_fn(at)
 }
 
 /// Returns the point of a ball around `center` that is nearest to `to`.
-fn clipped<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
+fn clamp_to_ball<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
     let way_m = distance(center, to);
-    if way_m <= radius_m { to } else { along(center, sub(to, center), radius_m / way_m) }
+    if way_m <= radius_m { to } else { add_scaled(center, sub(to, center), radius_m / way_m) }
 }
 
-fn objection<const D: usize>(
+fn make_veto<const D: usize>(
     chain: &Chain<D>,
     from: usize,
-    reason: Reason,
+    reason: VetoReason,
     obstacle: impl Into<Option<u32>>,
 ) -> Veto<D> {
     let obstacle = obstacle.into();

@@ -1,17 +1,17 @@
 use super::*;
+use crate::fixtures::{TestRng, clearance_m};
 use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{distance, scaled, unit};
+use crate::rods::geometry::{distance, normalized, scaled};
+use crate::rods::motion_context::TOLERANCE_M;
 use crate::rods::rules::Rules;
-use crate::rods::scene::TOLERANCE_M;
-use crate::rods::veto::Reason;
-use crate::scenes::{Numbers, clearance_m};
+use crate::rods::veto::VetoReason;
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
 
 /// The rules of the slides' own escape.
-fn literal(dt_s: f64, speed_max_m_s: f64) -> Escape {
-    Escape { method: Method::Literal, ..Escape::new(dt_s, speed_max_m_s) }
+fn literal(dt_s: f64, speed_max_m_s: f64) -> EscapeRules {
+    EscapeRules { method: EscapeMethod::Literal, ..EscapeRules::new(dt_s, speed_max_m_s) }
 }
 
 fn swarm<const D: usize>(n_rods: usize) -> Chain<D> {
@@ -28,13 +28,13 @@ fn mover<const D: usize>(center: Point<D>, radius_m: f64, velocity_m_s: Point<D>
 
 /// Balls at random, none on the chain along the first axis, that keep their ways.
 fn movers<const D: usize>(seed: u64, n: u32, speed_m_s: f64) -> Obstacles<D> {
-    let mut numbers = Numbers::new(seed);
+    let mut numbers = TestRng::new(seed);
     let mut ball = |id| {
         let mut center: Point<D> = numbers.point(5.0);
         center[1] += 1.3_f64.copysign(center[1]);
-        let u: Point<D> = unit(numbers.point(1.0)).unwrap();
+        let u: Point<D> = normalized(numbers.point(1.0)).unwrap();
         let velocity_m_s = scaled(u, speed_m_s);
-        Obstacle { velocity_m_s, ..Obstacle::ball(id, center, numbers.within(0.2, 0.5)) }
+        Obstacle { velocity_m_s, ..Obstacle::ball(id, center, numbers.uniform(0.2, 0.5)) }
     };
     Obstacles::new((0..n).map(&mut ball).collect(), 1.0).unwrap()
 }
@@ -45,13 +45,13 @@ fn tick<const D: usize>(
     obstacles: &mut Obstacles<D>,
     escaper: &mut Escaper<D>,
     propagator: &mut Propagator<D>,
-) -> Escaped<D> {
+) -> EscapeReport<D> {
     let start = chain.points().to_vec();
     obstacles.advance(escaper.rules().dt_s);
     let told =
-        escaper.escape(chain, obstacles, propagator, &start, &mut WayOut::default()).unwrap();
+        escaper.escape(chain, obstacles, propagator, &start, &mut EscapePlan::default()).unwrap();
     for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
-        assert!(distance(*from, *to) <= escaper.rules().most_m() + 1e-12, "connector {k}");
+        assert!(distance(*from, *to) <= escaper.rules().max_step_m() + 1e-12, "connector {k}");
         assert!(from == to || !chain.connectors()[k].is_still());
     }
     assert!(chain.max_rod_violation_m() <= 1e-9);
@@ -68,7 +68,7 @@ fn a_chain_gets_out_of_the_way_of_a_ball_that_crosses_it() {
         let (mut center, mut velocity_m_s) = ([0.0; D], [0.0; D]);
         (center[0], center[1], velocity_m_s[1]) = (at_x, 2.0, -0.5);
         let (mut chain, mut obstacles) = (swarm::<D>(8), mover(center, 0.4, velocity_m_s));
-        let mut escaper = Escaper::new(Escape { ticks_ahead, ..literal(DT_S, 1.5) });
+        let mut escaper = Escaper::new(EscapeRules { ticks_ahead, ..literal(DT_S, 1.5) });
         for _ in 0..600 {
             let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
             assert_eq!(told.deepest_m, 0.0, "{told:?}");
@@ -104,9 +104,15 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.5, 0.0], 0.4, [-1.0, 0.0]));
     let mut start = chain.points().to_vec();
     start[0][0] += 0.015;
-    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
+    let mut escaper = Escaper::new(EscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
     escaper
-        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
+        .escape(
+            &mut chain,
+            &obstacles,
+            &mut Propagator::default(),
+            &start,
+            &mut EscapePlan::default(),
+        )
         .unwrap();
     assert!((distance(chain.points()[0], start[0]) - 0.02).abs() <= 1e-9);
 }
@@ -114,7 +120,7 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
 #[test]
 fn it_is_told_when_only_the_speed_limit_is_in_the_way() {
     let (mut chain, mut obstacles) = (swarm::<2>(4), mover([0.0, 0.8], 0.4, [0.0, -4.0]));
-    let mut escaper = Escaper::new(Escape { ticks_ahead: 0.0, ..literal(DT_S, 0.5) });
+    let mut escaper = Escaper::new(EscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 0.5) });
     let mut told = Vec::new();
     for _ in 0..6 {
         told.push(tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default()));
@@ -122,7 +128,7 @@ fn it_is_told_when_only_the_speed_limit_is_in_the_way() {
     let last = told.last().unwrap();
     assert!(last.deepest_m > 0.1 && last.capped > 0);
     let left = last.left.unwrap();
-    assert_eq!((left.obstacle, left.veto.unwrap().reason), (9, Reason::StepLimit));
+    assert_eq!((left.obstacle, left.veto.unwrap().reason), (9, VetoReason::StepLimit));
 }
 
 #[test]
@@ -139,7 +145,10 @@ fn who_never_moves_is_told_and_nothing_changes() {
     }
     assert_eq!(chain, before);
     let left = told.unwrap().left.unwrap();
-    assert_eq!((left.part, left.veto.unwrap().reason), (Part::Connector(1), Reason::Failed));
+    assert_eq!(
+        (left.part, left.veto.unwrap().reason),
+        (ChainPart::Connector(1), VetoReason::Failed)
+    );
 }
 
 #[test]
@@ -165,7 +174,13 @@ fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
     let mut escaper = Escaper::new(literal(DT_S, f64::INFINITY));
     let start = chain.points().to_vec();
     let told = escaper
-        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
+        .escape(
+            &mut chain,
+            &obstacles,
+            &mut Propagator::default(),
+            &start,
+            &mut EscapePlan::default(),
+        )
         .unwrap();
     assert_eq!(told.deepest_m, 0.0);
     let [x, y] = chain.points()[0];
@@ -217,7 +232,7 @@ fn walls_stop_an_escape_and_are_not_passed() {
                 &obstacles,
                 &mut Propagator::default(),
                 &start,
-                &mut WayOut::default(),
+                &mut EscapePlan::default(),
             )
             .unwrap();
         assert!(chain.points().iter().all(|p| p[1] >= -0.05 - 1e-9));
@@ -231,7 +246,13 @@ fn where_nothing_moves_nothing_changes() {
     let obstacles = Obstacles::new(vec![Obstacle::ball(1, [0.0, 0.2], 0.3)], 1.0).unwrap();
     let start = chain.points().to_vec();
     let told = Escaper::new(literal(DT_S, 1.0))
-        .escape(&mut chain, &obstacles, &mut Propagator::default(), &start, &mut WayOut::default())
+        .escape(
+            &mut chain,
+            &obstacles,
+            &mut Propagator::default(),
+            &start,
+            &mut EscapePlan::default(),
+        )
         .unwrap();
     assert_eq!((told.moves, told.left, &chain), (0, None, &before));
 }
@@ -240,14 +261,14 @@ fn where_nothing_moves_nothing_changes() {
 fn wrong_numbers_are_named() {
     let mut chain = swarm::<2>(2);
     let start = chain.points().to_vec();
-    let mut place = |rules: Escape, start: &[Point<2>]| {
+    let mut place = |rules: EscapeRules, start: &[Point<2>]| {
         Escaper::new(rules)
             .escape(
                 &mut chain,
                 &Obstacles::default(),
                 &mut Propagator::default(),
                 start,
-                &mut WayOut::default(),
+                &mut EscapePlan::default(),
             )
             .unwrap_err()
             .place()
@@ -255,7 +276,7 @@ fn wrong_numbers_are_named() {
     };
     assert_eq!(place(literal(0.0, 1.0), &start), "escape");
     assert_eq!(place(literal(0.1, f64::NAN), &start), "escape");
-    let blind = Escape { ticks_ahead: -1.0, ..literal(0.1, 1.0) };
+    let blind = EscapeRules { ticks_ahead: -1.0, ..literal(0.1, 1.0) };
     assert_eq!(place(blind, &start), "escape");
     assert_eq!(place(literal(0.1, 1.0), &start[1..]), "start of the tick");
 }

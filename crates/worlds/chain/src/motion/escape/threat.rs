@@ -1,21 +1,21 @@
 //! The parts of a chain near a moving obstacle, with their distances.
 
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, Point, distance, first_axis, perpendicular, sub, unit};
+use crate::rods::geometry::{Bounds, Point, distance, first_axis, normalized, perpendicular, sub};
 use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::own_body::OwnBody;
+use crate::rods::rod_bvh::RodBvh;
 use std::ops::Range;
 
 /// A part of a chain; the order breaks ties between equally deep violations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum ChainPart {
     /// A connector.
     Connector(usize),
     /// The rod between a connector and the next.
     Rod(usize),
 }
 
-impl Part {
+impl ChainPart {
     /// Returns the connector, or the one at the start of the rod.
     pub fn connector(self) -> usize {
         let (Self::Connector(k) | Self::Rod(k)) = self;
@@ -34,7 +34,7 @@ impl Part {
 /// A part and a moving obstacle that may get too near to each other in this tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Threat {
-    pub(super) part: Part,
+    pub(super) part: ChainPart,
     /// Index among [`Obstacles::moving`].
     pub(super) mover: usize,
     /// The free space required around the obstacle, meters, and the depth of the part in it, as last measured.
@@ -59,46 +59,46 @@ pub(super) struct Nearness<const D: usize> {
 /// Returns the position of a part relative to an obstacle.
 pub(super) fn nearness<const D: usize>(
     chain: &Chain<D>,
-    part: Part,
+    part: ChainPart,
     mover: &Obstacle<D>,
 ) -> Nearness<D> {
-    let (body, radius_m) = body(chain, part);
+    let (body, radius_m) = part_body(chain, part);
     let nearest = mover.core.nearest_to_segment(body);
     let length_m = distance(body[0], body[1]);
     let along_rod =
         if length_m > 0.0 { distance(body[0], nearest.on_body) / length_m } else { 0.0 };
     Nearness {
         gap_m: nearest.distance_m - mover.radius_m - radius_m,
-        away: unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover)),
+        away: normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover)),
         along_rod,
     }
 }
 
 /// Returns the distance of the surfaces of a part and an obstacle, meters; negative if they overlap.
-pub(super) fn gap_m<const D: usize>(chain: &Chain<D>, part: Part, mover: &Obstacle<D>) -> f64 {
-    let (body, radius_m) = body(chain, part);
+pub(super) fn gap_m<const D: usize>(chain: &Chain<D>, part: ChainPart, mover: &Obstacle<D>) -> f64 {
+    let (body, radius_m) = part_body(chain, part);
     mover.core.nearest_to_segment(body).distance_m - mover.radius_m - radius_m
 }
 
 /// Returns the ends of a part, and its radius, meters.
-fn body<const D: usize>(chain: &Chain<D>, part: Part) -> ([Point<D>; 2], f64) {
+fn part_body<const D: usize>(chain: &Chain<D>, part: ChainPart) -> ([Point<D>; 2], f64) {
     let points = chain.points();
     match part {
-        Part::Connector(i) => ([points[i]; 2], chain.connectors()[i].radius_m),
-        Part::Rod(i) => ([points[i], points[i + 1]], chain.rods()[i].radius_m),
+        ChainPart::Connector(i) => ([points[i]; 2], chain.connectors()[i].radius_m),
+        ChainPart::Rod(i) => ([points[i], points[i + 1]], chain.rods()[i].radius_m),
     }
 }
 
 /// Returns the direction across the way of an obstacle, to its left.
 pub(super) fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
-    perpendicular(unit(mover.velocity_m_s).unwrap_or(first_axis()))
+    perpendicular(normalized(mover.velocity_m_s).unwrap_or(first_axis()))
 }
 
 /// Collects all parts that are nearer than `within_m` to a moving obstacle.
 pub(super) fn collect<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
-    body: &mut OwnBody<D>,
+    body: &mut RodBvh<D>,
     within_m: impl Fn(&Obstacle<D>) -> f64,
     threats: &mut Vec<Threat>,
 ) {
@@ -112,23 +112,23 @@ pub(super) fn collect<const D: usize>(
     let movers = obstacles.moving().iter().enumerate();
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
-        let mut look = |part: Part| {
+        let mut look = |part: ChainPart| {
             if gap_m(chain, part, mover) < within_m {
                 let (margin_m, depth_m, given_up) = Default::default();
                 threats.push(Threat { part, mover: k, margin_m, depth_m, given_up });
             }
         };
         body.visit(&mover.bounds().grown(within_m), |rod| {
-            look(Part::Connector(rod));
-            look(Part::Rod(rod));
+            look(ChainPart::Connector(rod));
+            look(ChainPart::Rod(rod));
         });
         // The last connector starts no rod.
-        look(Part::Connector(n_rods));
+        look(ChainPart::Connector(n_rods));
     }
 }
 
 fn rod_box<const D: usize>(chain: &Chain<D>, i: usize) -> Bounds<D> {
     // Rods are no thicker than their connectors.
     let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
-    Bounds::of(&[chain.points()[i], chain.points()[i + 1]]).grown(radius_m)
+    Bounds::from_points(&[chain.points()[i], chain.points()[i + 1]]).grown(radius_m)
 }

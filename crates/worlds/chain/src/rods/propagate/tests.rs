@@ -28,11 +28,11 @@
 //! 18. one connector, one rod, coincidence, no motion, NaN, a base inside: [`degenerate`]
 
 use super::*;
+use crate::fixtures::{TestRng, Wanderer, ball_field, clearance_m, own_clearance_m};
 use crate::rods::chain::{Connector, Mobility, Rod};
 use crate::rods::geometry::{add, norm, scaled, sub};
 use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::Source;
-use crate::scenes::{Numbers, Wanderer, ball_field, clearance_m, own_clearance_m};
+use crate::rods::veto::RequestSource;
 use proptest::prelude::*;
 
 mod apart;
@@ -58,11 +58,11 @@ fn go<const D: usize>(
 
 /// A random walk of rods within limits.
 fn crooked<const D: usize>(seed: u64, n_rods: usize, rod: Rod, radius_m: f64) -> Chain<D> {
-    let mut numbers = Numbers::new(seed);
+    let mut numbers = TestRng::new(seed);
     let mut walk = Wanderer::<D>::new(seed);
     let mut points = vec![[0.0; D]];
     for _ in 0..n_rods {
-        let length_m = numbers.within(rod.min_m, rod.max_m);
+        let length_m = numbers.uniform(rod.min_m, rod.max_m);
         points.push(walk.next(points[points.len() - 1], length_m));
     }
     Chain::new(points, vec![Connector::free(radius_m); n_rods + 1], vec![rod; n_rods]).unwrap()
@@ -88,7 +88,7 @@ fn wander<const D: usize>(seed: u64, rules: Rules, steps: usize, max_bend_rad: f
             Outcome::Vetoed(_) => {
                 assert_eq!(bits(&chain), before, "a veto leaves every bit");
                 vetoes += 1;
-                walk.turn();
+                walk.turn_anywhere();
             }
             Outcome::Moved(moved) => {
                 moves += 1;
@@ -146,7 +146,7 @@ fn a_rod_within_its_limits_only_changes_its_length() {
     let points = vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]];
     let mut chain = Chain::new(points, vec![Connector::free(0.0); 3], vec![rod; 2]).unwrap();
     let outcome = go(&mut chain, &Obstacles::default(), 0, [0.2, 0.1]);
-    let moved = outcome.moved().unwrap();
+    let moved = outcome.motion().unwrap();
     assert_eq!((moved.touched.clone(), moved.changed), (0..1, 1));
     assert_eq!(chain.points()[1..], [[1.0, 0.0], [2.0, 0.0]]);
 }
@@ -154,7 +154,7 @@ fn a_rod_within_its_limits_only_changes_its_length() {
 #[test]
 fn fixed_and_failed_connectors_object_and_stay() {
     let rod = Rod::fixed(1.0, 0.0);
-    for (fail, reason) in [(false, Reason::Fixed), (true, Reason::Failed)] {
+    for (fail, reason) in [(false, VetoReason::Fixed), (true, VetoReason::Failed)] {
         let mut chain =
             Chain::straight([0.0; 3], [1.0, 0.0, 0.0], 4, rod, Connector::free(0.0)).unwrap();
         if fail {
@@ -175,7 +175,7 @@ fn fixed_and_failed_connectors_object_and_stay() {
         // The constraint that was named is the one that mattered.
         chain.set_failed(0, false);
         chain.set_mobility(0, Mobility::Free).unwrap();
-        assert!(go(&mut chain, &Obstacles::default(), 4, [4.5, 1.0, 0.0]).moved().is_some());
+        assert!(go(&mut chain, &Obstacles::default(), 4, [4.5, 1.0, 0.0]).motion().is_some());
     }
 }
 
@@ -186,13 +186,13 @@ fn slaves_stay_on_their_line_and_plane() {
         Chain::straight([0.0; 3], [1.0, 0.0, 0.0], 1, rod, Connector::free(0.0)).unwrap();
     let line = Mobility::OnSegment([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]);
     chain.set_mobility(1, line).unwrap();
-    assert!(go(&mut chain, &Obstacles::default(), 0, [0.5, 0.6, 0.0]).moved().is_some());
+    assert!(go(&mut chain, &Obstacles::default(), 0, [0.5, 0.6, 0.0]).motion().is_some());
     assert!(distance(chain.points()[1], [1.3, 0.0, 0.0]) < 1e-12);
     let veto = go(&mut chain, &Obstacles::default(), 0, [0.5, 3.0, 0.0]);
-    assert_eq!(veto.veto().unwrap().reason, Reason::Mobility);
+    assert_eq!(veto.veto().unwrap().reason, VetoReason::Mobility);
     let plane = Mobility::OnPlane { normal: [0.0, 0.0, 1.0], offset_m: 0.0 };
     chain.set_mobility(1, plane).unwrap();
-    assert!(go(&mut chain, &Obstacles::default(), 0, [0.5, 0.6, 0.5]).moved().is_some());
+    assert!(go(&mut chain, &Obstacles::default(), 0, [0.5, 0.6, 0.5]).motion().is_some());
     assert_eq!(chain.points()[1][2], 0.0);
     assert!(chain.max_rod_violation_m() < 1e-12);
 }
@@ -207,11 +207,11 @@ fn as_far_as_possible_stops_at_the_obstacle_and_says_why() {
     let mut propagator = Propagator::default();
     let vetoed = propagator.propagate(&mut chain, &obstacles, &exact).unwrap();
     let veto = vetoed.veto().unwrap();
-    assert_eq!((veto.reason, veto.obstacle), (Reason::TargetBlocked, Some(9)));
+    assert_eq!((veto.reason, veto.obstacle), (VetoReason::TargetBlocked, Some(9)));
     assert!(veto.reached[0] > 1.3 && bits(&chain) == before);
-    let far = Request { mode: Mode::AsFarAsPossible, ..exact };
+    let far = Request { mode: VetoEffect::AsFarAsPossible, ..exact };
     let outcome = propagator.propagate(&mut chain, &obstacles, &far).unwrap();
-    assert_eq!(outcome.moved().unwrap().cut_short, Some(*veto));
+    assert_eq!(outcome.motion().unwrap().cut_short, Some(*veto));
     assert_eq!(chain.points()[0], veto.reached);
 }
 
@@ -220,16 +220,16 @@ fn a_rod_as_initiator_moves_rigidly() {
     let rod = Rod { min_m: 0.8, max_m: 1.0, radius_m: 0.0 };
     let mut chain = Chain::straight([0.0, 0.0], [1.0, 0.0], 5, rod, Connector::free(0.0)).unwrap();
     let motion = Motion::Rod { i: 2, to: [[2.0, 0.3], [3.0, 0.3]] };
-    let request = Request { motion, source: Source::Planner, mode: Mode::Exact };
+    let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let outcome = Propagator::default().propagate(&mut chain, &Obstacles::default(), &request);
-    assert_eq!(outcome.unwrap().moved().unwrap().touched, 0..6);
+    assert_eq!(outcome.unwrap().motion().unwrap().touched, 0..6);
     assert_eq!(chain.points()[2..4], [[2.0, 0.3], [3.0, 0.3]]);
     assert!(chain.max_rod_violation_m() < 1e-12);
     let stretched = Motion::Rod { i: 2, to: [[2.0, 0.3], [3.5, 0.3]] };
     let before = bits(&chain);
     let request = Request { motion: stretched, ..request };
     let outcome = Propagator::default().propagate(&mut chain, &Obstacles::default(), &request);
-    assert_eq!(outcome.unwrap().veto().unwrap().reason, Reason::Mobility);
+    assert_eq!(outcome.unwrap().veto().unwrap().reason, VetoReason::Mobility);
     assert_eq!(bits(&chain), before);
 }
 

@@ -1,18 +1,18 @@
 //! The cheapest way through the places around a robot, to where the way of the static map goes on.
 
-use super::View;
-use super::sight::{Places, REACH, SIDE};
+use super::LocalView;
+use super::local_costmap::{LocalBoxSet, PLAN_RADIUS_BOXES, PLAN_SIDE_BOXES};
 use crate::effector::HEADINGS;
 
-const PLACES: usize = (SIDE * SIDE) as usize;
+const LOCAL_BOXES: usize = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as usize;
 /// Price of a first step away from the goal that goes straight back, or gives up a sidestep. It is
 /// there because a robot sees little of a wide obstacle, and would otherwise go to and fro before it.
-const PRICE_OF_CHANGE: u16 = 4;
-const UNREACHED: u16 = u16::MAX;
+const CHANGE_COST: u16 = 4;
+const INFINITE_COST: u16 = u16::MAX;
 
 /// Prices of a search, in actions.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Prices {
+pub(super) struct StepCosts {
     /// Price of a place that is blocked now; the obstacle may go away.
     pub(super) blocked: u16,
     /// Extra price of a place beside a blocked one, where a slip ends in a contact.
@@ -38,38 +38,43 @@ struct Label {
 }
 
 /// Returns the direction of the first step; none where every way out is walled in.
-pub(super) fn first_step(view: &View<'_>, prices: Prices) -> Option<u8> {
+pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> {
     let start = Label { cost: 0, rise: 0, first: 4, last: view.heading };
-    let mut labels = [Label { cost: UNREACHED, ..start }; PLACES];
-    let center = Places::number(0, 0)?;
+    let mut labels = [Label { cost: INFINITE_COST, ..start }; LOCAL_BOXES];
+    let center = LocalBoxSet::index(0, 0)?;
     labels[center] = start;
     // Labels are corrected until none changes; there are few of them.
     let (mut waiting, mut next) = (1u128 << center, 0u128);
     while waiting != 0 {
         let n = waiting.trailing_zeros() as usize;
         waiting &= waiting - 1;
-        next |= spread(view, prices, &mut labels, n);
+        next |= relax_neighbors(view, prices, &mut labels, n);
         if waiting == 0 {
             waiting = std::mem::take(&mut next);
         }
     }
-    let out = (0..PLACES).filter(|&n| n != center && is_exit(view, n));
-    let known = out.map(|n| labels[n]).filter(|label| label.cost != UNREACHED);
+    let out = (0..LOCAL_BOXES).filter(|&n| n != center && is_exit(view, n));
+    let known = out.map(|n| labels[n]).filter(|label| label.cost != INFINITE_COST);
     let best =
         known.min_by_key(|l| (i32::from(l.cost) + i32::from(l.rise), l.first != view.heading));
     best.map(|label| label.first)
 }
 
 /// Spreads a label to the neighbors of its place, and returns those that have changed.
-fn spread(view: &View<'_>, prices: Prices, labels: &mut [Label; PLACES], n: usize) -> u128 {
-    let (from, (col, row)) = (labels[n], place(n));
+fn relax_neighbors(
+    view: &LocalView<'_>,
+    prices: StepCosts,
+    labels: &mut [Label; LOCAL_BOXES],
+    n: usize,
+) -> u128 {
+    let (from, (col, row)) = (labels[n], box_offset(n));
     let mut changed = 0;
     // First ahead, then to the right: of equal ways the first is kept, and robots that meet head on
     // both keep to the right.
     for turn in [0, 3, 1, 2] {
         let direction = (from.last + turn) % 4;
         let (east, north) = HEADINGS[usize::from(direction)];
-        let Some(next) = Places::number(col + east, row + north) else { continue };
+        let Some(next) = LocalBoxSet::index(col + east, row + north) else { continue };
         let at = view.offset(col, row);
         let Some(rise) = view.field.rise(at.0, at.1, direction) else { continue };
         let is_first = from.first == 4;
@@ -79,10 +84,14 @@ fn spread(view: &View<'_>, prices: Prices, labels: &mut [Label; PLACES], n: usiz
             _ => prices.is_sidestep,
         };
         let is_change = is_first && rise >= 0 && prices.moved.is_some_and(gives_up);
-        let change = if is_change { PRICE_OF_CHANGE } else { 0 };
-        let lane = u16::from(is_left_lane(view, place(next), direction));
-        let cost =
-            from.cost + 1 + quarters(turn) + change + lane + price(view, prices, place(next));
+        let change = if is_change { CHANGE_COST } else { 0 };
+        let lane = u16::from(is_left_lane(view, box_offset(next), direction));
+        let cost = from.cost
+            + 1
+            + quarter_turns(turn)
+            + change
+            + lane
+            + box_cost(view, prices, box_offset(next));
         if cost < labels[next].cost {
             let first = if is_first { direction } else { from.first };
             labels[next] =
@@ -94,31 +103,32 @@ fn spread(view: &View<'_>, prices: Prices, labels: &mut [Label; PLACES], n: usiz
 }
 
 /// Returns the price of standing in a place, beside the step.
-fn price(view: &View<'_>, prices: Prices, (col, row): (i32, i32)) -> u16 {
-    if view.blocked.has(col, row) {
+fn box_cost(view: &LocalView<'_>, prices: StepCosts, (col, row): (i32, i32)) -> u16 {
+    if view.blocked.contains(col, row) {
         return prices.blocked;
     }
-    let beside = HEADINGS.iter().any(|(east, north)| view.blocked.has(col + east, row + north));
-    prices.beside * u16::from(beside) + prices.vague * u16::from(view.vague.has(col, row))
+    let beside =
+        HEADINGS.iter().any(|(east, north)| view.blocked.contains(col + east, row + north));
+    prices.beside * u16::from(beside) + prices.vague * u16::from(view.vague.contains(col, row))
 }
 
 /// Returns whether a place is in the left lane of a passage: there is a wall to the left, and room
 /// to the right. A robot that comes the other way then finds its own right lane taken.
-fn is_left_lane(view: &View<'_>, (col, row): (i32, i32), direction: u8) -> bool {
+fn is_left_lane(view: &LocalView<'_>, (col, row): (i32, i32), direction: u8) -> bool {
     let at = view.offset(col, row);
     let is_wall = |side: u8| view.field.rise(at.0, at.1, (direction + side) % 4).is_none();
     is_wall(1) && !is_wall(3)
 }
 
-fn quarters(turn: u8) -> u16 {
+fn quarter_turns(turn: u8) -> u16 {
     u16::from(turn.min(4 - turn))
 }
 
 /// Returns whether the static map's way may be followed from a place on: at a goal, and where it
 /// leads out of the planned square, or along its edge. Where it leads back in there is no way
 /// around.
-fn is_exit(view: &View<'_>, n: usize) -> bool {
-    let (col, row) = place(n);
+fn is_exit(view: &LocalView<'_>, n: usize) -> bool {
+    let (col, row) = box_offset(n);
     let at = view.offset(col, row);
     if view.field.is_goal(at.0, at.1) {
         return true;
@@ -126,10 +136,10 @@ fn is_exit(view: &View<'_>, n: usize) -> bool {
     let Some(direction) = view.field.direction(at.0, at.1) else { return false };
     let (east, north) = HEADINGS[usize::from(direction)];
     let ring = |col: i32, row: i32| col.abs().max(row.abs());
-    ring(col, row) == REACH && ring(col + east, row + north) >= REACH
+    ring(col, row) == PLAN_RADIUS_BOXES && ring(col + east, row + north) >= PLAN_RADIUS_BOXES
 }
 
 /// Returns column and row of a place from the robot.
-fn place(n: usize) -> (i32, i32) {
-    (n as i32 % SIDE - REACH, n as i32 / SIDE - REACH)
+fn box_offset(n: usize) -> (i32, i32) {
+    (n as i32 % PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES, n as i32 / PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES)
 }

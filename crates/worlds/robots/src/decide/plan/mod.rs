@@ -6,7 +6,7 @@
 //!    the last contact, for a few decisions.
 //! 2. *Detour*: the cheapest way through the places around it. A blocked place costs some actions
 //!    that grow while the robot waits, because the obstacle may go away.
-//! 3. *Requests*: a robot that waits before something asks it to make room ([`super::ask`]). A robot
+//! 3. *Requests*: a robot that waits before something asks it to make room ([`super::set_request`]). A robot
 //!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
 //!    request on with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority
 //!    inheritance with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn;
@@ -15,48 +15,48 @@
 //!    actions. Without this, two robots in a dead end could wait for each other forever.
 
 mod detour;
-mod mood;
-mod sight;
+mod local_costmap;
+mod memory;
 #[cfg(test)]
 mod tests;
 
-use super::ask::Ask;
+use super::pass_request::PassRequest;
 use super::{Memory, Percept};
 use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
 use crate::state::WALL;
 use crate::world::RobotBody;
-use detour::Prices;
-use mood::Mood;
+use detour::StepCosts;
+use local_costmap::{BeamModel, LocalBoxSet, LocalCostmap};
+use memory::PlannerMemory;
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::{FlowField, FreeSpace};
-use sight::{Eyes, Places, Sight};
 use std::sync::Arc;
 
 /// Actions without progress after which a robot strays, at least; its rank adds up to 31, so that
 /// not all stray at once.
-const STUCK: u8 = 64;
+const MIN_STRAY_ACTIONS: u8 = 64;
 /// Decisions for which a robot believes that the thing it has touched is still there.
-const BUMP: u8 = 2;
+const BUMP_DECISIONS: u8 = 2;
 /// Decisions for which a robot keeps out of a place that it was asked to leave.
-const KEEP_AWAY: u8 = 1;
+const KEEP_AWAY_DECISIONS: u8 = 1;
 
 /// Decisions to wait before something after which a robot with sensors that err tries to go on.
-const PATIENCE: u8 = 5;
+const WAIT_TIMEOUT_DECISIONS: u8 = 5;
 /// Highest rank of a robot that has been at its last goal and was asked to leave it. Its rank grows
 /// with the time that it is away.
-const HIGHEST_DONE: u8 = 63;
+const MAX_DONE_RANK: u8 = 63;
 
 /// Plans the steps of robots of one type.
 #[derive(Debug)]
 pub struct Planner {
-    eyes: Eyes,
+    beam_model: BeamModel,
     /// Whether sensors or wheels err, so that robots had better keep their distance.
     is_careful: bool,
 }
 
 /// The present goal of a robot.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way<'a> {
+pub(super) struct CurrentGoal<'a> {
     /// Ways to it.
     pub(super) field: &'a FlowField,
     /// Whether it is the last one and was reached before.
@@ -64,19 +64,19 @@ pub(super) struct Way<'a> {
 }
 
 /// Everything that a robot knows of the places around it.
-struct View<'a> {
+struct LocalView<'a> {
     field: &'a FlowField,
     at: (u32, u32),
     heading: u8,
-    blocked: Places,
-    vague: Places,
+    blocked: LocalBoxSet,
+    vague: LocalBoxSet,
     /// See [`Planner::is_careful`].
     is_careful: bool,
     /// Whether no other body is noticed.
     is_alone: bool,
 }
 
-impl View<'_> {
+impl LocalView<'_> {
     fn offset(&self, col: i32, row: i32) -> (u32, u32) {
         (self.at.0.wrapping_add_signed(col), self.at.1.wrapping_add_signed(row))
     }
@@ -87,11 +87,11 @@ impl View<'_> {
 
     fn is_blocked(&self, direction: u8) -> bool {
         let (east, north) = HEADINGS[usize::from(direction)];
-        self.blocked.has(east, north)
+        self.blocked.contains(east, north)
     }
 
     /// Returns the direction of a shortest way on the static map; ahead where there is one.
-    fn downhill(&self) -> Option<u8> {
+    fn goal_direction(&self) -> Option<u8> {
         if self.rise(self.heading) == Some(-1) {
             return Some(self.heading);
         }
@@ -99,7 +99,7 @@ impl View<'_> {
     }
 
     /// Returns the direction in which the way goes on behind the next place.
-    fn beyond(&self, direction: u8) -> Option<u8> {
+    fn next_direction(&self, direction: u8) -> Option<u8> {
         let (east, north) = HEADINGS[usize::from(direction)];
         let (col, row) = self.offset(east, north);
         self.field.direction(col, row)
@@ -115,37 +115,38 @@ impl Planner {
         box_size_m: f64,
         wheels_err: bool,
     ) -> Self {
-        let eyes = Eyes::new(walls, size, body, box_size_m);
-        Self { is_careful: wheels_err || !eyes.are_reliable, eyes }
+        let eyes = BeamModel::new(walls, size, body, box_size_m);
+        Self { is_careful: wheels_err || !eyes.are_reliable, beam_model: eyes }
     }
 
     /// Returns the next action of a robot.
     pub(super) fn step(
         &self,
-        way: Way<'_>,
+        way: CurrentGoal<'_>,
         percept: &Percept<'_>,
         memory: &mut Memory,
         draws: &mut Draws,
     ) -> ActionId {
-        let heard = Ask::take_heard(memory);
-        let mut mood = Mood::of(memory);
-        notice(&mut mood, way, percept, draws);
-        let seen = self.eyes.look(percept);
+        let heard = PassRequest::take_heard(memory);
+        let mut mood = PlannerMemory::from_memory(memory);
+        update_memory(&mut mood, way, percept, draws);
+        let seen = self.beam_model.local_costmap(percept);
         let is_alone = seen.is_none() && mood.bump_left == 0 && heard.is_none();
-        let Sight { mut blocked, vague } = seen.unwrap_or_default();
+        let LocalCostmap { mut blocked, vague } = seen.unwrap_or_default();
         if mood.bump_left > 0 {
             let (east, north) = HEADINGS[usize::from(mood.bump)];
-            blocked.add(east, north);
+            blocked.insert(east, north);
         }
         let (at, heading) = (percept.at, percept.heading);
         let is_careful = self.is_careful;
-        let view = View { field: way.field, at, heading, blocked, vague, is_alone, is_careful };
+        let view =
+            LocalView { field: way.field, at, heading, blocked, vague, is_alone, is_careful };
         // An obstacle ahead is believed to be there once more, because a sensor may miss it.
-        if !self.eyes.are_reliable && view.is_blocked(heading) && mood.bump_left == 0 {
+        if !self.beam_model.are_reliable && view.is_blocked(heading) && mood.bump_left == 0 {
             mood.bump = heading;
-            mood.bump_left = BUMP;
+            mood.bump_left = BUMP_DECISIONS;
         }
-        obey(&mut mood, heard, &view, draws);
+        obey_request(&mut mood, heard, &view, draws);
         let stands = way.is_done && way.field.is_goal(at.0, at.1);
         let action = if mood.yield_left > 0 {
             make_room(&mut mood, &view)
@@ -162,7 +163,12 @@ impl Planner {
 }
 
 /// Brings a robot's memory up to date: its last move, its progress, its last contact.
-fn notice(mood: &mut Mood, way: Way<'_>, percept: &Percept<'_>, draws: &mut Draws) {
+fn update_memory(
+    mood: &mut PlannerMemory,
+    way: CurrentGoal<'_>,
+    percept: &Percept<'_>,
+    draws: &mut Draws,
+) {
     let place = ((percept.at.0 & 15) << 4 | percept.at.1 & 15) as u8;
     mood.request = 0;
     mood.bump_left = mood.bump_left.saturating_sub(1);
@@ -173,7 +179,7 @@ fn notice(mood: &mut Mood, way: Way<'_>, percept: &Percept<'_>, draws: &mut Draw
     if way.is_done {
         mood.rank = match way.field.is_goal(percept.at.0, percept.at.1) {
             true => 1,
-            false => (mood.rank + u8::from(percept.now.is_multiple_of(4))).clamp(2, HIGHEST_DONE),
+            false => (mood.rank + u8::from(percept.now.is_multiple_of(4))).clamp(2, MAX_DONE_RANK),
         };
     }
     let moved = direction_between(mood.place, place);
@@ -184,23 +190,23 @@ fn notice(mood: &mut Mood, way: Way<'_>, percept: &Percept<'_>, draws: &mut Draw
         mood.bump_left = 0;
         mood.yield_pending = false;
     }
-    mood.stuck = progress(mood.stuck, way, percept.at, moved);
-    if mood.stuck >= STUCK + mood.rank / 8 {
+    mood.stuck = stuck_count(mood.stuck, way, percept.at, moved);
+    if mood.stuck >= MIN_STRAY_ACTIONS + mood.rank / 8 {
         mood.stuck = 0;
         if !way.is_done {
             mood.rank = draw_rank(draws);
         }
-        mood.stray_left = 4 + draws.below(12) as u8;
+        mood.stray_left = 4 + draws.uniform_below(12) as u8;
         mood.yield_left = 0;
     }
     if let Some(contact) = percept.contact.filter(|contact| contact.kind != WALL) {
         mood.bump = (percept.heading + contact.side as u8) % 4;
-        mood.bump_left = BUMP;
+        mood.bump_left = BUMP_DECISIONS;
     }
 }
 
 /// Returns how stuck a robot is after a move in this direction: less, the nearer the goal it came.
-fn progress(stuck: u8, way: Way<'_>, (col, row): (u32, u32), moved: Option<u8>) -> u8 {
+fn stuck_count(stuck: u8, way: CurrentGoal<'_>, (col, row): (u32, u32), moved: Option<u8>) -> u8 {
     let rise_back = moved.and_then(|d| way.field.rise(col, row, (d + 2) % 4));
     match rise_back {
         _ if way.is_done && way.field.is_goal(col, row) => stuck.saturating_sub(1),
@@ -211,7 +217,7 @@ fn progress(stuck: u8, way: Way<'_>, (col, row): (u32, u32), moved: Option<u8>) 
 }
 
 fn draw_rank(draws: &mut Draws) -> u8 {
-    HIGHEST_DONE + 1 + draws.below(255 - u32::from(HIGHEST_DONE)) as u8
+    MAX_DONE_RANK + 1 + draws.uniform_below(255 - u32::from(MAX_DONE_RANK)) as u8
 }
 
 /// Returns the direction from one place to another, both modulo 16; none where they are the same.
@@ -229,7 +235,12 @@ fn direction_between(from: u8, to: u8) -> Option<u8> {
 }
 
 /// Chooses where to make room, where a request is to be obeyed.
-fn obey(mood: &mut Mood, heard: Option<Ask>, view: &View<'_>, draws: &mut Draws) {
+fn obey_request(
+    mood: &mut PlannerMemory,
+    heard: Option<PassRequest>,
+    view: &LocalView<'_>,
+    draws: &mut Draws,
+) {
     let Some(ask) = heard else { return };
     let own = mood.rank;
     let bound = if mood.yield_left > 0 { own.max(mood.yield_rank * 8) } else { own };
@@ -245,7 +256,7 @@ fn obey(mood: &mut Mood, heard: Option<Ask>, view: &View<'_>, draws: &mut Draws)
             + 12 * u32::from(ask.then == Some(direction))
             + 4 * (rise + 1) as u32
             + 2 * u32::from(turn.min(4 - turn))
-            + draws.below(2);
+            + draws.uniform_below(2);
         if best.is_none_or(|(least, _)| price < least) {
             best = Some((price, direction));
         }
@@ -256,23 +267,23 @@ fn obey(mood: &mut Mood, heard: Option<Ask>, view: &View<'_>, draws: &mut Draws)
     if let Some((_, direction)) = best {
         mood.yield_to = direction;
         mood.yield_pending = true;
-        mood.yield_left = KEEP_AWAY;
+        mood.yield_left = KEEP_AWAY_DECISIONS;
         mood.yield_rank = ask.rank / 8;
     }
 }
 
 /// Leaves its place as it was asked to, then keeps away from it for a while.
-fn make_room(mood: &mut Mood, view: &View<'_>) -> ActionId {
+fn make_room(mood: &mut PlannerMemory, view: &LocalView<'_>) -> ActionId {
     mood.yield_left -= 1;
     if !mood.yield_pending {
         return STAY;
     }
     let direction = mood.yield_to;
     if view.is_blocked(direction) {
-        mood.ask(mood.yield_rank.saturating_mul(8).saturating_add(7), direction, None);
+        mood.set_request(mood.yield_rank.saturating_mul(8).saturating_add(7), direction, None);
     } else {
         // It counts only the decisions after the move.
-        mood.yield_left = KEEP_AWAY;
+        mood.yield_left = KEEP_AWAY_DECISIONS;
     }
     match turn_to(view.heading, direction) {
         Some(turn) => turn,
@@ -282,20 +293,20 @@ fn make_room(mood: &mut Mood, view: &View<'_>) -> ActionId {
 }
 
 /// Goes somewhere, to get out of a deadlock.
-fn stray(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
+fn stray(mood: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
     mood.stray_left -= 1;
     let is_open = |d: u8| view.rise(d).is_some() && !view.is_blocked(d);
-    if is_open(view.heading) && draws.below(4) > 0 {
-        mood.ask(mood.rank, view.heading, None);
+    if is_open(view.heading) && draws.uniform_below(4) > 0 {
+        mood.set_request(mood.rank, view.heading, None);
         return FORWARD;
     }
-    if draws.below(2) == 0 { LEFT } else { RIGHT }
+    if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
 }
 
 /// Takes the next step toward the goal, or waits before an obstacle.
-fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
+fn travel(mood: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
     let direction = if view.is_alone {
-        view.downhill()
+        view.goal_direction()
     } else {
         let blocked = 3 + 4 * u16::from(mood.waited);
         let moved = mood.moved.checked_sub(1);
@@ -303,20 +314,21 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
         // Where nothing errs robots see enough to keep to every change of course.
         let gained = |moved: u8| view.rise((moved + 2) % 4) == Some(1);
         let is_sidestep = !view.is_careful || moved.is_some_and(|moved| !gained(moved));
-        detour::first_step(view, Prices { blocked, beside, vague, moved, is_sidestep })
+        detour::first_step(view, StepCosts { blocked, beside, vague, moved, is_sidestep })
     };
     let Some(direction) = direction else { return STAY };
-    mood.ask(mood.rank, direction, view.beyond(direction));
+    mood.set_request(mood.rank, direction, view.next_direction(direction));
     if let Some(turn) = turn_to(view.heading, direction) {
         return turn;
     }
     if view.is_blocked(direction) {
         mood.waited += 1;
         // Sensors that err may see something in a narrow gap forever.
-        let tries = view.is_careful && mood.waited > PATIENCE && draws.below(4) == 0;
+        let tries =
+            view.is_careful && mood.waited > WAIT_TIMEOUT_DECISIONS && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }
-    if mood.waited < 4 && meets(view, direction, draws) {
+    if mood.waited < 4 && should_yield(view, direction, draws) {
         mood.waited += 1;
         return STAY;
     }
@@ -325,14 +337,14 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
 
 /// Returns whether to let another robot pass that may step into the same place: one from the
 /// right goes first, and of two head on one by a fair draw.
-fn meets(view: &View<'_>, direction: u8, draws: &mut Draws) -> bool {
+fn should_yield(view: &LocalView<'_>, direction: u8, draws: &mut Draws) -> bool {
     let (east, north) = HEADINGS[usize::from(direction)];
     let beside = |d: u8| {
         let (e, n) = HEADINGS[usize::from(d % 4)];
-        view.blocked.has(east + e, north + n)
+        view.blocked.contains(east + e, north + n)
     };
     let comes = beside(direction + 3) || beside(direction);
-    comes && draws.below(2) == 0
+    comes && draws.uniform_below(2) == 0
 }
 
 fn turn_to(heading: u8, direction: u8) -> Option<ActionId> {

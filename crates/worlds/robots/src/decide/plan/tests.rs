@@ -1,7 +1,7 @@
 //! Promises of planning robots, tried in whole runs.
 
 use crate::robots_run;
-use crate::run::RobotsRun;
+use crate::world_impl::RobotsRun;
 use sidestep_kernel::{Cycle, Digest, Simulation};
 use sidestep_scenario::Source;
 use std::collections::BTreeSet;
@@ -104,7 +104,8 @@ fn listed(map: &std::path::Path, list: &str) -> String {
 /// # Panics
 /// When two robots are in one box, or have changed places in one cycle.
 fn last_arrival(run: &mut RobotsRun, limit: Cycle) -> Option<Cycle> {
-    let places = |run: &RobotsRun| (0..50).map(|id| run.state().body(id).at()).collect::<Vec<_>>();
+    let places =
+        |run: &RobotsRun| (0..50).map(|id| run.state().body(id).position()).collect::<Vec<_>>();
     let mut before = places(run);
     while run.cycle() < limit {
         run.advance(1);
@@ -128,8 +129,8 @@ fn longest_alone(run: &RobotsRun) -> Cycle {
     let alone = |id: u32| {
         let world = run.world();
         let crate::world::Role::Robot(model) = &world.type_of(id).role else { return 0 };
-        let way = &model.behaviour.ways()[0];
-        let (mut at, mut cycles) = (world.map_position(run.state().body(id).at()), 0);
+        let way = &model.behaviour.flow_fields()[0];
+        let (mut at, mut cycles) = (world.map_position(run.state().body(id).position()), 0);
         let mut heading = run.state().body(id).facing.get().heading();
         while let Some(direction) = way.direction(at.0, at.1) {
             let turn = (4 + direction - heading) % 4;
@@ -174,7 +175,7 @@ const PASSAGE: &str = "format = 1\nworld = \"robots\"\nmap.ascii = \"\"\"\n#####
 fn who_stands_at_its_goal_makes_room_when_asked_and_returns() {
     let mut run = start(PASSAGE, 1);
     advance(&mut run, 200);
-    let place = |id| run.world().map_position(run.state().body(id).at());
+    let place = |id| run.world().map_position(run.state().body(id).position());
     assert_eq!([place(0), place(1)], [(4, 1), (10, 1)]);
 }
 
@@ -188,7 +189,7 @@ fn requests_and_ranks_are_the_same_for_any_number_of_workers() {
     );
     let digest = |workers| -> Digest {
         let mut run = start(&text, workers);
-        run.share_always();
+        run.force_parallel();
         advance(&mut run, 300);
         run.digest()
     };

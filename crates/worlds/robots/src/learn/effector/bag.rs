@@ -1,21 +1,21 @@
 //! Odometry against the true poses of a bag, by the rule for corrected logs (L6).
 
-use super::carmen::{Rule, learn_by};
-use super::{EffectorModel, check_box};
+use super::carmen::{EventRule, learn_with_rule};
+use super::{LearnedEffector, check_box};
 use crate::learn::EstimateOptions;
-use crate::learn::track::{Gaps, Pose, pose_at};
+use crate::learn::track::{Gaps, Pose2, pose_at};
 use sidestep_import::bag::BagLog;
 use sidestep_import::carmen::{CorrectedLog, Scan};
-use sidestep_import::mrclam::TruePose;
+use sidestep_import::mrclam::StampedPose2;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::hypot;
 
 /// A window ends after this turn: the programs that correct CARMEN logs take a scan then.
 const WINDOW_TURN_RAD: f64 = 0.5;
 /// A claimed path this much shorter than a box is one: poses are rounded.
-const PATH_SLACK: f64 = 1e-6;
+const PATH_TOLERANCE: f64 = 1e-6;
 /// The least move and the longest path of a turn, as a share of a box.
-const PATH_SHARE: f64 = 0.3;
+const PATH_FRACTION: f64 = 0.3;
 
 /// The rule by which events become transitions.
 const RULE: &str = "odometry against true poses over windows of one box or half a radian, displacement over \
@@ -27,34 +27,36 @@ pub(super) fn learn(
     log: &BagLog,
     box_m: f64,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
+) -> Result<LearnedEffector, InputError> {
     check_box(box_m)?;
-    let rule = Rule {
+    let rule = EventRule {
         words: RULE,
-        path_m: PATH_SHARE * box_m,
+        path_m: PATH_FRACTION * box_m,
         remedy: "choose a smaller box, or a bag in which the robot drives",
     };
-    let mut model = learn_by(&rule, source, &windows(log, box_m), options)?;
+    let mut model = learn_with_rule(&rule, source, &windows(log, box_m), options)?;
     (model.report.box_m, model.profile.box_m) = (Some(box_m), Some(box_m));
     Ok(model)
 }
 
 /// Returns the true pose at the end of each window, and the poses that odometry claims in between.
 fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
-    let gaps = Gaps::of(&log.odometry);
+    let gaps = Gaps::from_track(&log.odometry);
     let mut scans: Vec<Scan> = Vec::new();
-    let mut open: Option<Window> = None;
+    let mut open: Option<OdometryWindow> = None;
     for truth in &log.truth {
         let Some(believed) = pose_at(&log.odometry, truth.t_secs) else { continue };
-        let stretch = gaps.before(truth.t_secs);
+        let stretch = gaps.count_before(truth.t_secs);
         let Some(window) = open.as_mut().filter(|window| window.stretch == stretch) else {
             // Between stretches the claims of odometry are unknown.
-            scans.extend(open.take().map(Window::abandoned));
-            open = Some(Window::new(truth, believed, stretch));
+            scans.extend(open.take().map(OdometryWindow::into_unpaired_scan));
+            open = Some(OdometryWindow::new(truth, believed, stretch));
             continue;
         };
         if window.extend(&believed, box_m) {
-            scans.extend(open.replace(Window::new(truth, believed, stretch)).map(|done| done.scan));
+            scans.extend(
+                open.replace(OdometryWindow::new(truth, believed, stretch)).map(|done| done.scan),
+            );
         }
     }
     scans.extend(open.map(|last| last.scan));
@@ -62,31 +64,31 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
 }
 
 /// The time since a true pose, and the claims of odometry about it.
-struct Window {
+struct OdometryWindow {
     /// Number of gaps of odometry before.
     stretch: usize,
     /// The pose that odometry claims at the start.
-    start: Pose,
+    start: Pose2,
     scan: Scan,
 }
 
-impl Window {
-    fn new(truth: &TruePose, believed: Pose, stretch: usize) -> Self {
+impl OdometryWindow {
+    fn new(truth: &StampedPose2, believed: Pose2, stretch: usize) -> Self {
         let pose = [truth.position_m[0], truth.position_m[1], truth.heading_rad];
         let scan = Scan { t_secs: truth.t_secs, n_beams: 0, pose, odometry: vec![pose] };
         Self { stretch, start: believed, scan }
     }
 
     /// Adds the next pose that odometry claims; returns whether the window ends there.
-    fn extend(&mut self, believed: &Pose, box_m: f64) -> bool {
+    fn extend(&mut self, believed: &Pose2, box_m: f64) -> bool {
         let claimed = self.start.motion_to(believed);
-        self.scan.odometry.push(Pose::from(self.scan.pose).after(&claimed).into());
-        hypot(claimed.ahead_m, claimed.left_m) >= box_m * (1.0 - PATH_SLACK)
+        self.scan.odometry.push(Pose2::from(self.scan.pose).compose(&claimed).into());
+        hypot(claimed.ahead_m, claimed.left_m) >= box_m * (1.0 - PATH_TOLERANCE)
             || claimed.turn_rad.abs() >= WINDOW_TURN_RAD
     }
 
     /// Returns a scan that begins no pair.
-    fn abandoned(mut self) -> Scan {
+    fn into_unpaired_scan(mut self) -> Scan {
         self.scan.odometry.clear();
         self.scan
     }
@@ -96,17 +98,17 @@ impl Window {
 mod tests {
     use super::*;
 
-    fn pose(t_secs: f64, x_m: f64, heading_rad: f64) -> TruePose {
-        TruePose { t_secs, position_m: [x_m, 0.0], heading_rad }
+    fn pose(t_secs: f64, x_m: f64, heading_rad: f64) -> StampedPose2 {
+        StampedPose2 { t_secs, position_m: [x_m, 0.0], heading_rad }
     }
 
     /// Ten poses a second at a speed.
-    fn track(n: u32, speed_mps: f64) -> Vec<TruePose> {
+    fn track(n: u32, speed_mps: f64) -> Vec<StampedPose2> {
         let at = |k: u32| pose(0.1 * f64::from(k), 0.1 * f64::from(k) * speed_mps, 0.0);
         (0..n).map(at).collect()
     }
 
-    fn log(odometry: Vec<TruePose>, truth: Vec<TruePose>) -> BagLog {
+    fn log(odometry: Vec<StampedPose2>, truth: Vec<StampedPose2>) -> BagLog {
         BagLog { odometry, truth, scans: Vec::new(), mount: None }
     }
 
@@ -135,7 +137,7 @@ mod tests {
     fn odometry_that_drifts_is_no_error_as_only_motions_are_compared() {
         let turned = track(101, 1.0)
             .into_iter()
-            .map(|p| TruePose {
+            .map(|p| StampedPose2 {
                 position_m: [5.0, p.position_m[0]],
                 heading_rad: 0.5 * std::f64::consts::PI,
                 ..p
@@ -155,10 +157,13 @@ mod tests {
             (0..200).map(at).collect::<Vec<_>>()
         };
         let mut odometry = turning(0.02);
-        odometry
-            .extend(track(20, 1.0).into_iter().map(|p| TruePose { t_secs: 30.0 + p.t_secs, ..p }));
+        odometry.extend(
+            track(20, 1.0).into_iter().map(|p| StampedPose2 { t_secs: 30.0 + p.t_secs, ..p }),
+        );
         let mut truth = turning(0.018);
-        truth.extend(track(20, 1.0).into_iter().map(|p| TruePose { t_secs: 30.0 + p.t_secs, ..p }));
+        truth.extend(
+            track(20, 1.0).into_iter().map(|p| StampedPose2 { t_secs: 30.0 + p.t_secs, ..p }),
+        );
         let report =
             learn("f", &log(odometry, truth), 0.5, &EstimateOptions::default()).unwrap().report;
         let turns = report.turns.expect("turns");

@@ -1,31 +1,31 @@
 //! Odometry against corrected poses (rule L6).
 //!
-//! [`learn`] takes a CARMEN log; [`learn_by`] any source of pairs of poses, such as a bag.
+//! [`learn`] takes a CARMEN log; [`learn_with_rule`] any source of pairs of poses, such as a bag.
 
-use super::EffectorModel;
-use super::events::{Events, Move, Turn};
+use super::LearnedEffector;
+use super::events::{Events, MoveEvent, TurnEvent};
 use super::report::EffectorReport;
 use crate::learn::EstimateOptions;
-use crate::learn::track::{Motion, Pose};
+use crate::learn::track::{Displacement2, Pose2};
 use sidestep_import::carmen::{CorrectedLog, Scan};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{hypot, tan, wrap_angle};
 use sidestep_statistics::{Moments, percentile};
 
 /// A move with more turn than this is not a move ahead.
-const FORWARD_TURN_MAX_DEG: f64 = 10.0;
+const MAX_FORWARD_TURN_DEG: f64 = 10.0;
 /// A smaller turn does not count as a turn.
-const TURN_MIN_DEG: f64 = 20.0;
+const MIN_TURN_DEG: f64 = 20.0;
 /// A shorter step of odometry is too short to show its slip.
-const SLIP_STEP_MIN_M: f64 = 0.03;
+const MIN_SLIP_STEP_M: f64 = 0.03;
 /// A step of odometry as long as this, or a turn as wide, is none: the pose has jumped.
-const JUMP_MIN_M: f64 = 1.0;
-const JUMP_MIN_RAD: f64 = 0.3;
+const MIN_JUMP_M: f64 = 1.0;
+const MIN_JUMP_RAD: f64 = 0.3;
 /// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
 const MAD_TO_SD: f64 = 1.4826;
 /// Real wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
 /// in place of odometry, by 3 % to 13 %.
-const SLIP_SD_MAX: f64 = 0.02;
+const MAX_SLIP_SD: f64 = 0.02;
 
 /// The rule by which events become transitions.
 const RULE: &str = "odometry against corrected poses, displacement over commanded path, \
@@ -33,7 +33,7 @@ const RULE: &str = "odometry against corrected poses, displacement over commande
     over commanded taken for the share of a quarter turn, phase-averaged; every count plus alpha";
 
 /// The thresholds that tell moves from turns, and how a result is described.
-pub(super) struct Rule {
+pub(super) struct EventRule {
     /// The rule in words, for the profile.
     pub(super) words: &'static str,
     /// A shorter move does not count as a move, and a turn with a longer path is not a turn in place.
@@ -42,26 +42,26 @@ pub(super) struct Rule {
     pub(super) remedy: &'static str,
 }
 
-const CARMEN: Rule =
-    Rule { words: RULE, path_m: 0.3, remedy: "name a corrected log with ODOM messages" };
+const CARMEN_RULE: EventRule =
+    EventRule { words: RULE, path_m: 0.3, remedy: "name a corrected log with ODOM messages" };
 
 pub(super) fn learn(
     source: &str,
     log: &CorrectedLog,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
-    learn_by(&CARMEN, source, log, options)
+) -> Result<LearnedEffector, InputError> {
+    learn_with_rule(&CARMEN_RULE, source, log, options)
 }
 
 /// Learns from a log by a rule that may differ from that for CARMEN logs.
-pub(super) fn learn_by(
-    rule: &Rule,
+pub(super) fn learn_with_rule(
+    rule: &EventRule,
     source: &str,
     log: &CorrectedLog,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
-    let pairs: Vec<Pair> = log.scans.windows(2).filter_map(Pair::of).collect();
-    let ahead: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_ahead(rule.path_m)).collect();
+) -> Result<LearnedEffector, InputError> {
+    let pairs: Vec<ScanPair> = log.scans.windows(2).filter_map(ScanPair::from_scans).collect();
+    let ahead: Vec<&ScanPair> = pairs.iter().filter(|pair| pair.is_ahead(rule.path_m)).collect();
     let events = Events {
         moves: ahead.iter().map(|pair| pair.as_move()).collect(),
         turns: pairs.iter().filter_map(|pair| pair.as_turn(rule.path_m)).collect(),
@@ -71,8 +71,8 @@ pub(super) fn learn_by(
         return Err(InputError::new(source, cause, rule.remedy));
     }
     let mut report = events.report(source, options);
-    tell_slip(&mut report, &odometry_steps(log));
-    let of = |value: fn(&&Pair) -> f64| Moments::of(ahead.iter().map(value));
+    add_slip(&mut report, &odometry_steps(log));
+    let of = |value: fn(&&ScanPair) -> f64| Moments::from_values(ahead.iter().map(value));
     let moments = [
         ("odometry_forward_m", of(|pair| pair.claimed.ahead_m)),
         ("error_ahead_m", of(|pair| pair.corrected.ahead_m - pair.claimed.ahead_m)),
@@ -80,12 +80,12 @@ pub(super) fn learn_by(
     ];
     let known = moments.into_iter().filter_map(|(name, m)| Some((name.to_string(), m?)));
     report.moments.extend(known);
-    Ok(EffectorModel { report, profile: events.profile(rule.words, options) })
+    Ok(LearnedEffector { report, profile: events.profile(rule.words, options) })
 }
 
 /// Adds the slip that the steps of odometry show, and the warning where it is too large.
-fn tell_slip(report: &mut EffectorReport, steps: &[Motion]) {
-    report.lateral_slip = Moments::of(steps.iter().filter_map(slip_ratio));
+fn add_slip(report: &mut EffectorReport, steps: &[Displacement2]) {
+    report.lateral_slip = Moments::from_values(steps.iter().filter_map(slip_ratio));
     report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);
     let whole = steps.iter().filter(|step| !is_jump(step));
     report.lateral_slip_robust_sd = robust_spread(whole.filter_map(slip_ratio).collect());
@@ -95,33 +95,33 @@ fn tell_slip(report: &mut EffectorReport, steps: &[Motion]) {
 
 /// The motion between two scans, in the frame of the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Pair {
+struct ScanPair {
     /// According to odometry.
-    claimed: Motion,
+    claimed: Displacement2,
     /// According to the corrected poses.
-    corrected: Motion,
+    corrected: Displacement2,
     duration_s: f64,
 }
 
-impl Pair {
+impl ScanPair {
     /// Returns the motion; `None` where no odometry lies between the scans.
-    fn of(scans: &[Scan]) -> Option<Self> {
-        let start = Pose::from(scans[0].pose);
-        let claimed = Pose::from(*scans[0].odometry.last()?);
+    fn from_scans(scans: &[Scan]) -> Option<Self> {
+        let start = Pose2::from(scans[0].pose);
+        let claimed = Pose2::from(*scans[0].odometry.last()?);
         Some(Self {
             claimed: start.motion_to(&claimed),
-            corrected: start.motion_to(&Pose::from(scans[1].pose)),
+            corrected: start.motion_to(&Pose2::from(scans[1].pose)),
             duration_s: scans[1].t_secs - scans[0].t_secs,
         })
     }
 
     fn is_ahead(&self, path_min_m: f64) -> bool {
-        self.claimed.turn_rad.abs() <= FORWARD_TURN_MAX_DEG.to_radians()
+        self.claimed.turn_rad.abs() <= MAX_FORWARD_TURN_DEG.to_radians()
             && self.claimed.ahead_m >= path_min_m
     }
 
-    fn as_move(&self) -> Move {
-        Move {
+    fn as_move(&self) -> MoveEvent {
+        MoveEvent {
             ahead_boxes: self.corrected.ahead_m / self.claimed.ahead_m,
             left_boxes: self.corrected.left_m / self.claimed.ahead_m,
             turn_error_rad: wrap_angle(self.corrected.turn_rad - self.claimed.turn_rad),
@@ -129,30 +129,30 @@ impl Pair {
         }
     }
 
-    fn as_turn(&self, path_max_m: f64) -> Option<Turn> {
+    fn as_turn(&self, path_max_m: f64) -> Option<TurnEvent> {
         let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
-        let is_turn = self.claimed.turn_rad.abs() >= TURN_MIN_DEG.to_radians();
+        let is_turn = self.claimed.turn_rad.abs() >= MIN_TURN_DEG.to_radians();
         let (claimed, corrected) = (self.claimed.turn_rad, self.corrected.turn_rad);
-        let turn = Turn::new(claimed, corrected, Some(self.duration_s));
+        let turn = TurnEvent::new(claimed, corrected, Some(self.duration_s));
         (is_turn && path_m <= path_max_m).then_some(turn)
     }
 }
 
 /// Returns the steps of odometry, between poses that follow each other.
-fn odometry_steps(log: &CorrectedLog) -> Vec<Motion> {
+fn odometry_steps(log: &CorrectedLog) -> Vec<Displacement2> {
     let runs = std::iter::once(&log.odometry_before).chain(log.scans.iter().map(|s| &s.odometry));
     let steps = runs.flat_map(|run| run.windows(2));
-    steps.map(|step| Pose::from(step[0]).motion_to(&Pose::from(step[1]))).collect()
+    steps.map(|step| Pose2::from(step[0]).motion_to(&Pose2::from(step[1]))).collect()
 }
 
-fn is_jump(step: &Motion) -> bool {
-    hypot(step.ahead_m, step.left_m) >= JUMP_MIN_M || step.turn_rad.abs() >= JUMP_MIN_RAD
+fn is_jump(step: &Displacement2) -> bool {
+    hypot(step.ahead_m, step.left_m) >= MIN_JUMP_M || step.turn_rad.abs() >= MIN_JUMP_RAD
 }
 
 /// Returns the sideways motion of a step as a share of its length, beyond the part that an arc of
 /// the turned angle explains.
-fn slip_ratio(step: &Motion) -> Option<f64> {
-    (step.ahead_m.abs() > SLIP_STEP_MIN_M)
+fn slip_ratio(step: &Displacement2) -> Option<f64> {
+    (step.ahead_m.abs() > MIN_SLIP_STEP_M)
         .then(|| step.left_m / step.ahead_m - tan(step.turn_rad / 2.0))
 }
 
@@ -167,7 +167,7 @@ fn robust_spread(mut values: Vec<f64>) -> Option<f64> {
 }
 
 fn slip_warning(robust: f64, plain: f64) -> Option<String> {
-    (robust > SLIP_SD_MAX).then(|| {
+    (robust > MAX_SLIP_SD).then(|| {
         format!(
             "odometry slips sideways by {:.1} % of each step (1.4826 times the median absolute \
              deviation, of steps below 1 m and 0.3 rad; {:.1} % by the standard deviation of all; \
@@ -208,12 +208,16 @@ mod tests {
 
     #[test]
     fn a_turn_in_place_is_no_move_and_an_arc_is_neither() {
-        let turned =
-            Pair::of(&[scan(0.0, [0.0; 3], &[[0.1, 0.0, 0.6]]), scan(1.0, [0.1, 0.0, 0.5], &[])]);
+        let turned = ScanPair::from_scans(&[
+            scan(0.0, [0.0; 3], &[[0.1, 0.0, 0.6]]),
+            scan(1.0, [0.1, 0.0, 0.5], &[]),
+        ]);
         let turned = turned.unwrap();
         assert_eq!((turned.is_ahead(0.3), turned.as_turn(0.3).unwrap().true_rad), (false, 0.5));
-        let arc =
-            Pair::of(&[scan(0.0, [0.0; 3], &[[1.0, 0.0, 0.6]]), scan(1.0, [1.0, 0.0, 0.5], &[])]);
+        let arc = ScanPair::from_scans(&[
+            scan(0.0, [0.0; 3], &[[1.0, 0.0, 0.6]]),
+            scan(1.0, [1.0, 0.0, 0.5], &[]),
+        ]);
         assert_eq!((arc.unwrap().is_ahead(0.3), arc.unwrap().as_turn(0.3)), (false, None));
     }
 
@@ -228,7 +232,7 @@ mod tests {
         (0..40).map(pose).collect()
     }
 
-    fn learned(odometry: &[[f64; 3]]) -> EffectorModel {
+    fn learned(odometry: &[[f64; 3]]) -> LearnedEffector {
         let scans = vec![scan(0.0, [0.0; 3], odometry), scan(1.0, [19.0, 0.0, 0.0], &[])];
         learn("f", &log(scans), &EstimateOptions::default()).unwrap()
     }

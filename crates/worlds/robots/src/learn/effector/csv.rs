@@ -2,22 +2,27 @@
 
 use std::collections::BTreeMap;
 
-use super::EffectorModel;
-use super::events::{Events, Move, Turn, nearest_turn};
-use super::phase::{FORWARD_CLASSES, Outcome, forward_class, outcomes};
+use super::LearnedEffector;
+use super::events::{Events, MoveEvent, TurnEvent, nearest_turn};
+use super::grid_displacement::{
+    FORWARD_CLASSES, GridDisplacement, forward_class, grid_displacements,
+};
 use super::report::{EffectorReport, ForwardShares};
-use super::transitions::{EffectorProfile, Transition, exact, from_outcomes, intended, label};
-use crate::learn::holdout::{fit, split};
-use crate::learn::{Counts, EstimateOptions};
-use sidestep_import::table::{CsvRow, CsvTable, Word};
+use super::transitions::{
+    EffectorProfile, ProfileTransition, certain_transition, from_outcomes, intended_displacement,
+    label,
+};
+use crate::learn::holdout::{holdout_test, split};
+use crate::learn::{CountTable, EstimateOptions};
+use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
 
 /// The commands of a robot.
 const ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
 /// A longer displacement is not a single action; two such make the longest path of a profile.
-const BOXES_MAX: f64 = 8.0;
+const MAX_BOXES: f64 = 8.0;
 /// A wider turn is not a single action either.
-const TURN_MAX_DEG: f64 = 360.0;
+const MAX_TURN_DEG: f64 = 360.0;
 
 /// The rule by which events become transitions.
 const RULE: &str = "counts of measured displacements, phase-averaged where they are no whole \
@@ -25,7 +30,7 @@ const RULE: &str = "counts of measured displacements, phase-averaged where they 
 
 /// One row of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Displacement {
+struct MeasuredDisplacement {
     /// Index in [`ACTIONS`].
     action: usize,
     ahead_boxes: f64,
@@ -33,18 +38,18 @@ struct Displacement {
     turn_deg: f64,
 }
 
-impl Displacement {
+impl MeasuredDisplacement {
     /// Returns where it ends; turns that end alike, such as 270 and -90 degrees, are one outcome.
-    fn outcomes(&self) -> Vec<(Outcome, f64)> {
-        let mut ends = outcomes(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0);
+    fn outcomes(&self) -> Vec<(GridDisplacement, f64)> {
+        let mut ends = grid_displacements(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0);
         for (outcome, _) in &mut ends {
             outcome.quarters = (outcome.quarters + 1).rem_euclid(4) - 1;
         }
         ends
     }
 
-    fn as_move(&self) -> Move {
-        Move {
+    fn as_move(&self) -> MoveEvent {
+        MoveEvent {
             ahead_boxes: self.ahead_boxes,
             left_boxes: self.left_boxes,
             turn_error_rad: nearest_turn(0.0, self.turn_deg.to_radians()),
@@ -52,19 +57,19 @@ impl Displacement {
         }
     }
 
-    fn as_turn(&self) -> Turn {
-        let commanded_deg = f64::from(90 * intended(ACTIONS[self.action]).quarters);
-        Turn::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
+    fn as_turn(&self) -> TurnEvent {
+        let commanded_deg = f64::from(90 * intended_displacement(ACTIONS[self.action]).quarters);
+        TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
     }
 }
 
 pub(super) fn learn(
     table: &CsvTable,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
+) -> Result<LearnedEffector, InputError> {
     let (free, n_cut) = parse(table)?;
     let by_action: Vec<ActionLog> =
-        (0..ACTIONS.len()).map(|action| ActionLog::of(&free, action)).collect();
+        (0..ACTIONS.len()).map(|action| ActionLog::from_displacements(&free, action)).collect();
     let mut report = report(table.place(), &by_action, options);
     if n_cut > 0 {
         report.rejected.insert("contact".to_string(), n_cut);
@@ -73,47 +78,47 @@ pub(super) fn learn(
              lead into them are seen too rarely, so learn in the open"
         ));
     }
-    Ok(EffectorModel { report, profile: profile(&by_action, options) })
+    Ok(LearnedEffector { report, profile: profile(&by_action, options) })
 }
 
 /// The events of one action and the outcomes they had.
 struct ActionLog {
     action: &'static str,
-    events: Vec<Displacement>,
+    events: Vec<MeasuredDisplacement>,
     /// The intended outcome, then the others, the more frequent first.
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<GridDisplacement>,
 }
 
 impl ActionLog {
-    fn of(all: &[Displacement], action: usize) -> Self {
-        let events: Vec<Displacement> =
+    fn from_displacements(all: &[MeasuredDisplacement], action: usize) -> Self {
+        let events: Vec<MeasuredDisplacement> =
             all.iter().filter(|e| e.action == action).copied().collect();
-        let mut weights: BTreeMap<Outcome, f64> = BTreeMap::new();
-        for (outcome, weight) in events.iter().flat_map(Displacement::outcomes) {
+        let mut weights: BTreeMap<GridDisplacement, f64> = BTreeMap::new();
+        for (outcome, weight) in events.iter().flat_map(MeasuredDisplacement::outcomes) {
             *weights.entry(outcome).or_insert(0.0) += weight;
         }
         // Infinite, so that the intended outcome comes first whether or not it was seen.
-        weights.insert(intended(ACTIONS[action]), f64::INFINITY);
-        let mut ranked: Vec<(Outcome, f64)> = weights.into_iter().collect();
+        weights.insert(intended_displacement(ACTIONS[action]), f64::INFINITY);
+        let mut ranked: Vec<(GridDisplacement, f64)> = weights.into_iter().collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         let outcomes = ranked.into_iter().map(|(outcome, _)| outcome).collect();
         Self { action: ACTIONS[action], events, outcomes }
     }
 
-    fn counts<'e>(&self, events: impl IntoIterator<Item = &'e Displacement>) -> Counts {
+    fn counts<'e>(&self, events: impl IntoIterator<Item = &'e MeasuredDisplacement>) -> CountTable {
         let columns: Vec<String> = self.outcomes.iter().map(label).collect();
-        let mut counts = Counts::new("actions", &[self.action.to_string()], &columns);
-        for (outcome, weight) in events.into_iter().flat_map(Displacement::outcomes) {
+        let mut counts = CountTable::new("actions", &[self.action.to_string()], &columns);
+        for (outcome, weight) in events.into_iter().flat_map(MeasuredDisplacement::outcomes) {
             let column = self.outcomes.iter().position(|known| *known == outcome);
             counts.add(0, column.expect("outcomes were collected from all events"), weight);
         }
         counts
     }
 
-    fn transitions(&self, alpha: f64, assumed: &mut Vec<String>) -> Vec<Transition> {
+    fn transitions(&self, alpha: f64, assumed: &mut Vec<String>) -> Vec<ProfileTransition> {
         if self.events.is_empty() {
             assumed.push(format!("{}: never fails", self.action));
-            return exact(intended(self.action));
+            return certain_transition(intended_displacement(self.action));
         }
         from_outcomes(&self.outcomes, self.counts(&self.events).row(0), alpha)
     }
@@ -121,41 +126,41 @@ impl ActionLog {
     /// Returns the shares of the paper's classes.
     fn forward_shares(&self) -> Option<ForwardShares> {
         let mut shares = vec![0.0; FORWARD_CLASSES.len()];
-        for (outcome, weight) in self.events.iter().flat_map(Displacement::outcomes) {
+        for (outcome, weight) in self.events.iter().flat_map(MeasuredDisplacement::outcomes) {
             let straight = outcome.quarters == 0;
             let class = if straight { forward_class(outcome.ahead, outcome.left) } else { 5 };
             shares[class] += weight;
         }
-        ForwardShares::of(&shares)
+        ForwardShares::from_counts(&shares)
     }
 }
 
 fn report(source: &str, logs: &[ActionLog], options: &EstimateOptions) -> EffectorReport {
     let [forward, left, right, _] = logs else { unreachable!("one log per action") };
     let events = Events {
-        moves: forward.events.iter().map(Displacement::as_move).collect(),
-        turns: left.events.iter().chain(&right.events).map(Displacement::as_turn).collect(),
+        moves: forward.events.iter().map(MeasuredDisplacement::as_move).collect(),
+        turns: left.events.iter().chain(&right.events).map(MeasuredDisplacement::as_turn).collect(),
     };
     let seen: Vec<&ActionLog> = logs.iter().filter(|log| !log.events.is_empty()).collect();
-    let tables: Vec<Counts> = seen.iter().map(|log| log.counts(&log.events)).collect();
+    let tables: Vec<CountTable> = seen.iter().map(|log| log.counts(&log.events)).collect();
     let fits = seen.iter().map(|log| {
         let (train, held) = split(&log.events, options.hold_out_every);
-        let mut fit = fit(&log.counts(train), &log.counts(held), options.alpha);
+        let mut fit = holdout_test(&log.counts(train), &log.counts(held), options.alpha);
         fit.table = log.action.to_string();
         fit
     });
     EffectorReport {
         transitions: forward.forward_shares(),
         actions: tables.iter().map(by_name).collect(),
-        probabilities: tables.iter().flat_map(Counts::estimates).collect(),
-        thin: tables.iter().flat_map(|table| table.thin(options.thin_below)).collect(),
+        probabilities: tables.iter().flat_map(CountTable::estimates).collect(),
+        thin: tables.iter().flat_map(|table| table.low_count_rows(options.thin_below)).collect(),
         hold_out: fits.collect(),
         ..events.report(source, options)
     }
 }
 
 /// Returns the outcomes of a table's only row, by name.
-fn by_name(table: &Counts) -> (String, BTreeMap<String, f64>) {
+fn by_name(table: &CountTable) -> (String, BTreeMap<String, f64>) {
     let named = table.columns().iter().cloned().zip(table.row(0).iter().copied());
     (table.rows()[0].clone(), named.collect())
 }
@@ -171,13 +176,13 @@ fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
 }
 
 /// Returns the rows without contact, and the number of those with contact.
-fn parse(table: &CsvTable) -> Result<(Vec<Displacement>, u64), InputError> {
+fn parse(table: &CsvTable) -> Result<(Vec<MeasuredDisplacement>, u64), InputError> {
     let place = table.place();
-    let columns = Columns::find(table)?;
+    let columns = DisplacementColumns::find(table)?;
     let (mut free, mut n_cut) = (Vec::new(), 0);
     for row in table.rows() {
         let displacement = columns.displacement(place, row)?;
-        if columns.met_obstacle(place, row)? {
+        if columns.has_contact(place, row)? {
             n_cut += 1;
         } else {
             free.push(displacement);
@@ -191,7 +196,7 @@ fn parse(table: &CsvTable) -> Result<(Vec<Displacement>, u64), InputError> {
 }
 
 /// The indices of the columns.
-struct Columns {
+struct DisplacementColumns {
     action: usize,
     ahead: usize,
     left: usize,
@@ -199,23 +204,27 @@ struct Columns {
     contact: Option<usize>,
 }
 
-impl Columns {
+impl DisplacementColumns {
     fn find(table: &CsvTable) -> Result<Self, InputError> {
         let [action, ahead, left, turn] =
             table.columns(["action", "ahead_boxes", "left_boxes", "turn_deg"])?;
         Ok(Self { action, ahead, left, turn, contact: table.find("contact") })
     }
 
-    fn displacement(&self, place: &str, row: CsvRow<'_>) -> Result<Displacement, InputError> {
-        Ok(Displacement {
+    fn displacement(
+        &self,
+        place: &str,
+        row: CsvRow<'_>,
+    ) -> Result<MeasuredDisplacement, InputError> {
+        Ok(MeasuredDisplacement {
             action: action(place, row.field(self.action))?,
-            ahead_boxes: limited(place, row.field(self.ahead), BOXES_MAX)?,
-            left_boxes: limited(place, row.field(self.left), BOXES_MAX)?,
-            turn_deg: limited(place, row.field(self.turn), TURN_MAX_DEG)?,
+            ahead_boxes: parse_limited(place, row.field(self.ahead), MAX_BOXES)?,
+            left_boxes: parse_limited(place, row.field(self.left), MAX_BOXES)?,
+            turn_deg: parse_limited(place, row.field(self.turn), MAX_TURN_DEG)?,
         })
     }
 
-    fn met_obstacle(&self, place: &str, row: CsvRow<'_>) -> Result<bool, InputError> {
+    fn has_contact(&self, place: &str, row: CsvRow<'_>) -> Result<bool, InputError> {
         let Some(contact) = self.contact.map(|column| row.field(column)) else { return Ok(false) };
         match contact.text {
             "no" => Ok(false),
@@ -226,7 +235,7 @@ impl Columns {
 }
 
 /// Returns an action by its name, or by the number that a recording gives it.
-fn action(place: &str, word: Word<'_>) -> Result<usize, InputError> {
+fn action(place: &str, word: Token<'_>) -> Result<usize, InputError> {
     let by_name = ACTIONS.iter().position(|name| *name == word.text);
     let by_number = || word.text.parse().ok().filter(|number| *number < ACTIONS.len());
     by_name.or_else(by_number).ok_or_else(|| {
@@ -235,7 +244,7 @@ fn action(place: &str, word: Word<'_>) -> Result<usize, InputError> {
     })
 }
 
-fn limited(place: &str, word: Word<'_>, most: f64) -> Result<f64, InputError> {
+fn parse_limited(place: &str, word: Token<'_>, most: f64) -> Result<f64, InputError> {
     let value = word.number(&place)?;
     if value.abs() <= most {
         return Ok(value);
@@ -250,7 +259,7 @@ mod tests {
 
     const HEAD: &str = "action,ahead_boxes,left_boxes,turn_deg\n";
 
-    fn learned(rows: &str, alpha: f64) -> Result<EffectorModel, InputError> {
+    fn learned(rows: &str, alpha: f64) -> Result<LearnedEffector, InputError> {
         let options = EstimateOptions { alpha, ..Default::default() };
         learn(&CsvTable::parse(&"f.csv", &format!("{HEAD}{rows}"))?, &options)
     }

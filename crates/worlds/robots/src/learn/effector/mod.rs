@@ -16,33 +16,33 @@
 //!   place: at least 20 degrees, at most 0.3 m of path.
 //! - L7, turn: commands of at least 0.1 rad/s with one sign, until 45 degrees are commanded.
 //!
-//! A displacement becomes grid transitions by *phase averaging*, see [`phase`].
+//! A displacement becomes grid transitions by *phase averaging*, see [`grid_displacement`].
 
 mod bag;
 mod carmen;
 mod csv;
 mod events;
+pub mod grid_displacement;
 mod mrclam;
-pub mod phase;
 mod report;
 mod transitions;
 
 pub use report::{EffectorReport, ForwardShares, TurnReport};
-pub use transitions::{EffectorProfile, Transition};
+pub use transitions::{EffectorProfile, ProfileTransition};
 
 use std::path::Path;
 
 use super::EstimateOptions;
-use sidestep_import::bag::Wanted;
+use sidestep_import::bag::TopicSelection;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
 /// Sides of a box that make sense for a robot, in m.
-const BOX_M: std::ops::RangeInclusive<f64> = 0.001..=1000.0;
+const BOX_RANGE_M: std::ops::RangeInclusive<f64> = 0.001..=1000.0;
 
 /// Refuses a box that makes no sense for a robot.
 fn check_box(box_m: f64) -> Result<(), InputError> {
-    if BOX_M.contains(&box_m) {
+    if BOX_RANGE_M.contains(&box_m) {
         return Ok(());
     }
     let cause = format!("a box of {box_m} m");
@@ -51,7 +51,7 @@ fn check_box(box_m: f64) -> Result<(), InputError> {
 
 /// A learned effector: its counts, and the transitions from which a simulation draws.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EffectorModel {
+pub struct LearnedEffector {
     /// Counts, probabilities with intervals, fit; serializable and printable.
     pub report: EffectorReport,
     /// The effector in the form of a profile.
@@ -67,7 +67,7 @@ pub fn from_mrclam(
     folder: &Path,
     box_m: f64,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
+) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let dataset = sidestep_import::mrclam::read(folder)?;
     mrclam::learn(&folder.display().to_string(), &dataset, box_m, options)
@@ -80,7 +80,7 @@ pub fn from_mrclam(
 ///
 /// # Errors
 /// When the file is missing or damaged, `options` are not valid, or no move is long enough.
-pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
+pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let log = sidestep_import::carmen::read(file)?;
     carmen::learn(&file.display().to_string(), &log, options)
@@ -98,10 +98,10 @@ pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<EffectorMod
 /// 1000 m, odometry is not wanted, or no move is long enough.
 pub fn from_bag(
     path: &Path,
-    wanted: &Wanted,
+    wanted: &TopicSelection,
     box_m: f64,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
+) -> Result<LearnedEffector, InputError> {
     options.check()?;
     bag::learn(
         &path.display().to_string(),
@@ -125,7 +125,7 @@ pub fn from_bag(
 ///
 /// # Errors
 /// When the file is missing or damaged, holds no row, or `options` are not valid.
-pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
+pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<LearnedEffector, InputError> {
     learn_csv(&CsvTable::read(file)?, options)
 }
 
@@ -133,7 +133,10 @@ pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<EffectorModel,
 ///
 /// # Errors
 /// When the table is damaged or `options` are not valid.
-pub fn learn_csv(table: &CsvTable, options: &EstimateOptions) -> Result<EffectorModel, InputError> {
+pub fn learn_csv(
+    table: &CsvTable,
+    options: &EstimateOptions,
+) -> Result<LearnedEffector, InputError> {
     options.check()?;
     csv::learn(table, options)
 }

@@ -2,20 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use super::events::{Events, Move, Turn};
-use super::{EffectorModel, check_box};
+use super::events::{Events, MoveEvent, TurnEvent};
+use super::{LearnedEffector, check_box};
 use crate::learn::EstimateOptions;
-use crate::learn::track::{Motion, pose_at};
-use sidestep_import::mrclam::{Command, Dataset, RobotLog};
+use crate::learn::track::{Displacement2, pose_at};
+use sidestep_import::mrclam::{Dataset, RobotLog, VelocityCommand};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::wrap_angle;
 
 /// Longest step between commands, because a longer one says nothing about the commands between.
-const STEP_SECS_MAX: f64 = 1.5;
+const MAX_STEP_SECS: f64 = 1.5;
 /// A move with more commanded turn than this is not a move ahead.
-const FORWARD_TURN_MAX_DEG: f64 = 10.0;
+const MAX_FORWARD_TURN_DEG: f64 = 10.0;
 /// A slower command is not a turn.
-const TURN_RATE_MIN_RADPS: f64 = 0.1;
+const MIN_TURN_RATE_RADPS: f64 = 0.1;
 /// A turn ends when this much is commanded.
 const TURN_DEG: f64 = 45.0;
 
@@ -30,7 +30,7 @@ pub(super) fn learn(
     dataset: &Dataset,
     box_m: f64,
     options: &EstimateOptions,
-) -> Result<EffectorModel, InputError> {
+) -> Result<LearnedEffector, InputError> {
     check_box(box_m)?;
     let mut events = Events::default();
     let mut rejected = BTreeMap::new();
@@ -47,30 +47,30 @@ pub(super) fn learn(
     report.rejected = rejected;
     let mut profile = events.profile(RULE, options);
     profile.box_m = Some(box_m);
-    Ok(EffectorModel { report, profile })
+    Ok(LearnedEffector { report, profile })
 }
 
 /// The motion commanded since a line.
 #[derive(Debug, Clone, Copy)]
-struct Window {
+struct CommandWindow {
     start_secs: f64,
     path_m: f64,
     turn_rad: f64,
 }
 
-impl Window {
-    fn from(command: &Command) -> Self {
+impl CommandWindow {
+    fn from(command: &VelocityCommand) -> Self {
         Self { start_secs: command.t_secs, path_m: 0.0, turn_rad: 0.0 }
     }
 
     /// Adds `command`, in force for `step_secs`.
-    fn hold(&mut self, command: &Command, step_secs: f64) {
+    fn add_command(&mut self, command: &VelocityCommand, step_secs: f64) {
         self.path_m += command.forward_mps * step_secs;
         self.turn_rad += command.turn_radps * step_secs;
     }
 
     /// Returns the robot's real motion until `end_secs`.
-    fn motion(&self, robot: &RobotLog, end_secs: f64) -> Option<Motion> {
+    fn motion(&self, robot: &RobotLog, end_secs: f64) -> Option<Displacement2> {
         let start = pose_at(&robot.truth, self.start_secs)?;
         Some(start.motion_to(&pose_at(&robot.truth, end_secs)?))
     }
@@ -78,25 +78,25 @@ impl Window {
 
 /// Returns whether a command holds too long, or time goes back, so that the motion is unknown.
 fn is_gap(step_secs: f64) -> bool {
-    !(0.0..=STEP_SECS_MAX).contains(&step_secs)
+    !(0.0..=MAX_STEP_SECS).contains(&step_secs)
 }
 
 /// Returns all moves of one box ahead; counts in `rejected` the windows that were not used.
-fn moves(robot: &RobotLog, box_m: f64, rejected: &mut BTreeMap<String, u64>) -> Vec<Move> {
+fn moves(robot: &RobotLog, box_m: f64, rejected: &mut BTreeMap<String, u64>) -> Vec<MoveEvent> {
     let Some(first) = robot.commands.first() else { return Vec::new() };
     let mut moves = Vec::new();
     let mut reject = |cause: &str| *rejected.entry(cause.to_string()).or_insert(0) += 1;
-    let mut window = Window::from(first);
+    let mut window = CommandWindow::from(first);
     for pair in robot.commands.windows(2) {
         let [command, next] = pair else { continue };
         let step_secs = next.t_secs - command.t_secs;
         if is_gap(step_secs) {
             reject("gap");
-            window = Window::from(next);
+            window = CommandWindow::from(next);
             continue;
         }
-        window.hold(command, step_secs);
-        if window.turn_rad.abs() > FORWARD_TURN_MAX_DEG.to_radians() {
+        window.add_command(command, step_secs);
+        if window.turn_rad.abs() > MAX_FORWARD_TURN_DEG.to_radians() {
             reject("turn");
         } else if window.path_m < box_m {
             continue;
@@ -105,13 +105,13 @@ fn moves(robot: &RobotLog, box_m: f64, rejected: &mut BTreeMap<String, u64>) -> 
         } else {
             reject("no_ground_truth");
         }
-        window = Window::from(next);
+        window = CommandWindow::from(next);
     }
     moves
 }
 
-fn as_move(window: &Window, motion: &Motion, end_secs: f64, box_m: f64) -> Move {
-    Move {
+fn as_move(window: &CommandWindow, motion: &Displacement2, end_secs: f64, box_m: f64) -> MoveEvent {
+    MoveEvent {
         ahead_boxes: motion.ahead_m / box_m,
         left_boxes: motion.left_m / box_m,
         turn_error_rad: wrap_angle(motion.turn_rad - window.turn_rad),
@@ -120,19 +120,19 @@ fn as_move(window: &Window, motion: &Motion, end_secs: f64, box_m: f64) -> Move 
 }
 
 /// Returns all turns of 45 degrees.
-fn turns(robot: &RobotLog) -> Vec<Turn> {
+fn turns(robot: &RobotLog) -> Vec<TurnEvent> {
     let mut turns = Vec::new();
-    let mut open: Option<Window> = None;
+    let mut open: Option<CommandWindow> = None;
     for pair in robot.commands.windows(2) {
         let [command, next] = pair else { continue };
         let step_secs = next.t_secs - command.t_secs;
-        if is_gap(step_secs) || command.turn_radps.abs() < TURN_RATE_MIN_RADPS {
+        if is_gap(step_secs) || command.turn_radps.abs() < MIN_TURN_RATE_RADPS {
             open = None;
             continue;
         }
         let same_side = open.filter(|w| w.turn_rad * command.turn_radps >= 0.0);
-        let mut window = same_side.unwrap_or(Window::from(command));
-        window.hold(command, step_secs);
+        let mut window = same_side.unwrap_or(CommandWindow::from(command));
+        window.add_command(command, step_secs);
         open = Some(window);
         if window.turn_rad.abs() >= TURN_DEG.to_radians() {
             open = None;
@@ -142,26 +142,26 @@ fn turns(robot: &RobotLog) -> Vec<Turn> {
     turns
 }
 
-fn as_turn(window: &Window, robot: &RobotLog, end_secs: f64) -> Option<Turn> {
+fn as_turn(window: &CommandWindow, robot: &RobotLog, end_secs: f64) -> Option<TurnEvent> {
     let motion = window.motion(robot, end_secs)?;
-    Some(Turn::new(window.turn_rad, motion.turn_rad, Some(end_secs - window.start_secs)))
+    Some(TurnEvent::new(window.turn_rad, motion.turn_rad, Some(end_secs - window.start_secs)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_import::mrclam::TruePose;
+    use sidestep_import::mrclam::StampedPose2;
 
     /// Commands once a second from t = 0; the robot moves at 1.1 m/s along x and does not turn.
     fn robot(commands: &[(f64, f64)]) -> RobotLog {
-        let command = |(i, (forward_mps, turn_radps)): (usize, &(f64, f64))| Command {
+        let command = |(i, (forward_mps, turn_radps)): (usize, &(f64, f64))| VelocityCommand {
             t_secs: i as f64,
             forward_mps: *forward_mps,
             turn_radps: *turn_radps,
         };
         let pose = |i: u32| {
             let t_secs = f64::from(i) * 0.25;
-            TruePose { t_secs, position_m: [1.1 * t_secs, 0.0], heading_rad: 0.0 }
+            StampedPose2 { t_secs, position_m: [1.1 * t_secs, 0.0], heading_rad: 0.0 }
         };
         RobotLog {
             truth: (0..40).map(pose).collect(),
@@ -185,7 +185,7 @@ mod tests {
         let mut rejected = BTreeMap::new();
         let mut log = robot(&[(1.0, 0.0), (1.0, 0.2), (1.0, 0.0), (1.0, 0.0), (1.0, 0.0)]);
         log.commands[4].t_secs = 9.0;
-        log.commands.push(Command { t_secs: 10.0, forward_mps: 0.0, turn_radps: 0.0 });
+        log.commands.push(VelocityCommand { t_secs: 10.0, forward_mps: 0.0, turn_radps: 0.0 });
         let found = moves(&log, 1.0, &mut rejected);
         assert_eq!(found.len(), 2, "steps 0-1 and 2-3");
         let causes = [("gap", 1), ("no_ground_truth", 1), ("turn", 1)];

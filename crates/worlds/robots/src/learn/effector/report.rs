@@ -5,10 +5,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::phase::FORWARD_CLASSES;
-use crate::learn::display::{self, Heading};
-use crate::learn::holdout::Fit;
-use crate::learn::{Estimate, EstimateOptions, ThinRow};
+use super::grid_displacement::FORWARD_CLASSES;
+use crate::learn::display::{self, TableHeading};
+use crate::learn::holdout::HoldoutTest;
+use crate::learn::{Estimate, EstimateOptions, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned effector. Displayed as readable tables, serialized for programs.
@@ -48,9 +48,9 @@ pub struct EffectorReport {
     /// Every estimated probability with its count and interval.
     pub probabilities: Vec<Estimate>,
     /// Rows with few counts.
-    pub thin: Vec<ThinRow>,
+    pub thin: Vec<LowCountRow>,
     /// Tests of how well a part of the events predicts the rest.
-    pub hold_out: Vec<Fit>,
+    pub hold_out: Vec<HoldoutTest>,
     /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
     /// Warnings that the reader should see before trusting the numbers.
@@ -76,7 +76,7 @@ pub struct ForwardShares {
 
 impl ForwardShares {
     /// Returns shares from counts in the order of [`FORWARD_CLASSES`]; `None` without counts.
-    pub(super) fn of(counts: &[f64]) -> Option<Self> {
+    pub(super) fn from_counts(counts: &[f64]) -> Option<Self> {
         let total: f64 = counts.iter().sum();
         let [stay, ahead, ahead2, ahead_left, ahead_right, other] =
             std::array::from_fn(|class: usize| counts[class] / total);
@@ -114,16 +114,16 @@ impl fmt::Display for EffectorReport {
         for (cause, count) in &self.rejected {
             writeln!(f, "  rejected {count}: {}", cause.replace('_', " "))?;
         }
-        display::warnings(f, &self.warnings)?;
-        display::moments(f, &self.named_moments())?;
+        display::write_warnings(f, &self.warnings)?;
+        display::write_moments(f, &self.named_moments())?;
         if let (Some(robust), Some(plain)) = (self.lateral_slip_robust_sd, self.lateral_slip_sd) {
             let [robust, plain] = [100.0 * robust, 100.0 * plain];
             writeln!(f, "lateral slip: {robust:.2} % robust, {plain:.2} % with all that jump")?;
         }
-        let heading = Heading { row: "action", column: "outcome" };
-        display::estimates(f, &self.probabilities, &heading)?;
-        display::thin(f, &self.thin, self.estimate.thin_below)?;
-        display::hold_out(f, &self.hold_out)
+        let heading = TableHeading { row: "action", column: "outcome" };
+        display::write_estimates(f, &self.probabilities, &heading)?;
+        display::write_low_count_rows(f, &self.thin, self.estimate.thin_below)?;
+        display::write_holdout_tests(f, &self.hold_out)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The transitions from which a simulation draws a move.
 
-use super::phase::{FORWARD_CLASSES, Outcome};
-use crate::learn::Counts;
+use super::grid_displacement::{FORWARD_CLASSES, GridDisplacement};
+use crate::learn::CountTable;
 use crate::learn::counts::{rounded, smooth};
 
 /// An effector in the form of a profile; the probabilities of each action sum to 1.
@@ -10,7 +10,7 @@ pub struct EffectorProfile {
     /// Side of a box in meters, where the transitions hold for boxes of that size only.
     pub box_m: Option<f64>,
     /// The transitions of each action, by its name; the first transition is the intended one.
-    pub actions: Vec<(String, Vec<Transition>)>,
+    pub actions: Vec<(String, Vec<ProfileTransition>)>,
     /// Actions without any event, and the transitions that were assumed for them.
     pub assumed: Vec<String>,
     /// The rule by which events became transitions.
@@ -19,7 +19,7 @@ pub struct EffectorProfile {
 
 impl EffectorProfile {
     /// Returns the transitions of an action.
-    pub fn action(&self, name: &str) -> Option<&[Transition]> {
+    pub fn action(&self, name: &str) -> Option<&[ProfileTransition]> {
         let found = self.actions.iter().find(|(action, _)| action == name);
         found.map(|(_, transitions)| transitions.as_slice())
     }
@@ -27,7 +27,7 @@ impl EffectorProfile {
 
 /// One possible result of an action.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Transition {
+pub struct ProfileTransition {
     /// Probability of the result.
     pub p: f64,
     /// Boxes walked, in the robot's frame: `F`, `B`, `L`, `R`; empty where it stays.
@@ -45,7 +45,7 @@ fn path(ahead: i32, left: i32) -> String {
 }
 
 /// Returns the name of an outcome in tables.
-pub(super) fn label(outcome: &Outcome) -> String {
+pub(super) fn label(outcome: &GridDisplacement) -> String {
     let path = path(outcome.ahead, outcome.left);
     match (path.as_str(), 90 * outcome.quarters) {
         ("", 0) => "stay".to_string(),
@@ -56,9 +56,13 @@ pub(super) fn label(outcome: &Outcome) -> String {
 }
 
 /// Returns transitions for outcomes with weights; the first is the intended one.
-pub(super) fn from_outcomes(outcomes: &[Outcome], weights: &[f64], alpha: f64) -> Vec<Transition> {
+pub(super) fn from_outcomes(
+    outcomes: &[GridDisplacement],
+    weights: &[f64],
+    alpha: f64,
+) -> Vec<ProfileTransition> {
     let probabilities = rounded(&smooth(weights, alpha));
-    let transition = |(outcome, p): (&Outcome, f64)| Transition {
+    let transition = |(outcome, p): (&GridDisplacement, f64)| ProfileTransition {
         p,
         path: path(outcome.ahead, outcome.left),
         turn_deg: 90 * outcome.quarters,
@@ -68,11 +72,11 @@ pub(super) fn from_outcomes(outcomes: &[Outcome], weights: &[f64], alpha: f64) -
 
 /// Returns the transitions of one box ahead by the paper's classes; `counts` has one row and a
 /// column per class. Counts outside the first five classes are spread over them in proportion.
-pub(super) fn forward(counts: &Counts, alpha: f64) -> Vec<Transition> {
+pub(super) fn forward_transitions(counts: &CountTable, alpha: f64) -> Vec<ProfileTransition> {
     let order = [1, 0, 2, 3, 4];
     debug_assert_eq!(FORWARD_CLASSES[order[0]], "ahead");
     let ends = [(1, 0), (0, 0), (2, 0), (1, 1), (1, -1)];
-    let outcomes = ends.map(|(ahead, left)| Outcome { ahead, left, quarters: 0 });
+    let outcomes = ends.map(|(ahead, left)| GridDisplacement { ahead, left, quarters: 0 });
     from_outcomes(&outcomes, &order.map(|class| counts.row(0)[class]), alpha)
 }
 
@@ -90,25 +94,30 @@ pub(super) fn turn_class(quarters: i32) -> usize {
 }
 
 /// Returns the transitions of a turn, `side` being 1 for left, -1 for right; `other` is spread.
-pub(super) fn turn(counts: &Counts, row: usize, side: i32, alpha: f64) -> Vec<Transition> {
-    let outcomes = [1, 0, 2].map(|n| Outcome { ahead: 0, left: 0, quarters: n * side });
+pub(super) fn turn_transitions(
+    counts: &CountTable,
+    row: usize,
+    side: i32,
+    alpha: f64,
+) -> Vec<ProfileTransition> {
+    let outcomes = [1, 0, 2].map(|n| GridDisplacement { ahead: 0, left: 0, quarters: n * side });
     from_outcomes(&outcomes, &counts.row(row)[..3], alpha)
 }
 
 /// Returns the transition of an action that never fails.
-pub(super) fn exact(outcome: Outcome) -> Vec<Transition> {
+pub(super) fn certain_transition(outcome: GridDisplacement) -> Vec<ProfileTransition> {
     from_outcomes(&[outcome], &[1.0], 0.0)
 }
 
 /// Returns the intended result of an action, by its name in a profile.
-pub(super) fn intended(action: &str) -> Outcome {
+pub(super) fn intended_displacement(action: &str) -> GridDisplacement {
     let (ahead, quarters) = match action {
         "forward" => (1, 0),
         "left" => (0, 1),
         "right" => (0, -1),
         _ => (0, 0),
     };
-    Outcome { ahead, left: 0, quarters }
+    GridDisplacement { ahead, left: 0, quarters }
 }
 
 #[cfg(test)]
@@ -125,11 +134,11 @@ mod tests {
     #[test]
     fn what_is_in_no_class_is_spread_in_proportion() {
         let columns = FORWARD_CLASSES.map(String::from);
-        let mut counts = Counts::new("forward", &["forward".to_string()], &columns);
+        let mut counts = CountTable::new("forward", &["forward".to_string()], &columns);
         for (class, weight) in [(0, 1.0), (1, 6.0), (3, 1.0), (5, 2.0)] {
             counts.add(0, class, weight);
         }
-        let transitions = forward(&counts, 0.0);
+        let transitions = forward_transitions(&counts, 0.0);
         let found: Vec<_> = transitions.iter().map(|t| (t.path.as_str(), t.p)).collect();
         assert_eq!(found, [("F", 0.75), ("", 0.125), ("FF", 0.0), ("FL", 0.125), ("FR", 0.0)]);
     }
@@ -137,10 +146,11 @@ mod tests {
     #[test]
     fn a_right_turn_mirrors_a_left_one() {
         let columns = TURN_CLASSES.map(String::from);
-        let mut counts = Counts::new("turns", &["left".to_string()], &columns);
+        let mut counts = CountTable::new("turns", &["left".to_string()], &columns);
         counts.add(0, 0, 9.0);
         counts.add(0, 1, 1.0);
-        let turns: Vec<_> = turn(&counts, 0, -1, 0.0).iter().map(|t| (t.turn_deg, t.p)).collect();
+        let turns: Vec<_> =
+            turn_transitions(&counts, 0, -1, 0.0).iter().map(|t| (t.turn_deg, t.p)).collect();
         assert_eq!(turns, [(-90, 0.9), (0, 0.1), (-180, 0.0)]);
     }
 }

@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 
 use super::{assert_close, assert_moments, expected, shared};
 use crate::learn::EstimateOptions;
-use crate::learn::effector::{EffectorModel, from_carmen, from_mrclam};
+use crate::learn::effector::{LearnedEffector, from_carmen, from_mrclam};
 
 const MOMENTS: [&str; 4] = ["ahead_boxes", "left_boxes", "dtheta_minus_cmd_rad", "duration_s"];
 
-fn as_json(model: &EffectorModel) -> Value {
+fn as_json(model: &LearnedEffector) -> Value {
     serde_json::to_value(&model.report).unwrap()
 }
 

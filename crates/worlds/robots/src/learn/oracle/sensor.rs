@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 
 use super::{assert_close, assert_moments, expected, shared};
-use crate::learn::sensor::{SensorModel, SensorOptions, from_mrclam};
+use crate::learn::sensor::{LearnedSensor, SensorOptions, from_mrclam};
 
-fn learned() -> Option<(SensorModel, Value, Value)> {
+fn learned() -> Option<(LearnedSensor, Value, Value)> {
     let model = from_mrclam(&shared("logs/mrclam7")?, &SensorOptions::default()).unwrap();
     let report = serde_json::to_value(&model.report).unwrap();
     Some((model, report, expected("mrclam7_dev_sensor.json")))

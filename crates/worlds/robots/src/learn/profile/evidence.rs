@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, Value, value};
 
 use super::{implicit, words};
-use crate::learn::effector::EffectorModel;
-use crate::learn::holdout::Fit;
-use crate::learn::sensor::SensorModel;
-use crate::learn::{Estimate, EstimateOptions, ThinRow};
+use crate::learn::effector::LearnedEffector;
+use crate::learn::holdout::HoldoutTest;
+use crate::learn::sensor::LearnedSensor;
+use crate::learn::{Estimate, EstimateOptions, LowCountRow};
 
-pub(super) fn of_sensor(model: &SensorModel) -> Table {
+pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     let report = &model.report;
     let mut table = Table::new();
     table["source"] = value(&report.source);
@@ -25,18 +25,18 @@ pub(super) fn of_sensor(model: &SensorModel) -> Table {
         thin: &report.thin,
         hold_out: &report.hold_out,
         // Confusion between single subjects says more about one arena than about the camera.
-        estimates: report.probabilities.iter().filter(|e| is_of_kinds(model, e)).collect(),
+        estimates: report.probabilities.iter().filter(|e| is_about_kinds(model, e)).collect(),
     };
     certainty.write(&mut table);
     table
 }
 
 /// Returns whether an estimate is about kinds; `confusion` is about subjects where kinds are known.
-fn is_of_kinds(model: &SensorModel, estimate: &Estimate) -> bool {
+fn is_about_kinds(model: &LearnedSensor, estimate: &Estimate) -> bool {
     model.report.kinds.is_none() || estimate.table != "confusion"
 }
 
-pub(super) fn of_effector(model: &EffectorModel) -> Table {
+pub(super) fn effector_evidence(model: &LearnedEffector) -> Table {
     let report = &model.report;
     let mut table = Table::new();
     table["source"] = value(&report.source);
@@ -46,10 +46,10 @@ pub(super) fn of_effector(model: &EffectorModel) -> Table {
         table["turns"] = count(turns.n as f64).into();
     }
     if let Some(sd) = report.lateral_slip_sd {
-        table["lateral_slip_sd"] = value(significant(sd));
+        table["lateral_slip_sd"] = value(round_to_six(sd));
     }
     if let Some(sd) = report.lateral_slip_robust_sd {
-        table["lateral_slip_robust_sd"] = value(significant(sd));
+        table["lateral_slip_robust_sd"] = value(round_to_six(sd));
     }
     let certainty = Certainty {
         options: &report.estimate,
@@ -68,8 +68,8 @@ struct Certainty<'a> {
     options: &'a EstimateOptions,
     assumed: &'a [String],
     warnings: &'a [String],
-    thin: &'a [ThinRow],
-    hold_out: &'a [Fit],
+    thin: &'a [LowCountRow],
+    hold_out: &'a [HoldoutTest],
     estimates: Vec<&'a Estimate>,
 }
 
@@ -77,11 +77,11 @@ impl Certainty<'_> {
     fn write(&self, table: &mut Table) {
         table["alpha"] = value(self.options.alpha);
         table["thin_below"] = value(i64::from(self.options.thin_below));
-        table["thin"] = value(Array::from_iter(self.thin.iter().map(thin)));
+        table["thin"] = value(Array::from_iter(self.thin.iter().map(low_count_row)));
         table["assumed"] = words(self.assumed);
         table["warnings"] = words(self.warnings);
         table["hold_out_every"] = count(self.options.hold_out_every as f64).into();
-        let fits = ArrayOfTables::from_iter(self.hold_out.iter().map(fit));
+        let fits = ArrayOfTables::from_iter(self.hold_out.iter().map(holdout_table));
         table["hold_out"] = Item::ArrayOfTables(fits);
         let mut by_table: BTreeMap<&str, BTreeMap<&str, Vec<&Estimate>>> = BTreeMap::new();
         for estimate in &self.estimates {
@@ -110,16 +110,16 @@ fn estimates(rows: &BTreeMap<&str, Vec<&Estimate>>) -> Table {
 }
 
 fn estimate(estimate: &Estimate) -> InlineTable {
-    let interval = [estimate.interval.low, estimate.interval.high].map(significant);
+    let interval = [estimate.interval.low, estimate.interval.high].map(round_to_six);
     let mut fields = InlineTable::new();
     fields.insert("count", count(estimate.count));
     fields.insert("of", count(estimate.of));
-    fields.insert("p", significant(estimate.probability).into());
+    fields.insert("p", round_to_six(estimate.probability).into());
     fields.insert("interval", Array::from_iter(interval).into());
     fields
 }
 
-fn thin(row: &ThinRow) -> InlineTable {
+fn low_count_row(row: &LowCountRow) -> InlineTable {
     let mut fields = InlineTable::new();
     fields.insert("table", row.table.as_str().into());
     fields.insert("row", row.row.as_str().into());
@@ -127,17 +127,17 @@ fn thin(row: &ThinRow) -> InlineTable {
     fields
 }
 
-fn fit(fit: &Fit) -> Table {
+fn holdout_table(fit: &HoldoutTest) -> Table {
     let mut table = Table::new();
     table["table"] = value(&fit.table);
     table["trained_on"] = count(fit.trained_on).into();
     table["held_out"] = count(fit.held_out).into();
-    table["chi_square"] = value(significant(fit.chi_square));
+    table["chi_square"] = value(round_to_six(fit.chi_square));
     table["degrees_of_freedom"] = count(fit.degrees_of_freedom as f64).into();
-    table["p_value"] = value(significant(fit.p_value));
+    table["p_value"] = value(round_to_six(fit.p_value));
     for (name, loss) in [("log_loss", fit.log_loss), ("log_loss_floor", fit.log_loss_floor)] {
         if let Some(loss) = loss {
-            table[name] = value(significant(loss));
+            table[name] = value(round_to_six(loss));
         }
     }
     table
@@ -150,6 +150,6 @@ fn count(count: f64) -> Value {
 }
 
 /// Returns a value with six decimals: more than any interval justifies.
-fn significant(value: f64) -> f64 {
+fn round_to_six(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

@@ -9,8 +9,8 @@ mod evidence;
 
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
 
-use super::effector::{EffectorModel, Transition};
-use super::sensor::{NamedRow, SensorModel};
+use super::effector::{LearnedEffector, ProfileTransition};
+use super::sensor::{LearnedSensor, NamedRow};
 use sidestep_kernel::InputError;
 use sidestep_scenario::FORMAT;
 
@@ -31,7 +31,7 @@ pub fn with_sensor(
     place: &str,
     text: &str,
     name: &str,
-    model: &SensorModel,
+    model: &LearnedSensor,
 ) -> Result<String, InputError> {
     with_section(place, text, ["sensors", name], sensor(model))
 }
@@ -45,13 +45,13 @@ pub fn with_effector(
     place: &str,
     text: &str,
     name: &str,
-    model: &EffectorModel,
+    model: &LearnedEffector,
 ) -> Result<String, InputError> {
     with_section(place, text, ["effectors", name], effector(model))
 }
 
 /// Returns whether the profile `text` has a section `name` among the `group` "sensors" or "effectors".
-pub fn has(text: &str, group: &str, name: &str) -> bool {
+pub fn has_section(text: &str, group: &str, name: &str) -> bool {
     let section = |document: DocumentMut| document.get(group)?.get(name).map(|_| ());
     text.parse().ok().and_then(section).is_some()
 }
@@ -82,7 +82,7 @@ fn with_section(
 fn parse(place: &str, text: &str) -> Result<DocumentMut, InputError> {
     let document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| {
         let error = InputError::new(place, e.message(), "write valid TOML");
-        e.span().map_or(error.clone(), |span| error.in_text(text, span.start))
+        e.span().map_or(error.clone(), |span| error.with_offset(text, span.start))
     })?;
     let format = document.get("format").and_then(Item::as_integer);
     if format != Some(i64::from(FORMAT)) || !document.contains_key("profile") {
@@ -99,7 +99,7 @@ fn implicit() -> Table {
     table
 }
 
-fn sensor(model: &SensorModel) -> Table {
+fn sensor(model: &LearnedSensor) -> Table {
     let profile = &model.profile;
     let mut section = Table::new();
     section["bearings_deg"] = numbers(&profile.bearings_deg);
@@ -120,11 +120,11 @@ fn sensor(model: &SensorModel) -> Table {
         section["confusion_by_class"] = Item::Table(by_class);
     }
     section["distance_confusion"] = rows(&profile.distance_confusion);
-    section["evidence"] = Item::Table(evidence::of_sensor(model));
+    section["evidence"] = Item::Table(evidence::sensor_evidence(model));
     section
 }
 
-fn effector(model: &EffectorModel) -> Table {
+fn effector(model: &LearnedEffector) -> Table {
     let mut section = Table::new();
     if let Some(box_m) = model.profile.box_m {
         section["box_m"] = value(box_m);
@@ -132,13 +132,13 @@ fn effector(model: &EffectorModel) -> Table {
     for (action, transitions) in &model.profile.actions {
         section[action] = value(Array::from_iter(transitions.iter().map(transition)));
     }
-    section["evidence"] = Item::Table(evidence::of_effector(model));
+    section["evidence"] = Item::Table(evidence::effector_evidence(model));
     section
 }
 
 /// Returns `{ p = 0.9, path = "F" }`; a turn of 0 is left out, and so is the path of a turn in
 /// place.
-fn transition(transition: &Transition) -> Value {
+fn transition(transition: &ProfileTransition) -> Value {
     let mut fields = InlineTable::new();
     fields.insert("p", transition.p.into());
     if !transition.path.is_empty() || transition.turn_deg == 0 {

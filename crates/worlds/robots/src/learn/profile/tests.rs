@@ -20,12 +20,12 @@ fn file(folder: &tempfile::TempDir, text: &str) -> std::path::PathBuf {
     path
 }
 
-fn sensor_model() -> SensorModel {
+fn sensor_model() -> LearnedSensor {
     let folder = tempfile::tempdir().unwrap();
     sensor_from(&file(&folder, READINGS), &SensorOptions::default()).unwrap()
 }
 
-fn effector_model() -> EffectorModel {
+fn effector_model() -> LearnedEffector {
     let folder = tempfile::tempdir().unwrap();
     effector_from(&file(&folder, MOTIONS), &EstimateOptions::default()).unwrap()
 }

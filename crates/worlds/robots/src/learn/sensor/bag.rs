@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::SensorModel;
+use super::LearnedSensor;
 use super::camera::{NOTHING, SensorProfile};
 use super::csv::ReadingLog;
 use super::options::{DistanceClasses, SensorOptions};
-use super::readings::{Distance, Reading};
-use super::report::AgainstMap;
-use crate::learn::track::{Gaps, Pose, pose_at};
+use super::readings::{Distance, LabeledReading};
+use super::report::MapComparison;
+use crate::learn::track::{Gaps, Pose2, pose_at};
 use sidestep_import::bag::BagLog;
 use sidestep_import::bag::messages::LaserScan;
-use sidestep_import::{PixelMap, Sight};
+use sidestep_import::{PixelMap, RayHit};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, hypot, sin};
 use sidestep_kernel::view;
@@ -20,25 +20,25 @@ use sidestep_kernel::view;
 const OBSERVATIONS: [&str; 2] = [NOTHING, WALL];
 const WALL: &str = "wall";
 /// Most beams of a profile, unless others are asked for; a scan has hundreds, a simulated robot few.
-const BEAMS_MAX: usize = 16;
+const MAX_BEAMS: usize = 16;
 /// The longest way in meters that odometry alone measures since the last true pose.
-const RECKONED_MAX_M: f64 = 1.0;
+const MAX_DEAD_RECKONING_M: f64 = 1.0;
 /// A scanner with this share of its beams ending before the wall sees things that are not on the map.
-const IN_FRONT_MAX: f64 = 0.1;
+const MAX_IN_FRONT_FRACTION: f64 = 0.1;
 
 /// The rule by which counts become rows.
 const RULE: &str = "range to the first wall of the map from the true pose against measured range, no wall or \
     no echo within the range being nothing; every count plus alpha";
 
-/// Learns the scanner; `options` have the fan and range of the profile, see [`fan`].
+/// Learns the scanner; `options` have the fan and range of the profile, see [`scan_options`].
 pub(super) fn learn(
     source: &str,
     log: &BagLog,
     map: &PixelMap,
     options: &SensorOptions,
     classes: &DistanceClasses,
-) -> Result<SensorModel, InputError> {
-    let judged = Judge::new(log, map, options.range_m, classes).judge_all();
+) -> Result<LearnedSensor, InputError> {
+    let judged = BeamEvaluator::new(log, map, options.range_m, classes).evaluate_all();
     if judged.readings.is_empty() {
         let causes =
             judged.skipped.iter().map(|(cause, n)| format!("{n} {}", cause.replace('_', " ")));
@@ -48,22 +48,22 @@ pub(super) fn learn(
         return Err(InputError::new(source, cause, remedy));
     }
     let n_skipped = judged.skipped.values().sum::<u64>();
-    let against = AgainstMap::of(judged.readings.iter().map(Reading::ranges_m));
+    let against = MapComparison::from_ranges(judged.readings.iter().map(LabeledReading::ranges_m));
     let observations = OBSERVATIONS.map(String::from).to_vec();
     let log_of = ReadingLog { observations, classes, readings: judged.readings, rule: RULE };
     let mut model = log_of.model(source, options);
     let report = &mut model.report;
     (report.measurements, report.skipped) = (report.sightings + n_skipped, n_skipped);
     report.skipped_by_cause = judged.skipped;
-    report.warnings.extend(against.warning(IN_FRONT_MAX));
+    report.warnings.extend(against.warning(MAX_IN_FRONT_FRACTION));
     report.warnings.extend(mount_warning(log));
     report.against_map = Some(against);
-    model.profile = seeing_all(model.profile);
+    model.profile = with_walls_only(model.profile);
     Ok(model)
 }
 
 /// Anything stops a beam, so all kinds look like a wall.
-fn seeing_all(profile: SensorProfile) -> SensorProfile {
+fn with_walls_only(profile: SensorProfile) -> SensorProfile {
     let designates = profile.designates.into_iter().map(|(kind, _)| (kind, WALL.to_string()));
     SensorProfile { designates: designates.collect(), ..profile }
 }
@@ -79,13 +79,13 @@ fn mount_warning(log: &BagLog) -> Option<String> {
 }
 
 /// Returns the options with the fan and the range of the scans, where no others are asked for.
-pub(super) fn fan(
+pub(super) fn scan_options(
     options: &SensorOptions,
     scan: &LaserScan,
     range_m: Option<f64>,
     bearings_deg: Option<&[f64]>,
 ) -> SensorOptions {
-    let step = scan.ranges_m.len().div_ceil(BEAMS_MAX).max(1);
+    let step = scan.ranges_m.len().div_ceil(MAX_BEAMS).max(1);
     let own = || {
         let beams = (step / 2..scan.ranges_m.len()).step_by(step);
         beams.map(|beam| rounded_deg(bearing_rad(scan, beam))).collect()
@@ -108,30 +108,31 @@ fn bearing_rad(scan: &LaserScan, beam: usize) -> f64 {
 
 /// Beams that were judged, and the others by cause.
 #[derive(Default)]
-struct Judged {
-    readings: Vec<Reading>,
+struct EvaluatedBeams {
+    readings: Vec<LabeledReading>,
     skipped: BTreeMap<String, u64>,
 }
 
 /// Compares scans with the ranges expected from a map.
-struct Judge<'a> {
+struct BeamEvaluator<'a> {
     log: &'a BagLog,
     map: &'a PixelMap,
     range_m: f64,
     classes: &'a DistanceClasses,
     gaps: Gaps,
-    mount: Mount,
+    mount: ScannerMount,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> BeamEvaluator<'a> {
     fn new(log: &'a BagLog, map: &'a PixelMap, range_m: f64, classes: &'a DistanceClasses) -> Self {
-        let gaps = Gaps::of(&log.odometry);
-        let mount = Mount::of(log.mount.unwrap_or(view::Pose::at([0.0; 3])));
+        let gaps = Gaps::from_track(&log.odometry);
+        let mount =
+            ScannerMount::from_pose(log.mount.unwrap_or(view::Pose::from_position([0.0; 3])));
         Self { log, map, range_m, classes, gaps, mount }
     }
 
-    fn judge_all(&self) -> Judged {
-        let mut judged = Judged::default();
+    fn evaluate_all(&self) -> EvaluatedBeams {
+        let mut judged = EvaluatedBeams::default();
         for scan in &self.log.scans {
             let mut skip = |cause: &str, n: usize| {
                 *judged.skipped.entry(cause.to_string()).or_insert(0) += n as u64;
@@ -141,7 +142,7 @@ impl<'a> Judge<'a> {
                 continue;
             };
             for beam in 0..scan.ranges_m.len() {
-                match self.judge(scan, beam, &pose) {
+                match self.evaluate_beam(scan, beam, &pose) {
                     Ok(reading) => judged.readings.push(reading),
                     Err(cause) => skip(cause, 1),
                 }
@@ -151,19 +152,25 @@ impl<'a> Judge<'a> {
     }
 
     /// Returns the pose at a time: between true poses, else from the last one on by odometry.
-    fn pose_at(&self, t_secs: f64) -> Option<Pose> {
+    fn pose_at(&self, t_secs: f64) -> Option<Pose2> {
         let BagLog { truth, odometry, .. } = self.log;
         pose_at(truth, t_secs).or_else(|| {
             let known = truth.get(truth.partition_point(|p| p.t_secs <= t_secs).checked_sub(1)?)?;
             let motion = pose_at(odometry, known.t_secs)?.motion_to(&pose_at(odometry, t_secs)?);
-            let is_unbroken = self.gaps.before(known.t_secs) == self.gaps.before(t_secs);
-            (is_unbroken && hypot(motion.ahead_m, motion.left_m) <= RECKONED_MAX_M)
-                .then(|| Pose::from(*known).after(&motion))
+            let is_unbroken =
+                self.gaps.count_before(known.t_secs) == self.gaps.count_before(t_secs);
+            (is_unbroken && hypot(motion.ahead_m, motion.left_m) <= MAX_DEAD_RECKONING_M)
+                .then(|| Pose2::from(*known).compose(&motion))
         })
     }
 
     /// Compares a beam with the map; `Err` says why it cannot be judged.
-    fn judge(&self, scan: &LaserScan, beam: usize, pose: &Pose) -> Result<Reading, &'static str> {
+    fn evaluate_beam(
+        &self,
+        scan: &LaserScan,
+        beam: usize,
+        pose: &Pose2,
+    ) -> Result<LabeledReading, &'static str> {
         let (least_m, most_m) = (f64::from(scan.range_min_m), f64::from(scan.range_max_m));
         let measured_m = f64::from(scan.ranges_m[beam]);
         if measured_m.is_nan() {
@@ -174,21 +181,23 @@ impl<'a> Judge<'a> {
         }
         let (from_m, direction_rad) = self.mount.beam(pose, bearing_rad(scan, beam));
         let limit_m = self.range_m.min(most_m);
-        let expected_m = match self.map.sight(from_m, direction_rad, limit_m) {
-            Sight::Unknown => return Err("unmapped"),
-            Sight::Wall(range_m) if range_m <= least_m => return Err("nearer_than_measured"),
-            Sight::Wall(range_m) => Some(range_m),
-            Sight::Nothing => None,
+        let expected_m = match self.map.cast_ray(from_m, direction_rad, limit_m) {
+            RayHit::Unknown => return Err("unmapped"),
+            RayHit::Wall(range_m) if range_m <= least_m => return Err("nearer_than_measured"),
+            RayHit::Wall(range_m) => Some(range_m),
+            RayHit::Nothing => None,
         };
         // Many drivers say the greatest range where nothing answers.
         let reported_m = (measured_m < most_m && measured_m <= limit_m).then_some(measured_m);
         Ok(self.reading(expected_m, reported_m))
     }
 
-    fn reading(&self, expected_m: Option<f64>, reported_m: Option<f64>) -> Reading {
-        let at =
-            |range_m: f64| Distance { class: self.classes.of(range_m), range_m: Some(range_m) };
-        Reading {
+    fn reading(&self, expected_m: Option<f64>, reported_m: Option<f64>) -> LabeledReading {
+        let at = |range_m: f64| Distance {
+            class: self.classes.class_of(range_m),
+            range_m: Some(range_m),
+        };
+        LabeledReading {
             truth: usize::from(expected_m.is_some()),
             reported: usize::from(reported_m.is_some()),
             true_at: expected_m.map(at),
@@ -198,24 +207,24 @@ impl<'a> Judge<'a> {
 }
 
 /// The mount of a scanner on its robot, in the plane.
-struct Mount {
-    place: Pose,
+struct ScannerMount {
+    place: Pose2,
     /// -1 where it hangs upside down, so that its bearings run the other way.
     side: f64,
 }
 
-impl Mount {
-    fn of(pose: view::Pose) -> Self {
-        let (ahead, up) = (pose.turned([1.0, 0.0, 0.0]), pose.turned([0.0, 0.0, 1.0]));
+impl ScannerMount {
+    fn from_pose(pose: view::Pose) -> Self {
+        let (ahead, up) = (pose.rotate([1.0, 0.0, 0.0]), pose.rotate([0.0, 0.0, 1.0]));
         let [x_m, y_m, _] = pose.at_m;
-        let place = Pose { x_m, y_m, heading_rad: atan2(ahead[1], ahead[0]) };
+        let place = Pose2 { x_m, y_m, heading_rad: atan2(ahead[1], ahead[0]) };
         Self { place, side: if up[2] < 0.0 { -1.0 } else { 1.0 } }
     }
 
     /// Returns where a beam starts and its direction in the world.
-    fn beam(&self, robot: &Pose, bearing_rad: f64) -> ([f64; 2], f64) {
+    fn beam(&self, robot: &Pose2, bearing_rad: f64) -> ([f64; 2], f64) {
         let (s, c) = (sin(robot.heading_rad), cos(robot.heading_rad));
-        let Pose { x_m, y_m, heading_rad } = self.place;
+        let Pose2 { x_m, y_m, heading_rad } = self.place;
         let from_m = [robot.x_m + c * x_m - s * y_m, robot.y_m + s * x_m + c * y_m];
         (from_m, robot.heading_rad + heading_rad + self.side * bearing_rad)
     }
@@ -225,8 +234,8 @@ impl Mount {
 mod tests {
     use super::*;
     use sidestep_import::bag::messages::{Header, Time};
-    use sidestep_import::mrclam::TruePose;
-    use sidestep_kernel::view::Plane;
+    use sidestep_import::mrclam::StampedPose2;
+    use sidestep_kernel::view::Isometry2;
     use sidestep_map::Cell;
     use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -234,7 +243,7 @@ mod tests {
     fn room() -> PixelMap {
         let is_wall = |col: u32, row: u32| col == 0 || col == 7 || row == 0 || row == 5;
         let cell = |k: u32| if is_wall(k % 8, k / 8) { Cell::Wall } else { Cell::Free };
-        let plane = Plane { origin_m: [-1.0, -1.0], yaw_rad: 0.0 };
+        let plane = Isometry2 { origin_m: [-1.0, -1.0], yaw_rad: 0.0 };
         PixelMap::new(8, 6, 1.0, plane, (0..48).map(cell).collect())
     }
 
@@ -254,18 +263,23 @@ mod tests {
         }
     }
 
-    fn pose(t_secs: f64, x_m: f64) -> TruePose {
-        TruePose { t_secs, position_m: [x_m, 1.0], heading_rad: 0.0 }
+    fn pose(t_secs: f64, x_m: f64) -> StampedPose2 {
+        StampedPose2 { t_secs, position_m: [x_m, 1.0], heading_rad: 0.0 }
     }
 
     /// A robot that stands at (1, 1) and looks along x.
     fn log(scans: Vec<LaserScan>) -> BagLog {
         let truth = (0..5).map(|k| pose(f64::from(k), 1.0)).collect();
-        BagLog { odometry: Vec::new(), truth, scans, mount: Some(view::Pose::at([0.0; 3])) }
+        BagLog {
+            odometry: Vec::new(),
+            truth,
+            scans,
+            mount: Some(view::Pose::from_position([0.0; 3])),
+        }
     }
 
-    fn learned(log: &BagLog) -> Result<SensorModel, InputError> {
-        let own = fan(&SensorOptions::default(), &log.scans[0], None, None);
+    fn learned(log: &BagLog) -> Result<LearnedSensor, InputError> {
+        let own = scan_options(&SensorOptions::default(), &log.scans[0], None, None);
         let options = SensorOptions { distance_edges_m: vec![2.0], ..own };
         learn("f", log, &room(), &options, &options.check()?)
     }
@@ -281,7 +295,7 @@ mod tests {
         ];
         let model = learned(&log(scans)).unwrap();
         let against =
-            AgainstMap { agreeing: 5, missed: 1, seen_through: 1, in_front: 1, not_there: 1 };
+            MapComparison { agreeing: 5, missed: 1, seen_through: 1, in_front: 1, not_there: 1 };
         assert_eq!(model.report.against_map, Some(against));
         assert_eq!(model.report.confusion.cells(), [[2.0, 1.0], [1.0, 5.0]]);
         assert_eq!(model.report.distance_counts.0.cells(), [[2.0, 0.0], [1.0, 2.0]]);
@@ -315,8 +329,8 @@ mod tests {
         let report = learned(&hanging).unwrap().report;
         assert_eq!(report.against_map.map(|beams| (beams.agreeing, beams.not_there)), Some((2, 1)));
         assert!(report.errors.range_error_m.unwrap().sd < 1e-6);
-        let behind = Mount::of(view::Pose::heading([0.0, 1.0, 0.0], PI));
-        let (from_m, direction_rad) = behind.beam(&Pose::from([2.0, 1.0, FRAC_PI_2]), 0.0);
+        let behind = ScannerMount::from_pose(view::Pose::from_heading([0.0, 1.0, 0.0], PI));
+        let (from_m, direction_rad) = behind.beam(&Pose2::from([2.0, 1.0, FRAC_PI_2]), 0.0);
         assert!((from_m[0] - 1.0).abs() < 1e-9 && (direction_rad - 1.5 * PI).abs() < 1e-9);
     }
 
@@ -346,9 +360,9 @@ mod tests {
         let mut wide = scan(0, [1.0; 3]);
         (wide.ranges_m, wide.angle_min_rad) = (vec![1.0; 360], -PI as f32);
         wide.angle_increment_rad = (PI / 180.0) as f32;
-        let fan = fan(&SensorOptions::default(), &wide, Some(3.0), None);
+        let fan = scan_options(&SensorOptions::default(), &wide, Some(3.0), None);
         assert_eq!((fan.bearings_deg.len(), fan.range_m), (16, 3.0));
         assert!((fan.bearings_deg[8] - 15.0).abs() < 2.0, "{:?}", fan.bearings_deg);
-        assert!(matches!(room().sight([1.0, 1.0], 0.0, 9.0), Sight::Wall(_)));
+        assert!(matches!(room().cast_ray([1.0, 1.0], 0.0, 9.0), RayHit::Wall(_)));
     }
 }

@@ -2,8 +2,8 @@
 
 use super::detection::Detection;
 use super::options::{BEYOND, DistanceClasses, SensorOptions};
-use super::tables::{LANDMARK, NOBODY, ROBOT};
-use crate::learn::Counts;
+use super::tables::{LANDMARK, NO_SUBJECT, ROBOT};
+use crate::learn::CountTable;
 use crate::learn::counts::{rounded, smooth};
 
 /// The report when nothing is seen.
@@ -59,20 +59,20 @@ const RULE: &str = "P(nothing | subject) is 1 minus the detection rate of its ki
     nothing) is spurious readings per beam and bin without a subject; every count plus alpha";
 
 /// The counts that a camera's rows are computed from.
-pub(super) struct Looks<'a> {
+pub(super) struct CameraCounts<'a> {
     /// True kind against decoded kind.
-    pub(super) kinds: &'a Counts,
+    pub(super) kinds: &'a CountTable,
     /// Detection by kind and class.
     pub(super) detection: &'a Detection,
     /// True class against measured class.
-    pub(super) distance: &'a Counts,
+    pub(super) distance: &'a CountTable,
     /// Class of spurious readings.
-    pub(super) beyond: &'a Counts,
+    pub(super) beyond: &'a CountTable,
 }
 
 /// Returns a camera that reports `nothing`, `robot` or `landmark`.
 pub(super) fn camera(
-    looks: &Looks<'_>,
+    looks: &CameraCounts<'_>,
     options: &SensorOptions,
     classes: &DistanceClasses,
 ) -> SensorProfile {
@@ -111,17 +111,22 @@ pub(super) fn camera(
 }
 
 /// Returns the row of reports in a direction where nothing stands.
-fn spurious_row(looks: &Looks<'_>, options: &SensorOptions) -> Vec<f64> {
+fn spurious_row(looks: &CameraCounts<'_>, options: &SensorOptions) -> Vec<f64> {
     let beams = looks.detection.looks as f64 * options.bearings_deg.len() as f64;
     let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
-    let spurious = looks.kinds.row(NOBODY);
+    let spurious = looks.kinds.row(NO_SUBJECT);
     let robot_or_landmark = spurious[ROBOT] + spurious[LANDMARK];
     let empty = (beams - in_view - robot_or_landmark).max(1.0);
     smooth(&[empty, spurious[ROBOT], spurious[LANDMARK]], options.estimate.alpha)
 }
 
 /// Returns the row of reports in the direction of a robot or landmark, in one class or in all.
-fn subject_row(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> Vec<f64> {
+fn subject_row(
+    looks: &CameraCounts<'_>,
+    kind: usize,
+    class: Option<usize>,
+    alpha: f64,
+) -> Vec<f64> {
     let detected = detection_rate(looks, kind, class, alpha);
     let mut as_kind = looks.kinds.smoothed(kind, alpha).unwrap_or_else(|| {
         let mut truly = vec![0.0; 3];
@@ -133,7 +138,7 @@ fn subject_row(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64)
 }
 
 /// Returns the detection rate in a class; over all classes where none was in view in that one.
-fn detection_rate(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
+fn detection_rate(looks: &CameraCounts<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
     let table = detection_table(looks, kind);
     if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
         return row[0];
@@ -143,12 +148,12 @@ fn detection_rate(looks: &Looks<'_>, kind: usize, class: Option<usize>, alpha: f
     if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
 }
 
-fn detection_table<'a>(looks: &Looks<'a>, kind: usize) -> &'a Counts {
+fn detection_table<'a>(looks: &CameraCounts<'a>, kind: usize) -> &'a CountTable {
     if kind == ROBOT { &looks.detection.robots } else { &looks.detection.landmarks }
 }
 
-fn assumed_detections(looks: &Looks<'_>, kind: usize, name: &str) -> Vec<String> {
-    let thin = detection_table(looks, kind).thin(1);
+fn assumed_detections(looks: &CameraCounts<'_>, kind: usize, name: &str) -> Vec<String> {
+    let thin = detection_table(looks, kind).low_count_rows(1);
     let assumed = |class: String| format!("detection of {name} in {class}: as over all classes");
     thin.into_iter().map(|row| assumed(row.row)).collect()
 }
@@ -156,8 +161,8 @@ fn assumed_detections(looks: &Looks<'_>, kind: usize, name: &str) -> Vec<String>
 /// Returns the rows of the distance classes and of `beyond`. A class without counts is reported
 /// truly; a spurious report without counts may have any class.
 pub(super) fn distance_rows(
-    distance: &Counts,
-    beyond: &Counts,
+    distance: &CountTable,
+    beyond: &CountTable,
     alpha: f64,
     assumed: &mut Vec<String>,
 ) -> Vec<NamedRow> {
@@ -165,7 +170,7 @@ pub(super) fn distance_rows(
     for (class, name) in distance.rows().iter().enumerate() {
         let row = distance.smoothed(class, alpha).unwrap_or_else(|| {
             assumed.push(format!("distance {name}: reported truly"));
-            truly(distance.columns().len(), class)
+            certain_row(distance.columns().len(), class)
         });
         rows.push(NamedRow::new(name, &row));
     }
@@ -177,7 +182,7 @@ pub(super) fn distance_rows(
 }
 
 /// Returns the row of a value that is always reported truly.
-pub(super) fn truly(n: usize, column: usize) -> Vec<f64> {
+pub(super) fn certain_row(n: usize, column: usize) -> Vec<f64> {
     let mut row = vec![0.0; n];
     row[column] = 1.0;
     row

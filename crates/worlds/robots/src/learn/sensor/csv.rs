@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::SensorModel;
-use super::camera::{NOTHING, NamedRow, SensorProfile, distance_rows, truly};
+use super::LearnedSensor;
+use super::camera::{NOTHING, NamedRow, SensorProfile, certain_row, distance_rows};
 use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
-use super::readings::{Reading, read};
+use super::readings::{LabeledReading, read};
 use super::report::{ErrorMoments, SensorReport};
-use crate::learn::holdout::{Fit, fit, split};
-use crate::learn::{CountMatrix, Counts};
+use crate::learn::holdout::{HoldoutTest, holdout_test, split};
+use crate::learn::{CountMatrix, CountTable};
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 use sidestep_statistics::Moments;
@@ -18,7 +18,7 @@ pub(super) fn learn(
     table: &CsvTable,
     options: &SensorOptions,
     classes: &DistanceClasses,
-) -> Result<SensorModel, InputError> {
+) -> Result<LearnedSensor, InputError> {
     let (observations, readings) = read(table, options.sensor.as_deref(), classes)?;
     Ok(ReadingLog { observations, classes, readings, rule: RULE }.model(table.place(), options))
 }
@@ -31,23 +31,24 @@ pub(super) struct ReadingLog<'a> {
     /// `nothing`, then the others by name.
     pub(super) observations: Vec<String>,
     pub(super) classes: &'a DistanceClasses,
-    pub(super) readings: Vec<Reading>,
+    pub(super) readings: Vec<LabeledReading>,
     /// The rule in words, for the profile.
     pub(super) rule: &'static str,
 }
 
 impl ReadingLog<'_> {
     /// Returns the sensor that the readings describe.
-    pub(super) fn model(&self, source: &str, options: &SensorOptions) -> SensorModel {
-        SensorModel { report: self.report(source, options), profile: self.profile(options) }
+    pub(super) fn model(&self, source: &str, options: &SensorOptions) -> LearnedSensor {
+        LearnedSensor { report: self.report(source, options), profile: self.profile(options) }
     }
 
     fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
         let n = self.readings.len() as u64;
-        let all: Vec<&Reading> = self.readings.iter().collect();
+        let all: Vec<&LabeledReading> = self.readings.iter().collect();
         let (confusion, distance) = (self.confusion(&all), self.distance(&all, self.classes));
         let by_class = self.by_class();
-        let tables: Vec<&Counts> = [&confusion, &distance].into_iter().chain(&by_class).collect();
+        let tables: Vec<&CountTable> =
+            [&confusion, &distance].into_iter().chain(&by_class).collect();
         SensorReport {
             source: source.to_owned(),
             measurements: n,
@@ -69,8 +70,11 @@ impl ReadingLog<'_> {
             detection: None,
             against_map: None,
             probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
-            thin: tables.iter().flat_map(|t| t.thin(options.estimate.thin_below)).collect(),
-            hold_out: self.hold_out(options),
+            thin: tables
+                .iter()
+                .flat_map(|t| t.low_count_rows(options.estimate.thin_below))
+                .collect(),
+            hold_out: self.holdout_tests(options),
             estimate: options.estimate,
             warnings: Vec::new(),
             distance_counts: CountMatrix(distance.clone()),
@@ -78,18 +82,22 @@ impl ReadingLog<'_> {
         }
     }
 
-    fn confusion(&self, readings: &[&Reading]) -> Counts {
-        let mut counts = Counts::new("confusion", &self.observations, &self.observations);
+    fn confusion(&self, readings: &[&LabeledReading]) -> CountTable {
+        let mut counts = CountTable::new("confusion", &self.observations, &self.observations);
         readings.iter().for_each(|r| counts.add(r.truth, r.reported, 1.0));
         counts
     }
 
     /// Counts the confusion of objects in each distance class; `nothing` has none.
-    fn by_class(&self) -> Vec<Counts> {
+    fn by_class(&self) -> Vec<CountTable> {
         let table = |class: &String| {
-            Counts::new(&format!("confusion_{class}"), &self.observations[1..], &self.observations)
+            CountTable::new(
+                &format!("confusion_{class}"),
+                &self.observations[1..],
+                &self.observations,
+            )
         };
-        let mut tables: Vec<Counts> = self.classes.names.iter().map(table).collect();
+        let mut tables: Vec<CountTable> = self.classes.names.iter().map(table).collect();
         for reading in &self.readings {
             if let Some(distance) = reading.true_at {
                 tables[distance.class].add(reading.truth - 1, reading.reported, 1.0);
@@ -98,62 +106,63 @@ impl ReadingLog<'_> {
         tables
     }
 
-    fn distance(&self, readings: &[&Reading], classes: &DistanceClasses) -> Counts {
-        let mut counts = Counts::new("distance", &classes.names, &classes.names);
-        for (truth, reported) in readings.iter().filter_map(|r| r.right_distances()) {
+    fn distance(&self, readings: &[&LabeledReading], classes: &DistanceClasses) -> CountTable {
+        let mut counts = CountTable::new("distance", &classes.names, &classes.names);
+        for (truth, reported) in readings.iter().filter_map(|r| r.correct_distances()) {
             counts.add(truth.class, reported.class, 1.0);
         }
         counts
     }
 
     fn three_classes(&self) -> Option<CountMatrix> {
-        let classes = DistanceClasses::very_near_near_far();
-        let mut counts = Counts::new("distance3", &classes.names, &classes.names);
-        for (truth_m, reported_m) in self.right_ranges_m() {
-            counts.add(classes.of(truth_m), classes.of(reported_m), 1.0);
+        let classes = DistanceClasses::three_classes();
+        let mut counts = CountTable::new("distance3", &classes.names, &classes.names);
+        for (truth_m, reported_m) in self.correct_ranges_m() {
+            counts.add(classes.class_of(truth_m), classes.class_of(reported_m), 1.0);
         }
         (counts.cells().iter().flatten().sum::<f64>() > 0.0).then_some(CountMatrix(counts))
     }
 
-    fn right_ranges_m(&self) -> impl Iterator<Item = (f64, f64)> {
-        let right = self.readings.iter().filter_map(Reading::right_distances);
+    fn correct_ranges_m(&self) -> impl Iterator<Item = (f64, f64)> {
+        let right = self.readings.iter().filter_map(LabeledReading::correct_distances);
         right.filter_map(|(truth, reported)| Some((truth.range_m?, reported.range_m?)))
     }
 
     fn errors(&self) -> ErrorMoments {
         let in_class = |class: usize| {
-            let ranges = self.right_ranges_m().filter(move |r| self.classes.of(r.0) == class);
-            Moments::of(ranges.map(|(truth_m, reported_m)| reported_m - truth_m))
+            let ranges =
+                self.correct_ranges_m().filter(move |r| self.classes.class_of(r.0) == class);
+            Moments::from_values(ranges.map(|(truth_m, reported_m)| reported_m - truth_m))
         };
         ErrorMoments {
-            range_error_m: Moments::of(self.right_ranges_m().map(|(t, r)| r - t)),
+            range_error_m: Moments::from_values(self.correct_ranges_m().map(|(t, r)| r - t)),
             range_error_by_true_class: (0..self.classes.len()).map(in_class).collect(),
             bearing_error_rad: None,
         }
     }
 
     /// Counts the classes of reports where nothing was.
-    fn beyond(&self) -> Counts {
-        let mut counts = Counts::new(BEYOND, &[BEYOND.to_string()], &self.classes.names);
+    fn beyond(&self) -> CountTable {
+        let mut counts = CountTable::new(BEYOND, &[BEYOND.to_string()], &self.classes.names);
         let spurious = self.readings.iter().filter(|r| r.truth == 0);
         spurious.filter_map(|r| r.reported_at).for_each(|at| counts.add(0, at.class, 1.0));
         counts
     }
 
-    fn hold_out(&self, options: &SensorOptions) -> Vec<Fit> {
+    fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
         let alpha = options.estimate.alpha;
         let (train, held) = split(&self.readings, options.estimate.hold_out_every);
-        let distance = |part: &[&Reading]| self.distance(part, self.classes);
+        let distance = |part: &[&LabeledReading]| self.distance(part, self.classes);
         vec![
-            fit(&self.confusion(&train), &self.confusion(&held), alpha),
-            fit(&distance(&train), &distance(&held), alpha),
+            holdout_test(&self.confusion(&train), &self.confusion(&held), alpha),
+            holdout_test(&distance(&train), &distance(&held), alpha),
         ]
     }
 
     fn profile(&self, options: &SensorOptions) -> SensorProfile {
         let alpha = options.estimate.alpha;
         let mut assumed = Vec::new();
-        let all: Vec<&Reading> = self.readings.iter().collect();
+        let all: Vec<&LabeledReading> = self.readings.iter().collect();
         let confusion = self.confusion_rows(&self.confusion(&all), alpha, &mut assumed);
         let distance = self.distance(&all, self.classes);
         SensorProfile {
@@ -181,14 +190,14 @@ impl ReadingLog<'_> {
 
     fn confusion_rows(
         &self,
-        counts: &Counts,
+        counts: &CountTable,
         alpha: f64,
         assumed: &mut Vec<String>,
     ) -> Vec<NamedRow> {
         let row = |(index, name): (usize, &String)| {
             let row = counts.smoothed(index, alpha).unwrap_or_else(|| {
                 assumed.push(format!("confusion of {name}: reported truly"));
-                truly(self.observations.len(), index)
+                certain_row(self.observations.len(), index)
             });
             NamedRow::new(name, &row)
         };
@@ -201,7 +210,7 @@ impl ReadingLog<'_> {
         if self.readings.iter().all(|reading| reading.true_at.is_none()) {
             return Vec::new();
         }
-        let rows = |counts: &Counts| {
+        let rows = |counts: &CountTable| {
             let row = |index: usize| match counts.smoothed(index, alpha) {
                 Some(row) => NamedRow::new(&counts.rows()[index], &row),
                 None => pooled[index + 1].clone(),
@@ -216,7 +225,7 @@ impl ReadingLog<'_> {
 mod tests {
     use super::*;
 
-    fn learned(text: &str, options: &SensorOptions) -> Result<SensorModel, InputError> {
+    fn learned(text: &str, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
         learn(&CsvTable::parse(&"f.csv", text)?, options, &options.check()?)
     }
 

@@ -3,17 +3,17 @@
 use serde::Serialize;
 
 use super::options::DistanceClasses;
-use super::sighting::{others, position_of};
-use crate::learn::Counts;
+use super::sighting::{other_subjects, position_of};
+use crate::learn::CountTable;
 use crate::learn::track::pose_at;
 use sidestep_import::mrclam::{Dataset, RobotLog};
 
 /// Half of the angle within which a subject is surely in view.
-const FIELD_HALF_RAD: f64 = 0.40;
+const HALF_FIELD_OF_VIEW_RAD: f64 = 0.40;
 /// Length of a bin in seconds.
 const BIN_SECS: f64 = 1.0;
 /// Largest number of bins; a longer log (eleven days) is taken for damaged time stamps.
-const BINS_MAX: f64 = 1e6;
+const MAX_BINS: f64 = 1e6;
 
 /// Detection by distance class: rows are classes, columns `seen` and `missed`.
 ///
@@ -25,27 +25,27 @@ pub struct Detection {
     /// Number of bins, over all observers, in which the observer's pose is known.
     pub looks: u64,
     /// Counts over all subjects.
-    pub all: Counts,
+    pub all: CountTable,
     /// Counts over robots only.
-    pub robots: Counts,
+    pub robots: CountTable,
     /// Counts over landmarks only.
-    pub landmarks: Counts,
+    pub landmarks: CountTable,
 }
 
 impl Detection {
     /// Returns the tables, most general first.
-    pub fn tables(&self) -> [&Counts; 3] {
+    pub fn tables(&self) -> [&CountTable; 3] {
         [&self.all, &self.robots, &self.landmarks]
     }
 
     /// Counts of `views`.
-    pub(super) fn of<'a>(
-        views: impl IntoIterator<Item = &'a View>,
+    pub(super) fn from_views<'a>(
+        views: impl IntoIterator<Item = &'a SubjectView>,
         looks: u64,
         classes: &DistanceClasses,
     ) -> Self {
         let columns = ["seen", "missed"].map(String::from);
-        let table = |name: &str| Counts::new(name, &classes.names, &columns);
+        let table = |name: &str| CountTable::new(name, &classes.names, &columns);
         let mut detection = Self {
             looks,
             all: table("detection"),
@@ -64,7 +64,7 @@ impl Detection {
 
 /// One subject in view of one bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct View {
+pub(super) struct SubjectView {
     is_robot: bool,
     /// Distance class of the true range at mid-bin.
     class: usize,
@@ -73,7 +73,7 @@ pub(super) struct View {
 
 /// Returns all subjects in view, over all bins of all observers, and the number of bins with a
 /// pose.
-pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<View>, u64) {
+pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<SubjectView>, u64) {
     let mut views = Vec::new();
     let mut looks = 0;
     for (&observer, robot) in &dataset.robots {
@@ -82,7 +82,7 @@ pub(super) fn views(dataset: &Dataset, classes: &DistanceClasses) -> (Vec<View>,
         for (bin, read) in read.iter().enumerate() {
             let middle_secs = start_secs + (bin as f64 + 0.5) * BIN_SECS;
             looks += u64::from(pose_at(&robot.truth, middle_secs).is_some());
-            views.extend(in_view(dataset, observer, middle_secs, read, classes));
+            views.extend(subjects_in_view(dataset, observer, middle_secs, read, classes));
         }
     }
     (views, looks)
@@ -93,14 +93,14 @@ fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     let truth = robot.truth.iter().map(|sample| sample.t_secs);
     let commands = robot.commands.iter().map(|command| command.t_secs);
     let readings = robot.measurements.iter().map(|reading| reading.t_secs);
-    let (a, b, c) = (ends(truth)?, ends(commands)?, ends(readings)?);
+    let (a, b, c) = (first_and_last(truth)?, first_and_last(commands)?, first_and_last(readings)?);
     let start_secs = a.0.max(b.0).max(c.0);
     let n_bins = ((a.1.min(b.1).min(c.1) - start_secs) / BIN_SECS).floor();
-    (1.0..=BINS_MAX).contains(&n_bins).then_some((start_secs, n_bins as usize))
+    (1.0..=MAX_BINS).contains(&n_bins).then_some((start_secs, n_bins as usize))
 }
 
 /// Returns the first and last of the time stamps.
-fn ends(mut stamps: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+fn first_and_last(mut stamps: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let first = stamps.next()?;
     Some((first, stamps.last().unwrap_or(first)))
 }
@@ -123,20 +123,21 @@ fn codes_by_bin(
     read
 }
 
-fn in_view(
+fn subjects_in_view(
     dataset: &Dataset,
     observer: u32,
     t_secs: f64,
     read: &[u32],
     classes: &DistanceClasses,
-) -> Vec<View> {
+) -> Vec<SubjectView> {
     let Some(pose) = pose_at(&dataset.robots[&observer].truth, t_secs) else { return Vec::new() };
-    others(dataset, observer)
+    other_subjects(dataset, observer)
         .filter_map(|subject| {
-            let (range_m, bearing_rad) = pose.sees(position_of(dataset, subject, t_secs)?);
-            (bearing_rad.abs() <= FIELD_HALF_RAD).then(|| View {
+            let (range_m, bearing_rad) =
+                pose.range_and_bearing(position_of(dataset, subject, t_secs)?);
+            (bearing_rad.abs() <= HALF_FIELD_OF_VIEW_RAD).then(|| SubjectView {
                 is_robot: dataset.robots.contains_key(&subject),
-                class: classes.of(range_m),
+                class: classes.class_of(range_m),
                 seen: read.contains(&subject),
             })
         })
@@ -147,7 +148,7 @@ fn in_view(
 mod tests {
     use super::super::sighting::tests::{reading, scene};
     use super::*;
-    use sidestep_import::mrclam::Command;
+    use sidestep_import::mrclam::VelocityCommand;
 
     #[test]
     fn a_subject_in_view_is_seen_in_the_bins_in_which_it_was_read() {
@@ -157,11 +158,11 @@ mod tests {
             reading(1.3, 60, 2.06, 0.245),
             reading(4.0, 99, 2.06, 0.245),
         ]);
-        let command = |t_secs| Command { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
+        let command = |t_secs| VelocityCommand { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
         dataset.robots.get_mut(&1).unwrap().commands = vec![command(0.0), command(9.0)];
         let classes = DistanceClasses::new(&[2.5], &[]).unwrap();
         let (views, looks) = views(&dataset, &classes);
-        let detection = Detection::of(&views, looks, &classes);
+        let detection = Detection::from_views(&views, looks, &classes);
         assert_eq!(detection.looks, 4, "four whole bins; robot 2 logged no commands");
         assert_eq!(detection.landmarks.row(0), [2.0, 6.0]);
         assert_eq!(detection.robots.row(1), [0.0, 4.0]);
@@ -172,7 +173,7 @@ mod tests {
     fn a_log_with_absurd_time_stamps_has_no_bins() {
         let mut dataset = scene(vec![reading(0.0, 60, 2.0, 0.0), reading(1e12, 60, 2.0, 0.0)]);
         let robot = dataset.robots.get_mut(&1).unwrap();
-        let command = |t_secs| Command { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
+        let command = |t_secs| VelocityCommand { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
         robot.commands = vec![command(0.0), command(1e12)];
         robot.truth.last_mut().unwrap().t_secs = 1e12;
         assert_eq!(bins(robot), None);

@@ -29,17 +29,17 @@ mod tables;
 pub use camera::{NamedRow, SensorProfile};
 pub use detection::Detection;
 pub use options::SensorOptions;
-pub use report::{AgainstMap, ErrorMoments, SensorReport};
+pub use report::{ErrorMoments, MapComparison, SensorReport};
 
 use std::path::Path;
 
-use sidestep_import::bag::Wanted;
+use sidestep_import::bag::TopicSelection;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
 /// A learned sensor: its counts, and the rows from which a simulation draws.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SensorModel {
+pub struct LearnedSensor {
     /// Counts, probabilities with intervals, fit; serializable and printable.
     pub report: SensorReport,
     /// The sensor in the form of a profile.
@@ -50,7 +50,7 @@ pub struct SensorModel {
 ///
 /// # Errors
 /// When a file is missing or damaged, or `options` are not valid.
-pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<SensorModel, InputError> {
+pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
     let dataset = sidestep_import::mrclam::read(folder)?;
     mrclam::learn(&folder.display().to_string(), &dataset, options, &classes)
@@ -74,15 +74,15 @@ pub struct Scanner<'a> {
 /// are skipped, and so are ranges below the least that the scanner measures.
 ///
 /// # Errors
-/// Those of [`bag::read`](sidestep_import::bag::read) and [`pixel_map`](sidestep_import::pixel_map); when scans
+/// Those of [`bag::read`](sidestep_import::bag::read) and [`load_pixel_map`](sidestep_import::pixel_map); when scans
 /// are not wanted, no beam can be judged, or `options` are not valid.
 pub fn from_bag(
     path: &Path,
-    wanted: &Wanted,
+    wanted: &TopicSelection,
     scanner: &Scanner<'_>,
     options: &SensorOptions,
-) -> Result<SensorModel, InputError> {
-    let map = sidestep_import::pixel_map(scanner.map, None)?.ok_or_else(|| {
+) -> Result<LearnedSensor, InputError> {
+    let map = sidestep_import::load_pixel_map(scanner.map, None)?.ok_or_else(|| {
         let remedy = "name the .yaml file of a ROS map";
         InputError::new(scanner.map.display(), "this is no map of pixels", remedy)
     })?;
@@ -90,7 +90,7 @@ pub fn from_bag(
     let Some(scan) = log.scans.first() else {
         return Err(InputError::new(source, "no scans were read", "name the topic of the scans"));
     };
-    let options = bag::fan(options, scan, scanner.range_m, scanner.bearings_deg);
+    let options = bag::scan_options(options, scan, scanner.range_m, scanner.bearings_deg);
     let classes = options.check()?;
     bag::learn(&source, &log, &map, &options, &classes)
 }
@@ -110,7 +110,7 @@ pub fn from_bag(
 ///
 /// # Errors
 /// When the file is missing or damaged, or `options` are not valid.
-pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<SensorModel, InputError> {
+pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     learn_csv(&CsvTable::read(file)?, options)
 }
 
@@ -118,7 +118,7 @@ pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<SensorModel, Inp
 ///
 /// # Errors
 /// When the table is damaged or `options` are not valid.
-pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<SensorModel, InputError> {
+pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
     csv::learn(table, options, &classes)
 }

@@ -4,7 +4,7 @@ use crate::learn::EstimateOptions;
 use sidestep_kernel::InputError;
 
 /// Largest number of distance classes; more are taken for a mistake.
-const CLASSES_MAX: usize = 64;
+const MAX_CLASSES: usize = 64;
 
 /// Options of learning a sensor.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +68,7 @@ impl DistanceClasses {
         let edges_m = edges_m.strip_prefix(&[0.0]).unwrap_or(edges_m).to_vec();
         let increasing = edges_m.windows(2).all(|pair| pair[0] < pair[1]);
         let positive = edges_m.iter().all(|edge| edge.is_finite() && *edge > 0.0);
-        if !increasing || !positive || edges_m.len() >= CLASSES_MAX {
+        if !increasing || !positive || edges_m.len() >= MAX_CLASSES {
             let cause = format!("{edges_m:?} do not cut distances into classes");
             let remedy = "give fewer than 64 increasing, positive distances in m";
             return Err(InputError::new("distance edges", cause, remedy));
@@ -77,10 +77,10 @@ impl DistanceClasses {
             [] => (0..=edges_m.len()).map(|i| format!("d{i}")).collect(),
             names => names.to_vec(),
         };
-        Self { edges_m, names }.with_sound_names()
+        Self { edges_m, names }.with_checked_names()
     }
 
-    fn with_sound_names(self) -> Result<Self, InputError> {
+    fn with_checked_names(self) -> Result<Self, InputError> {
         let mut distinct: Vec<&String> = self.names.iter().collect();
         distinct.sort();
         distinct.dedup();
@@ -97,7 +97,7 @@ impl DistanceClasses {
     }
 
     /// Returns the three classes that every report has, cut at [`THREE_EDGES_M`].
-    pub(super) fn very_near_near_far() -> Self {
+    pub(super) fn three_classes() -> Self {
         Self {
             edges_m: THREE_EDGES_M[1..].to_vec(),
             names: ["very_near", "near", "far"].map(String::from).to_vec(),
@@ -109,7 +109,7 @@ impl DistanceClasses {
     }
 
     /// Returns the class of a distance in meters; an edge belongs to the farther class.
-    pub(super) fn of(&self, distance_m: f64) -> usize {
+    pub(super) fn class_of(&self, distance_m: f64) -> usize {
         self.edges_m.partition_point(|edge| *edge <= distance_m)
     }
 
@@ -133,7 +133,7 @@ mod tests {
     fn an_edge_belongs_to_the_farther_class_and_a_leading_zero_adds_none() {
         let classes = DistanceClasses::new(&[0.0, 2.0, 4.0], &[]).unwrap();
         assert_eq!(classes.names, ["d0", "d1", "d2"]);
-        assert_eq!([1.99, 2.0, 3.9, 4.0, 9.0].map(|d| classes.of(d)), [0, 1, 1, 2, 2]);
+        assert_eq!([1.99, 2.0, 3.9, 4.0, 9.0].map(|d| classes.class_of(d)), [0, 1, 1, 2, 2]);
         assert_eq!(classes.edges_from_zero_m(), [0.0, 2.0, 4.0]);
     }
 

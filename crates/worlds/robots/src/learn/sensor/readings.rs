@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 
 use super::camera::NOTHING;
 use super::options::{BEYOND, DistanceClasses};
-use sidestep_import::table::{CsvRow, CsvTable, Word};
+use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
 
 /// Largest number of observations; a column with more is taken for a column of numbers.
-const OBSERVATIONS_MAX: usize = 250;
+const MAX_OBSERVATIONS: usize = 250;
 
 /// One row of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reading {
+pub(super) struct LabeledReading {
     /// Index of the true observation; 0 is `nothing`.
     pub(super) truth: usize,
     /// Index of the reported one.
@@ -23,9 +23,9 @@ pub(super) struct Reading {
     pub(super) reported_at: Option<Distance>,
 }
 
-impl Reading {
+impl LabeledReading {
     /// Returns true and reported distance of a correct report of something.
-    pub(super) fn right_distances(&self) -> Option<(Distance, Distance)> {
+    pub(super) fn correct_distances(&self) -> Option<(Distance, Distance)> {
         (self.truth == self.reported).then_some((self.true_at?, self.reported_at?))
     }
 
@@ -50,8 +50,8 @@ pub(super) fn read(
     table: &CsvTable,
     wanted: Option<&str>,
     classes: &DistanceClasses,
-) -> Result<(Vec<String>, Vec<Reading>), InputError> {
-    let columns = Columns::find(table)?;
+) -> Result<(Vec<String>, Vec<LabeledReading>), InputError> {
+    let columns = ReadingColumns::find(table)?;
     let rows = rows_of_sensor(table, wanted)?;
     let observations = observations(table.place(), &rows, &columns)?;
     let parser = RowParser { place: table.place(), columns, observations, classes };
@@ -60,7 +60,7 @@ pub(super) fn read(
 }
 
 /// The indices of the columns.
-struct Columns {
+struct ReadingColumns {
     truth: usize,
     reported: usize,
     true_at: usize,
@@ -69,7 +69,7 @@ struct Columns {
     in_meters: bool,
 }
 
-impl Columns {
+impl ReadingColumns {
     fn find(table: &CsvTable) -> Result<Self, InputError> {
         let in_meters = table.find("true_class").is_none();
         let [true_at, reported_at] = if in_meters {
@@ -112,7 +112,7 @@ fn rows_of_sensor<'t>(
 fn observations(
     place: &str,
     rows: &[CsvRow<'_>],
-    columns: &Columns,
+    columns: &ReadingColumns,
 ) -> Result<Vec<String>, InputError> {
     let words = rows.iter().flat_map(|row| [row.field(columns.truth), row.field(columns.reported)]);
     let mut names = BTreeSet::new();
@@ -122,8 +122,8 @@ fn observations(
             return Err(word.error(&place, "the observation is empty".to_string(), remedy));
         }
         names.insert(word.text);
-        if names.len() >= OBSERVATIONS_MAX {
-            let cause = format!("{OBSERVATIONS_MAX} different observations or more");
+        if names.len() >= MAX_OBSERVATIONS {
+            let cause = format!("{MAX_OBSERVATIONS} different observations or more");
             return Err(word.error(&place, cause, "name kinds of things, not measurements"));
         }
     }
@@ -134,19 +134,19 @@ fn observations(
 /// Turns rows into readings.
 struct RowParser<'a> {
     place: &'a str,
-    columns: Columns,
+    columns: ReadingColumns,
     observations: Vec<String>,
     classes: &'a DistanceClasses,
 }
 
 impl RowParser<'_> {
-    fn reading(&self, row: &CsvRow<'_>) -> Result<Reading, InputError> {
+    fn reading(&self, row: &CsvRow<'_>) -> Result<LabeledReading, InputError> {
         let truth = self.observation(row.field(self.columns.truth));
         let reported = self.observation(row.field(self.columns.reported));
         // A distance beside `nothing` is ignored, but it must still be a valid distance.
         let true_at = self.distance(row.field(self.columns.true_at))?;
         let reported_at = self.distance(row.field(self.columns.reported_at))?;
-        Ok(Reading {
+        Ok(LabeledReading {
             truth,
             reported,
             true_at: true_at.filter(|_| truth != 0),
@@ -154,12 +154,12 @@ impl RowParser<'_> {
         })
     }
 
-    fn observation(&self, word: Word<'_>) -> usize {
+    fn observation(&self, word: Token<'_>) -> usize {
         let found = self.observations.iter().position(|name| name == word.text);
         found.expect("every observation of the file was collected")
     }
 
-    fn distance(&self, word: Word<'_>) -> Result<Option<Distance>, InputError> {
+    fn distance(&self, word: Token<'_>) -> Result<Option<Distance>, InputError> {
         match word.text {
             "" | BEYOND => Ok(None),
             _ if self.columns.in_meters => self.range(word).map(Some),
@@ -167,16 +167,16 @@ impl RowParser<'_> {
         }
     }
 
-    fn range(&self, word: Word<'_>) -> Result<Distance, InputError> {
+    fn range(&self, word: Token<'_>) -> Result<Distance, InputError> {
         let range_m = word.number(&self.place)?;
         if range_m < 0.0 {
             let cause = format!("a distance of {range_m} m");
             return Err(word.error(&self.place, cause, "give a distance of at least 0 m"));
         }
-        Ok(Distance { class: self.classes.of(range_m), range_m: Some(range_m) })
+        Ok(Distance { class: self.classes.class_of(range_m), range_m: Some(range_m) })
     }
 
-    fn class(&self, word: Word<'_>) -> Result<Distance, InputError> {
+    fn class(&self, word: Token<'_>) -> Result<Distance, InputError> {
         let names = &self.classes.names;
         let class = names.iter().position(|name| name == word.text).ok_or_else(|| {
             let cause = format!("`{}` is not a distance class", word.text);

@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::detection::Detection;
 use super::sighting::is_consistent;
-use crate::learn::display::{self, Heading};
-use crate::learn::holdout::Fit;
-use crate::learn::{CountMatrix, Counts, Estimate, EstimateOptions, ThinRow};
+use crate::learn::display::{self, TableHeading};
+use crate::learn::holdout::HoldoutTest;
+use crate::learn::{CountMatrix, CountTable, Estimate, EstimateOptions, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned sensor. Displayed as readable tables, serialized for programs.
@@ -32,9 +32,9 @@ pub struct SensorReport {
     /// Barcodes that no subject has, and how often they were read.
     pub unknown_codes: BTreeMap<u32, u64>,
     /// Counts of the true against the reported value: `{true: {reported: count}}`.
-    pub confusion: Counts,
+    pub confusion: CountTable,
     /// The same by kind of subject.
-    pub kinds: Option<Counts>,
+    pub kinds: Option<CountTable>,
     /// Lower edges of the distance classes in meters.
     pub distance_edges_m: Vec<f64>,
     /// Names of the distance classes.
@@ -58,14 +58,14 @@ pub struct SensorReport {
     pub detection: Option<Detection>,
     /// Counts of beams by how they agree with a map.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub against_map: Option<AgainstMap>,
+    pub against_map: Option<MapComparison>,
     /// Every estimated probability with its count and interval. Of `confusion`, only the cells with
     /// counts.
     pub probabilities: Vec<Estimate>,
     /// Rows with few counts.
-    pub thin: Vec<ThinRow>,
+    pub thin: Vec<LowCountRow>,
     /// Tests of how well a part of the events predicts the rest.
-    pub hold_out: Vec<Fit>,
+    pub hold_out: Vec<HoldoutTest>,
     /// The rule by which counts become probabilities.
     pub estimate: EstimateOptions,
     /// Warnings that the reader should see before trusting the numbers.
@@ -87,7 +87,7 @@ pub struct ErrorMoments {
 /// Numbers of beams by the thing they met against the map at that place. A range agrees with the map as that
 /// of a sighting with its subject: within half a meter, or a quarter of the range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct AgainstMap {
+pub struct MapComparison {
     /// The wall was met where it is, or nothing where nothing is.
     pub agreeing: u64,
     /// Nothing was met where a wall is.
@@ -100,9 +100,9 @@ pub struct AgainstMap {
     pub not_there: u64,
 }
 
-impl AgainstMap {
+impl MapComparison {
     /// Counts expected against measured ranges in meters; `None` stands for nothing.
-    pub(super) fn of(ranges_m: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Self {
+    pub(super) fn from_ranges(ranges_m: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Self {
         let mut counts = Self::default();
         for pair in ranges_m {
             *match pair {
@@ -138,7 +138,7 @@ impl AgainstMap {
     }
 }
 
-impl fmt::Display for AgainstMap {
+impl fmt::Display for MapComparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rows = [
             (self.agreeing, "as the map has it"),
@@ -166,14 +166,18 @@ impl fmt::Display for SensorReport {
         if let Some(beams) = &self.against_map {
             write!(f, "{beams}")?;
         }
-        display::warnings(f, &self.warnings)?;
+        display::write_warnings(f, &self.warnings)?;
         let moments = [
             ("range error [m]", self.errors.range_error_m),
             ("bearing error [rad]", self.errors.bearing_error_rad),
         ];
-        display::moments(f, &moments.map(|(name, m)| (name.to_string(), m)))?;
-        display::estimates(f, &self.probabilities, &Heading { row: "true", column: "reported" })?;
-        display::thin(f, &self.thin, self.estimate.thin_below)?;
-        display::hold_out(f, &self.hold_out)
+        display::write_moments(f, &moments.map(|(name, m)| (name.to_string(), m)))?;
+        display::write_estimates(
+            f,
+            &self.probabilities,
+            &TableHeading { row: "true", column: "reported" },
+        )?;
+        display::write_low_count_rows(f, &self.thin, self.estimate.thin_below)?;
+        display::write_holdout_tests(f, &self.hold_out)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::learn::track::{Pose, pose_at};
+use crate::learn::track::{Pose2, pose_at};
 use sidestep_import::mrclam::{Dataset, Measurement};
 use sidestep_kernel::math::wrap_angle;
 
@@ -11,11 +11,11 @@ const BEARING_TOLERANCE_RAD: f64 = 0.15;
 /// ... and the range by no more than the greater of this ...
 const RANGE_TOLERANCE_M: f64 = 0.5;
 /// ... and this share of the true range.
-const RANGE_TOLERANCE_SHARE: f64 = 0.25;
+const RANGE_TOLERANCE_FRACTION: f64 = 0.25;
 /// Spread of the bearing by which candidates are weighed.
 const BEARING_SPREAD_RAD: f64 = 0.03;
 /// Spread of the range by which candidates are weighed, as a share of the true range.
-const RANGE_SPREAD_SHARE: f64 = 0.1;
+const RANGE_SPREAD_FRACTION: f64 = 0.1;
 
 /// One judged reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,7 @@ impl Sighting {
     }
 
     /// Returns the true subject's geometry, where the reading named it.
-    pub(super) fn correct(&self) -> Option<Candidate> {
+    pub(super) fn correct_candidate(&self) -> Option<Candidate> {
         self.truth.filter(|candidate| self.decoded == Some(candidate.subject))
     }
 }
@@ -59,14 +59,14 @@ pub(super) struct Candidate {
 
 /// The reason why a reading cannot be judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Skip {
+pub(super) enum SkipReason {
     /// The observer's own pose is unknown at that time.
     ObserverLost,
     /// The pose of the decoded robot is unknown at that time.
     SubjectLost,
 }
 
-impl Skip {
+impl SkipReason {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::ObserverLost => "observer_without_ground_truth",
@@ -76,12 +76,12 @@ impl Skip {
 }
 
 /// Judges all readings of all robots; the others are counted by cause.
-pub(super) fn judge_all(dataset: &Dataset) -> (Vec<Sighting>, BTreeMap<Skip, u64>) {
+pub(super) fn associate_all(dataset: &Dataset) -> (Vec<Sighting>, BTreeMap<SkipReason, u64>) {
     let mut sightings = Vec::new();
     let mut skipped = BTreeMap::new();
     for (&observer, robot) in &dataset.robots {
         for measurement in &robot.measurements {
-            match judge(dataset, observer, measurement) {
+            match associate(dataset, observer, measurement) {
                 Ok(sighting) => sightings.push(sighting),
                 Err(cause) => *skipped.entry(cause).or_insert(0) += 1,
             }
@@ -90,16 +90,20 @@ pub(super) fn judge_all(dataset: &Dataset) -> (Vec<Sighting>, BTreeMap<Skip, u64
     (sightings, skipped)
 }
 
-fn judge(dataset: &Dataset, observer: u32, reading: &Measurement) -> Result<Sighting, Skip> {
+fn associate(
+    dataset: &Dataset,
+    observer: u32,
+    reading: &Measurement,
+) -> Result<Sighting, SkipReason> {
     let own_track = &dataset.robots[&observer].truth;
-    let pose = pose_at(own_track, reading.t_secs).ok_or(Skip::ObserverLost)?;
+    let pose = pose_at(own_track, reading.t_secs).ok_or(SkipReason::ObserverLost)?;
     let decoded = dataset.subject_of_barcode.get(&reading.barcode).copied();
-    let candidates = consistent(dataset, observer, &pose, reading);
+    let candidates = consistent_candidates(dataset, observer, &pose, reading);
     let nearest = candidates.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit)).copied();
     let as_decoded = candidates.iter().find(|c| Some(c.subject) == decoded).copied();
     let lost = |subject| position_of(dataset, subject, reading.t_secs).is_none();
     if as_decoded.is_none() && decoded.is_some_and(lost) {
-        return Err(Skip::SubjectLost);
+        return Err(SkipReason::SubjectLost);
     }
     Ok(Sighting {
         observer,
@@ -113,36 +117,42 @@ fn judge(dataset: &Dataset, observer: u32, reading: &Measurement) -> Result<Sigh
 }
 
 /// Returns all other subjects that are consistent with the reading, by subject number.
-fn consistent(
+fn consistent_candidates(
     dataset: &Dataset,
     observer: u32,
-    pose: &Pose,
+    pose: &Pose2,
     reading: &Measurement,
 ) -> Vec<Candidate> {
-    others(dataset, observer)
+    other_subjects(dataset, observer)
         .filter_map(|subject| {
-            let (range_m, bearing_rad) = pose.sees(position_of(dataset, subject, reading.t_secs)?);
-            weigh(subject, range_m, bearing_rad, reading)
+            let (range_m, bearing_rad) =
+                pose.range_and_bearing(position_of(dataset, subject, reading.t_secs)?);
+            weighted_candidate(subject, range_m, bearing_rad, reading)
         })
         .collect()
 }
 
 /// Returns whether a measured range may be that of something at a true range.
 pub(super) fn is_consistent(true_m: f64, measured_m: f64) -> bool {
-    let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_SHARE * true_m);
+    let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_FRACTION * true_m);
     (measured_m - true_m).abs() <= tolerance_m
 }
 
-fn weigh(subject: u32, range_m: f64, bearing_rad: f64, reading: &Measurement) -> Option<Candidate> {
+fn weighted_candidate(
+    subject: u32,
+    range_m: f64,
+    bearing_rad: f64,
+    reading: &Measurement,
+) -> Option<Candidate> {
     let off_rad = wrap_angle(reading.bearing_rad - bearing_rad).abs();
     let off_m = (reading.range_m - range_m).abs();
-    let (u, v) = (off_rad / BEARING_SPREAD_RAD, off_m / (RANGE_SPREAD_SHARE * range_m));
+    let (u, v) = (off_rad / BEARING_SPREAD_RAD, off_m / (RANGE_SPREAD_FRACTION * range_m));
     let is_near = off_rad <= BEARING_TOLERANCE_RAD && is_consistent(range_m, reading.range_m);
     is_near.then_some(Candidate { subject, range_m, bearing_rad, misfit: u * u + v * v })
 }
 
 /// Returns all subjects but `observer`: robots, then landmarks.
-pub(super) fn others(dataset: &Dataset, observer: u32) -> impl Iterator<Item = u32> {
+pub(super) fn other_subjects(dataset: &Dataset, observer: u32) -> impl Iterator<Item = u32> {
     let subjects = dataset.robots.keys().chain(dataset.landmarks.keys());
     subjects.copied().filter(move |subject| *subject != observer)
 }
@@ -159,14 +169,14 @@ pub(super) fn position_of(dataset: &Dataset, subject: u32, t_secs: f64) -> Optio
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use sidestep_import::mrclam::{RobotLog, TruePose};
+    use sidestep_import::mrclam::{RobotLog, StampedPose2};
 
     /// Robot 1 stands at the origin and looks along x from t = 0 to 10 s; robot 2 stands at
     /// (3, 0) until t = 5 s; landmarks 6 and 7 at (2, 0.5) and (2, -0.5). Barcodes are ten
     /// times the subject.
     pub(in crate::learn::sensor) fn scene(measurements: Vec<Measurement>) -> Dataset {
         let still = |x: f64, until: u32| {
-            let at = |i| TruePose {
+            let at = |i| StampedPose2 {
                 t_secs: f64::from(i) * 0.25,
                 position_m: [x, 0.0],
                 heading_rad: 0.0,
@@ -191,18 +201,18 @@ pub(super) mod tests {
         Measurement { t_secs, barcode, range_m, bearing_rad }
     }
 
-    fn judged(reading: Measurement) -> Result<Option<u32>, Skip> {
-        judge(&scene(Vec::new()), 1, &reading).map(|sighting| sighting.subject())
+    fn judged(reading: Measurement) -> Result<Option<u32>, SkipReason> {
+        associate(&scene(Vec::new()), 1, &reading).map(|sighting| sighting.subject())
     }
 
     #[test]
     fn a_consistent_decoded_subject_is_the_true_one_though_another_is_nearer() {
         // Between robot 2 and landmark 6, both within the tolerance, the robot closer.
-        let sighting = judge(&scene(Vec::new()), 1, &reading(1.0, 60, 2.5, 0.11)).unwrap();
+        let sighting = associate(&scene(Vec::new()), 1, &reading(1.0, 60, 2.5, 0.11)).unwrap();
         assert_eq!((sighting.nearest, sighting.subject()), (Some(2), Some(6)));
-        let misread = judge(&scene(Vec::new()), 1, &reading(1.0, 70, 2.06, 0.245)).unwrap();
+        let misread = associate(&scene(Vec::new()), 1, &reading(1.0, 70, 2.06, 0.245)).unwrap();
         assert_eq!((misread.subject(), misread.decoded), (Some(6), Some(7)));
-        assert_eq!(misread.correct(), None);
+        assert_eq!(misread.correct_candidate(), None);
     }
 
     #[test]
@@ -213,8 +223,8 @@ pub(super) mod tests {
 
     #[test]
     fn a_lost_observer_or_decoded_robot_skips_the_reading() {
-        assert_eq!(judged(reading(11.0, 60, 2.0, 0.0)), Err(Skip::ObserverLost));
-        assert_eq!(judged(reading(6.0, 20, 3.0, 0.0)), Err(Skip::SubjectLost));
+        assert_eq!(judged(reading(11.0, 60, 2.0, 0.0)), Err(SkipReason::ObserverLost));
+        assert_eq!(judged(reading(6.0, 20, 3.0, 0.0)), Err(SkipReason::SubjectLost));
         assert_eq!(judged(reading(6.0, 10, 2.06, 0.245)), Ok(Some(6)), "one's own code");
     }
 

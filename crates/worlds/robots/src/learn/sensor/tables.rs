@@ -2,7 +2,7 @@
 
 use super::options::{BEYOND, DistanceClasses};
 use super::sighting::{Candidate, Sighting};
-use crate::learn::Counts;
+use crate::learn::CountTable;
 use sidestep_import::mrclam::Dataset;
 
 /// Row of a table of kinds, and column: a robot.
@@ -10,19 +10,19 @@ pub(super) const ROBOT: usize = 0;
 /// Row of a table of kinds, and column: a landmark.
 pub(super) const LANDMARK: usize = 1;
 /// Row of a table of kinds: no subject. The column is a code that no subject has.
-pub(super) const NOBODY: usize = 2;
+pub(super) const NO_SUBJECT: usize = 2;
 
 /// The names of a data set's subjects in tables.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Labels {
+pub(super) struct SubjectLabels {
     /// Subject numbers, in increasing order.
     subjects: Vec<u32>,
     /// Those that are robots.
     robots: Vec<u32>,
 }
 
-impl Labels {
-    pub(super) fn of(dataset: &Dataset) -> Self {
+impl SubjectLabels {
+    pub(super) fn from_dataset(dataset: &Dataset) -> Self {
         let robots: Vec<u32> = dataset.robots.keys().copied().collect();
         let mut subjects: Vec<u32> = robots.clone();
         subjects.extend(dataset.landmarks.keys());
@@ -40,19 +40,19 @@ impl Labels {
 
     fn kind(&self, subject: Option<u32>) -> usize {
         match subject {
-            None => NOBODY,
+            None => NO_SUBJECT,
             Some(subject) if self.robots.contains(&subject) => ROBOT,
             Some(_) => LANDMARK,
         }
     }
 
     /// Counts the true subject against the decoded subject.
-    pub(super) fn confusion(&self, sightings: &[Sighting]) -> Counts {
+    pub(super) fn confusion(&self, sightings: &[Sighting]) -> CountTable {
         let mut rows: Vec<String> = self.subjects.iter().map(|s| format!("S{s}")).collect();
         let mut columns = rows.clone();
         rows.push("NONE".to_string());
         columns.push("UNKNOWN".to_string());
-        let mut counts = Counts::new("confusion", &rows, &columns);
+        let mut counts = CountTable::new("confusion", &rows, &columns);
         for sighting in sightings {
             counts.add(self.index(sighting.subject()), self.index(sighting.decoded), 1.0);
         }
@@ -60,10 +60,13 @@ impl Labels {
     }
 
     /// Counts the same by kind.
-    pub(super) fn kinds<'a>(&self, sightings: impl IntoIterator<Item = &'a Sighting>) -> Counts {
+    pub(super) fn kinds<'a>(
+        &self,
+        sightings: impl IntoIterator<Item = &'a Sighting>,
+    ) -> CountTable {
         let rows = ["ROBOT", "LANDMARK", "NONE"].map(String::from);
         let columns = ["ROBOT", "LANDMARK", "UNKNOWN"].map(String::from);
-        let mut counts = Counts::new("kinds", &rows, &columns);
+        let mut counts = CountTable::new("kinds", &rows, &columns);
         for sighting in sightings {
             counts.add(self.kind(sighting.subject()), self.kind(sighting.decoded), 1.0);
         }
@@ -71,7 +74,7 @@ impl Labels {
     }
 
     /// Returns whether the true subject is of `kind`.
-    pub(super) fn is_of(&self, sighting: &Sighting, kind: usize) -> bool {
+    pub(super) fn is_of_kind(&self, sighting: &Sighting, kind: usize) -> bool {
         self.kind(sighting.subject()) == kind
     }
 }
@@ -81,28 +84,28 @@ pub(super) fn distance<'a>(
     name: &str,
     sightings: impl IntoIterator<Item = &'a Sighting>,
     classes: &DistanceClasses,
-) -> Counts {
-    let mut counts = Counts::new(name, &classes.names, &classes.names);
+) -> CountTable {
+    let mut counts = CountTable::new(name, &classes.names, &classes.names);
     for sighting in sightings {
-        if let Some(Candidate { range_m, .. }) = sighting.correct() {
-            counts.add(classes.of(range_m), classes.of(sighting.range_m), 1.0);
+        if let Some(Candidate { range_m, .. }) = sighting.correct_candidate() {
+            counts.add(classes.class_of(range_m), classes.class_of(sighting.range_m), 1.0);
         }
     }
     counts
 }
 
 /// Counts the class of the measured range where there was no subject.
-pub(super) fn beyond(sightings: &[Sighting], classes: &DistanceClasses) -> Counts {
-    let mut counts = Counts::new(BEYOND, &[BEYOND.to_string()], &classes.names);
+pub(super) fn beyond(sightings: &[Sighting], classes: &DistanceClasses) -> CountTable {
+    let mut counts = CountTable::new(BEYOND, &[BEYOND.to_string()], &classes.names);
     for sighting in sightings.iter().filter(|sighting| sighting.truth.is_none()) {
-        counts.add(0, classes.of(sighting.range_m), 1.0);
+        counts.add(0, classes.class_of(sighting.range_m), 1.0);
     }
     counts
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sighting::judge_all;
+    use super::super::sighting::associate_all;
     use super::super::sighting::tests::{reading, scene};
     use super::*;
 
@@ -114,15 +117,15 @@ mod tests {
             reading(1.0, 99, 3.0, 0.0),
             reading(1.0, 60, 1.0, -1.5),
         ]);
-        let (sightings, _) = judge_all(&dataset);
-        let labels = Labels::of(&dataset);
+        let (sightings, _) = associate_all(&dataset);
+        let labels = SubjectLabels::from_dataset(&dataset);
         let confusion = serde_json::to_value(labels.confusion(&sightings)).unwrap();
         let expected = serde_json::json!({
             "S2": {"S2": 1, "S6": 1, "UNKNOWN": 1}, "NONE": {"S6": 1}
         });
         assert_eq!(confusion, expected);
         assert_eq!(labels.kinds(&sightings).row(ROBOT), [1.0, 1.0, 1.0]);
-        assert_eq!(labels.kinds(&sightings).row(NOBODY), [0.0, 1.0, 0.0]);
+        assert_eq!(labels.kinds(&sightings).row(NO_SUBJECT), [0.0, 1.0, 0.0]);
         let classes = DistanceClasses::new(&[2.0, 3.1], &[]).unwrap();
         assert_eq!(distance("d", &sightings, &classes).row(1), [0.0, 0.0, 1.0]);
         assert_eq!(beyond(&sightings, &classes).row(0), [1.0, 0.0, 0.0]);

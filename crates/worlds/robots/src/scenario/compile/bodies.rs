@@ -1,30 +1,30 @@
 //! Properties that all bodies have in common: number, places, size, and how often they act.
 
-use super::super::{Period, Placing, Side};
+use super::super::{Period, SideBoxes, StartPose};
 use super::*;
 
 /// Bodies that a scenario describes together.
 #[derive(Debug)]
-pub(super) struct Group {
+pub(super) struct BodyGroup {
     pub(super) count: u64,
     /// Given places; drawn inside `region` where empty.
-    pub(super) places: Vec<Spanned<Placing>>,
+    pub(super) places: Vec<Spanned<StartPose>>,
     pub(super) region: Option<[u32; 4]>,
     pub(super) span: Range<usize>,
-    pub(super) ty: TypeOf,
+    pub(super) ty: GroupTypes,
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
 }
 
 /// One type for all of a group, or one for each body.
 #[derive(Debug)]
-pub(super) enum TypeOf {
-    All(u16),
-    Each(Vec<u16>),
+pub(super) enum GroupTypes {
+    Shared(u16),
+    PerBody(Vec<u16>),
 }
 
 impl Compiler<'_> {
-    pub(super) fn groups(&mut self) -> Result<Vec<Group>, InputError> {
+    pub(super) fn groups(&mut self) -> Result<Vec<BodyGroup>, InputError> {
         let robots = std::mem::take(&mut self.file.robots.0);
         let people = std::mem::take(&mut self.file.people.0);
         let doors = std::mem::take(&mut self.file.doors.0);
@@ -52,10 +52,10 @@ impl Compiler<'_> {
     }
 
     /// Returns the number of bodies: given, or that of the given places.
-    pub(super) fn count(
+    pub(super) fn body_count(
         &self,
         count: Option<&Spanned<u32>>,
-        places: &[Spanned<Placing>],
+        places: &[Spanned<StartPose>],
         span: &Range<usize>,
     ) -> Result<u64, InputError> {
         match count {
@@ -130,11 +130,11 @@ impl Compiler<'_> {
 }
 
 /// Returns the number of cycles from one action to the next.
-pub(super) fn cycles_of(period: Option<Period>) -> u32 {
+pub(super) fn period_cycles(period: Option<Period>) -> u32 {
     period.map_or(1, |period| period.get() as u32)
 }
 
 /// Returns width and height in boxes.
-pub(super) fn boxes(size: Option<[Side; 2]>) -> (u32, u32) {
+pub(super) fn size_boxes(size: Option<[SideBoxes; 2]>) -> (u32, u32) {
     size.map_or((1, 1), |[width, height]| (width.get() as u32, height.get() as u32))
 }

@@ -1,10 +1,10 @@
 //! Compilation of the map section to boxes.
 
 use super::*;
-use sidestep_import::AsBoxes;
+use sidestep_import::GridOptions;
 
 /// Farthest corner of a map: poses are recorded with 15 bits per coordinate.
-const MAX_SIDE: u32 = (1 << 15) - 2 * MAX_PATH as u32;
+const MAX_SIDE_BOXES: u32 = (1 << 15) - 2 * MAX_PATH_STEPS as u32;
 
 /// Returns the map of a scenario, and the doors that a generated office has.
 ///
@@ -16,9 +16,9 @@ pub(super) fn load_map(
 ) -> Result<(Arc<GridMap>, Vec<Rect>), InputError> {
     let (map, doors) = read_map(source, section)?;
     let error = |cause: String, remedy: String| Err(source.error(section.span(), cause, remedy));
-    if map.width() > MAX_SIDE || map.height() > MAX_SIDE {
+    if map.width() > MAX_SIDE_BOXES || map.height() > MAX_SIDE_BOXES {
         let cause = format!("a map of {} x {} boxes", map.width(), map.height());
-        return error(cause, format!("use larger boxes: at most {MAX_SIDE} a side"));
+        return error(cause, format!("use larger boxes: at most {MAX_SIDE_BOXES} a side"));
     }
     if map.count(Cell::Free) == 0 {
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
@@ -44,9 +44,9 @@ fn read_map(
     match (&s.file, &s.ascii, &s.office) {
         (Some(file), None, None) => {
             let resolution_m = s.resolution_m.map(f64::from);
-            let boxes = AsBoxes { box_size_m, resolution_m, unknown: s.unknown };
-            let map = sidestep_import::map_file(&source.path(file.get_ref()), boxes);
-            let map = map.map_err(|error| source.naming(file.span(), error))?;
+            let boxes = GridOptions { box_size_m, resolution_m, unknown: s.unknown };
+            let map = sidestep_import::load_map(&source.path(file.get_ref()), boxes);
+            let map = map.map_err(|error| source.with_key_at(file.span(), error))?;
             Ok((map, Vec::new()))
         }
         (None, Some(art), None) => {
@@ -56,7 +56,7 @@ fn read_map(
         }
         (None, None, Some(spec)) => {
             let office = spec.get_ref().build(box_size_m);
-            let office = office.map_err(|error| source.error_of(spec.span(), &error))?;
+            let office = office.map_err(|error| source.error_from(spec.span(), &error))?;
             Ok((office.map, office.doors))
         }
         _ => {

@@ -1,37 +1,37 @@
 //! Sections of people (any mobile objects) and doors.
 
-use super::super::Placing;
-use super::bodies::{Group, TypeOf, boxes, cycles_of};
+use super::super::StartPose;
+use super::bodies::{BodyGroup, GroupTypes, period_cycles, size_boxes};
 use super::*;
 use crate::effector::Side;
 
 /// Longest side of a door that a map brings, in boxes.
-const MAX_SIDE: u32 = 64;
+const MAX_DOOR_SIDE_BOXES: u32 = 64;
 
 /// Place of a door, and its columns and rows.
-type SizedPlace = (Spanned<Placing>, (u32, u32));
+type SizedPosition = (Spanned<StartPose>, (u32, u32));
 
 impl Compiler<'_> {
     pub(super) fn people(
         &mut self,
         s: &MoverSection,
         span: Range<usize>,
-    ) -> Result<Group, InputError> {
-        let count = self.count(s.count.as_ref(), &s.at, &span)?;
-        let size = boxes(s.size);
+    ) -> Result<BodyGroup, InputError> {
+        let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
+        let size = size_boxes(s.size);
         self.reach = self.reach.max(1);
         let step = [Transition { p: 1.0, path: vec![Side::Front], turn: 0 }];
         let actions = actions_at_headings(&[step.to_vec()], size, self.stride());
-        let straight = Chance::new(s.p_straight.map_or(0.8, f64::from));
+        let straight = Bernoulli::new(s.p_straight.map_or(0.8, f64::from));
         let ty = self.body_type(&s.kind, size, actions, Role::Mover(Mover { straight }))?;
-        let ty = TypeOf::All(self.add_type(ty, &span)?);
-        Ok(Group {
+        let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
+        Ok(BodyGroup {
             count,
             places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
             span,
             ty,
-            period: cycles_of(s.period),
+            period: period_cycles(s.period),
             phase: s.phase,
         })
     }
@@ -40,7 +40,7 @@ impl Compiler<'_> {
         &mut self,
         s: &DoorSection,
         span: Range<usize>,
-    ) -> Result<Group, InputError> {
+    ) -> Result<BodyGroup, InputError> {
         let doors = self.door_places(s, &span)?;
         let (mut places, mut types) = (Vec::new(), Vec::new());
         for (k, (place, size)) in doors.iter().enumerate() {
@@ -51,12 +51,12 @@ impl Compiler<'_> {
             types.push(self.add_type(ty, &span)?);
             places.push(place.clone());
         }
-        Ok(Group {
+        Ok(BodyGroup {
             count: doors.len() as u64,
             places,
             region: None,
             span,
-            ty: TypeOf::Each(types),
+            ty: GroupTypes::PerBody(types),
             period: 1,
             phase: Some(0),
         })
@@ -67,20 +67,23 @@ impl Compiler<'_> {
         &self,
         s: &DoorSection,
         span: &Range<usize>,
-    ) -> Result<Vec<SizedPlace>, InputError> {
+    ) -> Result<Vec<SizedPosition>, InputError> {
         let facing = Some(0);
         let given = s.at.iter().map(|place| {
-            let place = Spanned::new(place.span(), Placing { facing, ..*place.get_ref() });
-            (place, boxes(s.size))
+            let place = Spanned::new(place.span(), StartPose { facing, ..*place.get_ref() });
+            (place, size_boxes(s.size))
         });
         let mut doors: Vec<_> = given.collect();
         for rect in self.office_doors.iter().filter(|_| s.office) {
-            if [rect.width, rect.height].iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+            if [rect.width, rect.height]
+                .iter()
+                .any(|side| !(1..=MAX_DOOR_SIDE_BOXES).contains(side))
+            {
                 let cause = format!("a door of {} x {} boxes", rect.width, rect.height);
-                let remedy = format!("give 1 to {MAX_SIDE} boxes a side");
+                let remedy = format!("give 1 to {MAX_DOOR_SIDE_BOXES} boxes a side");
                 return Err(self.source.error(span.clone(), cause, remedy));
             }
-            let place = Placing { at: (rect.col, rect.row), facing };
+            let place = StartPose { at: (rect.col, rect.row), facing };
             doors.push((Spanned::new(span.clone(), place), (rect.width, rect.height)));
         }
         if doors.is_empty() {
@@ -109,8 +112,8 @@ impl Compiler<'_> {
                 Ok(Door::Periodic { open: p.open, closed: p.closed, phase })
             }
             (None, Some(r)) => Ok(Door::Random {
-                open: Chance::new(r.p_open.get()),
-                close: Chance::new(r.p_close.get()),
+                open: Bernoulli::new(r.p_open.get()),
+                close: Bernoulli::new(r.p_close.get()),
             }),
             _ => {
                 let remedy = "add periodic = { open = 200, closed = 100 } or \

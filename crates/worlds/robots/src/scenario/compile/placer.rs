@@ -1,21 +1,21 @@
 //! Places of bodies at the start: those that the scenario gives, and those that a seed draws.
 
-use super::bodies::{Group, TypeOf};
+use super::bodies::{BodyGroup, GroupTypes};
 use super::*;
-use crate::scenario::Placing;
+use crate::scenario::StartPose;
 
 /// The part of a scenario on which the places at the start depend: another seed needs nothing else of it.
 #[derive(Debug)]
 pub(crate) struct Placer {
     pub(super) source: Arc<Source>,
     pub(super) map: Arc<GridMap>,
-    pub(super) groups: Vec<Group>,
+    pub(super) groups: Vec<BodyGroup>,
     /// Width and height in boxes of each type of bodies.
     pub(super) sizes: Vec<(u32, u32)>,
 }
 
 /// Bodies, and their places and facings at the start, by id.
-pub(super) struct Placed {
+pub(super) struct Placement {
     pub(super) bodies: Vec<Body>,
     pub(super) start: Vec<((u32, u32), u8)>,
 }
@@ -24,7 +24,7 @@ impl Placer {
     /// Returns the first id of each group: robots, people, doors, in whichever order they are placed.
     pub(super) fn first_ids(&self) -> Vec<EntityId> {
         let mut next = 0;
-        let first = |group: &Group| {
+        let first = |group: &BodyGroup| {
             let first = next;
             next += group.count as EntityId;
             first
@@ -33,12 +33,12 @@ impl Placer {
     }
 
     /// Places all bodies, with the draws of `streams`.
-    pub(super) fn place(&self, streams: &Streams) -> Result<Placed, InputError> {
+    pub(super) fn place(&self, streams: &Streams) -> Result<Placement, InputError> {
         let n = self.groups.iter().map(|group| group.count as usize).sum();
-        let mut round = Round {
+        let mut round = PlacementBuilder {
             placer: self,
             streams,
-            floor: Floor::new(&self.map),
+            floor: PlacementGrid::new(&self.map),
             spans: vec![0..0; n],
             bodies: vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n],
             start: vec![((0, 0), 0); n],
@@ -52,28 +52,28 @@ impl Placer {
                 }
             }
         }
-        Ok(Placed { bodies: round.bodies, start: round.start })
+        Ok(Placement { bodies: round.bodies, start: round.start })
     }
 }
 
 /// One round of placing.
-struct Round<'a> {
+struct PlacementBuilder<'a> {
     placer: &'a Placer,
     streams: &'a Streams,
-    floor: Floor,
+    floor: PlacementGrid,
     /// Spans by id, to name the other body when two bodies stand on each other.
     spans: Vec<Range<usize>>,
     bodies: Vec<Body>,
     start: Vec<((u32, u32), u8)>,
 }
 
-impl Round<'_> {
-    fn add_group(&mut self, group: &Group, first: EntityId) -> Result<(), InputError> {
+impl PlacementBuilder<'_> {
+    fn add_group(&mut self, group: &BodyGroup, first: EntityId) -> Result<(), InputError> {
         for k in 0..group.count as usize {
             let id = first + k as EntityId;
             let ty = match &group.ty {
-                TypeOf::All(ty) => *ty,
-                TypeOf::Each(types) => types[k],
+                GroupTypes::Shared(ty) => *ty,
+                GroupTypes::PerBody(types) => types[k],
             };
             let size = self.placer.sizes[usize::from(ty)];
             let (at, span) = match group.places.get(k) {
@@ -84,9 +84,9 @@ impl Round<'_> {
             let facing = facing.unwrap_or_else(|| {
                 self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
             });
-            let phase = group
-                .phase
-                .unwrap_or_else(|| self.streams.draws(id, 0, purpose::PHASE).below(group.period));
+            let phase = group.phase.unwrap_or_else(|| {
+                self.streams.draws(id, 0, purpose::PHASE).uniform_below(group.period)
+            });
             self.start[id as usize] = (at, facing);
             self.spans[id as usize] = span;
             self.bodies[id as usize] =
@@ -97,7 +97,7 @@ impl Round<'_> {
 
     fn given_place(
         &mut self,
-        place: &Spanned<Placing>,
+        place: &Spanned<StartPose>,
         id: EntityId,
         size: (u32, u32),
     ) -> Result<(u32, u32), InputError> {
@@ -105,13 +105,13 @@ impl Round<'_> {
         let boxes = Rect { col: at.0, row: at.1, width: size.0, height: size.1 };
         match self.floor.place(id, boxes) {
             Ok(()) => Ok(at),
-            Err(obstacle) => Err(self.in_the_way(place.span(), boxes, obstacle)),
+            Err(obstacle) => Err(self.position_not_free(place.span(), boxes, obstacle)),
         }
     }
 
     fn drawn_place(
         &mut self,
-        group: &Group,
+        group: &BodyGroup,
         k: usize,
         id: EntityId,
         size: (u32, u32),
@@ -129,16 +129,21 @@ impl Round<'_> {
         })
     }
 
-    fn in_the_way(&self, span: Range<usize>, boxes: Rect, obstacle: Obstacle) -> InputError {
+    fn position_not_free(
+        &self,
+        span: Range<usize>,
+        boxes: Rect,
+        obstacle: PlacementError,
+    ) -> InputError {
         let Rect { col, row, width, height } = boxes;
         let body = format!("a body of {width} x {height} boxes at [{col}, {row}]");
         let cause = match obstacle {
-            Obstacle::Outside => {
+            PlacementError::OffMap => {
                 let (width, height) = (self.placer.map.width(), self.placer.map.height());
                 format!("{body} leaves the map of {width} x {height} boxes")
             }
-            Obstacle::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
-            Obstacle::Body(id, c, r) => {
+            PlacementError::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
+            PlacementError::Body(id, c, r) => {
                 let other =
                     self.placer.source.error(self.spans[id as usize].clone(), "", "").position();
                 let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));

@@ -1,19 +1,19 @@
 //! Remarks that need the sections of a scenario: on effectors, and on goals out of reach.
 
 use super::super::RobotsFile;
-use super::bodies::Group;
+use super::bodies::BodyGroup;
 use super::*;
 
 /// Returns warnings of effectors that move in a way that their author may not expect.
-pub(super) fn on_effectors(
+pub(super) fn effector_remarks(
     file: &RobotsFile,
-    effectors: &BTreeMap<String, Located<EffectorSection>>,
+    effectors: &BTreeMap<String, LocatedSection<EffectorSection>>,
 ) -> Vec<Remark> {
     let sections = file.robots.0.iter().enumerate();
     let remarks = sections.flat_map(|(k, section)| {
         let name = section.get_ref().effector.as_ref().map(Spanned::get_ref);
         let found = name.and_then(|name| Some((name, effectors.get(name)?)));
-        let words = found.map_or(vec![], |(name, at)| not_as_meant(name, at));
+        let words = found.map_or(vec![], |(name, at)| misleading_transitions(name, at));
         words.into_iter().map(move |words| Remark::warning(format!("robots.{k}.effector"), words))
     });
     remarks.collect()
@@ -23,7 +23,7 @@ pub(super) fn on_effectors(
 const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
 
 /// Returns a note on a radio over which no robot speaks.
-pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
+pub(super) fn radio_remark(file: &RobotsFile) -> Option<Remark> {
     let speaks = |section: &Spanned<RobotSection>| {
         let behaviour = section.get_ref().behaviour.as_ref();
         behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.get_ref().as_str()))
@@ -38,7 +38,7 @@ pub(super) fn refuse_other_boxes(
     source: &Source,
     file: &RobotsFile,
     map_m: f64,
-    effectors: &BTreeMap<String, Located<EffectorSection>>,
+    effectors: &BTreeMap<String, LocatedSection<EffectorSection>>,
 ) -> Result<(), InputError> {
     let named = file.robots.0.iter().filter_map(|section| section.get_ref().effector.as_ref());
     for name in named {
@@ -60,7 +60,7 @@ pub(super) fn refuse_other_boxes(
 }
 
 /// Returns words for each action that mostly ends in a transition other than its first.
-fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
+fn misleading_transitions(name: &str, at: &LocatedSection<EffectorSection>) -> Vec<String> {
     let Ok(model) = tables::effector(name, at) else { return Vec::new() };
     let actions = model.actions.iter().zip(&model.transitions);
     let wrong = actions.filter_map(|(action, transitions)| {
@@ -70,9 +70,9 @@ fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
             format!(
                 "`{action}` of `{name}` mostly comes to {} ({}), not to {} ({}), which is meant \
                  because it is its first transition",
-                in_words(likeliest),
+                describe(likeliest),
                 percent(likeliest.p),
-                in_words(meant),
+                describe(meant),
                 percent(meant.p),
             )
         })
@@ -80,7 +80,7 @@ fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
     wrong.collect()
 }
 
-fn in_words(transition: &Transition) -> String {
+fn describe(transition: &Transition) -> String {
     let path: String = transition.path.iter().map(|side| side.letter()).collect();
     let turn_deg = [0, 90, 180, -90][usize::from(transition.turn % 4)];
     match (path.as_str(), turn_deg) {
@@ -98,14 +98,14 @@ fn percent(share: f64) -> String {
 impl Compiler<'_> {
     /// Warns of robots that cannot reach all their goals; `groups` are those of the sections of
     /// robots, in order, and each comes with the id of its first body.
-    pub(super) fn warn_of_goals<'g>(
+    pub(super) fn warn_of_unreachable_goals<'g>(
         &mut self,
-        groups: impl Iterator<Item = (&'g Group, EntityId)>,
-        placed: &Placed,
+        groups: impl Iterator<Item = (&'g BodyGroup, EntityId)>,
+        placed: &Placement,
     ) {
         for (k, (group, first)) in groups.enumerate() {
             let ids = first..first + group.count as EntityId;
-            let missed: Vec<usize> = ids.map(|id| self.goals_out_of_reach(placed, id)).collect();
+            let missed: Vec<usize> = ids.map(|id| self.unreachable_goals(placed, id)).collect();
             let robots = missed.iter().filter(|goals| **goals > 0).count();
             if robots > 0 {
                 let (all, goals) = (group.count, missed.iter().sum::<usize>());
@@ -118,13 +118,13 @@ impl Compiler<'_> {
         }
     }
 
-    fn goals_out_of_reach(&self, placed: &Placed, id: EntityId) -> usize {
+    fn unreachable_goals(&self, placed: &Placement, id: EntityId) -> usize {
         let Role::Robot(model) = &self.types[usize::from(placed.bodies[id as usize].ty)].role
         else {
             return 0;
         };
         // Ways lead back as well, so a robot that reaches a goal from its start reaches it from other goals.
         let (col, row) = placed.start[id as usize].0;
-        model.behaviour.ways().iter().filter(|way| !way.reaches_goal(col, row)).count()
+        model.behaviour.flow_fields().iter().filter(|way| !way.reaches_goal(col, row)).count()
     }
 }

@@ -1,9 +1,9 @@
 //! Robot sections: bodies with sensors and effectors, and behaviors.
 
-use super::super::{AvoidanceSection, Placing};
-use super::bodies::{Group, TypeOf, cycles_of};
-use super::idle::BEHAVIOURS;
-use super::random::Wrong;
+use super::super::{AvoidanceSection, StartPose};
+use super::bodies::{BodyGroup, GroupTypes, period_cycles};
+use super::random::UnlocatedError;
+use super::unused_keys::BEHAVIOURS;
 use super::*;
 
 impl Compiler<'_> {
@@ -11,83 +11,86 @@ impl Compiler<'_> {
         &mut self,
         s: &RobotSection,
         span: Range<usize>,
-    ) -> Result<Group, InputError> {
+    ) -> Result<BodyGroup, InputError> {
         if let Some(scen) = &s.scen {
-            return self.robots_of_scen(s, scen, &span);
+            return self.robots_from_scen(s, scen, &span);
         }
-        let count = self.count(s.count.as_ref(), &s.at, &span)?;
-        let size = side(s);
+        let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
+        let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
         let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel::new(body, behaviour));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
-        let ty = TypeOf::All(self.add_type(ty, &span)?);
-        Ok(Group {
+        let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
+        Ok(BodyGroup {
             count,
             places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
             span,
             ty,
-            period: cycles_of(s.period),
+            period: period_cycles(s.period),
             phase: s.phase,
         })
     }
 
     /// Reads starts and goals from a MovingAI list: the first `count` rows, one robot each.
-    fn robots_of_scen(
+    fn robots_from_scen(
         &mut self,
         s: &RobotSection,
         scen: &Spanned<std::path::PathBuf>,
         span: &Range<usize>,
-    ) -> Result<Group, InputError> {
+    ) -> Result<BodyGroup, InputError> {
         let rows = sidestep_import::movingai::load_scen(&self.source.path(scen.get_ref()));
-        let rows = rows.map_err(|error| self.source.naming(scen.span(), error))?;
+        let rows = rows.map_err(|error| self.source.with_key_at(scen.span(), error))?;
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
             let cause = format!("count = {count}, but the list has {} rows", rows.len());
             return Err(self.source.error(scen.span(), cause, "give a smaller count"));
         }
-        let size = side(s);
+        let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let free = Arc::new(FreeSpace::of_map(&self.map));
+        let free = Arc::new(FreeSpace::from_map(&self.map));
         let avoidance = self.avoidance(None, &free, size, &body);
         let (mut places, mut types) = (Vec::new(), Vec::new());
         let place = self.source.path(scen.get_ref()).display().to_string();
         for row in &rows[..count] {
             let checked = row.check_against(&place, &self.map);
-            checked.map_err(|error| self.source.naming(scen.span(), error))?;
-            let goals = vec![Arc::new(FlowField::toward(&free, size, &[row.goal]))];
+            checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
+            let goals = vec![Arc::new(FlowField::to_nearest(&free, size, &[row.goal]))];
             let avoidance = avoidance.clone();
             if !goals[0].is_goal(row.goal.0, row.goal.1) {
                 let cause =
                     format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
                 let remedy = "give smaller robots, or another list";
-                return Err(InputError::new(&place, cause, remedy).at(row.line, 1));
+                return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
             }
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel::new(Arc::clone(&body), behaviour);
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);
-            places.push(Spanned::new(scen.span(), Placing { at: row.start, facing: None }));
+            places.push(Spanned::new(scen.span(), StartPose { at: row.start, facing: None }));
         }
-        Ok(Group {
+        Ok(BodyGroup {
             count: count as u64,
             places,
             region: None,
             span: span.clone(),
-            ty: TypeOf::Each(types),
-            period: cycles_of(s.period),
+            ty: GroupTypes::PerBody(types),
+            period: period_cycles(s.period),
             phase: s.phase,
         })
     }
 
     fn robot_body(&mut self, s: &RobotSection, size: u32) -> Result<RobotBody, InputError> {
-        let sensors =
-            s.sensors.iter().map(|name| self.mounted(name, size)).collect::<Result<Vec<_>, _>>()?;
+        let sensors = s
+            .sensors
+            .iter()
+            .map(|name| self.mounted_sensor(name, size))
+            .collect::<Result<Vec<_>, _>>()?;
         let effector = self.effector(s.effector.as_ref())?;
-        let reliable = self.file.regime.reliable_effectors();
+        let reliable = self.file.regime.has_reliable_effectors();
         let longest =
             effector.transitions.iter().flatten().map(|t| t.path.len()).max().unwrap_or(0);
         self.reach = self.reach.max(longest as u32);
@@ -96,11 +99,15 @@ impl Compiler<'_> {
         let actions =
             actions_at_headings(&actions.collect::<Vec<_>>(), (size, size), self.stride());
         let bearings = sensors.iter().flat_map(|m| m.model.bearings_deg.iter());
-        let sectors = bearings.map(|&deg| Sector::of(deg)).collect();
+        let sectors = bearings.map(|&deg| Sector::from_bearing_deg(deg)).collect();
         Ok(RobotBody { sectors, sensors, actions, effector })
     }
 
-    fn mounted(&self, name: &Spanned<String>, size: u32) -> Result<MountedSensor, InputError> {
+    fn mounted_sensor(
+        &self,
+        name: &Spanned<String>,
+        size: u32,
+    ) -> Result<MountedSensor, InputError> {
         let model = self.sensor_model(name)?;
         let box_size_m = self.map.box_size_m;
         let range_boxes = model.range_m / box_size_m;
@@ -112,19 +119,19 @@ impl Compiler<'_> {
             let remedy = "give a shorter range, fewer beams or larger boxes";
             return Err(self.source.error(name.span(), cause, remedy));
         }
-        let reliable = self.file.regime.reliable_sensors();
+        let reliable = self.file.regime.has_reliable_sensors();
         Ok(MountedSensor::new(model, size, box_size_m, self.stride(), reliable)
             .expect("the sensor's rows were checked"))
     }
 
     fn sensor_model(&self, name: &Spanned<String>) -> Result<SensorModel, InputError> {
-        let section = named(&self.source, &self.sensors, name, "sensor")?;
+        let section = find_named(&self.source, &self.sensors, name, "sensor")?;
         tables::sensor(name.get_ref(), section, &self.kinds, true)
     }
 
     fn effector(&self, name: Option<&Spanned<String>>) -> Result<EffectorModel, InputError> {
         let Some(name) = name else { return Ok(EffectorModel::perfect()) };
-        let section = named(&self.source, &self.effectors, name, "effector")?;
+        let section = find_named(&self.source, &self.effectors, name, "effector")?;
         tables::effector(name.get_ref(), section)
     }
 
@@ -135,12 +142,12 @@ impl Compiler<'_> {
         body: &RobotBody,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
         let Some(section) = section else {
-            return Ok(self.patient(Arc::new(Wander::default()), body));
+            return Ok(self.with_stall_detector(Arc::new(Wander::default()), body));
         };
         let s = section.get_ref();
-        let error = |wrong: Wrong| self.source.error(section.span(), wrong.0, wrong.1);
-        let free = Arc::new(FreeSpace::of_map(&self.map));
-        let ways = Ways { compiler: self, free: &free, size, span: section.span() };
+        let error = |wrong: UnlocatedError| self.source.error(section.span(), wrong.0, wrong.1);
+        let free = Arc::new(FreeSpace::from_map(&self.map));
+        let ways = FlowFieldBuilder { compiler: self, free: &free, size, span: section.span() };
         let avoidance = || self.avoidance(s.avoidance, &free, size, body);
         let actions = &body.effector.actions;
         let behaviour: Arc<dyn Behaviour> = match s.kind.get_ref().as_str() {
@@ -148,13 +155,13 @@ impl Compiler<'_> {
             "announce" => Arc::new(Announce { wander: wander(s), size }),
             "shuttle" => {
                 let end = |given: Option<[u32; 4]>, key: &str| {
-                    ways.to(needed(s, key, given, "[col, row, width, height]").map_err(error)?)
+                    ways.build(required(s, key, given, "[col, row, width, height]").map_err(error)?)
                 };
                 Arc::new(Shuttle { ends: [end(s.a, "a")?, end(s.b, "b")?], avoidance: avoidance() })
             }
             "goto" => {
-                let goals = needed(s, "goals", s.goals.as_ref(), "[[col, row], ...]");
-                let goals = goals.map_err(error)?.iter().map(|&(c, r)| ways.to([c, r, 1, 1]));
+                let goals = required(s, "goals", s.goals.as_ref(), "[[col, row], ...]");
+                let goals = goals.map_err(error)?.iter().map(|&(c, r)| ways.build([c, r, 1, 1]));
                 let goals = goals.collect::<Result<_, _>>()?;
                 let repeat = s.repeat.unwrap_or(false);
                 Arc::new(Goto { goals, repeat, avoidance: avoidance() })
@@ -171,19 +178,27 @@ impl Compiler<'_> {
             },
         };
         let waits = ["wander", "shuttle", "goto"].contains(&s.kind.get_ref().as_str());
-        Ok(if waits && !behaviour.asks() { self.patient(behaviour, body) } else { behaviour })
+        Ok(if waits && !behaviour.has_requests() {
+            self.with_stall_detector(behaviour, body)
+        } else {
+            behaviour
+        })
     }
 
     /// Returns a behavior that turns on contact, with another way to notice that it is blocked where
     /// there may be no contact.
-    fn patient(&self, inner: Arc<dyn Behaviour>, body: &RobotBody) -> Arc<dyn Behaviour> {
-        if self.has_no_contacts(body) { Arc::new(Patient { inner }) } else { inner }
+    fn with_stall_detector(
+        &self,
+        inner: Arc<dyn Behaviour>,
+        body: &RobotBody,
+    ) -> Arc<dyn Behaviour> {
+        if self.has_no_contacts(body) { Arc::new(StallDetector { inner }) } else { inner }
     }
 
     /// Returns whether a step that is blocked may do nothing, without a contact. Behaviors that turn
     /// on contact then need another way to notice it.
     fn has_no_contacts(&self, body: &RobotBody) -> bool {
-        let reliable = self.file.regime.reliable_effectors();
+        let reliable = self.file.regime.has_reliable_effectors();
         let may_stay = |t: &Transition| t.p > 0.0 && t.path.is_empty();
         self.file.obstacle_rule == ObstacleRule::Renormalise
             && body.effector.transitions_of(FORWARD, reliable).iter().any(may_stay)
@@ -199,39 +214,40 @@ impl Compiler<'_> {
         match section.unwrap_or_default() {
             AvoidanceSection::Plan => {
                 let (free, box_size_m) = (Arc::clone(free), self.map.box_size_m);
-                let wheels_err = !self.file.regime.reliable_effectors() && body.effector.errs();
+                let wheels_err =
+                    !self.file.regime.has_reliable_effectors() && body.effector.has_errors();
                 Avoidance::Plan(Arc::new(Planner::new(free, size, body, box_size_m, wheels_err)))
             }
-            AvoidanceSection::Avoid => Avoidance::Sidestep(Trust::OneBeam),
-            AvoidanceSection::Filter => Avoidance::Sidestep(Trust::TwoReports),
+            AvoidanceSection::Avoid => Avoidance::Sidestep(SensorTrust::OneBeam),
+            AvoidanceSection::Filter => Avoidance::Sidestep(SensorTrust::TwoReports),
             AvoidanceSection::Touch => Avoidance::Touch,
         }
     }
 
-    fn unknown_behaviour(&self, name: &str) -> Wrong {
+    fn unknown_behaviour(&self, name: &str) -> UnlocatedError {
         let own = self.own.keys().map(String::as_str);
         let known: Vec<&str> = BEHAVIOURS.iter().map(|(name, _)| *name).chain(own).collect();
-        (format!("unknown behaviour `{name}`"), nearest(name, &known))
+        (format!("unknown behaviour `{name}`"), suggestion(name, &known))
     }
 }
 
 /// Ways for robots of one size, asked for at one place of the scenario.
-struct Ways<'c, 'a> {
+struct FlowFieldBuilder<'c, 'a> {
     compiler: &'c Compiler<'a>,
     free: &'c FreeSpace,
     size: u32,
     span: Range<usize>,
 }
 
-impl Ways<'_, '_> {
+impl FlowFieldBuilder<'_, '_> {
     /// Returns the way to a region in which there is room for a robot.
-    fn to(&self, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
+    fn build(&self, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
         let (compiler, size) = (self.compiler, self.size);
         compiler.check_rect(rect, self.span.clone())?;
         let [col, row, width, height] = rect;
         let goals: Vec<_> =
             (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
-        let field = FlowField::toward(self.free, size, &goals);
+        let field = FlowField::to_nearest(self.free, size, &goals);
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
             return Ok(Arc::new(field));
         }
@@ -243,7 +259,12 @@ impl Ways<'_, '_> {
 }
 
 /// Returns the value of a key that a behavior cannot do without.
-fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -> Result<T, Wrong> {
+fn required<T>(
+    s: &BehaviourSection,
+    key: &str,
+    given: Option<T>,
+    example: &str,
+) -> Result<T, UnlocatedError> {
     given.ok_or_else(|| {
         (
             format!("behaviour `{}` needs `{key}`", s.kind.get_ref()),
@@ -256,13 +277,13 @@ fn wander(s: &BehaviourSection) -> Wander {
     Wander { turn_every: s.turn_every.unwrap_or(Wander::default().turn_every).max(1) }
 }
 
-fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, Wrong> {
-    let names = needed(s, "actions", s.actions.as_ref(), "[\"forward\", \"left\"]")?;
+fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, UnlocatedError> {
+    let names = required(s, "actions", s.actions.as_ref(), "[\"forward\", \"left\"]")?;
     let ids = names.iter().map(|name| random::action_id(name, actions).map(|id| id as u8));
     Ok(Replay { actions: ids.collect::<Result<_, _>>()?, repeat: s.repeat.unwrap_or(false) })
 }
 
 /// Returns the number of boxes of a robot's side.
-fn side(s: &RobotSection) -> u32 {
+fn side_boxes(s: &RobotSection) -> u32 {
     s.size.map_or(1, |side| side.get() as u32)
 }

@@ -1,10 +1,10 @@
 //! Hosts on networks with faults of every kind, from seeds.
 
 use super::super::epoch::{Epoch, is_majority};
-use super::super::host::Hosting;
-use super::{Tourist, hosts};
+use super::super::host::CoordinatorHost;
+use super::{TestCoordinator, hosts};
 use proptest::prelude::*;
-use sidestep_kernel::network::Patience;
+use sidestep_kernel::network::RetryPolicy;
 use std::collections::BTreeMap;
 
 /// A period in which some hosts hear no others: from tick, to tick, and the side of each host.
@@ -62,7 +62,7 @@ impl Faults {
 
 /// A group of hosts on a network.
 pub(super) struct Group {
-    pub hosts: Vec<Hosting<Tourist>>,
+    pub hosts: Vec<CoordinatorHost<TestCoordinator>>,
     pub is_alive: Vec<bool>,
     pub tick: u64,
     pub faults: Faults,
@@ -72,7 +72,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    pub(super) fn new(mut hosts: Vec<Hosting<Tourist>>, faults: Faults) -> Self {
+    pub(super) fn new(mut hosts: Vec<CoordinatorHost<TestCoordinator>>, faults: Faults) -> Self {
         hosts.iter_mut().for_each(|host| host.start(0));
         let is_alive = vec![true; hosts.len()];
         let mut group =
@@ -82,7 +82,7 @@ impl Group {
     }
 
     fn send(&mut self, k: usize) {
-        for sent in self.hosts[k].take_sent() {
+        for sent in self.hosts[k].take_messages() {
             let others = (0..self.hosts.len()).filter(|&to| to != k);
             for to in sent.to.map_or_else(|| others.collect(), |to| vec![to]) {
                 for at in self.faults.arrivals(k, to, self.tick, self.sent) {
@@ -130,19 +130,19 @@ impl Group {
     /// Returns the epochs of the coordinators that are on hosts which are alive.
     pub(super) fn aboard(&self) -> Vec<Epoch> {
         let alive = (0..self.hosts.len()).filter(|&k| self.is_alive[k]);
-        let seats = alive.map(|k| &self.hosts[k].seats[0]).filter(|seat| seat.is_aboard());
-        seats.map(|seat| seat.taken.epoch).collect()
+        let seats = alive.map(|k| &self.hosts[k].seats[0]).filter(|seat| seat.is_hosting());
+        seats.map(|seat| seat.accepted.epoch).collect()
     }
 
     /// Returns whether a majority has accepted an epoch and no newer one.
     pub(super) fn is_accepted(&self, epoch: Epoch) -> bool {
-        let accepts = |host: &Hosting<Tourist>| host.seats[0].promised == epoch;
+        let accepts = |host: &CoordinatorHost<TestCoordinator>| host.seats[0].promised == epoch;
         is_majority(&self.hosts.iter().map(accepts).collect::<Vec<_>>())
     }
 }
 
-const PATIENCE: Patience =
-    Patience { ticks: 8, bits_per_tick: f64::INFINITY, tries: 8, first_tries: 3 };
+const RETRY_POLICY: RetryPolicy =
+    RetryPolicy { ticks: 8, bits_per_tick: f64::INFINITY, tries: 8, first_tries: 3 };
 
 fn cuts(group: usize) -> impl Strategy<Value = Vec<Cut>> {
     let sides = prop::collection::vec(any::<bool>(), group);
@@ -173,7 +173,7 @@ fn faults(group: usize) -> impl Strategy<Value = Faults> {
 
 /// Flies a group until all have ended, and checks each tick.
 fn one_rules(group: usize, rounds: u8, faults: Faults) -> Result<(), TestCaseError> {
-    let mut group = Group::new(hosts(group, rounds, PATIENCE, 120), faults);
+    let mut group = Group::new(hosts(group, rounds, RETRY_POLICY, 120), faults);
     while !group.is_done() {
         prop_assert!(group.tick < 60_000, "somebody waits forever");
         prop_assert!(group.step(), "nothing happens any more");

@@ -2,30 +2,30 @@
 //! time may run out, by a search over all states that real hosts can come to.
 
 use super::super::epoch::{Epoch, is_majority};
-use super::super::seat::Post;
-use super::{Hotel, Tourist, hosts};
-use crate::agents::coordinator::host::Hosting;
-use sidestep_kernel::network::Patience;
+use super::super::replica::ReplicaRole;
+use super::{TestCoordinator, TestHost, hosts};
+use crate::agents::coordinator::host::CoordinatorHost;
+use sidestep_kernel::network::RetryPolicy;
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 const GROUP: usize = 3;
-const PATIENCE: Patience =
-    Patience { ticks: 10, bits_per_tick: f64::INFINITY, tries: 3, first_tries: 3 };
+const RETRY_POLICY: RetryPolicy =
+    RetryPolicy { ticks: 10, bits_per_tick: f64::INFINITY, tries: 3, first_tries: 3 };
 const MISS_TICKS: u64 = 400;
 
 /// A message under way.
-type Flight = (usize, usize, Vec<u8>);
+type InFlightMessage = (usize, usize, Vec<u8>);
 
 /// A state of the whole: hosts and a network.
 #[derive(Clone)]
-struct Whole {
-    hosts: Vec<Hosting<Tourist>>,
+struct SystemState {
+    hosts: Vec<CoordinatorHost<TestCoordinator>>,
     tick: u64,
     is_alive: [bool; GROUP],
     /// Flights in sorted order, because only the messages under way matter, not how long they have
     /// been under way.
-    flights: Vec<Flight>,
+    flights: Vec<InFlightMessage>,
     faults_left: u8,
     /// The hosts that have ever accepted each epoch.
     accepted: BTreeMap<Epoch, [bool; GROUP]>,
@@ -33,7 +33,7 @@ struct Whole {
 
 /// A thing that may happen next.
 #[derive(Debug, Clone, Copy)]
-enum Happens {
+enum Transition {
     Arrives(usize),
     IsDue(usize),
     Crashes(usize),
@@ -43,10 +43,10 @@ enum Happens {
     IsDueEarly(usize),
 }
 
-impl Whole {
+impl SystemState {
     fn new(faults: u8) -> Self {
         let mut whole = Self {
-            hosts: hosts(GROUP, 1, PATIENCE, MISS_TICKS),
+            hosts: hosts(GROUP, 1, RETRY_POLICY, MISS_TICKS),
             tick: 0,
             is_alive: [true; GROUP],
             flights: Vec::new(),
@@ -58,13 +58,13 @@ impl Whole {
         whole
     }
 
-    fn hotel(&self, k: usize) -> &Hotel {
+    fn hotel(&self, k: usize) -> &TestHost {
         &self.hosts[k].ship
     }
 
     /// Collects the messages that a host has sent, and notes the epoch that it has accepted.
     fn collect(&mut self, k: usize) {
-        for sent in self.hosts[k].take_sent() {
+        for sent in self.hosts[k].take_messages() {
             let others = (0..GROUP).filter(|&to| to != k);
             let to: Vec<usize> = sent.to.map_or_else(|| others.collect(), |to| vec![to]);
             let flights = to.into_iter().filter(|&to| self.is_alive[to]);
@@ -86,47 +86,49 @@ impl Whole {
     }
 
     /// Returns all that may happen next.
-    fn choices(&self) -> Vec<Happens> {
+    fn choices(&self) -> Vec<Transition> {
         let different = |&k: &usize| k == 0 || self.flights[k] != self.flights[k - 1];
         let flights: Vec<usize> = (0..self.flights.len()).filter(different).collect();
-        let mut all: Vec<Happens> = flights.iter().map(|&k| Happens::Arrives(k)).collect();
+        let mut all: Vec<Transition> = flights.iter().map(|&k| Transition::Arrives(k)).collect();
         let due = self.next_due().map_or(Vec::new(), |(_, hosts)| hosts);
         if flights.is_empty() {
-            all.extend(due.iter().map(|&k| Happens::IsDue(k)));
+            all.extend(due.iter().map(|&k| Transition::IsDue(k)));
         }
         if self.faults_left > 0 {
             if !flights.is_empty() {
-                all.extend(due.iter().map(|&k| Happens::IsDueEarly(k)));
+                all.extend(due.iter().map(|&k| Transition::IsDueEarly(k)));
             }
-            all.extend(flights.iter().flat_map(|&k| [Happens::IsLost(k), Happens::IsDoubled(k)]));
-            all.extend((0..GROUP).filter(|&k| self.is_alive[k]).map(Happens::Crashes));
+            all.extend(
+                flights.iter().flat_map(|&k| [Transition::IsLost(k), Transition::IsDoubled(k)]),
+            );
+            all.extend((0..GROUP).filter(|&k| self.is_alive[k]).map(Transition::Crashes));
         }
         all
     }
 
     /// Returns the state after something has happened.
-    fn after(&self, what: Happens) -> Self {
+    fn after(&self, what: Transition) -> Self {
         let mut next = self.clone();
         match what {
-            Happens::Arrives(k) => {
+            Transition::Arrives(k) => {
                 let (from, to, bytes) = next.flights.remove(k);
                 next.hosts[to].on_message(from, &bytes, next.tick).expect("sound");
                 next.collect(to);
             }
-            Happens::IsDue(k) | Happens::IsDueEarly(k) => {
+            Transition::IsDue(k) | Transition::IsDueEarly(k) => {
                 let due = next.hosts[k].next_timer().expect("due");
                 next.tick = next.tick.max(due);
                 next.hosts[k].on_timer(next.tick);
                 next.collect(k);
             }
-            Happens::IsLost(k) => drop(next.flights.remove(k)),
-            Happens::IsDoubled(k) => next.flights.insert(k, next.flights[k].clone()),
-            Happens::Crashes(k) => {
+            Transition::IsLost(k) => drop(next.flights.remove(k)),
+            Transition::IsDoubled(k) => next.flights.insert(k, next.flights[k].clone()),
+            Transition::Crashes(k) => {
                 next.is_alive[k] = false;
                 next.flights.retain(|(_, to, _)| *to != k);
             }
         }
-        let is_fault = !matches!(what, Happens::Arrives(_) | Happens::IsDue(_));
+        let is_fault = !matches!(what, Transition::Arrives(_) | Transition::IsDue(_));
         next.faults_left -= u8::from(is_fault);
         next
     }
@@ -134,7 +136,7 @@ impl Whole {
     /// Returns the epochs of the coordinators that are on hosts which are alive.
     fn aboard(&self) -> Vec<Epoch> {
         let seats = (0..GROUP).filter(|&k| self.is_alive[k]).map(|k| &self.hosts[k].seats[0]);
-        seats.filter(|seat| seat.is_aboard()).map(|seat| seat.taken.epoch).collect()
+        seats.filter(|seat| seat.is_hosting()).map(|seat| seat.accepted.epoch).collect()
     }
 
     /// Returns whether a majority has accepted an epoch and no newer one; those that have crashed
@@ -194,20 +196,20 @@ impl Whole {
             add(&self.hotel(k).told);
             let (seat, now) = (&self.hosts[k].seats[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
-            add(&(seat.promised, seat.seen, seat.taken, seat.stood));
-            add(&(left(seat.missed_at()), left(seat.quiet_until)));
+            add(&(seat.promised, seat.newest, seat.accepted, seat.candidate_number));
+            add(&(left(seat.election_timeout()), left(seat.quiet_until)));
             add(&seat.unanswering);
             add(&seat.copy.as_ref().map(|copy| (copy.at, copy.state.to_vec())));
-            match &seat.post {
-                Post::Empty => add(&0u8),
-                Post::Aboard(stay) => {
-                    add(&(1u8, left(stay.beat_at), left(stay.impatient_at)));
-                    add(&stay.passenger);
+            match &seat.role {
+                ReplicaRole::Idle => add(&0u8),
+                ReplicaRole::Hosting(stay) => {
+                    add(&(1u8, left(stay.heartbeat_at), left(stay.timeout_at)));
+                    add(&stay.coordinator);
                 }
-                Post::Leaving { to, tries_left, due, beat_at } => {
+                ReplicaRole::Sending { to, tries_left, due, beat_at } => {
                     add(&(2u8, *to, *tries_left, left(*due), left(*beat_at)));
                 }
-                Post::Standing(one) => {
+                ReplicaRole::Candidate(one) => {
                     add(&(3u8, &one.asks, one.lost, one.tries_left, left(one.due)));
                     add(&(&one.votes, &one.heard));
                 }
@@ -242,7 +244,7 @@ mod erased {
 
 /// Visits every state that can be reached with some faults. Returns the number of states, and of ends.
 fn search(faults: u8) -> (usize, usize) {
-    let start = Whole::new(faults);
+    let start = SystemState::new(faults);
     let (mut known, mut ends) = (HashSet::from([start.digest()]), 0);
     let mut left = vec![start];
     while let Some(whole) = left.pop() {

@@ -5,23 +5,25 @@ mod interleavings;
 mod recovery;
 
 use super::epoch::Epoch;
-use super::host::Hosting;
-use super::passenger::{Here, Passenger, Rules, Ship, Step};
-use crate::agents::party::Unsound;
+use super::host::CoordinatorHost;
+use super::migrating::{
+    CoordinatorStep, HostConfig, HostContext, HostServices, MigratingCoordinator,
+};
+use crate::agents::participant::InvalidMessage;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::network::Patience;
+use sidestep_kernel::network::RetryPolicy;
 
 /// A coordinator that visits all hosts, returns, and tells all how it was: in each of some rounds, the
 /// last of which ends with the telling.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Tourist {
+struct TestCoordinator {
     rounds_left: u8,
-    task: Task,
+    task: TestTask,
     unreachable: Vec<bool>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-enum Task {
+enum TestTask {
     Visit(u8),
     Return,
     Tell(u8),
@@ -29,7 +31,7 @@ enum Task {
 
 /// A host of tourists.
 #[derive(Debug, Clone)]
-struct Hotel {
+struct TestHost {
     me: usize,
     group: usize,
     rounds: u8,
@@ -42,108 +44,120 @@ struct Hotel {
     is_cut_off: bool,
 }
 
-impl Ship for Hotel {
-    fn watches(&self, _: usize) -> bool {
+impl HostServices for TestHost {
+    fn is_watching(&self, _: usize) -> bool {
         !self.is_done()
     }
 
-    fn cut_off(&mut self, _: usize, _: &[usize]) {
+    fn on_no_majority(&mut self, _: usize, _: &[usize]) {
         self.is_cut_off = true;
     }
 }
 
-impl Hotel {
+impl TestHost {
     fn is_done(&self) -> bool {
         self.told.is_some() || self.is_cut_off
     }
 }
 
-impl Tourist {
+impl TestCoordinator {
     /// Returns the next host from number `k` on, without those that cannot be reached.
-    fn next(&self, k: u8, hotel: &Hotel) -> Option<u8> {
+    fn next(&self, k: u8, hotel: &TestHost) -> Option<u8> {
         let stays = |place: usize| place == hotel.me || self.unreachable[place];
         (k..hotel.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(&mut self, hotel: &Hotel, here: &Here<'_>) -> Step {
+    fn hop(&mut self, hotel: &TestHost, here: &HostContext<'_>) -> CoordinatorStep {
         loop {
             match self.task {
-                Task::Visit(k) => match self.next(k, hotel) {
+                TestTask::Visit(k) => match self.next(k, hotel) {
                     Some(next) => {
-                        self.task = Task::Visit(next);
-                        return Step::Hop(next.into());
+                        self.task = TestTask::Visit(next);
+                        return CoordinatorStep::Hop(next.into());
                     }
-                    None => self.task = Task::Return,
+                    None => self.task = TestTask::Return,
                 },
-                Task::Return => {
+                TestTask::Return => {
                     let home = usize::from(here.epochs[0].owner);
                     if home != hotel.me {
-                        return Step::Hop(home);
+                        return CoordinatorStep::Hop(home);
                     }
                     self.rounds_left = self.rounds_left.saturating_sub(1);
-                    self.task = if self.rounds_left > 0 { Task::Visit(0) } else { Task::Tell(0) };
+                    self.task =
+                        if self.rounds_left > 0 { TestTask::Visit(0) } else { TestTask::Tell(0) };
                 }
-                Task::Tell(k) => match self.next(k, hotel) {
+                TestTask::Tell(k) => match self.next(k, hotel) {
                     Some(next) => {
-                        self.task = Task::Tell(next);
-                        return Step::Hop(next.into());
+                        self.task = TestTask::Tell(next);
+                        return CoordinatorStep::Hop(next.into());
                     }
-                    None => return Step::Over,
+                    None => return CoordinatorStep::Done,
                 },
             }
         }
     }
 }
 
-impl Passenger for Tourist {
-    type Ship = Hotel;
+impl MigratingCoordinator for TestCoordinator {
+    type Services = TestHost;
 
-    fn new(hotel: &Hotel, _: usize) -> Self {
+    fn new(hotel: &TestHost, _: usize) -> Self {
         let unreachable = vec![false; hotel.group];
-        Self { rounds_left: hotel.rounds, task: Task::Visit(0), unreachable }
+        Self { rounds_left: hotel.rounds, task: TestTask::Visit(0), unreachable }
     }
 
-    fn written(&self) -> Vec<u8> {
+    fn encode(&self) -> Vec<u8> {
         postcard::to_stdvec(self).expect("plain data")
     }
 
-    fn read(bytes: &[u8], hotel: &Hotel, _: usize) -> Result<Self, Unsound> {
-        let read: Self = postcard::from_bytes(bytes).map_err(|_| Unsound::Form)?;
-        Unsound::Length.unless(read.unreachable.len() == hotel.group)?;
+    fn decode(bytes: &[u8], hotel: &TestHost, _: usize) -> Result<Self, InvalidMessage> {
+        let read: Self = postcard::from_bytes(bytes).map_err(|_| InvalidMessage::Form)?;
+        InvalidMessage::Length.unless(read.unreachable.len() == hotel.group)?;
         Ok(read)
     }
 
-    fn go_on(&mut self, hotel: &mut Hotel, here: &Here<'_>) -> Step {
+    fn advance(&mut self, hotel: &mut TestHost, here: &HostContext<'_>) -> CoordinatorStep {
         if !hotel.is_restless && !std::mem::replace(&mut hotel.is_rested, true) {
-            return Step::Stay;
+            return CoordinatorStep::Stay;
         }
         self.unreachable[hotel.me] = false;
         let step = self.hop(hotel, here);
-        if matches!(self.task, Task::Tell(_)) {
+        if matches!(self.task, TestTask::Tell(_)) {
             hotel.told.get_or_insert(here.epochs[0]);
         }
         hotel.is_rested = false;
         step
     }
 
-    fn cannot_reach(&mut self, place: usize) {
+    fn on_unreachable(&mut self, place: usize) {
         self.unreachable[place] = true;
     }
 
-    fn is_over_without(&self, place: usize) -> bool {
-        let Task::Tell(k) = self.task else { return false };
+    fn is_done_without(&self, place: usize) -> bool {
+        let TestTask::Tell(k) = self.task else { return false };
         (usize::from(k)..self.unreachable.len()).all(|k| k == place || self.unreachable[k])
     }
 }
 
 /// Returns the hosts of a group.
-fn hosts(group: usize, rounds: u8, patience: Patience, miss_ticks: u64) -> Vec<Hosting<Tourist>> {
+fn hosts(
+    group: usize,
+    rounds: u8,
+    patience: RetryPolicy,
+    miss_ticks: u64,
+) -> Vec<CoordinatorHost<TestCoordinator>> {
     let host = |me: usize| {
         let (is_rested, is_restless, told, is_cut_off) = (false, false, None, false);
-        let hotel = Hotel { me, group, rounds, is_rested, is_restless, told, is_cut_off };
+        let hotel = TestHost { me, group, rounds, is_rested, is_restless, told, is_cut_off };
         let expected = vec![true; group];
-        let rules = Rules { group, me, patience: Some(patience), expected, miss_ticks };
-        Hosting::new(hotel, &[(0..group).collect()], rules)
+        let rules = HostConfig {
+            group,
+            me,
+            retry_policy: Some(patience),
+            expected,
+            election_timeout_ticks: miss_ticks,
+        };
+        CoordinatorHost::new(hotel, &[(0..group).collect()], rules)
     };
     (0..group).map(host).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::chaos::{Faults, Group};
 use super::hosts;
-use sidestep_kernel::network::Patience;
+use sidestep_kernel::network::RetryPolicy;
 
 /// Rounds that a coordinator makes, so that its host dies in any of them.
 const ROUNDS: u8 = 20;
@@ -13,16 +13,16 @@ const LOSSES: [(f64, u32); 3] = [(0.0, 1), (0.1, 14), (0.3, 32)];
 
 /// Returns the patience of hosts where a message takes a tick, and the ticks after which a group misses its
 /// coordinator: the defaults of networks.
-fn patience(group: usize, tries: u32) -> (Patience, u64) {
+fn retry_policy(group: usize, tries: u32) -> (RetryPolicy, u64) {
     let bits_per_tick = f64::INFINITY;
-    let patience = Patience { ticks: 3, bits_per_tick, tries, first_tries: tries };
+    let patience = RetryPolicy { ticks: 3, bits_per_tick, tries, first_tries: tries };
     (patience, 3 * (group as u64 + u64::from(tries)))
 }
 
 /// Kills the host that the coordinator is on in a tick. Returns the ticks from then on until another host has it,
 /// accepted by a majority, and until all living hosts have their controls.
 fn recovery(group: usize, (loss, tries): (f64, u32), seed: u64) -> Option<(u64, u64)> {
-    let (patience, miss_ticks) = patience(group, tries);
+    let (patience, miss_ticks) = retry_policy(group, tries);
     let mut hosts = hosts(group, ROUNDS, patience, miss_ticks);
     hosts.iter_mut().for_each(|host| host.ship.is_restless = true);
     let mut group = Group::new(hosts, Faults { seed, loss, ..Faults::default() });
@@ -31,14 +31,14 @@ fn recovery(group: usize, (loss, tries): (f64, u32), seed: u64) -> Option<(u64, 
     while group.tick < dies_at {
         assert!(group.step() && !group.is_done());
     }
-    let farthest = (0..group.hosts.len()).max_by_key(|&k| group.hosts[k].seats[0].taken)?;
-    let lost = group.hosts[farthest].seats[0].taken.epoch;
+    let farthest = (0..group.hosts.len()).max_by_key(|&k| group.hosts[k].seats[0].accepted)?;
+    let lost = group.hosts[farthest].seats[0].accepted.epoch;
     (group.is_alive[farthest], group.faults.crashes) = (false, vec![(farthest, 0)]);
     let died_at = group.tick;
     let mut back_at = None;
     while !group.is_done() {
         assert!(group.step());
-        let newest = group.hosts.iter().map(|host| host.seats[0].taken.epoch).max()?;
+        let newest = group.hosts.iter().map(|host| host.seats[0].accepted.epoch).max()?;
         if newest > lost && group.is_accepted(newest) {
             back_at.get_or_insert(group.tick);
         }

@@ -14,8 +14,8 @@ mod pairs;
 #[cfg(test)]
 mod tests;
 
-use super::pose::{Pose, Vector};
 use super::serial::{Frames, SerialChain};
+use super::transform::{Transform, Vector};
 use mount::Mounts;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
@@ -26,25 +26,25 @@ use sidestep_kernel::geometry::norm;
 /// The shapes of an arm's links, and of all links that hang on them or carry the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmBody {
-    parts: Vec<Part>,
+    parts: Vec<LinkShape>,
     /// Pairs of parts that must not touch.
     pairs: Vec<(usize, usize)>,
 }
 
 /// A shape that is fixed in a link.
 #[derive(Debug, Clone, PartialEq)]
-struct Part {
+struct LinkShape {
     /// Name of its link.
     link: String,
     /// Its place in the model.
     mount: mount::Mount,
-    core: Core,
+    core: ShapeCore,
     /// Radius of a ball about its center that holds it, in m.
     radius_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Core {
+enum ShapeCore {
     Ball(Ball),
     Cylinder(Cylinder),
     Box(Cuboid),
@@ -52,13 +52,13 @@ enum Core {
 
 /// A part at a posture.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
+pub(super) struct PlacedShape {
     pose: ParryPose,
     center_m: Vector,
 }
 
 /// Two bodies that are nearer to each other than a distance.
-pub(super) struct Near {
+pub(super) struct Proximity {
     /// The point of the first that is nearest to the second, or deepest in it.
     pub(super) first_m: Vector,
     /// The point of the second.
@@ -81,20 +81,20 @@ impl ArmBody {
     ) -> Self {
         let mounts = Mounts::new(model, chain);
         let part = |solid: &Solid| {
-            let own = Pose::from_origin(&solid.origin);
-            let center = Pose { origin_m: solid.center_m, ..Pose::IDENTITY };
+            let own = Transform::from_origin(&solid.origin);
+            let center = Transform { origin_m: solid.center_m, ..Transform::IDENTITY };
             let core = core(&solid.shape)?;
-            Some(Part {
+            Some(LinkShape {
                 link: model.links[solid.link].clone(),
-                mount: mounts.of(solid.link, own.then(&center)),
+                mount: mounts.in_link(solid.link, own.compose(&center)),
                 radius_m: core.radius_m(),
                 core,
             })
         };
-        let parts: Vec<(usize, Part)> =
+        let parts: Vec<(usize, LinkShape)> =
             solids.iter().filter_map(|solid| Some((solid.link, part(solid)?))).collect();
         let links: Vec<usize> = parts.iter().map(|(link, _)| *link).collect();
-        let pairs = pairs::that_must_not_touch(model, &mounts, &links, may_touch);
+        let pairs = pairs::collision_pairs(model, &mounts, &links, may_touch);
         Self { parts: parts.into_iter().map(|(_, part)| part).collect(), pairs }
     }
 
@@ -116,16 +116,16 @@ impl ArmBody {
     /// values.
     pub fn overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
         let mut placed = Vec::new();
-        self.place(&chain.forward(values), values, &mut placed);
+        self.place_shapes(&chain.forward(values), values, &mut placed);
         let overlap = |&(a, b): &(usize, usize)| {
-            let near = self.near(&placed, a, b, 0.0).filter(|near| near.apart_m < 0.0)?;
+            let near = self.proximity(&placed, a, b, 0.0).filter(|near| near.apart_m < 0.0)?;
             Some((self.name(a), self.name(b), -near.apart_m))
         };
         self.pairs.iter().filter_map(overlap).collect()
     }
 
     /// Returns whether a link of the arm, counted as [`Frames::links`] are, has a shape.
-    pub(super) fn covers(&self, link: usize) -> bool {
+    pub(super) fn has_shape(&self, link: usize) -> bool {
         self.parts.iter().any(|part| part.mount.link == link)
     }
 
@@ -147,28 +147,38 @@ impl ArmBody {
     }
 
     /// Computes the places of all parts.
-    pub(super) fn place(&self, frames: &Frames, values: &[f64], placed: &mut Vec<Placed>) {
-        self.place_on(&frames.links, values, placed);
+    pub(super) fn place_shapes(
+        &self,
+        frames: &Frames,
+        values: &[f64],
+        placed: &mut Vec<PlacedShape>,
+    ) {
+        self.place_shapes_on(&frames.links, values, placed);
     }
 
     /// Computes the places of all parts if the arm's links are at `links`.
-    pub(super) fn place_on(&self, links: &[Pose], values: &[f64], placed: &mut Vec<Placed>) {
+    pub(super) fn place_shapes_on(
+        &self,
+        links: &[Transform],
+        values: &[f64],
+        placed: &mut Vec<PlacedShape>,
+    ) {
         placed.clear();
         placed.extend(self.parts.iter().map(|part| {
-            let pose = part.mount.at(links, values);
+            let pose = part.mount.transform(links, values);
             let upright = part.core.upright(&pose);
-            Placed { pose: upright, center_m: pose.origin_m }
+            PlacedShape { pose: upright, center_m: pose.origin_m }
         }));
     }
 
     /// Returns the relation of two parts, if they are nearer than `within_m`.
-    pub(super) fn near(
+    pub(super) fn proximity(
         &self,
-        placed: &[Placed],
+        placed: &[PlacedShape],
         a: usize,
         b: usize,
         within_m: f64,
-    ) -> Option<Near> {
+    ) -> Option<Proximity> {
         let far_m = self.parts[a].radius_m + self.parts[b].radius_m + within_m;
         if apart_m(placed[a].center_m, placed[b].center_m) > far_m {
             return None;
@@ -178,14 +188,14 @@ impl ArmBody {
     }
 
     /// Returns the relation of a part to a ball, if they are nearer than `within_m`.
-    pub(super) fn near_ball(
+    pub(super) fn ball_proximity(
         &self,
-        placed: &[Placed],
+        placed: &[PlacedShape],
         part: usize,
         center_m: Vector,
         radius_m: f64,
         within_m: f64,
-    ) -> Option<Near> {
+    ) -> Option<Proximity> {
         let far_m = self.parts[part].radius_m + radius_m + within_m;
         if apart_m(placed[part].center_m, center_m) > far_m {
             return None;
@@ -195,7 +205,7 @@ impl ArmBody {
     }
 }
 
-impl Core {
+impl ShapeCore {
     fn shape(&self) -> &dyn ParryShape {
         match self {
             Self::Ball(ball) => ball,
@@ -214,24 +224,24 @@ impl Core {
 
     /// Returns the pose in which parry draws it: cylinders of models are along z, those of parry
     /// along y.
-    fn upright(&self, pose: &Pose) -> ParryPose {
-        const UP: Pose = Pose {
+    fn upright(&self, pose: &Transform) -> ParryPose {
+        const UP: Transform = Transform {
             rotation: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
             origin_m: [0.0; 3],
         };
-        let pose = if matches!(self, Self::Cylinder(_)) { pose.then(&UP) } else { *pose };
+        let pose = if matches!(self, Self::Cylinder(_)) { pose.compose(&UP) } else { *pose };
         let [x, y, z, w] = pose.quaternion();
         ParryPose::from_parts(vector(pose.origin_m), Rotation::from_xyzw(x, y, z, w))
     }
 }
 
-fn core(shape: &Shape) -> Option<Core> {
+fn core(shape: &Shape) -> Option<ShapeCore> {
     match shape {
-        Shape::Sphere { radius_m } => Some(Core::Ball(Ball::new(*radius_m))),
+        Shape::Sphere { radius_m } => Some(ShapeCore::Ball(Ball::new(*radius_m))),
         Shape::Cylinder { radius_m, length_m } => {
-            Some(Core::Cylinder(Cylinder::new(0.5 * length_m, *radius_m)))
+            Some(ShapeCore::Cylinder(Cylinder::new(0.5 * length_m, *radius_m)))
         }
-        Shape::Box { size_m } => Some(Core::Box(Cuboid::new(vector(size_m.map(|x| 0.5 * x))))),
+        Shape::Box { size_m } => Some(ShapeCore::Box(Cuboid::new(vector(size_m.map(|x| 0.5 * x))))),
         // Solids are none of these.
         Shape::Mesh { .. } | Shape::Other { .. } => None,
     }
@@ -243,10 +253,10 @@ fn near(
     other_at: &ParryPose,
     other: &dyn ParryShape,
     within_m: f64,
-) -> Option<Near> {
+) -> Option<Proximity> {
     let found = query::contact(at, shape, other_at, other, within_m);
     let Contact { point1, point2, normal2, dist, .. } = found.expect("convex shapes")?;
-    Some(Near {
+    Some(Proximity {
         first_m: point(point1),
         second_m: point(point2),
         away: point(normal2),

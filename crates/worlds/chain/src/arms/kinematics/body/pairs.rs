@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 /// Returns the pairs of parts that can move against each other, are not connected by a joint, and
 /// may not touch. `links` are the links of the parts, by their index in the model.
-pub(super) fn that_must_not_touch(
+pub(super) fn collision_pairs(
     model: &Model,
     mounts: &Mounts,
     links: &[usize],
@@ -37,7 +37,7 @@ pub(super) fn that_must_not_touch(
 fn rigid_groups(model: &Model) -> Vec<usize> {
     let leader = |link: usize| {
         let mut at = link;
-        while let Some(joint) = model.joint_above(at).map(|joint| &model.joints[joint]) {
+        while let Some(joint) = model.parent_joint(at).map(|joint| &model.joints[joint]) {
             if joint.kind != JointKind::Fixed {
                 break;
             }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arms::kinematics::{Against, ArmGoal, ArmReason, Part as HitPart, Sphere};
+use crate::arms::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, Sphere};
 use proptest::prelude::*;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_testing::robot_model as shared;
@@ -81,14 +81,14 @@ fn what_hangs_beside_the_arm_follows_its_joints() {
     let body = body_of(&model, &chain, &[]);
     let right = body.parts.iter().find(|part| part.link == "right").expect("a finger");
     let values = [0.0, 0.0, 0.0, 0.07];
-    let at = right.mount.at(&chain.forward(&values).links, &values);
+    let at = right.mount.transform(&chain.forward(&values).links, &values);
     assert!(apart_m(at.origin_m, [3.0, -0.07, 1.0]) < 1e-12, "{at:?}");
     // From the bar `a` out, the column stands behind it.
     let [base, tip] = ["a", "tip"].map(|name| model.link("", name).expect("a link"));
     let outer = SerialChain::new(&model, base, tip, "tip").expect("a chain");
     let body = body_of(&model, &outer, &[]);
     let column = body.parts.iter().find(|part| part.link == "column").expect("a column");
-    let at = column.mount.at(&outer.forward(&[0.0, 0.0]).links, &[0.0, 0.0]);
+    let at = column.mount.transform(&outer.forward(&[0.0, 0.0]).links, &[0.0, 0.0]);
     assert!(apart_m(at.origin_m, [0.0, 0.0, -0.5]) < 1e-12, "{at:?}");
 }
 
@@ -104,10 +104,10 @@ proptest! {
         let sphere = Sphere { center_m: [at[0], at[1], 1.0], radius_m: 0.2 };
         let is_clear = |values: &[f64]| {
             let mut placed = Vec::new();
-            body.place(&chain.forward(values), values, &mut placed);
+            body.place_shapes(&chain.forward(values), values, &mut placed);
             let Sphere { center_m, radius_m } = sphere;
             let in_ball =
-                |part| body.near_ball(&placed, part, center_m, radius_m, 0.0).is_some();
+                |part| body.ball_proximity(&placed, part, center_m, radius_m, 0.0).is_some();
             body.overlaps(&chain, values).is_empty() && !(0..body.len()).any(in_ball)
         };
         let goal = ArmGoal {
@@ -117,7 +117,7 @@ proptest! {
             restarts: 50,
             ..ArmGoal::new(target)
         };
-        let answer = chain.solve(&goal, &chain.rest()).expect("right");
+        let answer = chain.solve(&goal, &chain.rest_values()).expect("right");
         // The posture that the target came from is an answer, if it is clear.
         prop_assert!(answer.reached || !is_clear(&there), "{:?}", answer.reason);
         prop_assert!(!answer.reached || is_clear(&answer.values));
@@ -132,10 +132,10 @@ fn the_link_that_is_in_the_way_is_named() {
     // Straight, there is no other posture. The bar is 0.05 m thick, so that its rod is not hit.
     let sphere = Sphere { center_m: [0.5, 0.14, 1.0], radius_m: 0.1 };
     let goal = ArmGoal { spheres: vec![sphere], ..ArmGoal::new(target) };
-    assert!(chain.solve(&goal, &chain.rest()).expect("right").reached);
-    let answer = chain.solve(&ArmGoal { body, ..goal }, &chain.rest()).expect("right");
-    let Some(ArmReason::Blocked(hit)) = answer.reason else { panic!("{answer:?}") };
-    assert_eq!((hit.part, hit.against), (HitPart::Link("a".into()), Against::Sphere(0)));
+    assert!(chain.solve(&goal, &chain.rest_values()).expect("right").reached);
+    let answer = chain.solve(&ArmGoal { body, ..goal }, &chain.rest_values()).expect("right");
+    let Some(IkFailure::Blocked(hit)) = answer.reason else { panic!("{answer:?}") };
+    assert_eq!((hit.part, hit.against), (HitPart::Link("a".into()), CollidesWith::Sphere(0)));
     assert!((hit.depth_m - 0.01).abs() < 1e-3);
 }
 

@@ -1,11 +1,11 @@
 //! Parts of an arm that are in another body, or nearly so.
 
-use super::super::body::{self, ArmBody, Near};
-use super::super::pose::Vector;
+use super::super::body::{self, ArmBody, Proximity};
 use super::super::skeleton::{Anchor, Skeleton};
-use super::answer::{Against, Hit, Part};
+use super::super::transform::Vector;
+use super::fast_fk::LinkTransforms;
 use super::goal::{ArmGoal, Sphere};
-use super::quick::Placed;
+use super::result::{ArmPart, CollidesWith, Collision};
 use crate::rods::geometry::nearest_on_segment;
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 
@@ -13,7 +13,7 @@ use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 const MARGIN: f64 = 1e-4;
 
 /// The parts of an arm, and the bodies that they must not enter.
-pub(super) struct Contacts<'a> {
+pub(super) struct ContactFinder<'a> {
     anchors: &'a [Anchor],
     /// Indices of the rods that stand for links without shapes.
     rods: Vec<usize>,
@@ -25,11 +25,11 @@ pub(super) struct Contacts<'a> {
 
 /// The contacts of a posture.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Touched {
+pub(super) struct ContactSet {
     pub(super) contacts: Vec<Contact>,
     /// The deepest of those that are more than a mere margin.
-    pub(super) hit: Option<Hit>,
-    parts: Vec<body::Placed>,
+    pub(super) hit: Option<Collision>,
+    parts: Vec<body::PlacedShape>,
 }
 
 /// A place where a part is too near to a body.
@@ -40,34 +40,39 @@ pub(super) struct Contact {
     /// The way that it must go, in m.
     pub(super) wanted_m: f64,
     /// The points that move it.
-    pub(super) pulls: [Pull; 2],
+    pub(super) pulls: [ContactPoint; 2],
 }
 
 /// A point of a link, and its share in a contact's motion.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pull {
+pub(super) struct ContactPoint {
     pub(super) link: usize,
     pub(super) at_m: Vector,
     pub(super) share: f64,
 }
 
-impl Touched {
-    fn add(&mut self, contact: Contact, depth_m: f64, hit: impl FnOnce() -> (Part, Against)) {
+impl ContactSet {
+    fn add(
+        &mut self,
+        contact: Contact,
+        depth_m: f64,
+        hit: impl FnOnce() -> (ArmPart, CollidesWith),
+    ) {
         self.contacts.push(contact);
         if depth_m > self.hit.as_ref().map_or(0.0, |hit| hit.depth_m) {
             let (part, against) = hit();
-            self.hit = Some(Hit { part, against, depth_m });
+            self.hit = Some(Collision { part, against, depth_m });
         }
     }
 }
 
-impl<'a> Contacts<'a> {
+impl<'a> ContactFinder<'a> {
     pub(super) fn new(skeleton: &'a Skeleton, goal: &'a ArmGoal) -> Self {
         let body = goal.body.as_ref().filter(|body| !body.is_empty());
         let anchors = &skeleton.connectors;
         let is_bare = |rod: &usize| {
             let mut links = holders(&anchors[*rod], &anchors[rod + 1]);
-            body.is_none_or(|body| !links.any(|link| body.covers(link)))
+            body.is_none_or(|body| !links.any(|link| body.has_shape(link)))
         };
         Self {
             anchors,
@@ -80,7 +85,7 @@ impl<'a> Contacts<'a> {
     }
 
     /// Finds all contacts of a posture.
-    pub(super) fn find(&self, values: &[f64], placed: &Placed, touched: &mut Touched) {
+    pub(super) fn find(&self, values: &[f64], placed: &LinkTransforms, touched: &mut ContactSet) {
         touched.contacts.clear();
         touched.hit = None;
         if !self.spheres.is_empty() {
@@ -90,7 +95,7 @@ impl<'a> Contacts<'a> {
             return;
         };
         let mut parts = std::mem::take(&mut touched.parts);
-        body.place_on(&placed.links, values, &mut parts);
+        body.place_shapes_on(&placed.links, values, &mut parts);
         self.parts_in_spheres(body, &parts, touched);
         if self.own_body {
             self.parts_in_parts(body, &parts, touched);
@@ -98,9 +103,9 @@ impl<'a> Contacts<'a> {
         touched.parts = parts;
     }
 
-    fn rod_in_spheres(&self, rod: usize, placed: &Placed, touched: &mut Touched) {
+    fn rod_in_spheres(&self, rod: usize, placed: &LinkTransforms, touched: &mut ContactSet) {
         let pair = [self.anchors[rod], self.anchors[rod + 1]];
-        let ends = pair.map(|anchor| placed.links[anchor.first].point(anchor.point_m));
+        let ends = pair.map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m));
         for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             let nearest = nearest_on_segment(center_m, ends[0], ends[1]);
             let apart_m = norm(sub(nearest, center_m));
@@ -113,46 +118,59 @@ impl<'a> Contacts<'a> {
             } else {
                 [0.0, 0.0, 1.0]
             };
-            let part = share(nearest, ends);
-            let pull = |end: usize, share| Pull { link: pair[end].first, at_m: ends[end], share };
+            let part = fraction_along(nearest, ends);
+            let pull =
+                |end: usize, share| ContactPoint { link: pair[end].first, at_m: ends[end], share };
             let pulls = [pull(0, 1.0 - part), pull(1, part)];
             let contact = Contact { away, wanted_m: depth_m + self.margin_m, pulls };
-            touched.add(contact, depth_m, || (Part::Rod(rod), Against::Sphere(sphere)));
+            touched.add(contact, depth_m, || (ArmPart::Rod(rod), CollidesWith::Sphere(sphere)));
         }
     }
 
-    fn parts_in_spheres(&self, body: &ArmBody, parts: &[body::Placed], touched: &mut Touched) {
+    fn parts_in_spheres(
+        &self,
+        body: &ArmBody,
+        parts: &[body::PlacedShape],
+        touched: &mut ContactSet,
+    ) {
         for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             for part in 0..body.len() {
-                let near = body.near_ball(parts, part, center_m, radius_m, self.margin_m);
+                let near = body.ball_proximity(parts, part, center_m, radius_m, self.margin_m);
                 if let Some(near) = near {
                     let contact = self.contact(&near, body.link(part), 0);
-                    let hit = || (Part::Link(body.name(part).into()), Against::Sphere(sphere));
+                    let hit =
+                        || (ArmPart::Link(body.name(part).into()), CollidesWith::Sphere(sphere));
                     touched.add(contact, -near.apart_m, hit);
                 }
             }
         }
     }
 
-    fn parts_in_parts(&self, body: &ArmBody, parts: &[body::Placed], touched: &mut Touched) {
+    fn parts_in_parts(
+        &self,
+        body: &ArmBody,
+        parts: &[body::PlacedShape],
+        touched: &mut ContactSet,
+    ) {
         for &(a, b) in body.own_pairs() {
-            if let Some(near) = body.near(parts, a, b, self.margin_m) {
+            if let Some(near) = body.proximity(parts, a, b, self.margin_m) {
                 let contact = self.contact(&near, body.link(a), body.link(b));
                 let name = |part| String::from(body.name(part));
-                touched
-                    .add(contact, -near.apart_m, || (Part::Link(name(b)), Against::Link(name(a))));
+                touched.add(contact, -near.apart_m, || {
+                    (ArmPart::Link(name(b)), CollidesWith::Link(name(a)))
+                });
             }
         }
     }
 
     /// Returns the contact of two bodies that are fixed in two links; the base stands still.
-    fn contact(&self, near: &Near, link: usize, other: usize) -> Contact {
+    fn contact(&self, near: &Proximity, link: usize, other: usize) -> Contact {
         Contact {
             away: near.away,
             wanted_m: self.margin_m - near.apart_m,
             pulls: [
-                Pull { link, at_m: near.first_m, share: 1.0 },
-                Pull { link: other, at_m: near.second_m, share: -1.0 },
+                ContactPoint { link, at_m: near.first_m, share: 1.0 },
+                ContactPoint { link: other, at_m: near.second_m, share: -1.0 },
             ],
         }
     }
@@ -165,7 +183,7 @@ fn holders(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
 }
 
 /// Returns the position of a point along a segment, in [0, 1].
-fn share(p_m: Vector, [a, b]: [Vector; 2]) -> f64 {
+fn fraction_along(p_m: Vector, [a, b]: [Vector; 2]) -> f64 {
     let d = sub(b, a);
     let square = dot(d, d);
     if square > 0.0 { (dot(sub(p_m, a), d) / square).clamp(0.0, 1.0) } else { 0.0 }

@@ -1,21 +1,21 @@
 //! Damped steps from one posture.
 
-use super::super::serial::{Motion, SerialChain};
+use super::super::serial::{JointMotion, SerialChain};
+use super::criteria::{Evaluation, IkCriteria};
 use super::goal::ArmGoal;
-use super::rows::{Look, Scene};
-use super::step::{Bounds, Stepper};
+use super::step::{JointRanges, Stepper};
 use sidestep_kernel::math::wrap_angle;
 
 /// The first damping, in parts of the mean of the matrix's diagonal: measured, as all numbers here,
 /// on 1,000 poses of each of eleven arms, with smaller ones it leaves the start's surroundings.
-const FIRST_DAMPING: f64 = 0.1;
+const INITIAL_DAMPING: f64 = 0.1;
 /// Factors of the damping after a step that helped, and after one that did not.
-const RELAX: f64 = 0.3;
-const STIFFEN: f64 = 5.0;
+const DAMPING_DECREASE: f64 = 0.3;
+const DAMPING_INCREASE: f64 = 5.0;
 
 /// The effort of one descent.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Effort {
+pub(super) struct DescentLimits {
     /// Most steps, including those that did not help.
     steps: usize,
     /// Steps without gain before it is given up.
@@ -24,7 +24,7 @@ pub(super) struct Effort {
     least_gain: f64,
 }
 
-impl Effort {
+impl DescentLimits {
     /// One start of many: where it goes slowly, another start is quicker (half of the time for all
     /// starts, measured).
     pub(super) const BRIEF: Self = Self { steps: 200, patience: 6, least_gain: 0.3 };
@@ -34,9 +34,9 @@ impl Effort {
 
 /// The end of a descent from one start.
 #[derive(Debug, Clone)]
-pub(super) struct Descent {
+pub(super) struct DescentResult {
     pub(super) values: Vec<f64>,
-    pub(super) look: Look,
+    pub(super) look: Evaluation,
     pub(super) steps: usize,
 }
 
@@ -44,13 +44,13 @@ pub(super) struct Descent {
 pub(super) struct Descender<'a> {
     pub(super) chain: &'a SerialChain,
     pub(super) goal: &'a ArmGoal,
-    pub(super) scene: Scene<'a>,
-    pub(super) bounds: Bounds,
+    pub(super) scene: IkCriteria<'a>,
+    pub(super) bounds: JointRanges,
     pub(super) stepper: Stepper,
 }
 
 impl Descender<'_> {
-    pub(super) fn is_met(&self, look: &Look) -> bool {
+    pub(super) fn is_met(&self, look: &Evaluation) -> bool {
         // Forward kinematics in another order differs in the last digits.
         const SLACK: f64 = 1.0 - 1e-9;
         look.tip_m <= SLACK * self.goal.tolerance_m
@@ -59,30 +59,30 @@ impl Descender<'_> {
     }
 
     /// Makes damped steps from a start, until the goal is met or there is no more gain.
-    pub(super) fn descend(&mut self, mut values: Vec<f64>, effort: Effort) -> Descent {
+    pub(super) fn descend(&mut self, mut values: Vec<f64>, effort: DescentLimits) -> DescentResult {
         self.bounds.clamp(&mut values);
         let n = values.len();
-        let mut look = Scene::blank(self.chain);
-        self.scene.look(&values, &mut look);
+        let mut look = IkCriteria::empty_evaluation(self.chain);
+        self.scene.evaluate(&values, &mut look);
         let (mut next, mut next_look) = (values.clone(), look.clone());
-        let mut damping = FIRST_DAMPING;
+        let mut damping = INITIAL_DAMPING;
         let (mut mark, mut since, mut steps) = (look.merit(), 0, 0);
         let mut is_new = true;
         let goes_on = |steps, since| n > 0 && steps < effort.steps && since < effort.patience;
         while goes_on(steps, since) && !self.is_met(&look) {
             steps += 1;
             if is_new {
-                self.scene.slopes(&look, n, &mut self.stepper.rows);
+                self.scene.jacobian(&look, n, &mut self.stepper.rows);
             }
             self.stepper.step(&values, &look.wanted, damping, &self.bounds, &mut next);
-            self.scene.look(&next, &mut next_look);
+            self.scene.evaluate(&next, &mut next_look);
             is_new = next_look.merit() < look.merit();
             if is_new {
                 std::mem::swap(&mut values, &mut next);
                 std::mem::swap(&mut look, &mut next_look);
-                damping *= RELAX;
+                damping *= DAMPING_DECREASE;
             } else {
-                damping *= STIFFEN;
+                damping *= DAMPING_INCREASE;
             }
             since += 1;
             if look.merit() < (1.0 - effort.least_gain) * mark {
@@ -90,21 +90,21 @@ impl Descender<'_> {
             }
         }
         self.unwind(&mut values);
-        Descent { values, look, steps }
+        DescentResult { values, look, steps }
     }
 
     /// Brings angles without limits to less than half a turn from zero.
     fn unwind(&self, values: &mut [f64]) {
         for (i, value) in values.iter_mut().enumerate() {
-            if self.bounds.ranges[i] == Bounds::ANY && self.is_round(i) {
+            if self.bounds.ranges[i] == JointRanges::UNLIMITED && self.is_periodic(i) {
                 *value = wrap_angle(*value);
             }
         }
     }
 
     /// Returns whether a variable that is a full turn larger is the same posture.
-    pub(super) fn is_round(&self, variable: usize) -> bool {
+    pub(super) fn is_periodic(&self, variable: usize) -> bool {
         let mut driven = self.chain.joints.iter().filter(|j| j.drive.variable == variable);
-        driven.all(|j| j.motion == Motion::Turn && j.drive.is_own())
+        driven.all(|j| j.motion == JointMotion::Turn && j.drive.is_own())
     }
 }

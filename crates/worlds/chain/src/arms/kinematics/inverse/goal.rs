@@ -1,12 +1,12 @@
 //! Goals of an arm.
 
 use super::super::body::ArmBody;
-use super::super::pose::{Pose, Vector};
+use super::super::transform::{Transform, Vector};
 use crate::arms::ik::Engine;
 use sidestep_kernel::InputError;
 
 /// The most postures that one goal may ask for.
-pub const MOST_SOLUTIONS: usize = 1000;
+pub const MAX_SOLUTIONS: usize = 1000;
 
 /// A sphere that no part of the arm may enter. Where the arm's links have no shapes, its rods are
 /// thin lines, so the radius must include the arm's thickness.
@@ -36,7 +36,7 @@ impl Axis {
 
 /// The part of the tip's orientation that counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Turn {
+pub enum OrientationMask {
     /// Nothing: the tip may be turned in any way.
     Free,
     /// The direction of one axis: the tip may turn about it.
@@ -47,18 +47,18 @@ pub enum Turn {
 
 /// The part of a target's pose that counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
+pub struct PoseMask {
     /// Whether the position along the axes x, y and z of the target's frame counts.
     pub along: [bool; 3],
     /// The part of the orientation that counts.
-    pub turn: Turn,
+    pub turn: OrientationMask,
 }
 
-impl Asked {
+impl PoseMask {
     /// The position alone.
-    pub const POSITION: Self = Self { along: [true; 3], turn: Turn::Free };
+    pub const POSITION: Self = Self { along: [true; 3], turn: OrientationMask::Free };
     /// Position and orientation.
-    pub const POSE: Self = Self { along: [true; 3], turn: Turn::Whole };
+    pub const POSE: Self = Self { along: [true; 3], turn: OrientationMask::Whole };
 
     /// Returns the part of a target that counts, with or without its orientation, where some axes of its frame are
     /// free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
@@ -77,24 +77,24 @@ impl Asked {
             return refused("a turn is free, and none is asked for", "add --rpy or --quaternion");
         }
         let turn = match free[..] {
-            _ if !is_turned => Turn::Free,
-            [] => Turn::Whole,
-            [axis] => Turn::Axis(axis),
-            [_, _, _] => Turn::Free,
+            _ if !is_turned => OrientationMask::Free,
+            [] => OrientationMask::Whole,
+            [axis] => OrientationMask::Axis(axis),
+            [_, _, _] => OrientationMask::Free,
             _ => {
                 let remedy = "free one turn, which leaves the direction of its axis, or all three";
                 return refused("two turns are free", remedy);
             }
         };
         let along = along.map(|free| !free);
-        if along == [false; 3] && turn == Turn::Free {
+        if along == [false; 3] && turn == OrientationMask::Free {
             return refused("everything is free", "leave something that the tip shall do");
         }
         Ok(Self { along, turn })
     }
 
     /// Returns whether all of the position counts.
-    pub fn whole_position(self) -> bool {
+    pub fn has_whole_position(self) -> bool {
         self.along == [true; 3]
     }
 }
@@ -103,9 +103,9 @@ impl Asked {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmGoal {
     /// Frame that the tip is to take, in the base's frame.
-    pub target: Pose,
+    pub target: Transform,
     /// The part of it that counts.
-    pub asked: Asked,
+    pub asked: PoseMask,
     /// Distance at which the target counts as reached, in m.
     pub tolerance_m: f64,
     /// Angle at which the orientation counts as reached, in rad.
@@ -141,16 +141,16 @@ impl ArmGoal {
     /// Returns a goal for the tip at `target_m`, turned in any way, to 1e-6 m, with 100 restarts,
     /// inside the limits.
     pub fn new(target_m: Vector) -> Self {
-        let target = Pose { origin_m: target_m, ..Pose::IDENTITY };
-        Self { asked: Asked::POSITION, ..Self::pose(target) }
+        let target = Transform { origin_m: target_m, ..Transform::IDENTITY };
+        Self { asked: PoseMask::POSITION, ..Self::from_pose(target) }
     }
 
     /// Returns a goal for the position and the orientation of the tip, to 1e-6 m and 1e-6 rad, with
     /// 100 restarts, inside the limits.
-    pub fn pose(target: Pose) -> Self {
+    pub fn from_pose(target: Transform) -> Self {
         Self {
             target,
-            asked: Asked::POSE,
+            asked: PoseMask::POSE,
             tolerance_m: 1e-6,
             tolerance_rad: 1e-6,
             engine: Engine::Auto,
@@ -167,25 +167,25 @@ impl ArmGoal {
     }
 
     pub(super) fn check(&self) -> Result<(), InputError> {
-        let Pose { origin_m, rotation } = &self.target;
+        let Transform { origin_m, rotation } = &self.target;
         if !origin_m.iter().all(|x| x.abs() <= 1e7) {
             let cause = format!("is {origin_m:?}");
             return Err(InputError::new("target", cause, "give finite coordinates up to 1e7 m"));
         }
-        if !self.target.is_turned() {
+        if !self.target.has_valid_rotation() {
             let cause = format!("has {rotation:?} as its orientation, which is no rotation");
             return Err(InputError::new("target", cause, "give three orthogonal unit vectors"));
         }
-        if self.asked.along == [false; 3] && self.asked.turn == Turn::Free {
+        if self.asked.along == [false; 3] && self.asked.turn == OrientationMask::Free {
             let cause = "neither position nor orientation counts";
             return Err(InputError::new("target", cause, "ask for some of it"));
         }
-        above_zero("tolerance", self.tolerance_m, "m", "a length")?;
-        above_zero("tolerance", self.tolerance_rad, "rad", "an angle")?;
-        above_zero("apart", self.apart, "rad", "an angle")?;
-        if !(1..=MOST_SOLUTIONS).contains(&self.solutions) {
+        check_positive("tolerance", self.tolerance_m, "m", "a length")?;
+        check_positive("tolerance", self.tolerance_rad, "rad", "an angle")?;
+        check_positive("apart", self.apart, "rad", "an angle")?;
+        if !(1..=MAX_SOLUTIONS).contains(&self.solutions) {
             let cause = format!("is {}", self.solutions);
-            let remedy = format!("give a number from 1 to {MOST_SOLUTIONS}");
+            let remedy = format!("give a number from 1 to {MAX_SOLUTIONS}");
             return Err(InputError::new("solutions", cause, remedy));
         }
         self.check_spheres()
@@ -193,7 +193,7 @@ impl ArmGoal {
 
     /// Returns whether the search goes on from posture to posture, instead of ending at the first that
     /// meets the goal.
-    pub(super) fn wants_many(&self) -> bool {
+    pub(super) fn is_multi_solution(&self) -> bool {
         self.solutions > 1 || self.nearest
     }
 
@@ -212,7 +212,7 @@ impl ArmGoal {
     }
 }
 
-fn above_zero(place: &str, value: f64, unit: &str, quantity: &str) -> Result<(), InputError> {
+fn check_positive(place: &str, value: f64, unit: &str, quantity: &str) -> Result<(), InputError> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }

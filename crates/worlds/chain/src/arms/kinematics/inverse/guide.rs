@@ -1,18 +1,18 @@
 //! The connectors' solution as a posture of the joints.
 
-use super::super::pose::Vector;
 use super::super::serial::SerialChain;
 use super::super::skeleton::Skeleton;
+use super::super::transform::Vector;
 use super::goal::ArmGoal;
-use crate::arms::ik::{Goal, Solver};
+use crate::arms::ik::{ChainIkGoal, IkSolver};
 use crate::rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{add, scaled};
 
 /// Least length, in m, of rods that a prismatic joint can close altogether.
-const LEAST_ROD_M: f64 = 1e-6;
+const MIN_ROD_M: f64 = 1e-6;
 /// Longest length of rods without a limit, as a multiple of the target's distance and the reach.
-const LONGEST: f64 = 4.0;
+const MAX_LENGTH_FACTOR: f64 = 4.0;
 /// Postures of the connectors that are tried.
 const RESTARTS: usize = 20;
 
@@ -26,18 +26,18 @@ pub(super) fn posture(
     start: &[f64],
 ) -> Option<(Vec<f64>, usize)> {
     let connectors = arm.connectors(skeleton, &arm.forward(start));
-    let (chain, before) = chain_of(arm, skeleton, goal, &connectors).ok()?;
+    let (chain, before) = arm_chain(arm, skeleton, goal, &connectors).ok()?;
     let balls =
         goal.spheres.iter().zip(0..).map(|(s, id)| Obstacle::ball(id, s.center_m, s.radius_m));
     let obstacles = Obstacles::new(balls.collect(), skeleton.reach_m).ok()?;
     let tip = chain.points().len() - 1;
-    let wanted = Goal {
+    let wanted = ChainIkGoal {
         tolerance_m: 0.5 * goal.tolerance_m,
         restarts: RESTARTS,
         seed: goal.seed,
-        ..Goal::new(tip, before, goal.target.origin_m)
+        ..ChainIkGoal::new(tip, before, goal.target.origin_m)
     };
-    let answer = Solver::new(Rules::default()).solve(&chain, &obstacles, &wanted).ok()?;
+    let answer = IkSolver::new(Rules::default()).solve(&chain, &obstacles, &wanted).ok()?;
     if !answer.reached {
         return None;
     }
@@ -47,21 +47,21 @@ pub(super) fn posture(
 
 /// Returns the arm as a chain: its connectors, with a fixed one before the first from which the
 /// bend there is measured, if there is a direction for it. Also returns the index of the base.
-fn chain_of(
+fn arm_chain(
     arm: &SerialChain,
     skeleton: &Skeleton,
     goal: &ArmGoal,
     connectors: &[Vector],
 ) -> Result<(Chain<3>, usize), InputError> {
     let mut points = connectors.to_vec();
-    let longest_m =
-        LONGEST * (skeleton.reach_m + goal.target.origin_m.iter().map(|x| x.abs()).sum::<f64>());
+    let longest_m = MAX_LENGTH_FACTOR
+        * (skeleton.reach_m + goal.target.origin_m.iter().map(|x| x.abs()).sum::<f64>());
     let mut rods: Vec<Rod> = skeleton
         .rods
         .iter()
         .map(|rod| Rod {
-            min_m: rod.min_m.max(LEAST_ROD_M),
-            max_m: rod.max_m.min(longest_m).max(LEAST_ROD_M),
+            min_m: rod.min_m.max(MIN_ROD_M),
+            max_m: rod.max_m.min(longest_m).max(MIN_ROD_M),
             radius_m: 0.0,
         })
         .collect();

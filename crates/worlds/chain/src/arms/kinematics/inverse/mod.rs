@@ -21,26 +21,26 @@
 //!
 //! Every answer's error is that of forward kinematics at its values.
 
-mod answer;
 mod contacts;
+mod criteria;
 mod descent;
-mod follow;
+mod fast_fk;
 mod goal;
 mod guide;
-mod many;
-mod quick;
-mod rows;
+mod result;
 mod search;
+mod solutions;
 mod step;
 #[cfg(test)]
 mod tests;
+mod tracking;
 
-pub use answer::{Against, ArmAnswer, ArmReason, Hit, Part, Posture};
-pub(crate) use follow::{Aim, Follower};
-pub use goal::{ArmGoal, Asked, Axis, MOST_SOLUTIONS, Sphere, Turn};
+pub use goal::{ArmGoal, Axis, MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere};
+pub use result::{ArmPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
+pub(crate) use tracking::{ConnectorTarget, JointTracker};
 
 use super::serial::SerialChain;
-use search::Search;
+use search::IkSearch;
 use sidestep_kernel::InputError;
 
 impl SerialChain {
@@ -50,10 +50,10 @@ impl SerialChain {
     /// # Errors
     /// When a target, tolerance, sphere or start is not in range. A target that cannot be reached
     /// is no error.
-    pub fn solve(&self, goal: &ArmGoal, start: &[f64]) -> Result<ArmAnswer, InputError> {
+    pub fn solve(&self, goal: &ArmGoal, start: &[f64]) -> Result<IkResult, InputError> {
         goal.check()?;
         self.check_count("start", start)?;
         let skeleton = self.skeleton();
-        Ok(Search::new(self, &skeleton, goal).run(start))
+        Ok(IkSearch::new(self, &skeleton, goal).run(start))
     }
 }

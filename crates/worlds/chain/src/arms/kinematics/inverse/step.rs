@@ -4,23 +4,25 @@ use super::super::serial::SerialChain;
 
 /// The range of each variable.
 #[derive(Debug)]
-pub(super) struct Bounds {
+pub(super) struct JointRanges {
     pub(super) ranges: Vec<[f64; 2]>,
 }
 
-impl Bounds {
+impl JointRanges {
     /// No limits.
-    pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+    pub(super) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
     /// Returns bounds without limits.
-    pub(super) fn none(chain: &SerialChain) -> Self {
-        Self { ranges: vec![Self::ANY; chain.variables.len()] }
+    pub(super) fn unlimited(chain: &SerialChain) -> Self {
+        Self { ranges: vec![Self::UNLIMITED; chain.variables.len()] }
     }
 
     /// Returns the limits of all joints: those that mimic another narrow its range.
-    pub(super) fn of(chain: &SerialChain) -> Self {
-        let own =
-            chain.variables.iter().map(|v| v.limits.map_or(Self::ANY, |l| [l.lower, l.upper]));
+    pub(super) fn from_chain(chain: &SerialChain) -> Self {
+        let own = chain
+            .variables
+            .iter()
+            .map(|v| v.limits.map_or(Self::UNLIMITED, |l| [l.lower, l.upper]));
         let mut ranges: Vec<_> = own.collect();
         for joint in &chain.joints {
             let drive = joint.drive;
@@ -73,7 +75,7 @@ impl Stepper {
         values: &[f64],
         wanted: &[f64],
         damping: f64,
-        bounds: &Bounds,
+        bounds: &JointRanges,
         next: &mut Vec<f64>,
     ) {
         let n = values.len();
@@ -86,7 +88,7 @@ impl Stepper {
         self.is_free.resize(n, true);
         self.wanted.clear();
         self.wanted.extend_from_slice(wanted);
-        while self.least_squares(n, damping) && self.stop_at_ends(values, bounds, next) {}
+        while self.least_squares(n, damping) && self.clamp_step(values, bounds, next) {}
         for ((next, moves), is_free) in next.iter_mut().zip(&self.moves).zip(&self.is_free) {
             if *is_free {
                 *next += moves;
@@ -96,7 +98,7 @@ impl Stepper {
 
     /// Puts the variables that would leave their ranges at their ends, subtracts the resulting changes
     /// from the wanted ones, and returns whether there were any.
-    fn stop_at_ends(&mut self, values: &[f64], bounds: &Bounds, next: &mut [f64]) -> bool {
+    fn clamp_step(&mut self, values: &[f64], bounds: &JointRanges, next: &mut [f64]) -> bool {
         let n = values.len();
         let mut any = false;
         for (i, &[lower, upper]) in bounds.ranges.iter().enumerate() {

@@ -1,17 +1,17 @@
 //! All bodies that the parts of a chain may touch in a tick.
 
 use super::super::threat::{Threat, collect};
-use super::super::{Margin, Part};
+use super::super::{ChainPart, Margin};
 use super::posture::ends;
 use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, Core, Nearest, Point, between_segments, distance};
+use crate::rods::geometry::{Bounds, Core, NearestPoints, Point, between_segments, distance};
 use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::own_body::OwnBody;
+use crate::rods::rod_bvh::RodBvh;
 
 /// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Wall<const D: usize> {
-    pub(super) part: Part,
+pub(super) struct WallContact<const D: usize> {
+    pub(super) part: ChainPart,
     pub(super) core: Core<D>,
     /// Distance from the core to be kept, meters: that of touching, or less if it was less.
     pub(super) keep_m: f64,
@@ -19,8 +19,8 @@ pub(super) struct Wall<const D: usize> {
 
 /// Two parts of the chain near each other.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
-    pub(super) parts: [Part; 2],
+pub(super) struct PartPair {
+    pub(super) parts: [ChainPart; 2],
     /// Distance to be kept, meters: that of touching, or less if it was less.
     pub(super) keep_m: f64,
 }
@@ -30,55 +30,59 @@ pub(super) struct Pair {
 pub(super) struct Contacts<const D: usize> {
     /// Parts near an obstacle that moves.
     pub(super) threats: Vec<Threat>,
-    pub(super) walls: Vec<Wall<D>>,
-    pub(super) pairs: Vec<Pair>,
-    body: OwnBody<D>,
+    pub(super) walls: Vec<WallContact<D>>,
+    pub(super) pairs: Vec<PartPair>,
+    body: RodBvh<D>,
 }
 
 impl<const D: usize> Contacts<D> {
     /// Collects the parts near obstacles that move. Connectors move by `way_m` at most.
-    pub(super) fn look_for_movers(
+    pub(super) fn find_movers(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         margin: Margin,
         way_m: f64,
     ) {
-        let within_m = |o: &Obstacle<D>| margin.around(o) + REACH * way_m;
+        let within_m = |o: &Obstacle<D>| margin.required_gap_m(o) + CONTACT_RANGE_FACTOR * way_m;
         collect(chain, obstacles, &mut self.body, within_m, &mut self.threats);
     }
 
     /// Collects walls and own parts that connectors may reach on a way of `way_m`.
-    pub(super) fn look_around(
+    pub(super) fn find_nearby(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         own: bool,
         way_m: f64,
     ) {
-        let reach_m = REACH * way_m;
+        let reach_m = CONTACT_RANGE_FACTOR * way_m;
         self.walls.clear();
         self.pairs.clear();
         for part in parts(chain) {
             let (ends, radius_m) = (ends(chain.points(), part), radius_m(chain, part));
-            obstacles.visit(&Bounds::of(&ends).grown(radius_m + reach_m), |o| {
+            obstacles.visit(&Bounds::from_points(&ends).grown(radius_m + reach_m), |o| {
                 let apart_m = o.core.nearest_to_segment(ends).distance_m;
                 let touch_m = radius_m + o.radius_m;
                 if !o.is_moving() && apart_m < touch_m + reach_m {
-                    self.walls.push(Wall { part, core: o.core, keep_m: touch_m.min(apart_m) });
+                    self.walls.push(WallContact {
+                        part,
+                        core: o.core,
+                        keep_m: touch_m.min(apart_m),
+                    });
                 }
             });
         }
         if own {
-            self.pair_up(chain, reach_m);
+            self.find_pairs(chain, reach_m);
         }
     }
 
-    fn pair_up(&mut self, chain: &Chain<D>, reach_m: f64) {
+    fn find_pairs(&mut self, chain: &Chain<D>, reach_m: f64) {
         let n = chain.rods().len();
         let boxes = |i: usize| {
             let [a, b] = [i, i + 1].map(|k| chain.connectors()[k].radius_m);
-            Bounds::of(&chain.points()[i..i + 2]).grown(a.max(b) + 0.5 * reach_m)
+            Bounds::from_points(&chain.points()[i..i + 2]).grown(a.max(b) + 0.5 * reach_m)
         };
         self.body.rebuild((0..n).map(boxes));
         let Self { body, pairs, .. } = self;
@@ -86,8 +90,8 @@ impl<const D: usize> Contacts<D> {
             body.visit(&boxes(rod), |other| {
                 if other > rod {
                     let last = (other + 1 == n).then_some(other + 1);
-                    for parts in candidates(rod, other, last).into_iter().flatten() {
-                        pairs.extend(near(chain, parts, reach_m));
+                    for parts in candidate_pairs(rod, other, last).into_iter().flatten() {
+                        pairs.extend(near_pair(chain, parts, reach_m));
                     }
                 }
             });
@@ -96,52 +100,62 @@ impl<const D: usize> Contacts<D> {
 }
 
 /// Distance within which a body is a contact, as a multiple of the way of a connector.
-const REACH: f64 = 4.0;
+const CONTACT_RANGE_FACTOR: f64 = 4.0;
 
-fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Part> + use<D> {
+fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + use<D> {
     let n = chain.rods().len();
-    (0..=n).map(Part::Connector).chain((0..n).map(Part::Rod))
+    (0..=n).map(ChainPart::Connector).chain((0..n).map(ChainPart::Rod))
 }
 
 /// Returns the radius of a part, meters.
-pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: Part) -> f64 {
+pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: ChainPart) -> f64 {
     match part {
-        Part::Connector(k) => chain.connectors()[k].radius_m,
-        Part::Rod(i) => chain.rods()[i].radius_m,
+        ChainPart::Connector(k) => chain.connectors()[k].radius_m,
+        ChainPart::Rod(i) => chain.rods()[i].radius_m,
     }
 }
 
 /// Returns the pairs that two rods and their connectors make. As in any motion, neighbors are
 /// exempt: connectors one index apart, rods two.
-fn candidates(rod: usize, other: usize, last: Option<usize>) -> [Option<[Part; 2]>; 6] {
-    let connectors = |c: usize| (c > rod + 1).then_some([Part::Connector(rod), Part::Connector(c)]);
-    let on_rod = |c: usize| (c > rod + 2).then_some([Part::Rod(rod), Part::Connector(c)]);
+fn candidate_pairs(rod: usize, other: usize, last: Option<usize>) -> [Option<[ChainPart; 2]>; 6] {
+    let connectors =
+        |c: usize| (c > rod + 1).then_some([ChainPart::Connector(rod), ChainPart::Connector(c)]);
+    let on_rod = |c: usize| (c > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(c)]);
     [
         connectors(other),
         last.and_then(connectors),
         on_rod(other),
         last.and_then(on_rod),
-        (rod + 1 < other).then_some([Part::Connector(rod), Part::Rod(other)]),
-        (other > rod + 2).then_some([Part::Rod(rod), Part::Rod(other)]),
+        (rod + 1 < other).then_some([ChainPart::Connector(rod), ChainPart::Rod(other)]),
+        (other > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Rod(other)]),
     ]
 }
 
-fn near<const D: usize>(chain: &Chain<D>, parts: [Part; 2], reach_m: f64) -> Option<Pair> {
+fn near_pair<const D: usize>(
+    chain: &Chain<D>,
+    parts: [ChainPart; 2],
+    reach_m: f64,
+) -> Option<PartPair> {
     let apart_m = nearest(chain.points(), parts).distance_m;
     let touch_m = parts.map(|part| radius_m(chain, part)).iter().sum::<f64>();
-    (apart_m < touch_m + reach_m).then(|| Pair { parts, keep_m: touch_m.min(apart_m) })
+    (apart_m < touch_m + reach_m).then(|| PartPair { parts, keep_m: touch_m.min(apart_m) })
 }
 
 /// Returns the nearest points of two parts.
-pub(super) fn nearest<const D: usize>(points: &[Point<D>], parts: [Part; 2]) -> Nearest<D> {
+pub(super) fn nearest<const D: usize>(
+    points: &[Point<D>],
+    parts: [ChainPart; 2],
+) -> NearestPoints<D> {
     match parts {
-        [Part::Connector(a), Part::Connector(b)] => Nearest::of(points[a], points[b]),
+        [ChainPart::Connector(a), ChainPart::Connector(b)] => {
+            NearestPoints::from_points(points[a], points[b])
+        }
         _ => between_segments(ends(points, parts[0]), ends(points, parts[1])),
     }
 }
 
 /// Returns the position of a point on a part: 0 at its first end, 1 at its second.
-pub(super) fn along_rod<const D: usize>(ends: [Point<D>; 2], at: Point<D>) -> f64 {
+pub(super) fn fraction_along<const D: usize>(ends: [Point<D>; 2], at: Point<D>) -> f64 {
     let length_m = distance(ends[0], ends[1]);
     if length_m > 0.0 { (distance(ends[0], at) / length_m).min(1.0) } else { 0.0 }
 }

@@ -4,13 +4,13 @@
 //! lengths are a band of three, solved in time linear in the rods. One by one, corrections would
 //! need as many passes as there are rods to get from one end of the chain to the other.
 
-use super::posture::Posture;
+use super::posture::TrialPosture;
 use crate::rods::chain::Rod;
-use crate::rods::geometry::{Point, along, dot, norm, sub};
+use crate::rods::geometry::{Point, add_scaled, dot, norm, sub};
 
 /// Brings rods back within their limits; owns its buffers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Lengths<const D: usize> {
+pub(super) struct LengthSolver<const D: usize> {
     /// Direction of each rod that is at a limit or beyond; zero for others.
     directions: Vec<Point<D>>,
     /// Main diagonal, then pivots; side diagonal toward the rod before; lengths beyond the limits.
@@ -20,30 +20,30 @@ pub(super) struct Lengths<const D: usize> {
 }
 
 /// Part of a rod's play that is left free at either limit, and the most of it, meters.
-const SPARE: f64 = 0.25;
-const SPARE_M: f64 = 1e-7;
+const MARGIN_FRACTION: f64 = 0.25;
+const MAX_MARGIN_M: f64 = 1e-7;
 /// Distance from a limit at which a rod counts as being there, meters.
 const AT_LIMIT_M: f64 = 1e-6;
 /// Keeps the equations solvable if a straight chain is held at both ends.
 const DAMPING: f64 = 1e-9;
 /// Corrections of a restoration at most, and the error at which it ends, meters.
-const MOST: usize = 8;
-const EXACT_M: f64 = 1e-12;
+const MAX_CORRECTIONS: usize = 8;
+const ERROR_TOLERANCE_M: f64 = 1e-12;
 
-impl<const D: usize> Lengths<D> {
+impl<const D: usize> LengthSolver<D> {
     /// Corrects until all lengths are within their limits, if they get there.
-    pub(super) fn restore(&mut self, posture: &mut Posture<'_, D>, rods: &[Rod]) {
-        for _ in 0..MOST {
-            if self.correct(posture, rods) <= EXACT_M {
+    pub(super) fn restore(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) {
+        for _ in 0..MAX_CORRECTIONS {
+            if self.correct(posture, rods) <= ERROR_TOLERANCE_M {
                 break;
             }
         }
     }
 
     /// Makes one correction of all lengths; returns the greatest error before it, meters.
-    pub(super) fn correct(&mut self, posture: &mut Posture<'_, D>, rods: &[Rod]) -> f64 {
+    pub(super) fn correct(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) -> f64 {
         let worst_m = self.measure(posture, rods);
-        if worst_m > EXACT_M {
+        if worst_m > ERROR_TOLERANCE_M {
             self.set_up(posture);
             self.eliminate();
             self.apply(posture);
@@ -51,14 +51,14 @@ impl<const D: usize> Lengths<D> {
         worst_m
     }
 
-    fn measure(&mut self, posture: &Posture<'_, D>, rods: &[Rod]) -> f64 {
+    fn measure(&mut self, posture: &TrialPosture<'_, D>, rods: &[Rod]) -> f64 {
         self.directions.clear();
         self.beyond_m.clear();
         let mut worst_m = 0.0_f64;
         for (i, rod) in rods.iter().enumerate() {
             let way = sub(posture.points[i + 1], posture.points[i]);
             let length_m = norm(way);
-            let spare_m = SPARE_M.min(SPARE * (rod.max_m - rod.min_m));
+            let spare_m = MAX_MARGIN_M.min(MARGIN_FRACTION * (rod.max_m - rod.min_m));
             let (low_m, high_m) = (rod.min_m + spare_m, rod.max_m - spare_m);
             let beyond_m = length_m - length_m.clamp(low_m, high_m);
             let is_free = length_m > low_m + AT_LIMIT_M && length_m < high_m - AT_LIMIT_M;
@@ -70,14 +70,14 @@ impl<const D: usize> Lengths<D> {
         worst_m
     }
 
-    fn set_up(&mut self, posture: &Posture<'_, D>) {
+    fn set_up(&mut self, posture: &TrialPosture<'_, D>) {
         self.diagonal.clear();
         self.side.clear();
         for (i, u) in self.directions.iter().enumerate() {
-            let ease = dot(*u, *u) * (posture.ease[i] + posture.ease[i + 1]);
+            let ease = dot(*u, *u) * (posture.inverse_mass[i] + posture.inverse_mass[i + 1]);
             self.diagonal.push(if ease > 0.0 { ease + DAMPING } else { 1.0 });
             let before = i.checked_sub(1).map_or([0.0; D], |b| self.directions[b]);
-            self.side.push(-posture.ease[i] * dot(before, *u));
+            self.side.push(-posture.inverse_mass[i] * dot(before, *u));
         }
     }
 
@@ -95,11 +95,11 @@ impl<const D: usize> Lengths<D> {
         }
     }
 
-    fn apply(&self, posture: &mut Posture<'_, D>) {
+    fn apply(&self, posture: &mut TrialPosture<'_, D>) {
         for (i, (u, by_m)) in self.directions.iter().zip(&self.beyond_m).enumerate() {
-            let ease = [posture.ease[i], posture.ease[i + 1]];
-            posture.points[i] = along(posture.points[i], *u, ease[0] * by_m);
-            posture.points[i + 1] = along(posture.points[i + 1], *u, -ease[1] * by_m);
+            let ease = [posture.inverse_mass[i], posture.inverse_mass[i + 1]];
+            posture.points[i] = add_scaled(posture.points[i], *u, ease[0] * by_m);
+            posture.points[i + 1] = add_scaled(posture.points[i + 1], *u, -ease[1] * by_m);
         }
     }
 }

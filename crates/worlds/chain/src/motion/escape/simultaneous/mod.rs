@@ -13,55 +13,55 @@
 //! way in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
 //! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
 
+mod constraints;
 mod contacts;
-mod given;
-mod laws;
-mod leading;
+mod escape_plan;
+mod leader_choice;
 mod lengths;
 #[cfg(test)]
 mod pinch;
 mod posture;
+mod rollout;
 mod solve;
-mod stage;
+mod solve_input;
 #[cfg(test)]
 mod tests;
-mod way_out;
 
 use super::threat::Threat;
-use super::{Escape, Escaped, Left, Margin};
+use super::{EscapeReport, EscapeRules, Margin, TrappedPart};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, distance};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
-use crate::rods::veto::{Reason, Veto};
-pub(crate) use given::Lead;
-use given::{Given, Through, Wishes};
-use leading::should_rest;
-use solve::Solver;
-pub use way_out::WayOut;
+use crate::rods::veto::{Veto, VetoReason};
+pub use escape_plan::EscapePlan;
+use leader_choice::should_rest;
+use solve::EscapeSolver;
+pub(crate) use solve_input::LeadMotion;
+use solve_input::{ExitDirection, SoftConstraints, SolveInput};
 
 /// Leads all parts of a chain out of the way at once. It owns its buffers.
 #[derive(Debug, Clone)]
-pub(super) struct Simultaneous<const D: usize> {
-    rules: Escape,
-    solver: Solver<D>,
+pub(super) struct SimultaneousEscape<const D: usize> {
+    rules: EscapeRules,
+    solver: EscapeSolver<D>,
     best: Vec<Point<D>>,
     start: Vec<Point<D>>,
 }
 
 /// Most steps of a tick, each at most as long as the thinnest part, so that no body is jumped over.
-const MOST_STEPS: f64 = 8.0;
+const MAX_STEPS: f64 = 8.0;
 /// Rounds of a solve with margins, and rounds without.
 const ROUNDS: [usize; 2] = [24, 40];
 /// Part of its speed from which on a chain counts as pressed.
-const PRESSED: f64 = 0.9;
+const PRESSED_SPEED_FRACTION: f64 = 0.9;
 /// Penetration that counts as contact, meters.
 const TOUCH_M: f64 = 1e-9;
 
-impl<const D: usize> Simultaneous<D> {
+impl<const D: usize> SimultaneousEscape<D> {
     /// Returns an escape that remembers nothing yet.
-    pub(super) fn new(rules: Escape) -> Self {
-        Self { rules, solver: Solver::default(), best: Vec::new(), start: Vec::new() }
+    pub(super) fn new(rules: EscapeRules) -> Self {
+        Self { rules, solver: EscapeSolver::default(), best: Vec::new(), start: Vec::new() }
     }
 
     /// Moves the chain out of the way.
@@ -71,20 +71,20 @@ impl<const D: usize> Simultaneous<D> {
         obstacles: &Obstacles<D>,
         rules: &Rules,
         start: &[Point<D>],
-        way_out: &mut WayOut,
-    ) -> Escaped<D> {
+        way_out: &mut EscapePlan,
+    ) -> EscapeReport<D> {
         let thinnest_m = 4.0 * chain.step_m();
-        let most_m = self.rules.most_m().min(MOST_STEPS * thinnest_m);
+        let most_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (most_m / thinnest_m).ceil().max(1.0);
-        let mut told = Escaped::default();
+        let mut told = EscapeReport::default();
         way_out.tick();
         for step in 1..=steps as usize {
             let most_m = most_m * step as f64 / steps;
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
-            let given = Given { chain, obstacles, rules, start: &at, most_m };
-            let goes_on = self.step(&given, way_out, &mut told);
+            let given = SolveInput { chain, obstacles, rules, start: &at, most_m };
+            let goes_on = self.find_step(&given, way_out, &mut told);
             if goes_on {
                 chain.points_mut().copy_from_slice(&self.best);
             }
@@ -95,8 +95,9 @@ impl<const D: usize> Simultaneous<D> {
         }
         let ways_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
         let longest_m = ways_m.fold(0.0, f64::max);
-        told.is_pressed =
-            told.left.is_some() || way_out.is_passing() || longest_m > PRESSED * most_m;
+        told.is_pressed = told.left.is_some()
+            || way_out.is_exiting()
+            || longest_m > PRESSED_SPEED_FRACTION * most_m;
         told
     }
 
@@ -106,44 +107,54 @@ impl<const D: usize> Simultaneous<D> {
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         rules: &Rules,
-        lead: &Lead<D>,
+        lead: &LeadMotion<D>,
     ) -> bool {
-        let most_m = self.rules.most_m();
-        let given = Given { chain, obstacles, rules, start: chain.points(), most_m };
+        let most_m = self.rules.max_step_m();
+        let given = SolveInput { chain, obstacles, rules, start: chain.points(), most_m };
         should_rest(&self.rules, &given, lead)
     }
 
     /// Finds the places of one step, in `best`; returns whether there are any.
-    fn step(&mut self, given: &Given<'_, D>, way_out: &mut WayOut, told: &mut Escaped<D>) -> bool {
-        let margin = self.rules.look_ahead();
-        if !self.solver.look(given, margin) {
-            way_out.forget();
+    fn find_step(
+        &mut self,
+        given: &SolveInput<'_, D>,
+        way_out: &mut EscapePlan,
+        told: &mut EscapeReport<D>,
+    ) -> bool {
+        let margin = self.rules.look_ahead_margin();
+        if !self.solver.find_contacts(given, margin) {
+            way_out.clear();
             return false;
         }
-        way_out.forget_what_is_passed(given, &self.solver);
-        let (before_m, nearest) = self.solver.least_gap(given, given.chain.points());
-        if before_m >= margin_around(given, margin, nearest) && !way_out.is_passing() {
+        way_out.clear_if_passed(given, &self.solver);
+        let (before_m, nearest) = self.solver.min_gap(given, given.chain.points());
+        if before_m >= margin_around(given, margin, nearest) && !way_out.is_exiting() {
             return false;
         }
-        let mut gap_m = self.attempt(given, way_out.through(), before_m);
+        let mut gap_m = self.attempt(given, way_out.exit_direction(), before_m);
         if way_out.plan(&self.rules, given, &self.solver, gap_m) {
-            gap_m = self.attempt(given, way_out.through(), before_m);
+            gap_m = self.attempt(given, way_out.exit_direction(), before_m);
         }
-        self.tell(given, gap_m, nearest, told)
+        self.report(given, gap_m, nearest, told)
     }
 
     /// Solves with the margins of the look-ahead and, if that leaves a part inside, without; the
     /// better one is in `best`. Returns its least gap, meters; the present one if nothing is better.
-    fn attempt(&mut self, given: &Given<'_, D>, through: Option<Through<D>>, before_m: f64) -> f64 {
+    fn attempt(
+        &mut self,
+        given: &SolveInput<'_, D>,
+        through: Option<ExitDirection<D>>,
+        before_m: f64,
+    ) -> f64 {
         self.best.clear();
         self.best.extend_from_slice(given.chain.points());
         // On the way through an obstacle depth is no measure.
         let mut best_m = if through.is_some() { f64::NEG_INFINITY } else { before_m };
-        for margin in [self.rules.look_ahead(), Margin::NONE] {
-            if !self.solver.solve(given, &Wishes { margin, through, rounds: ROUNDS }) {
+        for margin in [self.rules.look_ahead_margin(), Margin::NONE] {
+            if !self.solver.solve(given, &SoftConstraints { margin, through, rounds: ROUNDS }) {
                 continue;
             }
-            let (gap_m, _) = self.solver.least_gap(given, &self.solver.points);
+            let (gap_m, _) = self.solver.min_gap(given, &self.solver.points);
             if gap_m > best_m || gap_m >= -TOUCH_M {
                 best_m = gap_m;
                 self.best.copy_from_slice(&self.solver.points);
@@ -155,12 +166,12 @@ impl<const D: usize> Simultaneous<D> {
         if best_m == f64::NEG_INFINITY { before_m } else { best_m }
     }
 
-    fn tell(
+    fn report(
         &self,
-        given: &Given<'_, D>,
+        given: &SolveInput<'_, D>,
         gap_m: f64,
         nearest: Option<Threat>,
-        told: &mut Escaped<D>,
+        told: &mut EscapeReport<D>,
     ) -> bool {
         let moved = self.best != given.chain.points();
         if let Some(threat) = nearest.filter(|_| moved) {
@@ -169,18 +180,18 @@ impl<const D: usize> Simultaneous<D> {
             told.first = told.first.or(Some((threat.part.connector(), obstacle)));
         }
         (told.deepest_m, told.left) = (0.0, None);
-        let deepest = self.solver.least_gap(given, &self.best).1;
+        let deepest = self.solver.min_gap(given, &self.best).1;
         if let Some(threat) = deepest.filter(|_| gap_m < -TOUCH_M) {
             let k = threat.part.connector();
             let goes_m = distance(given.start[k], self.best[k]);
-            let is_capped = goes_m > PRESSED * given.most_m;
+            let is_capped = goes_m > PRESSED_SPEED_FRACTION * given.most_m;
             (told.vetoes, told.capped) = (1, usize::from(is_capped));
-            let reason = if is_capped { Reason::StepLimit } else { Reason::Inside };
+            let reason = if is_capped { VetoReason::StepLimit } else { VetoReason::Inside };
             let obstacle = given.obstacles.moving()[threat.mover].id;
             let reached = self.best[k];
             let veto = Veto { by: k, from: k, reason, obstacle: Some(obstacle), reached };
             told.deepest_m = -gap_m;
-            told.left = Some(Left { part: threat.part, obstacle, veto: Some(veto) });
+            told.left = Some(TrappedPart { part: threat.part, obstacle, veto: Some(veto) });
         }
         moved
     }
@@ -188,10 +199,10 @@ impl<const D: usize> Simultaneous<D> {
 
 /// Returns the margin around the obstacle of a threat, meters.
 fn margin_around<const D: usize>(
-    given: &Given<'_, D>,
+    given: &SolveInput<'_, D>,
     margin: Margin,
     threat: Option<Threat>,
 ) -> f64 {
     let mover = threat.map(|threat| &given.obstacles.moving()[threat.mover]);
-    mover.map_or(0.0, |mover| margin.around(mover))
+    mover.map_or(0.0, |mover| margin.required_gap_m(mover))
 }

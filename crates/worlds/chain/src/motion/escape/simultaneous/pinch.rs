@@ -1,9 +1,9 @@
 //! A bounded search for motions that avoid or leave the long pinch of `scenarios/chain/movers.toml`.
 
 use super::*;
+use crate::fixtures::{TestRng, clearance_m};
 use crate::rods::obstacle::Obstacle;
-use crate::scenario::Compiled;
-use crate::scenes::{Numbers, clearance_m};
+use crate::scenario::ChainScenario;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_scenario::Source;
@@ -27,8 +27,8 @@ type World = crate::world::ChainWorld<2>;
 
 /// A way through an obstacle from a tick on, up to a tick.
 #[derive(Debug, Clone, Copy)]
-struct Leg {
-    through: Through<2>,
+struct TimedExit {
+    through: ExitDirection<2>,
     from: usize,
     to: usize,
 }
@@ -45,9 +45,9 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
     let path = root().join("scenarios/chain/movers.toml");
     let settings = [format!("seed={seed}"), format!("fields.0.n={discs}")];
     let source = Source::read(&path, &settings).expect("a scenario");
-    let mut run = Compiled::<2>::new(&source).expect("valid").start(&source, 1);
+    let mut run = ChainScenario::<2>::new(&source).expect("valid").start(&source, 1);
     let (mut past, mut since, mut found) = (VecDeque::new(), 0, Vec::new());
-    while run.cycle() < run.plan().cycles {
+    while run.cycle() < run.config().cycles {
         past.push_back(run.state().body(0).chain.clone());
         if past.len() > BEFORE + 200 {
             past.pop_front();
@@ -68,30 +68,30 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
 }
 
 /// Returns the longest time in a row that a chain is inside, in ticks, if it goes along some ways; at most `enough`.
-fn inside(world: &World, episode: &Episode, legs: &[Leg], enough: usize) -> usize {
+fn inside(world: &World, episode: &Episode, legs: &[TimedExit], enough: usize) -> usize {
     let (mut chain, mut obstacles) = (episode.chain.clone(), (*world.obstacles).clone());
     let rules = world.escape.expect("something moves");
-    let (margin, most_m) = (rules.look_ahead(), rules.speed_max_m_s * rules.dt_s);
-    let (mut solver, mut now, mut most, mut clear) = (Solver::default(), 0, 0, 0);
+    let (margin, most_m) = (rules.look_ahead_margin(), rules.speed_max_m_s * rules.dt_s);
+    let (mut solver, mut now, mut most, mut clear) = (EscapeSolver::default(), 0, 0, 0);
     for tick in 0..TICKS {
         let movers: Vec<_> = movers(world, episode, tick + 1);
         obstacles.set_moving(&movers).expect("movers in range");
         let (start, was) = (chain.points().to_vec(), chain.clone());
-        let given = Given {
+        let given = SolveInput {
             chain: &was,
             obstacles: &obstacles,
             rules: &world.rules,
             start: &start,
             most_m,
         };
-        if solver.look(&given, margin) {
+        if solver.find_contacts(&given, margin) {
             let leg = legs.iter().find(|leg| (leg.from..leg.to).contains(&tick));
             let through = leg.map(|leg| leg.through);
-            if solver.solve(&given, &Wishes { margin, through, rounds: ROUNDS }) {
+            if solver.solve(&given, &SoftConstraints { margin, through, rounds: ROUNDS }) {
                 chain.points_mut().copy_from_slice(&solver.points);
             }
         }
-        let is_inside = clearance_m(&chain, &obstacles) < -crate::metrics::PENETRATION_M;
+        let is_inside = clearance_m(&chain, &obstacles) < -crate::metrics::PENETRATION_THRESHOLD_M;
         (now, clear) = if is_inside { (now + 1, 0) } else { (0, clear + 1) };
         most = most.max(now);
         if most >= enough || tick > BEFORE && clear > CLEAR {
@@ -102,7 +102,7 @@ fn inside(world: &World, episode: &Episode, legs: &[Leg], enough: usize) -> usiz
 }
 
 fn movers(world: &World, episode: &Episode, tick: usize) -> Vec<Obstacle<2>> {
-    world.movers.at(world.starts_s(episode.cycle + tick as u64)).collect()
+    world.movers.at(world.start_time_s(episode.cycle + tick as u64)).collect()
 }
 
 /// Returns the obstacles nearest to the chain when it began to be inside.
@@ -119,18 +119,18 @@ fn nearest(world: &World, episode: &Episode) -> Vec<u32> {
 
 /// Returns the motions that are tried: each way through each obstacle from every tenth tick on for 75 ticks, and pairs
 /// of ways at random, the second from where the first ends.
-fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
+fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<TimedExit>> {
     let way = |obstacle: u32, turn: usize| {
         let angle_rad = TAU * turn as f64 / DIRECTIONS as f64;
-        Through { obstacle, toward: [cos(angle_rad), sin(angle_rad)] }
+        ExitDirection { obstacle, toward: [cos(angle_rad), sin(angle_rad)] }
     };
     let mut all = vec![Vec::new()];
     for &obstacle in obstacles {
         for (turn, start) in (0..DIRECTIONS).flat_map(|turn| (2..12).map(move |k| (turn, 10 * k))) {
-            all.push(vec![Leg { through: way(obstacle, turn), from: start, to: start + 75 }]);
+            all.push(vec![TimedExit { through: way(obstacle, turn), from: start, to: start + 75 }]);
         }
     }
-    let mut numbers = Numbers::new(seed);
+    let mut numbers = TestRng::new(seed);
     let mut below = |n: usize| ((0.5 + 0.5 * numbers.point::<1>(1.0)[0]) * n as f64) as usize % n;
     for _ in 0..PAIRS {
         let mut way = || way(obstacles[below(obstacles.len())], below(DIRECTIONS));
@@ -138,8 +138,8 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
         let from = 20 + below(90);
         let turns = from + 5 + below(50);
         let ends = turns + 5 + below(75);
-        let first = Leg { through: ways[0], from, to: turns };
-        all.push(vec![first, Leg { through: ways[1], from: turns, to: ends }]);
+        let first = TimedExit { through: ways[0], from, to: turns };
+        all.push(vec![first, TimedExit { through: ways[1], from: turns, to: ends }]);
     }
     all
 }

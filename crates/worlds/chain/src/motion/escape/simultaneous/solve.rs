@@ -6,78 +6,80 @@
 
 use super::super::Margin;
 use super::super::threat::{Threat, gap_m, left_of};
-use super::contacts::{Contacts, along_rod, nearest, radius_m};
-use super::given::{Given, Through, Wishes};
-use super::laws::{Bend, Laws};
-use super::lengths::Lengths;
-use super::posture::{Posture, Spot, ends};
+use super::constraints::{BendConstraint, Constraints};
+use super::contacts::{Contacts, fraction_along, nearest, radius_m};
+use super::lengths::LengthSolver;
+use super::posture::{PartPoint, TrialPosture, ends};
+use super::solve_input::{ExitDirection, SoftConstraints, SolveInput};
 use crate::rods::geometry::{
-    Nearest, Point, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
+    NearestPoints, Point, add_scaled, distance, first_axis, lerp, normalized, perpendicular,
+    scaled, sub,
 };
 use crate::rods::obstacle::Obstacle;
 use std::f64::consts::PI;
 
 /// Finds places for all connectors. It owns its buffers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Solver<const D: usize> {
+pub(super) struct EscapeSolver<const D: usize> {
     pub(super) contacts: Contacts<D>,
     /// The places found.
     pub(super) points: Vec<Point<D>>,
     ease: Vec<f64>,
-    bends: Vec<Bend>,
-    lengths: Lengths<D>,
+    bends: Vec<BendConstraint>,
+    lengths: LengthSolver<D>,
 }
 
 /// Distance around an obstacle in which the chain goes along on a way through it, as a multiple of
 /// its longest rod.
-const ALONG: f64 = 2.0;
+const EXIT_RANGE_FACTOR: f64 = 2.0;
 /// Distance from which on an obstacle is passed, meters.
-const PASSED_M: f64 = 0.17;
+const PASSED_DISTANCE_M: f64 = 0.17;
 /// Part of a margin's violation that a round corrects.
-const SOFTLY: f64 = 0.3;
+const SOFT_FRACTION: f64 = 0.3;
 /// Rounds in which only laws count, and the number of them between two checks.
-const SETTLING: usize = 48;
-const CHECK_EVERY: usize = 8;
+const MAX_SETTLE_ROUNDS: usize = 48;
+const CHECK_INTERVAL: usize = 8;
 /// Parts of the motion that are tried if all of it breaks a law.
-const PARTS: [f64; 3] = [1.0, 0.5, 0.2];
+const MOTION_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.2];
 /// Distance beyond contact that corrections aim at, at most, meters; and as a part of the distance.
-const SLACK_M: f64 = 1e-4;
-const SLACK: f64 = 0.01;
+const MAX_SLACK_M: f64 = 1e-4;
+const SLACK_FRACTION: f64 = 0.01;
 /// Correction below which all is settled, meters.
-const SETTLED_M: f64 = 1e-6;
+const SETTLE_TOLERANCE_M: f64 = 1e-6;
 /// Part of its longest way that a connector leaves free for the last corrections.
-const RESERVE: f64 = 1e-4;
+const RESERVE_FRACTION: f64 = 1e-4;
 
-impl<const D: usize> Solver<D> {
+impl<const D: usize> EscapeSolver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
-    pub(super) fn look(&mut self, given: &Given<'_, D>, margin: Margin) -> bool {
-        let Given { chain, obstacles, rules, most_m, .. } = *given;
-        self.contacts.look_for_movers(chain, obstacles, margin, most_m);
+    pub(super) fn find_contacts(&mut self, given: &SolveInput<'_, D>, margin: Margin) -> bool {
+        let SolveInput { chain, obstacles, rules, most_m, .. } = *given;
+        self.contacts.find_movers(chain, obstacles, margin, most_m);
         if self.contacts.threats.is_empty() {
             return false;
         }
-        self.contacts.look_around(chain, obstacles, rules.self_collision, most_m);
+        self.contacts.find_nearby(chain, obstacles, rules.self_collision, most_m);
         self.ease.clear();
         self.ease.extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
         self.bends.clear();
         let limited = chain.connectors().iter().enumerate().filter(|(_, c)| c.max_bend_rad < PI);
-        self.bends.extend(limited.filter_map(|(k, _)| Bend::at(chain, k)));
+        self.bends.extend(limited.filter_map(|(k, _)| BendConstraint::from_connector(chain, k)));
         true
     }
 
     /// Finds places by some wishes; returns whether they keep the laws.
-    pub(super) fn solve(&mut self, given: &Given<'_, D>, wishes: &Wishes<D>) -> bool {
+    pub(super) fn solve(&mut self, given: &SolveInput<'_, D>, wishes: &SoftConstraints<D>) -> bool {
         self.points.clear();
         self.points.extend_from_slice(given.chain.points());
-        self.set_out(given, wishes.through);
+        self.start_exit(given, wishes.through);
         let [wishing, avoiding] = wishes.rounds;
         for round in 0..wishing + avoiding {
             let soft = (round < wishing).then_some(wishes.margin).filter(|m| *m != Margin::NONE);
-            let fled_m = self.flee(given, wishes.through, soft);
-            let held_m = self.hold();
-            self.lengths.correct(&mut posture(&mut self.points, &self.ease), given.chain.rods());
-            self.bound(given);
-            if fled_m.max(held_m) < SETTLED_M {
+            let fled_m = self.push_from_movers(given, wishes.through, soft);
+            let held_m = self.push_from_walls();
+            self.lengths
+                .correct(&mut trial_posture(&mut self.points, &self.ease), given.chain.rods());
+            self.limit_travel(given);
+            if fled_m.max(held_m) < SETTLE_TOLERANCE_M {
                 break;
             }
         }
@@ -86,28 +88,28 @@ impl<const D: usize> Solver<D> {
 
     /// Lets the chain around an obstacle that it goes through set out together, because parts that are
     /// only dragged along come late.
-    fn set_out(&mut self, given: &Given<'_, D>, through: Option<Through<D>>) {
+    fn start_exit(&mut self, given: &SolveInput<'_, D>, through: Option<ExitDirection<D>>) {
         let Some(through) = through else { return };
         let moving = given.obstacles.moving();
         let Some(mover) = moving.iter().find(|o| o.id == through.obstacle) else { return };
         let longest_m = given.chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
         for (point, ease) in self.points.iter_mut().zip(&self.ease) {
             let apart_m = mover.core.nearest_to_point(*point).distance_m - mover.radius_m;
-            if apart_m < ALONG * longest_m {
-                *point = along(*point, through.toward, ease * given.most_m);
+            if apart_m < EXIT_RANGE_FACTOR * longest_m {
+                *point = add_scaled(*point, through.toward, ease * given.most_m);
             }
         }
     }
 
     /// Leads parts away from moving obstacles; returns the greatest correction, meters.
-    fn flee(
+    fn push_from_movers(
         &mut self,
-        given: &Given<'_, D>,
-        through: Option<Through<D>>,
+        given: &SolveInput<'_, D>,
+        through: Option<ExitDirection<D>>,
         soft: Option<Margin>,
     ) -> f64 {
         let Self { contacts, points, ease, .. } = self;
-        let mut posture = posture(points, ease);
+        let mut posture = trial_posture(points, ease);
         let mut most_m = 0.0_f64;
         for threat in &contacts.threats {
             let mover = &given.obstacles.moving()[threat.mover];
@@ -116,8 +118,8 @@ impl<const D: usize> Solver<D> {
             let gap_m = nearest.distance_m - mover.radius_m - radius_m(given.chain, threat.part);
             let through = through.filter(|through| through.obstacle == mover.id);
             let keep_m = match (through, soft) {
-                (None, Some(margin)) => margin.around(mover),
-                _ => SLACK_M,
+                (None, Some(margin)) => margin.required_gap_m(mover),
+                _ => MAX_SLACK_M,
             };
             if gap_m >= keep_m {
                 continue;
@@ -125,11 +127,11 @@ impl<const D: usize> Solver<D> {
             let by = match through {
                 Some(through) => scaled(through.toward, given.most_m),
                 None => {
-                    let part = if soft.is_some() { SOFTLY } else { 1.0 };
-                    scaled(away_from(mover, &nearest), part * (keep_m - gap_m))
+                    let part = if soft.is_some() { SOFT_FRACTION } else { 1.0 };
+                    scaled(direction_away(mover, &nearest), part * (keep_m - gap_m))
                 }
             };
-            posture.shift(threat.part, along_rod(ends, nearest.on_body), by);
+            posture.shift(threat.part, fraction_along(ends, nearest.on_body), by);
             most_m = most_m.max(keep_m - gap_m);
         }
         most_m
@@ -137,17 +139,17 @@ impl<const D: usize> Solver<D> {
 
     /// Leads parts out of walls and apart, and bends back; returns the greatest correction,
     /// meters.
-    fn hold(&mut self) -> f64 {
+    fn push_from_walls(&mut self) -> f64 {
         let Self { contacts, points, ease, bends, .. } = self;
-        let mut posture = posture(points, ease);
+        let mut posture = trial_posture(points, ease);
         let mut most_m = 0.0_f64;
         for wall in &contacts.walls {
             let ends = posture.ends(wall.part);
             let nearest = wall.core.nearest_to_segment(ends);
             let short_m = wall.keep_m + slack_m(wall.keep_m) - nearest.distance_m;
-            let Some(away) = unit(sub(nearest.on_body, nearest.on_core)) else { continue };
+            let Some(away) = normalized(sub(nearest.on_body, nearest.on_core)) else { continue };
             if short_m > 0.0 {
-                let along_rod = along_rod(ends, nearest.on_body);
+                let along_rod = fraction_along(ends, nearest.on_body);
                 posture.shift(wall.part, along_rod, scaled(away, short_m));
                 most_m = most_m.max(short_m);
             }
@@ -157,11 +159,14 @@ impl<const D: usize> Solver<D> {
             let short_m = pair.keep_m + slack_m(pair.keep_m) - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
-                let spot = |part, at| Spot { part, along_rod: along_rod(posture.ends(part), at) };
+                let spot = |part, at| PartPoint {
+                    part,
+                    along_rod: fraction_along(posture.ends(part), at),
+                };
                 let [one, other] = [spot(one, nearest.on_body), spot(other, nearest.on_core)];
                 let across = || perpendicular(first_axis());
-                let away = unit(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
-                posture.part(one, other, away, short_m);
+                let away = normalized(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
+                posture.separate(one, other, away, short_m);
                 most_m = most_m.max(short_m);
             }
         }
@@ -169,55 +174,55 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Keeps every connector within its speed, and at an allowed place.
-    fn bound(&mut self, given: &Given<'_, D>) {
+    fn limit_travel(&mut self, given: &SolveInput<'_, D>) {
         for (k, point) in self.points.iter_mut().enumerate() {
             if self.ease[k] > 0.0 {
-                let room_m = given.room_m(k) * (1.0 - RESERVE);
+                let room_m = given.max_travel_m(k) * (1.0 - RESERVE_FRACTION);
                 let connector = &given.chain.connectors()[k];
                 let allowed = connector.mobility.project(*point, given.chain.points()[k]);
-                *point = clipped(given.start[k], allowed, room_m);
+                *point = clamp_to_ball(given.start[k], allowed, room_m);
             }
         }
     }
 
     /// Corrects until the laws hold, if necessary for a part of the motion; returns whether they
     /// do.
-    fn settle(&mut self, given: &Given<'_, D>) -> bool {
-        PARTS.iter().any(|&part| {
+    fn settle(&mut self, given: &SolveInput<'_, D>) -> bool {
+        MOTION_FRACTIONS.iter().any(|&part| {
             if part < 1.0 {
                 for (point, from) in self.points.iter_mut().zip(given.chain.points()) {
-                    *point = between(*from, *point, part);
+                    *point = lerp(*from, *point, part);
                 }
             }
-            (0..SETTLING).any(|round| {
-                self.hold();
-                self.bound(given);
-                let mut posture = posture(&mut self.points, &self.ease);
+            (0..MAX_SETTLE_ROUNDS).any(|round| {
+                self.push_from_walls();
+                self.limit_travel(given);
+                let mut posture = trial_posture(&mut self.points, &self.ease);
                 self.lengths.restore(&mut posture, given.chain.rods());
-                round % CHECK_EVERY == 0 && self.keeps_laws(given)
+                round % CHECK_INTERVAL == 0 && self.meets_constraints(given)
             })
         })
     }
 
-    fn keeps_laws(&self, given: &Given<'_, D>) -> bool {
+    fn meets_constraints(&self, given: &SolveInput<'_, D>) -> bool {
         let Self { contacts, points, bends, .. } = self;
-        Laws { given, points }.hold(contacts, bends)
+        Constraints { given, points }.are_met(contacts, bends)
     }
 
     /// Returns whether all parts are farther from an obstacle than it takes to have passed it.
-    pub(super) fn is_behind(&self, given: &Given<'_, D>, through: &Through<D>) -> bool {
+    pub(super) fn has_passed(&self, given: &SolveInput<'_, D>, through: &ExitDirection<D>) -> bool {
         let moving = given.obstacles.moving();
         let threats = self.contacts.threats.iter();
-        threats
-            .filter(|t| moving[t.mover].id == through.obstacle)
-            .all(|threat| gap_m(given.chain, threat.part, &moving[threat.mover]) > PASSED_M)
+        threats.filter(|t| moving[t.mover].id == through.obstacle).all(|threat| {
+            gap_m(given.chain, threat.part, &moving[threat.mover]) > PASSED_DISTANCE_M
+        })
     }
 
     /// Returns the least gap between the chain at some places and moving obstacles, meters, and the
     /// threat that has it.
-    pub(super) fn least_gap(
+    pub(super) fn min_gap(
         &self,
-        given: &Given<'_, D>,
+        given: &SolveInput<'_, D>,
         points: &[Point<D>],
     ) -> (f64, Option<Threat>) {
         let mut least = (f64::INFINITY, None);
@@ -233,21 +238,27 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-fn posture<'a, const D: usize>(points: &'a mut [Point<D>], ease: &'a [f64]) -> Posture<'a, D> {
-    Posture { points, ease }
+fn trial_posture<'a, const D: usize>(
+    points: &'a mut [Point<D>],
+    ease: &'a [f64],
+) -> TrialPosture<'a, D> {
+    TrialPosture { points, inverse_mass: ease }
 }
 
 /// Returns the direction from an obstacle to the nearest point of a part.
-pub(super) fn away_from<const D: usize>(mover: &Obstacle<D>, nearest: &Nearest<D>) -> Point<D> {
-    unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover))
+pub(super) fn direction_away<const D: usize>(
+    mover: &Obstacle<D>,
+    nearest: &NearestPoints<D>,
+) -> Point<D> {
+    normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover))
 }
 
 fn slack_m(keep_m: f64) -> f64 {
-    SLACK_M.min(SLACK * keep_m)
+    MAX_SLACK_M.min(SLACK_FRACTION * keep_m)
 }
 
 /// Returns the point of a ball around `center` that is nearest to `to`.
-fn clipped<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
+fn clamp_to_ball<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
     let way_m = distance(center, to);
-    if way_m <= radius_m { to } else { along(center, sub(to, center), radius_m / way_m) }
+    if way_m <= radius_m { to } else { add_scaled(center, sub(to, center), radius_m / way_m) }
 }

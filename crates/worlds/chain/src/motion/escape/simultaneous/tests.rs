@@ -1,10 +1,10 @@
 use super::super::Escaper;
 use super::*;
+use crate::fixtures::{TestRng, clearance_m};
 use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{Core, cross_each_other, scaled, unit};
+use crate::rods::geometry::{Core, normalized, scaled, segments_cross};
 use crate::rods::obstacle::Obstacle;
 use crate::rods::propagate::Propagator;
-use crate::scenes::{Numbers, clearance_m};
 use proptest::prelude::*;
 
 const DT_S: f64 = 0.02;
@@ -31,11 +31,11 @@ fn ball<const D: usize>(id: u32, center: Point<D>, velocity_m_s: Point<D>) -> Ob
 
 /// Balls at random, none on a chain along the first axis, that keep their ways.
 fn balls<const D: usize>(seed: u64, n: u32, speed_m_s: f64) -> Vec<Obstacle<D>> {
-    let mut numbers = Numbers::new(seed);
+    let mut numbers = TestRng::new(seed);
     let mut one = |id| {
         let mut center: Point<D> = numbers.point(4.0);
         center[1] += 1.3_f64.copysign(center[1]);
-        let u: Point<D> = unit(numbers.point(1.0)).unwrap();
+        let u: Point<D> = normalized(numbers.point(1.0)).unwrap();
         ball(id, center, scaled(u, speed_m_s))
     };
     (0..n).map(&mut one).collect()
@@ -46,18 +46,18 @@ struct Case<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,
     escaper: Escaper<D>,
-    way_out: WayOut,
+    way_out: EscapePlan,
 }
 
 impl<const D: usize> Case<D> {
     fn new(chain: Chain<D>, obstacles: Vec<Obstacle<D>>, speed_max_m_s: f64) -> Self {
         let obstacles = Obstacles::new(obstacles, 1.0).unwrap();
-        let escaper = Escaper::new(Escape::new(DT_S, speed_max_m_s));
-        Self { chain, obstacles, escaper, way_out: WayOut::default() }
+        let escaper = Escaper::new(EscapeRules::new(DT_S, speed_max_m_s));
+        Self { chain, obstacles, escaper, way_out: EscapePlan::default() }
     }
 
     /// Makes a tick, and checks the laws.
-    fn tick(&mut self) -> Escaped<D> {
+    fn tick(&mut self) -> EscapeReport<D> {
         let start = self.chain.points().to_vec();
         self.obstacles.advance(DT_S);
         let mut propagator = Propagator::new(SOLID);
@@ -93,7 +93,7 @@ fn assert_own_parts_are_apart<const D: usize>(chain: &Chain<D>) {
     if D == 2 {
         let rods: Vec<_> = points.windows(2).map(|w| [w[0], w[1]]).collect();
         for (i, one) in rods.iter().enumerate() {
-            assert!(rods.iter().skip(i + 2).all(|other| !cross_each_other(*one, *other)));
+            assert!(rods.iter().skip(i + 2).all(|other| !segments_cross(*one, *other)));
         }
     }
 }
@@ -199,28 +199,28 @@ fn a_chain_that_flees_with_all_its_speed_tells_its_leader() {
 }
 
 /// Ticks inside of a chain between tongs that goes one way for 1.5 s from a tick on.
-fn inside_by(way: Option<Through<2>>, from: usize) -> usize {
+fn inside_by(way: Option<ExitDirection<2>>, from: usize) -> usize {
     let discs = vec![ball(1, [0.2, 2.0], [0.0, -0.5]), ball(2, [0.2, -2.0], [0.0, 0.5])];
     let mut obstacles = Obstacles::new(discs, 1.0).unwrap();
-    let (mut chain, mut solver) = (straight::<2>(14, SWARM, 0.25), Solver::default());
-    let margin = Escape::new(DT_S, 1.0).look_ahead();
+    let (mut chain, mut solver) = (straight::<2>(14, SWARM, 0.25), EscapeSolver::default());
+    let margin = EscapeRules::new(DT_S, 1.0).look_ahead_margin();
     let mut inside = 0;
     for tick in 0..400 {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
         let (chain_now, most_m) = (chain.clone(), DT_S);
-        let given = Given {
+        let given = SolveInput {
             chain: &chain_now,
             obstacles: &obstacles,
             rules: &SOLID,
             start: &start,
             most_m,
         };
-        if !solver.look(&given, margin) {
+        if !solver.find_contacts(&given, margin) {
             continue;
         }
         let through = way.filter(|_| (from..from + 75).contains(&tick));
-        if solver.solve(&given, &Wishes { margin, through, rounds: ROUNDS }) {
+        if solver.solve(&given, &SoftConstraints { margin, through, rounds: ROUNDS }) {
             chain.points_mut().copy_from_slice(&solver.points);
         }
         inside += usize::from(clearance_m(&chain, &obstacles) < -1e-6);
@@ -242,7 +242,7 @@ fn no_motion_that_is_tried_leaves_the_tongs_untouched() {
     }) {
         let angle_rad = std::f64::consts::TAU * f64::from(turn) / 24.0;
         let toward = [sidestep_kernel::math::cos(angle_rad), sidestep_kernel::math::sin(angle_rad)];
-        let inside = inside_by(Some(Through { obstacle, toward }), from);
+        let inside = inside_by(Some(ExitDirection { obstacle, toward }), from);
         if inside < least.0 {
             least = (inside, Some((obstacle, turn, from)));
         }

@@ -9,7 +9,7 @@ fn far<const D: usize>() -> Obstacles<D> {
 
 /// Balls about the chain's start, and in its way.
 fn near<const D: usize>(seed: u64) -> Obstacles<D> {
-    let mut numbers = Numbers::new(seed ^ 0xba11);
+    let mut numbers = TestRng::new(seed ^ 0xba11);
     let ball = |id| Obstacle::ball(id, numbers.point(12.0), 0.4);
     Obstacles::new((0..if D == 2 { 12 } else { 60 }).map(ball).collect(), 1.0).unwrap()
 }
@@ -21,27 +21,28 @@ fn led_both_ways<const D: usize>(
     propagator: &mut Propagator<D>,
     [here, there]: [&Obstacles<D>; 2],
 ) -> [usize; 2] {
-    let mut numbers = Numbers::new(seed);
+    let mut numbers = TestRng::new(seed);
     let n_rods = 8 + (40.0 * numbers.unit()) as usize;
     let slack = if numbers.unit() < 0.5 { 0.0 } else { 0.3 };
-    let radius_m = numbers.within(0.0, 0.3);
+    let radius_m = numbers.uniform(0.0, 0.3);
     let rod = Rod { min_m: 1.0 - slack, max_m: 1.0, radius_m: 0.5 * radius_m };
     let mut apart = crooked::<D>(seed, n_rods, rod, radius_m);
     let mut looked = apart.clone();
     propagator.rules = Rules { self_collision: true, ..Rules::default() };
-    let mut looking = Propagator { proofs: Proofs::never(), ..propagator.clone() };
+    let mut looking = Propagator { proofs: ProofSchedule::never(), ..propagator.clone() };
     let k = if numbers.unit() < 0.5 { 0 } else { (n_rods as f64 * numbers.unit()) as usize };
     let (mut walk, mut vetoes) = (Wanderer::new(seed), 0);
     for _ in 0..60 {
-        let to = walk.next(apart.points()[k], numbers.within(0.0, 0.6));
-        let mode = if numbers.unit() < 0.5 { Mode::Exact } else { Mode::AsFarAsPossible };
+        let to = walk.next(apart.points()[k], numbers.uniform(0.0, 0.6));
+        let mode =
+            if numbers.unit() < 0.5 { VetoEffect::Exact } else { VetoEffect::AsFarAsPossible };
         let request = Request { mode, ..Request::exact(k, to) };
         let outcome = propagator.propagate(&mut apart, here, &request).unwrap();
         assert_eq!(outcome, looking.propagate(&mut looked, there, &request).unwrap(), "{seed}");
         assert_eq!(bits(&apart), bits(&looked), "{seed}");
         if outcome.veto().is_some() {
             vetoes += 1;
-            walk.turn();
+            walk.turn_anywhere();
         }
     }
     [60, vetoes]

@@ -1,7 +1,7 @@
 //! Convoys that are pulled through the pinned corridor.
 
 use super::*;
-use crate::scenes::{convoy, corridor_line, corridor_walls};
+use crate::fixtures::{convoy, corridor_line, corridor_walls};
 
 /// The leader's start: in the first, straight part, which is 14 m long.
 const LEAD_M: f64 = 13.0;

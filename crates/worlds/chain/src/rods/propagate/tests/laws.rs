@@ -2,7 +2,7 @@
 
 use super::random_worlds::{AnyWorld, apart_m, depth_of_part_m};
 use super::*;
-use crate::scenes::own_clearance_m;
+use crate::fixtures::own_clearance_m;
 
 const TOLERANCE: f64 = 1.1e-9;
 
@@ -24,7 +24,11 @@ fn keeps_the_laws<const D: usize>(seed: u64) {
     }
 }
 
-fn touches_what_it_says<const D: usize>(before: &Chain<D>, after: &Chain<D>, moved: &Moved<D>) {
+fn touches_what_it_says<const D: usize>(
+    before: &Chain<D>,
+    after: &Chain<D>,
+    moved: &CompletedMotion<D>,
+) {
     let (old, new) = (bits(before), bits(after));
     let changed: Vec<_> = (0..new.len()).filter(|&i| new[i] != old[i]).collect();
     assert!(changed.iter().all(|i| moved.touched.contains(i)), "{changed:?} {moved:?}");
@@ -79,29 +83,29 @@ fn without<const D: usize>(world: &AnyWorld<D>, veto: &Veto<D>) -> AnyWorld<D> {
     let mut rules = world.rules;
     let mut chain = world.chain.clone();
     match veto.reason {
-        Reason::Fixed | Reason::Failed | Reason::Mobility => {
+        VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility => {
             chain.set_failed(veto.by, false);
             chain.set_mobility(veto.by, Mobility::Free).unwrap();
         }
-        Reason::BendLimit => {
+        VetoReason::BendLimit => {
             for i in veto.by.saturating_sub(1)..(veto.by + 2).min(chain.points().len()) {
                 chain.set_max_bend_rad(i, std::f64::consts::PI).unwrap();
             }
         }
-        Reason::SelfCollision => rules.self_collision = false,
-        Reason::StepLimit => rules.slave_step_max_m = f64::INFINITY,
-        Reason::Limit => rules.backtracks = usize::MAX,
+        VetoReason::SelfCollision => rules.self_collision = false,
+        VetoReason::StepLimit => rules.slave_step_max_m = f64::INFINITY,
+        VetoReason::Limit => rules.backtracks = usize::MAX,
         _ => {}
     }
     let all: Vec<_> = world.all.iter().filter(|o| Some(o.id) != veto.obstacle).copied().collect();
     let obstacles = Obstacles::new(all.clone(), 0.8).unwrap();
-    AnyWorld { chain, all, obstacles, rules, numbers: Numbers::new(0) }
+    AnyWorld { chain, all, obstacles, rules, numbers: TestRng::new(0) }
 }
 
-fn blames_what_matters<const D: usize>(seed: u64, blamed: &mut Vec<Reason>) {
+fn blames_what_matters<const D: usize>(seed: u64, blamed: &mut Vec<VetoReason>) {
     let mut world = AnyWorld::<D>::new(seed);
     for _ in 0..6 {
-        let request = Request { mode: Mode::Exact, ..world.any_request(0.3) };
+        let request = Request { mode: VetoEffect::Exact, ..world.any_request(0.3) };
         let ask = |world: &AnyWorld<D>| {
             let mut chain = world.chain.clone();
             let mut propagator = Propagator::new(world.rules);
@@ -129,14 +133,14 @@ fn a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere() {
         blames_what_matters::<3>(seed, &mut blamed);
     }
     for reason in [
-        Reason::Fixed,
-        Reason::Failed,
-        Reason::Mobility,
-        Reason::TargetBlocked,
-        Reason::BothSidesBlocked,
-        Reason::BendLimit,
-        Reason::SelfCollision,
-        Reason::StepLimit,
+        VetoReason::Fixed,
+        VetoReason::Failed,
+        VetoReason::Mobility,
+        VetoReason::TargetBlocked,
+        VetoReason::BothSidesBlocked,
+        VetoReason::BendLimit,
+        VetoReason::SelfCollision,
+        VetoReason::StepLimit,
     ] {
         assert!(blamed.contains(&reason), "{reason:?} never happened");
     }
@@ -146,7 +150,7 @@ fn a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere() {
 fn goes_no_deeper<const D: usize>(seed: u64) -> usize {
     let mut world = AnyWorld::<D>::new(seed);
     let n = world.chain.points().len();
-    let mut numbers = Numbers::new(seed + 1_000_000);
+    let mut numbers = TestRng::new(seed + 1_000_000);
     for id in 0..3 {
         let at = world.chain.points()[(numbers.unit() * n as f64) as usize];
         world.all.push(Obstacle::ball(900 + id, add(at, numbers.point(0.2)), 0.12));
@@ -164,7 +168,7 @@ fn goes_no_deeper<const D: usize>(seed: u64) -> usize {
         let request = Request::exact(0, to);
         let mut chain = world.chain.clone();
         let outcome = propagator.propagate(&mut chain, &world.obstacles, &request).unwrap();
-        moves += usize::from(outcome.moved().is_some());
+        moves += usize::from(outcome.motion().is_some());
         for (was_m, is_m) in before.iter().zip(depths(&chain)) {
             assert!(is_m <= was_m.max(1e-9) + 1e-12, "seed {seed}: {was_m} -> {is_m}");
         }
@@ -186,7 +190,7 @@ fn ends_where_nobody_need_move<const D: usize>(seed: u64, among_balls: bool) -> 
     let field = if among_balls { ball_field(seed, 6.0, 0.03, 0.2, 0.1) } else { Vec::new() };
     let field = field.into_iter().filter(|o| apart_m(&chain, o) > 0.0).collect();
     let obstacles = Obstacles::new(field, 0.8).unwrap();
-    let mut numbers = Numbers::new(seed + 7);
+    let mut numbers = TestRng::new(seed + 7);
     let before = bits(&chain);
     let k = (numbers.unit() * 21.0) as usize;
     let to = add(chain.points()[k], numbers.point(0.005));
@@ -249,9 +253,9 @@ fn a_chain_that_is_pushed_never_runs_into_itself() {
             Chain::straight([0.0; 2], [-1.0, 0.0], 12, rod, Connector::free(0.25)).unwrap();
         let walls = [-1.0, 1.0].map(|y| Obstacle::capsule(1, [[-40.0, y], [5.0, y]], 0.0));
         let obstacles = Obstacles::new(walls.to_vec(), 1.3).unwrap();
-        let (mut propagator, mut numbers) = (Propagator::new(own()), Numbers::new(seed));
+        let (mut propagator, mut numbers) = (Propagator::new(own()), TestRng::new(seed));
         for _ in 0..200 {
-            let by = [-0.05, numbers.within(-0.02, 0.02)];
+            let by = [-0.05, numbers.uniform(-0.02, 0.02)];
             let request = Request::exact(0, add(chain.points()[0], by));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             blocked += usize::from(outcome.veto().is_some());

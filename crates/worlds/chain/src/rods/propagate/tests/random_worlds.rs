@@ -1,8 +1,8 @@
 //! Chains with every property that a chain may have, among obstacles of every kind.
 
 use super::*;
-use crate::rods::geometry::{Core, Cuboid, Nearest, dot, perpendicular, unit};
-use crate::scenes::own_clearance_m;
+use crate::fixtures::own_clearance_m;
+use crate::rods::geometry::{Core, Cuboid, NearestPoints, dot, normalized, perpendicular};
 use std::f64::consts::PI;
 
 /// A chain, its surroundings, and the rules of its reactions. All is well at the start.
@@ -11,12 +11,12 @@ pub(crate) struct AnyWorld<const D: usize> {
     pub(super) all: Vec<Obstacle<D>>,
     pub(crate) obstacles: Obstacles<D>,
     pub(crate) rules: Rules,
-    pub(crate) numbers: Numbers,
+    pub(crate) numbers: TestRng,
 }
 
 impl<const D: usize> AnyWorld<D> {
     pub(crate) fn new(seed: u64) -> Self {
-        let mut numbers = Numbers::new(seed);
+        let mut numbers = TestRng::new(seed);
         let mut chain = any_chain(seed, &mut numbers);
         constrain(&mut chain, &mut numbers);
         let n = (numbers.unit() * 40.0) as u32;
@@ -41,19 +41,20 @@ impl<const D: usize> AnyWorld<D> {
         } else {
             Motion::Connector { k, to: at(k) }
         };
-        let mode = if numbers.unit() < 0.3 { Mode::AsFarAsPossible } else { Mode::Exact };
-        Request { motion, source: Source::Planner, mode }
+        let mode =
+            if numbers.unit() < 0.3 { VetoEffect::AsFarAsPossible } else { VetoEffect::Exact };
+        Request { motion, source: RequestSource::Planner, mode }
     }
 }
 
-fn any_chain<const D: usize>(seed: u64, numbers: &mut Numbers) -> Chain<D> {
+fn any_chain<const D: usize>(seed: u64, numbers: &mut TestRng) -> Chain<D> {
     let n_rods = 1 + (numbers.unit() * 10.0) as usize;
     let mut walk = Wanderer::<D>::new(seed);
     let (mut points, mut rods) = (vec![[0.0; D]], Vec::new());
-    let radii_m: Vec<f64> = (0..=n_rods).map(|_| numbers.within(0.02, 0.1)).collect();
+    let radii_m: Vec<f64> = (0..=n_rods).map(|_| numbers.uniform(0.02, 0.1)).collect();
     for i in 0..n_rods {
-        let length_m = numbers.within(0.3, 0.6);
-        let slack_m = if numbers.unit() < 0.5 { 0.0 } else { numbers.within(0.0, 0.1) };
+        let length_m = numbers.uniform(0.3, 0.6);
+        let slack_m = if numbers.unit() < 0.5 { 0.0 } else { numbers.uniform(0.0, 0.1) };
         let radius_m = radii_m[i].min(radii_m[i + 1]) * numbers.unit();
         rods.push(Rod { min_m: length_m - slack_m, max_m: length_m + slack_m, radius_m });
         points.push(walk.next(points[i], length_m));
@@ -62,18 +63,18 @@ fn any_chain<const D: usize>(seed: u64, numbers: &mut Numbers) -> Chain<D> {
 }
 
 /// Bend limits for some chains, and one connector that is not free for some.
-fn constrain<const D: usize>(chain: &mut Chain<D>, numbers: &mut Numbers) {
+fn constrain<const D: usize>(chain: &mut Chain<D>, numbers: &mut TestRng) {
     let n = chain.points().len();
     if numbers.unit() < 0.5 {
         for i in 0..n {
             let bend_rad = chain.bend_rad(i).unwrap_or(0.0);
-            let limit_rad = numbers.within(0.4, PI).max(bend_rad + 0.05).min(PI);
+            let limit_rad = numbers.uniform(0.4, PI).max(bend_rad + 0.05).min(PI);
             chain.set_max_bend_rad(i, limit_rad).unwrap();
         }
     }
     let k = (numbers.unit() * n as f64) as usize;
     let at = chain.points()[k];
-    let normal = unit(numbers.point(1.0)).unwrap_or(crate::rods::geometry::first_axis());
+    let normal = normalized(numbers.point(1.0)).unwrap_or(crate::rods::geometry::first_axis());
     let mobility = match (numbers.unit() * 15.0) as usize {
         0 => Mobility::Fixed,
         1 => Mobility::OnPlane { normal, offset_m: dot(normal, at) },
@@ -85,22 +86,22 @@ fn constrain<const D: usize>(chain: &mut Chain<D>, numbers: &mut Numbers) {
     chain.set_mobility(k, mobility).unwrap();
 }
 
-fn any_obstacle<const D: usize>(id: u32, numbers: &mut Numbers) -> Obstacle<D> {
+fn any_obstacle<const D: usize>(id: u32, numbers: &mut TestRng) -> Obstacle<D> {
     let at: Point<D> = numbers.point(3.0);
-    let thin_m = if numbers.unit() < 0.5 { 0.0005 } else { numbers.within(0.01, 0.3) };
+    let thin_m = if numbers.unit() < 0.5 { 0.0005 } else { numbers.uniform(0.01, 0.3) };
     match (numbers.unit() * 3.0) as usize {
         0 => Obstacle::ball(id, at, thin_m.max(0.02)),
         1 => Obstacle::capsule(id, [at, add(at, numbers.point(0.8))], thin_m),
         _ => {
-            let half_m = std::array::from_fn(|_| numbers.within(0.001, 0.4));
+            let half_m = std::array::from_fn(|_| numbers.uniform(0.001, 0.4));
             let axes = any_axes(numbers);
             Obstacle::still(id, Core::Cuboid(Cuboid { center: at, axes, half_m }), 0.1 * thin_m)
         }
     }
 }
 
-fn any_axes<const D: usize>(numbers: &mut Numbers) -> [Point<D>; D] {
-    let u = unit(numbers.point(1.0)).unwrap_or(crate::rods::geometry::first_axis());
+fn any_axes<const D: usize>(numbers: &mut TestRng) -> [Point<D>; D] {
+    let u = normalized(numbers.point(1.0)).unwrap_or(crate::rods::geometry::first_axis());
     let v = perpendicular(u);
     let w = std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % D, (i + 2) % D);
@@ -117,7 +118,8 @@ pub(super) fn apart_m<const D: usize>(chain: &Chain<D>, o: &Obstacle<D>) -> f64 
 /// Returns the depth of connector `i` and the rod before it in an obstacle.
 pub(super) fn depth_of_part_m<const D: usize>(chain: &Chain<D>, i: usize, o: &Obstacle<D>) -> f64 {
     let p = chain.points();
-    let depth_m = |nearest: Nearest<D>, radius_m: f64| radius_m + o.radius_m - nearest.distance_m;
+    let depth_m =
+        |nearest: NearestPoints<D>, radius_m: f64| radius_m + o.radius_m - nearest.distance_m;
     let tip_m = depth_m(o.core.nearest_to_point(p[i]), chain.connectors()[i].radius_m);
     let rod_m =
         |r: usize| depth_m(o.core.nearest_to_segment([p[r], p[r + 1]]), chain.rods()[r].radius_m);

@@ -15,7 +15,7 @@ fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> 
     for _ in 0..100 {
         let to = walk.next(chain.points()[0], 0.03);
         if go(&mut chain, &obstacles, 0, to).veto().is_some() {
-            walk.turn();
+            walk.turn_anywhere();
         }
     }
     bits(&chain)
@@ -46,7 +46,7 @@ fn moves_as_its_mirror<const D: usize>(seed: u64, k: usize) -> Result<(), TestCa
     let (mut forth, balls) = among_balls::<D>(seed, 8);
     let points = forth.points().iter().rev().copied().collect();
     let mut back = Chain::new(points, forth.connectors().to_vec(), forth.rods().to_vec()).unwrap();
-    let to = add(forth.points()[k], Numbers::new(seed + 1).point(0.2));
+    let to = add(forth.points()[k], TestRng::new(seed + 1).point(0.2));
     go(&mut forth, &balls, k, to);
     go(&mut back, &balls, 8 - k, to);
     let mirrored: Vec<_> = back.points().iter().rev().copied().collect();
@@ -64,13 +64,13 @@ fn halves_move_on_their_own<const D: usize>(seed: u64, open: bool) -> Result<(),
         Chain::new(whole.points()[range].to_vec(), connectors, rods).unwrap()
     };
     let (mut low, mut high) = (half(0..5), half(4..11));
-    let to = add(whole.points()[4], Numbers::new(seed + 1).point(0.1));
+    let to = add(whole.points()[4], TestRng::new(seed + 1).point(0.1));
     let whole_came = go(&mut whole, &balls, 4, to);
-    let came = whole_came.moved().is_some();
+    let came = whole_came.motion().is_some();
     let halves = [go(&mut low, &balls, 4, to), go(&mut high, &balls, 0, to)];
-    prop_assert_eq!(came, halves.iter().all(|h| h.moved().is_some()));
+    prop_assert_eq!(came, halves.iter().all(|h| h.motion().is_some()));
     if came {
-        let changed = |outcome: &Outcome<D>| outcome.moved().map_or(0, |moved| moved.changed);
+        let changed = |outcome: &Outcome<D>| outcome.motion().map_or(0, |moved| moved.changed);
         // The head counts once in the whole, and once in either half, if it was cut up.
         prop_assert!(
             !open || changed(&whole_came) + 1 == changed(&halves[0]) + changed(&halves[1])

@@ -1,12 +1,12 @@
 //! No part passes through anything, however thin.
 
 use super::*;
-use crate::rods::geometry::{Core, Cuboid, cross_each_other};
+use crate::rods::geometry::{Core, Cuboid, segments_cross};
 
 #[test]
 fn nobody_passes_a_thin_wall() {
     for seed in 0..20 {
-        let mut numbers = Numbers::new(seed);
+        let mut numbers = TestRng::new(seed);
         let mut walls = Vec::new();
         for id in 0..40 {
             let a: Point<2> = numbers.point(3.0);
@@ -29,17 +29,17 @@ fn nobody_passes_a_thin_wall() {
             let outcome =
                 propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to)).unwrap();
             if outcome.veto().is_some() {
-                walk.turn();
+                walk.turn_anywhere();
             }
             for wall in &walls {
                 let Core::Segment(core) = wall.core else {
                     continue;
                 };
                 for (old, new) in before.iter().zip(chain.points()) {
-                    assert!(!cross_each_other([*old, *new], core), "seed {seed}");
+                    assert!(!segments_cross([*old, *new], core), "seed {seed}");
                 }
                 for rod in chain.points().windows(2) {
-                    assert!(!cross_each_other([rod[0], rod[1]], core), "seed {seed}");
+                    assert!(!segments_cross([rod[0], rod[1]], core), "seed {seed}");
                 }
             }
         }
@@ -51,22 +51,21 @@ fn nobody_passes_a_thin_wall() {
 fn nobody_passes_a_thin_plate() {
     let mut jams = 0;
     for seed in 0..12 {
-        let mut numbers = Numbers::new(seed);
+        let mut numbers = TestRng::new(seed);
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let plates: Vec<Cuboid<3>> =
-            (0..60)
-                .map(|k| {
-                    let half_m = std::array::from_fn(|i| {
-                        if i == k % 3 { 0.0005 } else { numbers.within(0.2, 0.7) }
-                    });
-                    Cuboid { center: numbers.point(2.5), axes, half_m }
-                })
-                // Nothing near where the chain starts.
-                .filter(|p| {
-                    let start = [[0.0; 3], [-2.5, 0.0, 0.0]];
-                    Core::Cuboid(*p).nearest_to_segment(start).distance_m > 0.1
-                })
-                .collect();
+        let plates: Vec<Cuboid<3>> = (0..60)
+            .map(|k| {
+                let half_m = std::array::from_fn(|i| {
+                    if i == k % 3 { 0.0005 } else { numbers.uniform(0.2, 0.7) }
+                });
+                Cuboid { center: numbers.point(2.5), axes, half_m }
+            })
+            // Nothing near where the chain starts.
+            .filter(|p| {
+                let start = [[0.0; 3], [-2.5, 0.0, 0.0]];
+                Core::Cuboid(*p).nearest_to_segment(start).distance_m > 0.1
+            })
+            .collect();
         let all = (0..).zip(&plates).map(|(id, p)| Obstacle::still(id, Core::Cuboid(*p), 0.0));
         let obstacles = Obstacles::new(all.collect(), 0.8).unwrap();
         let rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.002 };
@@ -81,7 +80,7 @@ fn nobody_passes_a_thin_plate() {
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             if outcome.veto().is_some() {
                 jams += 1;
-                walk.turn();
+                walk.turn_anywhere();
             }
             let ways = before.iter().zip(chain.points()).map(|(old, new)| [*old, *new]);
             let rods = chain.points().windows(2).map(|rod| [rod[0], rod[1]]);

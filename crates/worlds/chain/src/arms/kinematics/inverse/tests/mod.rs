@@ -1,11 +1,11 @@
 mod poses;
 
-use super::rows::Scene;
-use super::step::Bounds;
+use super::criteria::IkCriteria;
+use super::step::JointRanges;
 use super::*;
 use crate::arms::ik::Engine;
 use crate::arms::kinematics::RecoverError;
-use crate::arms::kinematics::{Pose, Vector};
+use crate::arms::kinematics::{Transform, Vector};
 use proptest::prelude::*;
 use sidestep_import::urdf::Model;
 use sidestep_kernel::geometry::{norm, sub};
@@ -43,7 +43,7 @@ fn apart_m(a: Vector, b: Vector) -> f64 {
 }
 
 fn inside(chain: &SerialChain, shares: &[f64]) -> Vec<f64> {
-    let ranges = Bounds::of(chain).ranges;
+    let ranges = JointRanges::from_chain(chain).ranges;
     let value = |(range, share): (&[f64; 2], &f64)| {
         let [lower, upper] = range.map(|x| x.clamp(-PI, PI));
         lower + share * (upper - lower)
@@ -76,27 +76,27 @@ proptest! {
         target in prop::array::uniform4(0.0..1.0f64),
         variable in 0usize..4,
         turn in prop::sample::select(vec![
-            Turn::Free, Turn::Axis(Axis::X), Turn::Axis(Axis::Z), Turn::Whole,
+            OrientationMask::Free, OrientationMask::Axis(Axis::X), OrientationMask::Axis(Axis::Z), OrientationMask::Whole,
         ]),
     ) {
         let arm = arm();
         let skeleton = arm.skeleton();
         let [values, target] = [there, target].map(|shares| inside(&arm, &shares));
         let spheres = vec![Sphere { center_m: [0.4, 0.3, 0.6], radius_m: 3.0 }];
-        let asked = Asked { along: [true, false, true], turn };
-        let goal = ArmGoal { spheres, asked, ..ArmGoal::pose(arm.forward(&target).tip) };
-        let scene = Scene::new(&arm, &skeleton, &goal);
+        let asked = PoseMask { along: [true, false, true], turn };
+        let goal = ArmGoal { spheres, asked, ..ArmGoal::from_pose(arm.forward(&target).tip) };
+        let scene = IkCriteria::new(&arm, &skeleton, &goal);
         let look_at = |by: f64| {
             let mut values = values.clone();
             values[variable] += by;
-            let mut look = Scene::blank(&arm);
-            scene.look(&values, &mut look);
+            let mut look = IkCriteria::empty_evaluation(&arm);
+            scene.evaluate(&values, &mut look);
             look
         };
         let (here, mut rows) = (look_at(0.0), Vec::new());
         // At half a turn the errors have a kink.
         prop_assume!(here.turn_rad < 3.1);
-        scene.slopes(&here, 4, &mut rows);
+        scene.jacobian(&here, 4, &mut rows);
         // Rows give the rates at which the wanted changes shrink.
         let products = rows.chunks_exact(4).zip(&here.wanted).map(|(row, w)| row[variable] * w);
         let by_rows = -2.0 * products.sum::<f64>();
@@ -108,14 +108,14 @@ proptest! {
 #[test]
 fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     let arm = arm();
-    let start = arm.rest();
+    let start = arm.rest_values();
     let solve = |goal: &ArmGoal| arm.solve(goal, &start).expect("right");
     let far = solve(&ArmGoal::new([9.0, 0.0, 0.5]));
-    assert!(matches!(far.reason, Some(ArmReason::TooFar { .. })), "{far:?}");
+    assert!(matches!(far.reason, Some(IkFailure::TooFar { .. })), "{far:?}");
     // Nearer to the shoulder than the elbow may fold.
     let near = arm.forward(&[0.0, 0.2, 2.9, 0.0]).tip.origin_m;
     let limited = solve(&ArmGoal { restarts: 10, ..ArmGoal::new(near) });
-    let Some(ArmReason::OutsideLimits { joint, .. }) = &limited.reason else {
+    let Some(IkFailure::OutsideLimits { joint, .. }) = &limited.reason else {
         panic!("{limited:?}")
     };
     assert!(["pitch", "elbow", "slide"].contains(&joint.as_str()));
@@ -124,8 +124,8 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     let target = arm.forward(&[0.3, 0.2, 0.4, 0.2]).tip.origin_m;
     let spheres = vec![Sphere { center_m: target, radius_m: 0.2 }];
     let blocked = solve(&ArmGoal { spheres, restarts: 10, ..ArmGoal::new(target) });
-    let Some(ArmReason::Blocked(hit)) = &blocked.reason else { panic!("{blocked:?}") };
-    assert_eq!(hit.against, Against::Sphere(0));
+    let Some(IkFailure::Blocked(hit)) = &blocked.reason else { panic!("{blocked:?}") };
+    assert_eq!(hit.against, CollidesWith::Sphere(0));
 }
 
 #[test]
@@ -135,16 +135,22 @@ fn wrong_goals_are_named() {
     let bad_sphere = Sphere { center_m: [0.0; 3], radius_m: -1.0 };
     for (goal, place) in [
         (ArmGoal::new([f64::NAN, 0.0, 0.0]), "target"),
-        (ArmGoal::pose(Pose { rotation: [[1.0; 3]; 3], ..Pose::IDENTITY }), "target"),
         (
-            ArmGoal { asked: Asked { along: [false; 3], turn: Turn::Free }, ..right.clone() },
+            ArmGoal::from_pose(Transform { rotation: [[1.0; 3]; 3], ..Transform::IDENTITY }),
+            "target",
+        ),
+        (
+            ArmGoal {
+                asked: PoseMask { along: [false; 3], turn: OrientationMask::Free },
+                ..right.clone()
+            },
             "target",
         ),
         (ArmGoal { tolerance_rad: 0.0, ..right.clone() }, "tolerance"),
         (ArmGoal { tolerance_m: -1.0, ..right.clone() }, "tolerance"),
         (ArmGoal { spheres: vec![bad_sphere], ..right.clone() }, "obstacle 1"),
     ] {
-        assert_eq!(arm.solve(&goal, &arm.rest()).expect_err("wrong").place(), place);
+        assert_eq!(arm.solve(&goal, &arm.rest_values()).expect_err("wrong").place(), place);
     }
     assert!(arm.solve(&right, &[0.0]).is_err());
     assert!(arm.solve(&right, &[f64::NAN; 4]).is_err());
@@ -179,7 +185,7 @@ fn shared_arms_reach_what_they_have_reached() {
             let share = |k: usize| (f64::from(seed) * 0.37 + k as f64 * 0.618_034).fract();
             let shares: Vec<f64> = (0..arm.variables.len()).map(share).collect();
             let target = arm.forward(&inside(&arm, &shares)).tip.origin_m;
-            let answer = arm.solve(&ArmGoal::new(target), &arm.rest()).expect("right");
+            let answer = arm.solve(&ArmGoal::new(target), &arm.rest_values()).expect("right");
             assert!(answer.reached, "{name}: {:?}", answer.reason);
             assert!(apart_m(arm.forward(&answer.values).tip.origin_m, target) <= 1e-6, "{name}");
             assert!(arm.outside_limits(&answer.values).is_empty(), "{name}");
@@ -194,7 +200,7 @@ fn the_connectors_of_an_iiwa_lead_to_its_joints_and_those_of_a_panda_do_not() {
         let model = Model::load(path).expect("a model");
         let arm = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
         let goal = ArmGoal { engine: Engine::Chain, ..ArmGoal::new([0.35, 0.2, 0.5]) };
-        let answer = arm.solve(&goal, &arm.rest()).expect("right");
+        let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         assert!(answer.reached, "{:?}", answer.reason);
         let skeleton = arm.skeleton();
         let connectors = arm.connectors(&skeleton, &arm.forward(&answer.values));

@@ -62,7 +62,7 @@ const KNOWN: [Known; 4] = [
 ];
 
 /// The angle between two orientations by the trace, which the solver does not use.
-fn angle_rad(a: &Pose, b: &Pose) -> f64 {
+fn angle_rad(a: &Transform, b: &Transform) -> f64 {
     let trace: f64 =
         (0..3).map(|i| sidestep_kernel::geometry::dot(a.rotation[i], b.rotation[i])).sum();
     acos((0.5 * (trace - 1.0)).clamp(-1.0, 1.0))
@@ -81,8 +81,8 @@ fn poses_of_an_independent_library_are_those_of_rpy_quaternion_and_forward_kinem
     let arm = six();
     for (values, xyz_m, rpy_rad, quaternion) in KNOWN {
         let tip = arm.forward(&values).tip;
-        let by_rpy = Pose::from_origin(&Origin { xyz_m, rpy_rad });
-        let by_quaternion = Pose::from_quaternion("q", xyz_m, quaternion).expect("right");
+        let by_rpy = Transform::from_origin(&Origin { xyz_m, rpy_rad });
+        let by_quaternion = Transform::from_quaternion("q", xyz_m, quaternion).expect("right");
         for pose in [by_rpy, by_quaternion] {
             assert!(apart_m(pose.origin_m, tip.origin_m) < 1e-11);
             for (row, expected) in pose.rotation.iter().zip(tip.rotation) {
@@ -99,8 +99,8 @@ fn poses_of_an_independent_library_are_those_of_rpy_quaternion_and_forward_kinem
 fn poses_of_an_independent_library_are_reached() {
     let arm = six();
     for (_, xyz_m, rpy_rad, _) in KNOWN {
-        let goal = ArmGoal::pose(Pose::from_origin(&Origin { xyz_m, rpy_rad }));
-        let answer = arm.solve(&goal, &arm.rest()).expect("right");
+        let goal = ArmGoal::from_pose(Transform::from_origin(&Origin { xyz_m, rpy_rad }));
+        let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         assert!(answer.reached, "{:?}", answer.reason);
         assert!(answer.error_m <= 1e-6 && answer.error_rad <= 1e-6);
         assert_met(&arm, &goal, &answer.values);
@@ -110,10 +110,10 @@ fn poses_of_an_independent_library_are_reached() {
 #[test]
 fn quaternions_of_length_zero_are_refused_and_others_have_length_one() {
     for wrong in [[0.0; 4], [f64::NAN, 0.0, 0.0, 1.0], [f64::INFINITY; 4]] {
-        let error = Pose::from_quaternion("--quaternion", [0.0; 3], wrong).expect_err("wrong");
+        let error = Transform::from_quaternion("--quaternion", [0.0; 3], wrong).expect_err("wrong");
         assert!(error.remedy().contains("scalar last"), "{error}");
     }
-    let half = Pose::from_quaternion("q", [0.0; 3], [0.0, 0.0, 5.0, 0.0]).expect("right");
+    let half = Transform::from_quaternion("q", [0.0; 3], [0.0, 0.0, 5.0, 0.0]).expect("right");
     assert_eq!(half.rotation, [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]);
 }
 
@@ -124,7 +124,7 @@ proptest! {
         start in prop::array::uniform6(0.0..1.0f64),
     ) {
         let arm = six();
-        let goal = ArmGoal::pose(arm.forward(&inside(&arm, &there)).tip);
+        let goal = ArmGoal::from_pose(arm.forward(&inside(&arm, &there)).tip);
         let answer = arm.solve(&goal, &inside(&arm, &start)).expect("right");
         prop_assert!(answer.reached, "{:?}", answer.reason);
         assert_met(&arm, &goal, &answer.values);
@@ -142,18 +142,18 @@ proptest! {
         // Turned about the free axis, and shifted along it, which the arm may undo.
         let mut rpy_rad = [0.0; 3];
         rpy_rad[axis] = off[axis];
-        let target = tip.then(&Pose::from_origin(&Origin { xyz_m: [0.0; 3], rpy_rad }));
-        let asked = Asked { along: [true; 3], turn: Turn::Axis(Axis::ALL[axis]) };
-        let goal = ArmGoal { asked, ..ArmGoal::pose(target) };
-        let answer = arm.solve(&goal, &arm.rest()).expect("right");
+        let target = tip.compose(&Transform::from_origin(&Origin { xyz_m: [0.0; 3], rpy_rad }));
+        let asked = PoseMask { along: [true; 3], turn: OrientationMask::Axis(Axis::ALL[axis]) };
+        let goal = ArmGoal { asked, ..ArmGoal::from_pose(target) };
+        let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached, "{:?}", answer.reason);
         let found = arm.forward(&answer.values).tip;
         prop_assert!(apart_m(found.origin_m, target.origin_m) <= 1e-6);
         prop_assert!(apart_m(found.axis(axis), target.axis(axis)) <= 1e-6);
         // Nowhere along x, but turned as the tip was.
-        let away = tip.then(&Pose::shift([100.0 * off[0], 0.0, 0.0]));
-        let asked = Asked { along: [false, true, true], turn: Turn::Whole };
-        let answer = arm.solve(&ArmGoal { asked, ..ArmGoal::pose(away) }, &arm.rest()).expect("right");
+        let away = tip.compose(&Transform::from_translation([100.0 * off[0], 0.0, 0.0]));
+        let asked = PoseMask { along: [false, true, true], turn: OrientationMask::Whole };
+        let answer = arm.solve(&ArmGoal { asked, ..ArmGoal::from_pose(away) }, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached && answer.error_m <= 1e-6, "{:?}", answer.reason);
         prop_assert!(angle_rad(&arm.forward(&answer.values).tip, &tip) <= 1e-6);
     }
@@ -162,8 +162,8 @@ proptest! {
     fn several_postures_all_reach_the_target_and_differ(there in prop::array::uniform6(0.1..0.9f64)) {
         let arm = six();
         let tip = arm.forward(&inside(&arm, &there)).tip;
-        let goal = ArmGoal { solutions: 4, apart: 0.2, ..ArmGoal::pose(tip) };
-        let answer = arm.solve(&goal, &arm.rest()).expect("right");
+        let goal = ArmGoal { solutions: 4, apart: 0.2, ..ArmGoal::from_pose(tip) };
+        let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached);
         let all: Vec<&Vec<f64>> =
             std::iter::once(&answer.values).chain(answer.others.iter().map(|p| &p.values)).collect();
@@ -174,7 +174,7 @@ proptest! {
                 prop_assert!(a.iter().zip(*b).any(|(a, b)| wrap_angle(a - b).abs() >= 0.2));
             }
         }
-        let away = |values: &[f64]| values.iter().zip(arm.rest()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let away = |values: &[f64]| values.iter().zip(arm.rest_values()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         prop_assert!(all.windows(2).all(|pair| away(pair[0]) <= away(pair[1])));
     }
 
@@ -187,9 +187,9 @@ proptest! {
         let arm = six();
         let values = inside(&arm, &there);
         let start: Vec<f64> = values.iter().zip(off).map(|(v, off)| v + off).collect();
-        let asked = if whole { Asked::POSE } else { Asked::POSITION };
+        let asked = if whole { PoseMask::POSE } else { PoseMask::POSITION };
         let tip = arm.forward(&values).tip;
-        let goal = ArmGoal { nearest: true, restarts: 20, asked, ..ArmGoal::pose(tip) };
+        let goal = ArmGoal { nearest: true, restarts: 20, asked, ..ArmGoal::from_pose(tip) };
         let answer = arm.solve(&goal, &start).expect("right");
         prop_assert!(answer.reached && answer.others.is_empty());
         let away = |a: &[f64]| a.iter().zip(&start).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
@@ -220,10 +220,10 @@ fn orientations_out_of_reach_are_told_as_such() {
     let arm = six();
     // As far as the arm gets, it points outward.
     let far = arm.forward(&[0.0; 6]).tip.origin_m;
-    let back = Pose::from_origin(&Origin { xyz_m: far, rpy_rad: [3.0, 0.0, 0.0] });
-    let goal = ArmGoal { ignore_limits: true, restarts: 20, ..ArmGoal::pose(back) };
-    let answer = arm.solve(&goal, &arm.rest()).expect("right");
-    assert!(matches!(answer.reason, Some(ArmReason::NotTurned { .. })), "{answer:?}");
+    let back = Transform::from_origin(&Origin { xyz_m: far, rpy_rad: [3.0, 0.0, 0.0] });
+    let goal = ArmGoal { ignore_limits: true, restarts: 20, ..ArmGoal::from_pose(back) };
+    let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
+    assert!(matches!(answer.reason, Some(IkFailure::NotTurned { .. })), "{answer:?}");
     assert!(answer.reason.expect("there").to_string().contains("not turned as asked"));
 }
 
@@ -238,8 +238,8 @@ fn shared_arms_take_poses_that_they_have_taken() {
         for seed in 0..20u32 {
             let share = |k: usize| (f64::from(seed) * 0.37 + k as f64 * 0.618_034).fract();
             let shares: Vec<f64> = (0..arm.variables.len()).map(share).collect();
-            let goal = ArmGoal::pose(arm.forward(&inside(&arm, &shares)).tip);
-            let answer = arm.solve(&goal, &arm.rest()).expect("right");
+            let goal = ArmGoal::from_pose(arm.forward(&inside(&arm, &shares)).tip);
+            let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
             assert!(answer.reached, "{name}: {:?}", answer.reason);
             assert_met(&arm, &goal, &answer.values);
         }

@@ -1,0 +1,15 @@
+//! The words about viewers that watch runs live.
+
+use crate::console::Console;
+use sidestep_session::ViewerAddress;
+
+/// Says where viewers are served, and warns of an address that others can reach.
+pub(crate) fn print_address(at: &ViewerAddress, console: Console) {
+    console.note(format!("Foxglove and Lichtblick: open a connection to {}", at.url()));
+    if at.is_public() {
+        console.warn(
+            "others can reach these viewers' address, which asks for no token: whoever has it can\n  \
+             watch, pause and steer the run; what is sent is not encrypted",
+        );
+    }
+}

@@ -1,0 +1,192 @@
+//! Films: the same view again and again, with moving things in it, without axes and legend.
+//!
+//! The static part is drawn once, and each picture is a copy of it with the moving things on top,
+//! because a film has hundreds of pictures.
+
+use resvg::tiny_skia::{Color, Pixmap, Transform};
+use sidestep_kernel::view::{Frame, Scenery, Trail, Vec3};
+
+use crate::error::DrawError;
+use crate::picture::canvas::{Camera, Canvas};
+use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
+use crate::raster::parse;
+use crate::svg::{Anchor, Rect, Svg, TextStyle};
+
+/// Longest side of a picture, pixels.
+const MAX_FRAME_PX: u32 = 4096;
+/// Height of the line of text under the picture, pixels.
+const CAPTION_HEIGHT_PX: u32 = 24;
+
+/// A view of a run, with the parts of it that never move.
+pub struct AnimationRenderer {
+    scenery: Scenery,
+    canvas: Canvas,
+    window: Rect,
+    background: Pixmap,
+}
+
+impl AnimationRenderer {
+    /// Returns a film that shows the content of all frames, `width_px` wide, or less if it would be
+    /// higher than that. Width and height in pixels are even, because video formats require it.
+    ///
+    /// # Errors
+    /// When the width is 0 or above 4096, or places are not finite.
+    pub fn new(scenery: Scenery, frames: &[Frame], width_px: u32) -> Result<Self, DrawError> {
+        if width_px > MAX_FRAME_PX {
+            let (found, limit) = (u64::from(width_px), u64::from(MAX_FRAME_PX));
+            return Err(DrawError::TooLarge { what: "film width in px", found, limit });
+        }
+        DrawError::positive("film width in px", f64::from(width_px))?;
+        check_content(&scenery, &Frame::default(), &[])?;
+        let (canvas, window) = view(&scenery, animation_bounds(&scenery, frames)?, width_px);
+        let (width, height) = (window.width as u32, window.height as u32 + CAPTION_HEIGHT_PX);
+        let mut still = Pixmap::new(width, height).ok_or_else(no_area)?;
+        still.fill(Color::WHITE);
+        let mut film = Self { scenery, canvas, window, background: still };
+        let mut svg = Svg::default();
+        let nothing = Frame::default();
+        let scene = Scene::new(&film.scenery, &nothing, &[]);
+        svg.open_clip(window);
+        scene.draw_still(&mut svg, &film.canvas);
+        svg.close_group();
+        film.background = film.composite(svg)?;
+        Ok(film)
+    }
+
+    /// Returns the width and height of its pictures in pixels.
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.background.width(), self.background.height())
+    }
+
+    /// Draws a moment with the ways that led to it, and a line of text under it.
+    ///
+    /// # Errors
+    /// When places are not finite.
+    pub fn render(
+        &self,
+        frame: &Frame,
+        trails: &[Trail],
+        caption: &str,
+    ) -> Result<AnimationFrame, DrawError> {
+        check_content(&self.scenery, frame, trails)?;
+        let scene = Scene::new(&self.scenery, frame, trails).with_thin_trails();
+        let mut svg = Svg::default();
+        svg.open_clip(self.window);
+        scene.draw_moving(&mut svg, &self.canvas);
+        svg.close_group();
+        svg.text(8.0, self.window.bottom() + 17.0, caption, &TextStyle::new(13.0, Anchor::Start));
+        Ok(AnimationFrame(self.composite(svg)?))
+    }
+
+    /// Returns the static part with more on top.
+    fn composite(&self, svg: Svg) -> Result<Pixmap, DrawError> {
+        let mut picture = self.background.clone();
+        let (width, height) = self.size_px();
+        let tree = parse(&svg.finish_transparent(f64::from(width), f64::from(height)))?;
+        resvg::render(&tree, Transform::identity(), &mut picture.as_mut());
+        Ok(picture)
+    }
+}
+
+fn no_area() -> DrawError {
+    DrawError::Svg("the picture has no area".into())
+}
+
+/// Returns the canvas that shows a box in a picture of this width, and the part of the picture that
+/// it takes.
+fn view(scenery: &Scenery, box_m: [Vec3; 2], width_px: u32) -> (Canvas, Rect) {
+    let camera = if scenery.dimensions == 2 { Camera::ABOVE } else { Camera::CORNER };
+    let [lo, hi] = projected_bounds(camera, box_m);
+    let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
+    let px_per_m = f64::from(width_px) / size_m[0].max(size_m[1]);
+    let even = |length_m: f64| {
+        f64::from(((length_m * px_per_m / 2.0).round() as u32).clamp(16, MAX_FRAME_PX / 2) * 2)
+    };
+    let window = Rect { x: 0.0, y: 0.0, width: even(size_m[0]), height: even(size_m[1]) };
+    let depths_m = Camera::range(camera.to_eye, box_m);
+    let canvas = Canvas { camera, px_per_m, zero: (0.0, window.height), origin_m: lo, depths_m };
+    (canvas, window)
+}
+
+/// One picture of a film: opaque, from the upper left pixel on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnimationFrame(Pixmap);
+
+impl AnimationFrame {
+    /// Returns four bytes per pixel: red, green, blue, and 255.
+    pub fn rgba(&self) -> &[u8] {
+        self.0.data()
+    }
+
+    /// Encodes the picture as PNG.
+    ///
+    /// # Errors
+    /// When the encoder fails.
+    pub fn to_png(&self) -> Result<Vec<u8>, DrawError> {
+        self.0.encode_png().map_err(|error| DrawError::Png(error.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{ball, plane};
+    use sidestep_kernel::view::{ALERT_COLOR, BODY_COLORS, Body, BodyKind, Condition};
+
+    /// A film of 20 by 10 meters, 200 pixels wide.
+    fn film(bodies: Vec<Body>) -> AnimationRenderer {
+        AnimationRenderer::new(Scenery { bodies, ..plane(20, 10) }, &[], 200).unwrap()
+    }
+
+    fn still(film: &AnimationRenderer, bodies: Vec<Body>, caption: &str) -> AnimationFrame {
+        film.render(&Frame { bodies, ..Frame::default() }, &[], caption).unwrap()
+    }
+
+    fn pixel(picture: &AnimationFrame, x: usize, y: usize) -> [u8; 3] {
+        let at = 4 * (200 * y + x);
+        picture.rgba()[at..at + 3].try_into().unwrap()
+    }
+
+    #[test]
+    fn north_is_up_and_a_meter_is_as_long_both_ways() {
+        let film = film(vec![ball(BodyKind::Connector, 0, [2.0, 9.0, 0.0], 1.0)]);
+        assert_eq!(film.size_px(), (200, 124));
+        let picture = still(&film, vec![], "");
+        assert_eq!(pixel(&picture, 20, 10), BODY_COLORS[0]);
+        assert_eq!(pixel(&picture, 20, 25), [255; 3]);
+    }
+
+    #[test]
+    fn what_moves_is_on_top_of_one_picture_only() {
+        let place = [5.0, 5.0, 0.0];
+        let film = film(vec![ball(BodyKind::Connector, 1, place, 1.0)]);
+        let moved = still(&film, vec![ball(BodyKind::Connector, 2, place, 1.0)], "");
+        assert_eq!(pixel(&moved, 50, 50), BODY_COLORS[2]);
+        assert_eq!(pixel(&still(&film, vec![], ""), 50, 50), BODY_COLORS[1]);
+    }
+
+    #[test]
+    fn agents_cover_what_is_in_the_way() {
+        let place = [5.0, 5.0, 0.0];
+        let bodies = vec![
+            ball(BodyKind::Connector, 0, place, 1.0).with_state_if(true, Condition::Failed),
+            ball(BodyKind::Obstacle, 0, place, 2.0),
+        ];
+        assert_eq!(pixel(&still(&film(vec![]), bodies, ""), 50, 50), ALERT_COLOR);
+    }
+
+    #[test]
+    fn the_caption_is_written_and_absurd_sizes_are_refused() {
+        let picture = still(&film(vec![]), vec![], "cycle 7");
+        let inked = (100..124).flat_map(|y| (0..200).map(move |x| (x, y)));
+        assert!(inked.filter(|&(x, y)| pixel(&picture, x, y)[0] < 128).count() > 20);
+        for width_px in [0, 9000] {
+            assert!(AnimationRenderer::new(plane(20, 10), &[], width_px).is_err());
+        }
+        for at in [f64::NAN, 1e300] {
+            let lost = vec![ball(BodyKind::Connector, 0, [at, 0.0, 0.0], 1.0)];
+            let frame = Frame { bodies: lost, ..Frame::default() };
+            assert!(film(vec![]).render(&frame, &[], "").is_err());
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The legend, and a picture's content in words.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::trails::agents;
+use super::{Scene, bodies};
+use crate::legend::{LegendEntry, LegendSymbol};
+use crate::style::{body_dashes, hex};
+use crate::ticks::group_thousands;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::{
+    Body, BodyKind, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
+};
+
+/// Most things with a color of their own in the legend; more share one line.
+const MAX_NAMED: usize = 10;
+/// Color of a symbol that stands for things of all colors.
+const ANY_COLOR: [u8; 3] = [0x70, 0x70, 0x70];
+/// Opacity of a trail on a floor in the legend.
+const RIBBON_OPACITY: f64 = 0.5;
+
+/// Describes the content of a picture in a sentence; empty if there are no agents.
+pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
+    let agents = agents(scenery, frame);
+    let Some((kind, _)) = agents.first() else { return String::new() };
+    let (scene, all, to) = (Scene::new(scenery, frame, trails), agents.len(), frame.cycle);
+    let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.number).collect();
+    let from = scene.trails.first().map_or(0, |trail| trail.span[0]);
+    let said = |cycle: Cycle| group_thousands(&cycle.to_string());
+    let (plural, to, from) = (plural(*kind, all), said(to), said(from));
+    match of.len() {
+        0 => format!("{} {plural} before cycle {to}.", group_thousands(&all.to_string())),
+        1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
+        n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
+        n => format!(
+            "Tracks of {n} of {all} {plural} (the others without color), cycles {from} to {to}."
+        ),
+    }
+}
+
+fn plural(kind: BodyKind, n: usize) -> String {
+    let one = if kind == BodyKind::Connector { "chain" } else { kind.name() };
+    if n == 1 { one.into() } else { format!("{one}s") }
+}
+
+/// Returns the legend: only entries for things in the picture.
+pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
+    let swatch = |color, opacity| LegendSymbol::Swatch {
+        fill: hex(color).into(),
+        rim: if opacity < 0.5 { hex(color).into() } else { "none".into() },
+        opacity,
+    };
+    let floor = scene.scenery.floor.as_ref();
+    let has = |occupancy| floor.is_some_and(|floor| floor.boxes.contains(&occupancy));
+    let mut entries = Vec::new();
+    if has(Occupancy::Wall) {
+        entries.push(LegendEntry::new(swatch(WALL_COLOR, 1.0), "wall"));
+    }
+    if has(Occupancy::Unknown) {
+        let (fill, rim) = (hex(UNKNOWN_COLOR).into(), "#CCCCCC".into());
+        entries.push(LegendEntry::new(LegendSymbol::Swatch { fill, rim, opacity: 1.0 }, "unknown"));
+    }
+    // By layer, then alphabetically.
+    let mut kinds = BTreeMap::new();
+    for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
+        let look = body.appearance(scene.scenery.dimensions);
+        if !look.legend.is_empty() {
+            let is_own = look.color == body_color(body.number);
+            let color = if is_own { ANY_COLOR } else { look.color };
+            kinds.entry((look.layer, look.legend)).or_insert((color, look.opacity));
+        }
+    }
+    let words = kinds.into_iter().map(|((_, words), (color, opacity))| (words, color, opacity));
+    entries.extend(
+        words.map(|(words, color, opacity)| LegendEntry::new(swatch(color, opacity), words)),
+    );
+    if scene.frame.bodies.iter().any(bodies::is_leader) {
+        entries.push(LegendEntry::new(LegendSymbol::Leader, "leader"));
+    }
+    if !scene.trails.is_empty() {
+        entries.push(LegendEntry::new(LegendSymbol::Ring, "beginning of a track"));
+    }
+    entries.extend(named_entries(scene));
+    entries
+}
+
+/// Returns an entry for everything with a color of its own: agents with a trail, and chains.
+fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
+    let trails = scene.trails.iter().map(|trail| (trail.of.number, (trail.of.kind, trail.width_m)));
+    let is_first = |body: &&Body| body.kind == BodyKind::Connector && body.part == Some(0);
+    let chains = scene.frame.bodies.iter().filter(is_first);
+    let chains = chains
+        .filter(|body| {
+            scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
+        })
+        .map(|body| (body.number, (body.kind, None)));
+    let all: BTreeMap<u32, (BodyKind, Option<f64>)> = chains.chain(trails).collect();
+    let dashes = body_dashes(&all.keys().copied().collect());
+    let entry = |(&number, &(kind, width_m)): (&u32, &(BodyKind, Option<f64>))| {
+        let color = hex(body_color(number)).into();
+        let symbol = match width_m {
+            Some(_) => {
+                LegendSymbol::Swatch { fill: color, rim: "none".into(), opacity: RIBBON_OPACITY }
+            }
+            None => LegendSymbol::Line { color, marker: None, dash: dashes[&number] },
+        };
+        LegendEntry::new(symbol, display_name(scene, kind, number))
+    };
+    let mut entries: Vec<LegendEntry> = all.iter().take(MAX_NAMED).map(entry).collect();
+    if all.len() > MAX_NAMED {
+        let symbol = LegendSymbol::Line { color: hex(ANY_COLOR).into(), marker: None, dash: "" };
+        entries.push(LegendEntry::new(symbol, format!("and {} more", all.len() - MAX_NAMED)));
+    }
+    entries
+}
+
+/// Returns the name of a thing.
+pub(super) fn display_name(scene: &Scene<'_>, kind: BodyKind, number: u32) -> String {
+    let own = scene.scenery.names.iter().find(|(k, n, _)| (*k, *n) == (kind, number));
+    match own {
+        Some((_, _, name)) => name.clone(),
+        None => format!("{} {number}", plural(kind, 1)),
+    }
+}

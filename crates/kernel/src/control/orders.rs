@@ -1,0 +1,143 @@
+//! Orders that were given, as rows of a table, and orders to be given again.
+
+use super::team::Orders;
+use crate::ports::Table;
+use crate::units::{Cycle, EntityId};
+use std::ops::Range;
+
+/// Name of the table of orders.
+pub(super) const ORDERS: &str = "orders";
+
+/// One value of an order, as recorded.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OrderRow {
+    pub(crate) cycle: Cycle,
+    pub(crate) agent: EntityId,
+    /// Number of the order's name among all names.
+    pub(crate) order: u32,
+    pub(crate) part: u32,
+    pub(crate) value: f64,
+}
+
+/// Returns the table of orders; `names` are the names of all of them.
+pub(crate) fn orders_table(names: Vec<String>) -> Table<OrderRow> {
+    Table::new(ORDERS)
+        .u64("cycle", "cycle before which the order was given, counted from 0", |o: &OrderRow| {
+            o.cycle
+        })
+        .u32("agent", "entity id of the agent that was ordered", |o| o.agent)
+        .label("order", "the quantity that was ordered", names, |o| o.order)
+        .u32("part", "place of the value in the order, from 0", |o| o.part)
+        .f64("value", "the value, in the unit that the order's name ends in", |o| o.value)
+}
+
+/// Orders by the cycle before which each is given; those of one cycle stay in their order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OrderLog {
+    entries: Vec<OrderEntry>,
+    agents: Vec<EntityId>,
+    values: Vec<f64>,
+}
+
+/// One order to several agents.
+#[derive(Debug, Clone, PartialEq)]
+struct OrderEntry {
+    cycle: Cycle,
+    order: String,
+    agents: Range<usize>,
+    values: Range<usize>,
+}
+
+impl OrderLog {
+    /// Notes orders that are given before a cycle, after those of the same cycle.
+    pub fn add(&mut self, cycle: Cycle, orders: &Orders<'_>) {
+        let (agents, values) = (self.agents.len(), self.values.len());
+        self.agents.extend_from_slice(orders.agents);
+        self.values.extend_from_slice(orders.values);
+        let (agents, values) = (agents..self.agents.len(), values..self.values.len());
+        if let Some(last) = self.entries.last_mut()
+            && last.agents.end == agents.start
+            && last.can_extend_with(cycle, orders)
+        {
+            (last.agents.end, last.values.end) = (agents.end, values.end);
+            return;
+        }
+        let at = self.entries.partition_point(|entry| entry.cycle <= cycle);
+        self.entries.insert(at, OrderEntry { cycle, order: orders.order.into(), agents, values });
+    }
+
+    /// Returns whether the book has no orders.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Iterates over the orders, each with the cycle before which it is given.
+    pub fn iter(&self) -> impl Iterator<Item = (Cycle, Orders<'_>)> {
+        self.entries.iter().map(|entry| (entry.cycle, self.orders(entry)))
+    }
+
+    fn orders<'a>(&'a self, entry: &'a OrderEntry) -> Orders<'a> {
+        let OrderEntry { order, agents, values, .. } = entry;
+        let (agents, values) = (&self.agents[agents.clone()], &self.values[values.clone()]);
+        Orders { order, agents, values }
+    }
+
+    /// Iterates over the orders that are given before `cycle`.
+    pub(crate) fn due(&self, cycle: Cycle) -> impl Iterator<Item = Orders<'_>> {
+        let due = self.count_before(cycle)..self.count_before(cycle.saturating_add(1));
+        self.entries[due].iter().map(|entry| self.orders(entry))
+    }
+
+    /// Returns the first cycle after `cycle` before which an order is given.
+    pub(crate) fn next_after(&self, cycle: Cycle) -> Option<Cycle> {
+        let next = self.count_before(cycle.saturating_add(1));
+        self.entries.get(next).map(|entry| entry.cycle)
+    }
+
+    /// Number of entries for cycles before `cycle`.
+    fn count_before(&self, cycle: Cycle) -> usize {
+        self.entries.partition_point(|entry| entry.cycle < cycle)
+    }
+}
+
+impl OrderEntry {
+    /// Returns whether further orders can be joined to the entry: the same order, with as many values per agent.
+    fn can_extend_with(&self, cycle: Cycle, orders: &Orders<'_>) -> bool {
+        let width = |agents: usize, values: usize| values.checked_div(agents);
+        let (agents, values) = (self.agents.len(), self.values.len());
+        self.cycle == cycle
+            && self.order == orders.order
+            && width(agents, values) == width(orders.agents.len(), orders.values.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_due_by_cycle_and_stay_in_their_order() {
+        let mut book = OrderLog::default();
+        for (cycle, agent) in [(5, 2), (3, 1), (5, 0), (5, 7), (9, 4)] {
+            book.add(cycle, &Orders { order: "a", agents: &[agent], values: &[f64::from(agent)] });
+        }
+        let agents = |cycle| book.due(cycle).flat_map(|o| o.agents.to_vec()).collect::<Vec<_>>();
+        assert_eq!((agents(5), agents(3), agents(4)), (vec![2, 0, 7], vec![1], vec![]));
+        let next = [0, 3, 4, 5, 9].map(|now| book.next_after(now));
+        assert_eq!(next, [Some(3), Some(5), Some(5), Some(9), None]);
+    }
+
+    #[test]
+    fn orders_of_one_cycle_are_joined_where_they_are_alike() {
+        let mut book = OrderLog::default();
+        let note = |book: &mut OrderLog, order, values: &[f64]| {
+            book.add(1, &Orders { order, agents: &[0], values });
+        };
+        note(&mut book, "a", &[1.0]);
+        note(&mut book, "a", &[2.0]);
+        note(&mut book, "a", &[2.0, 3.0]);
+        note(&mut book, "b", &[4.0]);
+        let all: Vec<_> = book.iter().map(|(_, o)| (o.order, o.values.to_vec())).collect();
+        assert_eq!(all, [("a", vec![1.0, 2.0]), ("a", vec![2.0, 3.0]), ("b", vec![4.0])]);
+    }
+}

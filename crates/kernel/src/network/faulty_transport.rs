@@ -1,0 +1,103 @@
+//! A network with faults: it can lose and delay messages, cut links, and have a limited range.
+//!
+//! A message takes one tick, or more when it is large or delayed. Every draw depends on sender, receiver,
+//! tick and number, never on the order in which agents are visited.
+
+use super::Network;
+use super::links::FaultStreams;
+use crate::distr::Bernoulli;
+use crate::ports::{Envelope, MemoryTransport, Transport};
+use crate::units::{Cycle, EntityId};
+use std::collections::BTreeMap;
+
+/// Distances between agents, at the start of a cycle.
+pub trait Distances {
+    /// Returns the distance between two agents in meters.
+    fn distance_m(&self, link: [EntityId; 2]) -> f64;
+}
+
+/// A transport for the talks of one cycle, on which some links may be cut.
+pub struct FaultyTransport<'a, T> {
+    inner: T,
+    network: Option<&'a Network>,
+    draws: FaultStreams,
+    /// Places of the agents; without them, every agent reaches every other.
+    places: Option<&'a dyn Distances>,
+    /// First tick of each talk, and its time in seconds after the start of the run, both rising.
+    talks: &'a [(u64, f64)],
+    /// Tick from which on each way of a link is free, where messages take time by their size.
+    pub(super) free_at: BTreeMap<[EntityId; 2], f64>,
+}
+
+impl<'a> FaultyTransport<'a, MemoryTransport> {
+    /// Returns a network in memory with some faults; without any it loses nothing. The talks of the cycle, at least
+    /// one, are given by their first ticks and the times of those in seconds after the start of the run.
+    pub fn in_memory(
+        network: Option<&'a Network>,
+        draws: FaultStreams,
+        places: Option<&'a dyn Distances>,
+        talks: &'a [(u64, f64)],
+    ) -> Self {
+        let faults = network.map(Network::faults).unwrap_or_default();
+        let inner = MemoryTransport::new(draws.streams, draws.network, faults);
+        Self { inner, network, draws, places, talks, free_at: BTreeMap::new() }
+    }
+}
+
+impl<T: Transport> FaultyTransport<'_, T> {
+    /// Returns the time of a tick, in seconds after the start of the run.
+    fn time_s(&self, network: &Network, tick: u64) -> f64 {
+        let begun = self.talks.partition_point(|(first, _)| *first <= tick);
+        let (first, starts_s) = self.talks[begun.saturating_sub(1)];
+        starts_s + network.seconds(tick.saturating_sub(first))
+    }
+
+    /// Returns whether the link of a message lets it through: it is not cut, within range, and not
+    /// in a burst that takes the message.
+    fn passes(&self, envelope: &Envelope) -> bool {
+        let Some(network) = self.network else { return true };
+        let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
+        let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
+        let apart_m = self.places.map_or(0.0, |places| places.distance_m(link));
+        if !network.carries(link, at_s) || apart_m > network.range_m {
+            return false;
+        }
+        let Some(bursts) = &network.bursts else { return true };
+        let words =
+            self.draws.streams.pair(sender, receiver, tick, self.draws.burst_loss, sequence);
+        !(Bernoulli::new(bursts.loss).sample(words[0])
+            && bursts.is_in_burst(&self.draws, link, at_s))
+    }
+
+    /// Returns the tick in which all of a message is on its way: its link carries one message after
+    /// the other.
+    fn departure_tick(&mut self, envelope: &Envelope) -> u64 {
+        let bits_per_tick = self.network.map_or(f64::INFINITY, Network::bits_per_tick);
+        if bits_per_tick == f64::INFINITY {
+            return envelope.cycle;
+        }
+        let free_at = self.free_at.entry([envelope.sender, envelope.receiver]).or_default();
+        let bits = 8.0 * envelope.payload.len() as f64;
+        *free_at = free_at.max(envelope.cycle as f64) + bits / bits_per_tick;
+        free_at.floor() as u64
+    }
+}
+
+impl<T: Transport> Transport for FaultyTransport<'_, T> {
+    fn send(&mut self, mut envelope: Envelope) {
+        let is_carried = self.passes(&envelope);
+        // A message lost on the way occupies the link all the same.
+        envelope.cycle = self.departure_tick(&envelope);
+        if is_carried {
+            self.inner.send(envelope);
+        }
+    }
+
+    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
+        self.inner.receive(receiver, now)
+    }
+
+    fn next_arrival(&self) -> Option<Cycle> {
+        self.inner.next_arrival()
+    }
+}

@@ -1,0 +1,57 @@
+//! The plan of a run, and the effort that it took.
+
+use crate::units::Cycle;
+use serde::{Deserialize, Serialize};
+
+/// The settings of a run that every scenario has, in any world.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunConfig {
+    /// The scenario's name; may be empty.
+    pub name: String,
+    /// The seed.
+    pub seed: u64,
+    /// The maximum number of cycles.
+    pub cycles: Cycle,
+    /// Number of cycles between two checkpoints; 0 for none.
+    pub checkpoint_every: Cycle,
+}
+
+impl RunConfig {
+    /// Returns the number of cycles between two checkpoints; the largest number where there are
+    /// none.
+    pub fn checkpoint_interval(&self) -> Cycle {
+        if self.checkpoint_every == 0 { Cycle::MAX } else { self.checkpoint_every }
+    }
+}
+
+/// The conflict groups of a run since its start, and its processor time in this process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RunStats {
+    /// The conflict groups.
+    pub groups: GroupSizes,
+    /// Processor time of all workers, in nanoseconds.
+    pub cpu_ns: u64,
+}
+
+/// Conflict groups by size: a sum over cycles, which checkpoints keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GroupSizes {
+    /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
+    pub counts: [u64; 32],
+    /// Number of bodies of the largest group in which bodies met; 0 if none ever did.
+    pub largest: u64,
+}
+
+impl GroupSizes {
+    /// Counts a group of several bodies.
+    pub(crate) fn add(&mut self, size: usize) {
+        self.counts[size.ilog2() as usize] += 1;
+        self.largest = self.largest.max(size as u64);
+    }
+
+    /// Adds the groups of other cycles, or of another worker.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.counts.iter_mut().zip(other.counts).for_each(|(sum, n)| *sum += n);
+        self.largest = self.largest.max(other.largest);
+    }
+}

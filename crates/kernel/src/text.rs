@@ -1,0 +1,143 @@
+//! Texts of a world for people, as data: the caller that shows them decides on the layout.
+
+use serde_json::Value;
+
+/// Names and values, one per line.
+pub type KeyValues = Vec<(String, String)>;
+
+/// A statement about a state: as JSON, and in words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Description {
+    /// The form for machines.
+    pub json: Value,
+    /// The form for people; every line ends in a line feed.
+    pub text: String,
+}
+
+/// Returns a line of a name and a value.
+pub fn key_value(name: &str, value: impl Into<String>) -> (String, String) {
+    (name.into(), value.into())
+}
+
+/// Returns a number with its thousands set apart by spaces: `1 234 567`.
+pub fn group_thousands(number: u64) -> String {
+    let digits = number.to_string();
+    let first = digits.len() % 3;
+    let (head, tail) = digits.split_at(first);
+    let groups = tail.as_bytes().chunks(3).map(|c| std::str::from_utf8(c).unwrap_or_default());
+    let head = (!head.is_empty()).then_some(head);
+    head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns a number with the given number of decimals; a value that rounds to 0 has no sign.
+pub fn format_fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(size) if size.chars().all(|c| matches!(c, '0' | '.')) => size.into(),
+        _ => text,
+    }
+}
+
+/// The first characters of a value that is a command to copy.
+const COMMAND_PREFIX: &str = "sidestep ";
+
+/// Columns of a line of text.
+pub const LINE_COLS: usize = 80;
+
+/// Returns lines of names and values, the values below each other and broken into lines of
+/// [`LINE_COLS`] columns where they have spaces. A command, which people copy, stays whole.
+pub fn align_pairs(rows: &[(String, String)]) -> String {
+    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    let line = |(name, value): &(String, String)| {
+        let cols = match value.starts_with(COMMAND_PREFIX) {
+            true => usize::MAX,
+            false => LINE_COLS.saturating_sub(width + 4),
+        };
+        let words = wrap(value, cols);
+        format!(
+            "  {name:<width$}  {}\n",
+            words.join(&format!("\n{:indent$}", "", indent = width + 4))
+        )
+    };
+    rows.iter().map(line).collect()
+}
+
+/// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
+/// that fits, and each line feed in it, stays unchanged.
+pub fn wrap(text: &str, cols: usize) -> Vec<String> {
+    text.split('\n').flat_map(|line| wrap_line(line, cols)).collect()
+}
+
+fn wrap_line(text: &str, cols: usize) -> Vec<String> {
+    if text.chars().count() <= cols {
+        return vec![text.into()];
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for word in split_words(text) {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= cols => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.into()),
+        }
+    }
+    lines
+}
+
+/// Splits text at its spaces, except one before a percent sign: a number keeps its unit.
+fn split_words(text: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    let mut start = 0;
+    for (at, _) in text.match_indices(' ').filter(|(at, _)| !text[at + 1..].starts_with('%')) {
+        words.push(&text[start..at]);
+        start = at + 1;
+    }
+    words.push(&text[start..]);
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_not_parted_from_its_percent_sign() {
+        assert_eq!(wrap("claim 93 %, record 0 %", 20), ["claim 93 %, record", "0 %"]);
+        assert_eq!(wrap("a b  c", 3), ["a b", " c"]);
+    }
+
+    #[test]
+    fn values_stand_below_each_other() {
+        let rows = [key_value("a", "1"), key_value("long", "2")];
+        assert_eq!(align_pairs(&rows), "  a     1\n  long  2\n");
+    }
+
+    #[test]
+    fn long_values_are_broken_at_spaces_and_stand_below_their_first_line() {
+        let words = ["seventeen_columns"; 6].join(" ");
+        let told = align_pairs(&[key_value("name", words)]);
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines.len(), 2, "{told}");
+        assert!(lines[1].starts_with("        seventeen") && lines.iter().all(|l| l.len() <= 80));
+        let command = format!("sidestep report {}", "x".repeat(99));
+        assert_eq!(align_pairs(&[key_value("look", &command)]), format!("  look  {command}\n"));
+        assert_eq!(wrap(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
+        assert_eq!(wrap("a  b\nc", 80), ["a  b", "c"]);
+    }
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        assert_eq!(
+            [-1e-9, -0.0, 3.364e-13, -0.0005, -2.5].map(|x| format_fixed(x, 3)),
+            ["0.000", "0.000", "0.000", "-0.001", "-2.500"]
+        );
+        assert_eq!((format_fixed(-0.4, 0), format_fixed(f64::NAN, 2)), ("0".into(), "NaN".into()));
+    }
+
+    #[test]
+    fn thousands_are_set_apart() {
+        assert_eq!([0, 999, 1000].map(group_thousands), ["0", "999", "1 000"]);
+        assert_eq!(group_thousands(1_234_567), "1 234 567");
+    }
+}

@@ -1,0 +1,85 @@
+//! A world with agents that may be processes: the interface that a server and its nodes use.
+
+use crate::agent::{AgentPercept, AgentProgram, Channel, Controls, InvalidControl};
+use sidestep::kernel::{EntityId, InputError, Simulation};
+use sidestep_session::fleet::AgentName;
+
+/// A world of agents with programs of their own.
+pub trait DistributedWorld: Send + Sync {
+    /// Number of agents; their ids on the network are those below.
+    fn count(&self) -> usize;
+
+    /// Returns the name of an agent.
+    fn name(&self, agent: EntityId) -> AgentName;
+
+    /// Returns the id of a named agent; none if there is no such agent.
+    fn id(&self, name: AgentName) -> Option<EntityId>;
+
+    /// Duration of a cycle, in seconds of the scenario.
+    fn cycle_s(&self) -> f64;
+
+    /// Returns whether packets may be lost, delayed or doubled.
+    fn has_faults(&self) -> bool;
+
+    /// Returns the change of the scenario, as `key=value`, that keeps agents from waiting forever for one that is
+    /// gone where time passes `speed` times as fast; none where they never do.
+    fn timeout_override(&self, speed: f64) -> Option<String>;
+
+    /// Returns whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
+    fn waits_for_lost_nodes(&self) -> bool {
+        false
+    }
+
+    /// Returns the percepts of the agents that decide next in the cycle to come, by rising id.
+    fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept>;
+
+    /// Returns the largest number of rounds of this cycle that may follow one with this number of groups; 0 where all
+    /// decide at once.
+    fn max_further_rounds(&self, _: &dyn Simulation, _: usize) -> usize {
+        0
+    }
+
+    /// Returns whether a control counts if it came before the node of its agent was lost.
+    fn keeps_controls_of_lost_nodes(&self) -> bool {
+        true
+    }
+
+    /// Takes the controls of a round with the given groups, where later rounds depend on them; those that make no
+    /// sense are left out. Agents that are gone are noted; none of the controls is theirs, unless these
+    /// are heeded ([`DistributedWorld::keeps_controls_of_lost_nodes`]).
+    fn accept_controls(
+        &self,
+        _run: &dyn Simulation,
+        _groups: &[Vec<EntityId>],
+        _controls: &mut Controls,
+        _gone: &[EntityId],
+    ) -> Vec<InvalidControl> {
+        Vec::new()
+    }
+
+    /// Returns the controls of the cycle to come that make no sense.
+    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl>;
+
+    /// Returns the program of an agent, which talks only with those of the same build.
+    fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram>;
+
+    /// Returns the faults of the scenario's network for packets of an agent; none where it loses nothing.
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>>;
+
+    /// Returns the id of a named agent.
+    ///
+    /// # Errors
+    /// When there is no such agent.
+    fn find(&self, name: AgentName) -> Result<EntityId, InputError> {
+        self.id(name).ok_or_else(|| {
+            let cause = format!("the scenario has no {} {name}", name.noun());
+            InputError::new(name.option(), cause, self.agent_hint())
+        })
+    }
+
+    /// Returns words for the existing agents, by the option that names one.
+    fn agent_hint(&self) -> String {
+        let last = self.name(self.count().saturating_sub(1) as EntityId);
+        format!("give {} to {last}", self.name(0).option())
+    }
+}

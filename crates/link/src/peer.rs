@@ -1,0 +1,23 @@
+//! Parties of a fleet, by which words and wires name the sender.
+
+use serde::{Deserialize, Serialize};
+use sidestep::kernel::EntityId;
+use std::fmt;
+
+/// A party of a fleet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Peer {
+    /// The server of the world.
+    Server,
+    /// The node of an agent.
+    Node(EntityId),
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Server => write!(f, "server"),
+            Self::Node(id) => write!(f, "{id}"),
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! A text that is served by HTTP at one address.
+
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Time that a client has for its request.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Most bytes of a request that are read.
+const MAX_REQUEST_BYTES: usize = 4096;
+
+/// Shows a text at an address from now on, one request after the other.
+///
+/// # Errors
+/// When the address cannot be taken.
+pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
+    let listener = TcpListener::bind(address)?;
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            // A malformed request gets no answer.
+            let _ = respond(stream, &text);
+        }
+    });
+    Ok(())
+}
+
+fn respond(mut stream: TcpStream, text: &Mutex<String>) -> io::Result<()> {
+    stream.set_read_timeout(Some(REQUEST_TIMEOUT))?;
+    stream.set_write_timeout(Some(REQUEST_TIMEOUT))?;
+    let mut asked = [0; MAX_REQUEST_BYTES];
+    let mut length = 0;
+    while !asked[..length].windows(4).any(|end| end == b"\r\n\r\n") {
+        let read = stream.read(&mut asked[length..])?;
+        if read == 0 {
+            return Ok(());
+        }
+        length += read;
+    }
+    let text = text.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let status = if asked.starts_with(b"GET ") { "200 OK" } else { "405 Method Not Allowed" };
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\n\
+         Content-Length: {}\r\nConnection: close\r\n\r\n{text}",
+        text.len()
+    )
+}

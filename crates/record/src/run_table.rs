@@ -1,0 +1,482 @@
+//! Tables of which cells may be missing: one row per run.
+//!
+//! [`write()`] creates one Parquet file, completely or not at all; [`read()`] reads it back after
+//! comparing its checksums. Tables that do not fit are written by [`TableStream`] and read by
+//! [`read_blocks()`]. Every column is optional in the file; its type is a 64-bit integer, a float, a
+//! truth value or text.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
+use parquet::column::writer::ColumnWriterImpl;
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::{ParquetError, Result as ParquetResult};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{FileReader, RowGroupReader};
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::{Type, TypePtr};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{Cells, ColumnType, RecordError, RoleColumn, Values};
+
+use crate::disk;
+use crate::format::{self, FormatVersion};
+use crate::part::error_cause;
+use crate::read::{check_bytes, damaged, read_cells, read_texts, required_value};
+use crate::schema::{self, CHECKSUMS, COLUMNS, FORMAT, VERSION};
+
+/// Number of rows in a row group.
+const GROUP_ROWS: usize = 1 << 16;
+
+/// One column in the key-value pair [`COLUMNS`] of the file.
+#[derive(Debug, Serialize, Deserialize)]
+struct RoleColumnEntry {
+    name: String,
+    role: Value,
+}
+
+/// A table that was read back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedTable<R> {
+    /// Its columns, all of the same length; those with a role that this version does not know are
+    /// left out.
+    pub columns: Vec<RoleColumn<R>>,
+    /// Version of the program that wrote it.
+    pub program_version: String,
+}
+
+/// Writes the columns (all of the same length) to the file at `path`, and adds `extra` to its
+/// key-value pairs.
+///
+/// # Errors
+/// A column of a type that such files do not support; an I/O error. An earlier file stays then.
+pub fn write<R: Serialize>(
+    path: &Path,
+    columns: &[&RoleColumn<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> Result<(), RecordError> {
+    let mut growing = TableStream::create(path, columns, program_version, extra)?;
+    growing.append(columns)?;
+    growing.finish()
+}
+
+/// A table that is written block by block, and appears once it is whole; dropped before, it leaves nothing.
+pub struct TableStream {
+    path: PathBuf,
+    growing: PathBuf,
+    hash: SharedChecksum,
+    checksums: Vec<u32>,
+    writer: Option<SerializedFileWriter<HashingWriter>>,
+}
+
+impl TableStream {
+    /// Creates a table with columns of these names, roles and types.
+    ///
+    /// # Errors
+    /// A column of a type that such files do not support; an I/O error.
+    pub fn create<R: Serialize>(
+        path: &Path,
+        columns: &[&RoleColumn<R>],
+        program_version: &str,
+        extra: &[(&str, String)],
+    ) -> Result<Self, RecordError> {
+        let growing = disk::partial_path(path);
+        let hash = SharedChecksum::default();
+        let create = || {
+            let sink = HashingWriter { file: File::create(&growing)?, hash: hash.clone() };
+            let pairs = key_values(columns, program_version, extra)?;
+            let schema = parquet_schema(columns)?;
+            let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
+            writer.flush()?;
+            Ok(writer)
+        };
+        let writer = create();
+        hash.take();
+        let mut table = Self {
+            path: path.into(),
+            growing: growing.clone(),
+            hash,
+            checksums: Vec::new(),
+            writer: None,
+        };
+        table.writer = Some(writer.map_err(|e: ParquetError| table.write_error(e))?);
+        Ok(table)
+    }
+
+    /// Appends rows, in the columns with which it was created.
+    ///
+    /// # Errors
+    /// Another number or type of columns; an I/O error.
+    pub fn append<R>(&mut self, columns: &[&RoleColumn<R>]) -> Result<(), RecordError> {
+        self.append_groups(columns).map_err(|e| self.write_error(e))
+    }
+
+    fn append_groups<R>(&mut self, columns: &[&RoleColumn<R>]) -> ParquetResult<()> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        let rows = columns.first().map_or(0, |c| c.values.len());
+        for start in (0..rows).step_by(GROUP_ROWS) {
+            let mut group = writer.next_row_group()?;
+            for column in columns {
+                write_column(&mut group, column, start..rows.min(start + GROUP_ROWS))?;
+            }
+            group.close()?;
+            writer.flush()?;
+            self.checksums.push(self.hash.take());
+        }
+        Ok(())
+    }
+
+    /// Completes the table, and gives it its name.
+    ///
+    /// # Errors
+    /// An I/O error. An earlier file stays then.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        if let Some(mut writer) = self.writer.take() {
+            let checksums = schema::checksums_to_text(&self.checksums);
+            writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
+            let synced = writer.into_inner().and_then(|sink| Ok(sink.file.sync_all()?));
+            synced.map_err(|e| self.write_error(e))?;
+        }
+        disk::rename(&self.growing, &self.path)
+    }
+
+    fn write_error(&self, error: ParquetError) -> RecordError {
+        RecordError::new(self.path.display(), error_cause(error))
+    }
+}
+
+impl Drop for TableStream {
+    fn drop(&mut self) {
+        // On a full disk a half-written file must not keep its space; one that was finished has its name.
+        let _ = std::fs::remove_file(&self.growing);
+    }
+}
+
+fn properties(pairs: Vec<KeyValue>) -> WriterProperties {
+    WriterProperties::builder()
+        .set_created_by(concat!("sidestep-record ", env!("CARGO_PKG_VERSION")).into())
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true)
+        .set_key_value_metadata(Some(pairs))
+        .build()
+}
+
+fn key_values<R: Serialize>(
+    columns: &[&RoleColumn<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> ParquetResult<Vec<KeyValue>> {
+    let json = |e: serde_json::Error| ParquetError::External(Box::new(e));
+    let entry = |c: &&RoleColumn<R>| {
+        Ok(RoleColumnEntry { name: c.name.clone(), role: serde_json::to_value(&c.role)? })
+    };
+    let entries = columns.iter().map(entry).collect::<Result<Vec<_>, _>>().map_err(json)?;
+    let entries = serde_json::to_string(&entries).map_err(json)?;
+    let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
+    let mut pairs = vec![
+        pair(FORMAT, format::CURRENT.to_string()),
+        pair(VERSION, program_version.to_string()),
+        pair(COLUMNS, entries),
+    ];
+    pairs.extend(extra.iter().map(|(key, value)| pair(key, value.clone())));
+    Ok(pairs)
+}
+
+fn parquet_schema<R>(columns: &[&RoleColumn<R>]) -> ParquetResult<TypePtr> {
+    let field = |column: &&RoleColumn<R>| {
+        let (physical, logical) = match column.values.ty() {
+            ColumnType::I64 => (PhysicalType::INT64, None),
+            ColumnType::F64 => (PhysicalType::DOUBLE, None),
+            ColumnType::Bool => (PhysicalType::BOOLEAN, None),
+            ColumnType::Text => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+            other => return Err(wrong_type(&column.name, other)),
+        };
+        let field = Type::primitive_type_builder(&column.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()?;
+        Ok(Arc::new(field))
+    };
+    let fields = columns.iter().map(field).collect::<ParquetResult<_>>()?;
+    Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
+}
+
+fn wrong_type(column: &str, ty: ColumnType) -> ParquetError {
+    let ty = ty.name();
+    ParquetError::General(format!("column `{column}` is {ty}, not i64, f64, bool or text"))
+}
+
+fn write_column<R>(
+    group: &mut SerializedRowGroupWriter<'_, HashingWriter>,
+    RoleColumn { name, values, .. }: &RoleColumn<R>,
+    rows: Range<usize>,
+) -> ParquetResult<()> {
+    let too_few = || ParquetError::General("a column more than the schema has".into());
+    let mut column = group.next_column()?.ok_or_else(too_few)?;
+    let levels: Vec<i16> = match values.valid() {
+        None => vec![1; rows.len()],
+        Some(valid) => valid[rows.clone()].iter().map(|valid| i16::from(*valid)).collect(),
+    };
+    match values {
+        Values::I64(v) => write_values::<Int64Type>(column.typed(), &levels, present(v, rows)),
+        Values::F64(v) => write_values::<DoubleType>(column.typed(), &levels, present(v, rows)),
+        Values::Bool(v) => write_values::<BoolType>(column.typed(), &levels, present(v, rows)),
+        Values::Text(v) => {
+            let texts = rows.filter_map(|row| v.get(row)).map(ByteArray::from).collect();
+            write_values::<ByteArrayType>(column.typed(), &levels, texts)
+        }
+        other => Err(wrong_type(name, other.ty())),
+    }?;
+    column.close()
+}
+
+/// Returns the values in `rows` that are not missing.
+fn present<T: Copy>(cells: &Cells<T>, rows: Range<usize>) -> Vec<T> {
+    rows.filter_map(|row| cells.get(row).copied()).collect()
+}
+
+fn write_values<T: DataType>(
+    column: &mut ColumnWriterImpl<'_, T>,
+    levels: &[i16],
+    present: Vec<T::T>,
+) -> ParquetResult<()> {
+    column.write_batch(&present, Some(levels), None).map(drop)
+}
+
+/// A checksum that is shared with the writer that updates it.
+#[derive(Debug, Clone, Default)]
+struct SharedChecksum(Arc<Mutex<crc32fast::Hasher>>);
+
+impl SharedChecksum {
+    fn update(&self, bytes: &[u8]) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).update(bytes);
+    }
+
+    /// Returns the checksum of all bytes since the last call.
+    fn take(&self) -> u32 {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).finalize()
+    }
+}
+
+/// A file with bytes that are hashed while they are written.
+#[derive(Debug)]
+struct HashingWriter {
+    file: File,
+    hash: SharedChecksum,
+}
+
+impl Write for HashingWriter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.file.write(bytes)?;
+        self.hash.update(&bytes[..n]);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Reads the table in the file at `path`.
+///
+/// # Errors
+/// A file that is missing, damaged, not a table of this kind, or of another major format.
+pub fn read<R: DeserializeOwned + Clone>(path: &Path) -> Result<LoadedTable<R>, InputError> {
+    let mut whole: Option<LoadedTable<R>> = None;
+    read_blocks(path, |block| match &mut whole {
+        None => whole = Some(block),
+        Some(table) => {
+            for (column, more) in table.columns.iter_mut().zip(&block.columns) {
+                column.values.append(&more.values);
+            }
+        }
+    })?;
+    whole.ok_or_else(|| damaged(path, "it has no columns".to_string()))
+}
+
+/// Reads the table in the file at `path` block by block; a table without rows has one block without rows.
+///
+/// # Errors
+/// See [`read`]; blocks before a damaged one have been passed on.
+pub fn read_blocks<R: DeserializeOwned + Clone>(
+    path: &Path,
+    mut each: impl FnMut(LoadedTable<R>),
+) -> Result<(), InputError> {
+    let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
+    let failed = |e| damaged(path, error_cause(e));
+    let copy = bytes.try_clone().map_err(|e| failed(e.into()))?;
+    let file = SerializedFileReader::new(copy).map_err(failed)?;
+    let text = |key| required_value(path, file.metadata(), key);
+    let wrong = |e: &dyn std::fmt::Display| damaged(path, e.to_string());
+    let format: FormatVersion = text(FORMAT)?.parse().map_err(|e| wrong(&e))?;
+    format.check_readable(path.display())?;
+    let program_version = text(VERSION)?;
+    let entries: Vec<RoleColumnEntry> =
+        serde_json::from_str(&text(COLUMNS)?).map_err(|e| wrong(&e))?;
+    let checksums = schema::checksums_from_text(&text(CHECKSUMS)?).map_err(|e| wrong(&e))?;
+    let empty = empty_values(&file, &entries).map_err(failed)?;
+    let roles: Vec<Option<R>> =
+        entries.iter().map(|entry| serde_json::from_value(entry.role.clone()).ok()).collect();
+    let mut pass_on = |values: Vec<Values>| {
+        let column = |((entry, role), values): ((&RoleColumnEntry, &Option<R>), Values)| {
+            Some(RoleColumn { name: entry.name.clone(), role: role.clone()?, values })
+        };
+        let columns = entries.iter().zip(&roles).zip(values).filter_map(column).collect();
+        each(LoadedTable { columns, program_version: program_version.clone() });
+    };
+    if file.num_row_groups() == 0 {
+        pass_on(empty.clone());
+    }
+    for group in 0..file.num_row_groups() {
+        let mut values = empty.clone();
+        check_bytes(&bytes, file.metadata(), group, &checksums).map_err(failed)?;
+        read_group(file.get_row_group(group).map_err(failed)?.as_ref(), &mut values)
+            .map_err(failed)?;
+        pass_on(values);
+    }
+    Ok(())
+}
+
+/// Returns the values of key-value pairs of the table in the file at `path`, as far as it has them.
+///
+/// # Errors
+/// A file that is missing, or no Parquet file.
+pub(crate) fn read_key_values<const N: usize>(
+    path: &Path,
+    keys: [&str; N],
+) -> Result<[Option<String>; N], InputError> {
+    let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
+    let file = SerializedFileReader::new(bytes).map_err(|e| damaged(path, error_cause(e)))?;
+    let pairs = file.metadata().file_metadata().key_value_metadata();
+    let value = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.clone();
+    Ok(keys.map(value))
+}
+
+fn cannot_open(path: &Path, e: &io::Error) -> InputError {
+    InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
+}
+
+/// Returns columns without rows, of the file's types.
+fn empty_values(
+    file: &SerializedFileReader<File>,
+    entries: &[RoleColumnEntry],
+) -> ParquetResult<Vec<Values>> {
+    let stored = file.metadata().file_metadata().schema_descr();
+    let wrong = || ParquetError::General(format!("its columns are not those of `{COLUMNS}`"));
+    if stored.num_columns() != entries.len() {
+        return Err(wrong());
+    }
+    let values = |(i, entry): (usize, &RoleColumnEntry)| {
+        let column = stored.column(i);
+        if column.name() != entry.name || column.max_def_level() != 1 || column.max_rep_level() != 0
+        {
+            return Err(wrong());
+        }
+        match column.physical_type() {
+            PhysicalType::INT64 => Ok(Values::empty(ColumnType::I64)),
+            PhysicalType::DOUBLE => Ok(Values::empty(ColumnType::F64)),
+            PhysicalType::BOOLEAN => Ok(Values::empty(ColumnType::Bool)),
+            PhysicalType::BYTE_ARRAY => Ok(Values::empty(ColumnType::Text)),
+            _ => Err(wrong()),
+        }
+    };
+    entries.iter().enumerate().map(values).collect()
+}
+
+fn read_group(group: &dyn RowGroupReader, columns: &mut [Values]) -> ParquetResult<()> {
+    use parquet::column::reader::ColumnReader as Reader;
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    for (i, values) in columns.iter_mut().enumerate() {
+        let read = match group.get_column_reader(i)? {
+            Reader::Int64ColumnReader(r) => Values::I64(read_cells(r, true, Ok)?),
+            Reader::DoubleColumnReader(r) => Values::F64(read_cells(r, true, Ok)?),
+            Reader::BoolColumnReader(r) => Values::Bool(read_cells(r, true, Ok)?),
+            Reader::ByteArrayColumnReader(r) => Values::Text(read_texts(r, true)?),
+            _ => return Err(ParquetError::General(format!("column {i} has another type"))),
+        };
+        if read.len() != rows {
+            return Err(ParquetError::General(format!("column {i} has not {rows} rows")));
+        }
+        values.append(&read);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn column(name: &str, values: Values) -> RoleColumn<String> {
+        RoleColumn { name: name.into(), role: "metric".into(), values }
+    }
+
+    fn back(columns: &[RoleColumn<String>]) -> Vec<RoleColumn<String>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        write(
+            &path,
+            &columns.iter().collect::<Vec<_>>(),
+            "0.1.0",
+            &[("sidestep.plan", "{}".into())],
+        )
+        .unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        read(&path).unwrap().columns
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn a_table_survives_its_file(
+            rows in proptest::collection::vec(
+                (any::<Option<i64>>(), any::<Option<f64>>(), any::<Option<bool>>(), ".{0,5}"), 0..50,
+            ),
+        ) {
+            let text = |s: &String| (!s.is_empty()).then(|| s.clone());
+            let columns = [
+                column("a.b", Values::I64(rows.iter().map(|r| r.0).collect())),
+                column("b", Values::F64(
+                    rows.iter().map(|r| r.1.filter(|x| !x.is_nan())).collect(),
+                )),
+                column("c", Values::Bool(rows.iter().map(|r| r.2).collect())),
+                column("d", Values::Text(rows.iter().map(|r| text(&r.3)).collect())),
+            ];
+            prop_assert_eq!(back(&columns), columns);
+        }
+    }
+
+    #[test]
+    fn a_table_of_several_row_groups_survives_its_file() {
+        let n = GROUP_ROWS + 5;
+        let odd = |k: usize| (k % 2 == 1).then_some(k as i64);
+        let columns = [column("k", Values::I64((0..n).map(odd).collect()))];
+        assert_eq!(back(&columns), columns);
+    }
+
+    #[test]
+    fn a_changed_byte_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        let columns = [column("k", Values::I64((0..1000).map(Some).collect()))];
+        write(&path, &columns.iter().collect::<Vec<_>>(), "0.1.0", &[]).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for place in [10, whole.len() / 3] {
+            let mut changed = whole.clone();
+            changed[place] ^= 4;
+            std::fs::write(&path, &changed).unwrap();
+            assert!(read::<String>(&path).is_err(), "byte {place}");
+        }
+        std::fs::write(&path, &whole[..whole.len() - 9]).unwrap();
+        assert!(read::<String>(&path).is_err());
+    }
+}

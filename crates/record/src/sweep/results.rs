@@ -1,0 +1,126 @@
+//! The tables of a sweep that is done: of its runs, and of the times that they took.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{RecordError, RoleColumn};
+
+use super::folder::{FINGERPRINT, SHARES, SweepFolder};
+use crate::run_table::{self, LoadedTable, TableStream};
+
+const RESULTS: &str = "results.parquet";
+const TIMINGS: &str = "timings.parquet";
+/// Key of the plan in the key-value pairs of a table.
+const PLAN: &str = "sidestep.plan";
+
+/// The table of runs, and that of the times that they took, while they are written.
+pub struct ResultsWriter {
+    results: TableStream,
+    timings: TableStream,
+}
+
+impl ResultsWriter {
+    /// Appends runs to both.
+    ///
+    /// # Errors
+    /// Columns other than those it was started with; an I/O error.
+    pub fn append<R>(
+        &mut self,
+        results: &[&RoleColumn<R>],
+        timings: &[&RoleColumn<R>],
+    ) -> Result<(), RecordError> {
+        self.results.append(results)?;
+        self.timings.append(timings)
+    }
+
+    /// Completes both. The table of timings comes first, because the sweep is done once the results exist.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.timings.finish()?;
+        self.results.finish()
+    }
+}
+
+impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
+    /// Begins the table of runs, with columns of these names, roles and types, and that of their times.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn results_writer<R: Serialize>(
+        &self,
+        results: &[&RoleColumn<R>],
+        timings: &[&RoleColumn<R>],
+    ) -> Result<ResultsWriter, RecordError> {
+        let plan = serde_json::to_string(self.plan())
+            .map_err(|e| RecordError::new(self.path().display(), e))?;
+        let extra = [(PLAN, plan), (FINGERPRINT, self.fingerprint())];
+        let version = &self.manifest().program_version;
+        let table = |name: &str, columns| {
+            TableStream::create(&self.path().join(name), columns, version, &extra)
+        };
+        Ok(ResultsWriter { timings: table(TIMINGS, timings)?, results: table(RESULTS, results)? })
+    }
+
+    /// Returns whether the table of all runs exists.
+    pub fn is_complete(&self) -> bool {
+        self.results_file().is_file()
+    }
+
+    /// Returns the path of the table of all runs.
+    pub fn results_file(&self) -> PathBuf {
+        self.path().join(RESULTS)
+    }
+
+    /// Reads the table of all runs.
+    ///
+    /// # Errors
+    /// A sweep that is not done; a table that is damaged, or of another sweep.
+    pub fn results<R: DeserializeOwned + Clone>(&self) -> Result<LoadedTable<R>, InputError> {
+        if !self.is_complete() {
+            let remedy = "go on with `sidestep resume DIR`, or run its shares and \
+                          `sidestep sweep collect DIR`";
+            return Err(InputError::new(
+                self.path().display(),
+                "the sweep is not done yet",
+                remedy,
+            ));
+        }
+        self.table(RESULTS)
+    }
+
+    /// Reads the table of the times that the runs took.
+    ///
+    /// # Errors
+    /// A sweep that is not done; a table that is damaged, or of another sweep.
+    pub fn timings<R: DeserializeOwned + Clone>(&self) -> Result<LoadedTable<R>, InputError> {
+        self.table(TIMINGS)
+    }
+
+    fn table<R: DeserializeOwned + Clone>(&self, name: &str) -> Result<LoadedTable<R>, InputError> {
+        let path = self.path().join(name);
+        self.check_own(&path).and_then(|()| run_table::read(&path)).map_err(|e| {
+            // The results mark the sweep as done: without them everything is joined again.
+            let remedy = format!(
+                "delete `{RESULTS}`; `sidestep resume DIR` makes it again from the runs in `{SHARES}`"
+            );
+            InputError::new(e.place(), e.cause(), remedy)
+        })
+    }
+
+    /// Checks that a table is of this plan and these scenarios.
+    fn check_own(&self, path: &Path) -> Result<(), InputError> {
+        let [plan, fingerprint] = run_table::read_key_values(path, [PLAN, FINGERPRINT])?;
+        // Compared as it is read: another version may have written the same plan in other words.
+        let read = plan.and_then(|text| serde_json::from_str::<P>(&text).ok());
+        let value = |plan: &P| serde_json::to_value(plan).ok();
+        let is_same_plan = read.is_some_and(|read| value(&read) == value(self.plan()));
+        if is_same_plan && fingerprint == Some(self.fingerprint()) {
+            return Ok(());
+        }
+        Err(InputError::new(path.display(), "the table is of another sweep", String::new()))
+    }
+}

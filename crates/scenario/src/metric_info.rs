@@ -1,0 +1,82 @@
+//! Metrics in words.
+
+use sidestep_kernel::ports::table::split_unit;
+
+/// A metric of a world, for readers of results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MetricInfo {
+    /// Its name in results. One that ends in `.*` stands for all names with that beginning.
+    pub name: &'static str,
+    /// A few words for titles and axes, without the unit; `*` stands for the end of the name.
+    pub words: &'static str,
+    /// Its unit; empty for the one that the name ends in, if any.
+    pub unit: &'static str,
+    /// The thing counted or measured, in a phrase.
+    pub meaning: &'static str,
+}
+
+/// A metric in words for people.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MetricLabel {
+    /// A few words for titles and axes, without the unit.
+    pub words: String,
+    /// Its unit, if it has one.
+    pub unit: Option<&'static str>,
+    /// The thing counted or measured; empty where the world gives none.
+    pub meaning: &'static str,
+}
+
+/// Returns a metric in words, by the meanings of its world; a name without one is split into its
+/// own words.
+pub fn metric_label(meanings: &[MetricInfo], name: &str) -> MetricLabel {
+    let found = find_info(meanings, name).or_else(|| find_info(meanings, name.split_once('.')?.1));
+    if let Some((meaning, rest)) = found {
+        let own = split_unit(meaning.name).1;
+        let unit = if meaning.unit.is_empty() { own } else { Some(meaning.unit) };
+        let words = meaning.words.replace('*', &rest.replace(['_', '-'], " "));
+        return MetricLabel { words, unit, meaning: meaning.meaning };
+    }
+    let (quantity, unit) = split_unit(name);
+    let words = quantity.replace('_', " ").replace('.', ": ");
+    MetricLabel { words, unit, meaning: "" }
+}
+
+/// Returns the meaning of a name, and the end of the name that stands for `*`.
+fn find_info<'a>(meanings: &'a [MetricInfo], name: &'a str) -> Option<(&'a MetricInfo, &'a str)> {
+    meanings.iter().find_map(|meaning| {
+        let rest = match meaning.name.strip_suffix('*') {
+            Some(begin) => name.strip_prefix(begin)?,
+            None => (meaning.name == name).then_some("")?,
+        };
+        Some((meaning, rest))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_metric_is_told_by_its_world_or_else_by_its_name() {
+        let meaning = |name, words, unit| MetricInfo { name, words, unit, meaning: "m" };
+        let known = [
+            meaning("lag_m", "lag", ""),
+            meaning("hits.*", "hits of a *", ""),
+            meaning("trip", "trip", "cycles"),
+        ];
+        let said = |name| {
+            let MetricLabel { words, unit, .. } = metric_label(&known, name);
+            format!("{words} ({})", unit.unwrap_or("-"))
+        };
+        let names = ["lag_m", "hits.glass_wall", "trip", "counts.lag_m", "a.mean_gap_m", "x"];
+        let words = [
+            "lag (m)",
+            "hits of a glass wall (-)",
+            "trip (cycles)",
+            "lag (m)",
+            "a: mean gap (m)",
+            "x (-)",
+        ];
+        assert_eq!(names.map(said), words);
+    }
+}

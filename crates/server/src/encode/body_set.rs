@@ -1,0 +1,143 @@
+//! Casts: the bodies that the columns of frames stand for.
+
+use super::{CONDITIONS, convert};
+use crate::protocol::{Appearance, BodyTable, SessionId};
+use sidestep::kernel::view::{BODY_COLORS, Body, BodyKind, Shape};
+use std::collections::BTreeMap;
+
+/// The part of a body that stays the same as long as the cast does.
+#[derive(PartialEq)]
+struct BodyIdentity {
+    kind: BodyKind,
+    number: u32,
+    part: Option<u32>,
+    /// Things that are moved look different from those that stand still.
+    moves: bool,
+    shape: u32,
+}
+
+/// The bodies of a cast, in the order of the frames.
+pub(super) struct BodySet {
+    members: Vec<BodyIdentity>,
+    /// All different shapes, those of lines without their points.
+    shapes: Vec<Shape>,
+    forms: Vec<ShapeKey>,
+    /// Whether everything lies in a plane, where heights are not seen: a door that opens there stays the same body.
+    is_flat: bool,
+}
+
+/// A shape as far as it matters, in a form that can be sorted.
+type ShapeKey = (u8, [u64; 3]);
+
+impl BodySet {
+    /// Returns the troupe of these bodies.
+    pub(super) fn from_bodies(bodies: &[Body], dimensions: u8) -> Self {
+        let is_flat = dimensions == 2;
+        let members = Vec::with_capacity(bodies.len());
+        let mut troupe = Self { members, shapes: Vec::new(), forms: Vec::new(), is_flat };
+        let mut known = BTreeMap::new();
+        for body in bodies {
+            let form = shape_key(&body.shape, is_flat);
+            let shape = *known.entry(form).or_insert_with(|| {
+                troupe.shapes.push(without_points(&body.shape));
+                troupe.forms.push(form);
+                troupe.forms.len() as u32 - 1
+            });
+            let &Body { kind, number, part, .. } = body;
+            troupe.members.push(BodyIdentity {
+                kind,
+                number,
+                part,
+                moves: body.is_moving(),
+                shape,
+            });
+        }
+        troupe
+    }
+
+    /// Returns whether the given bodies are its own, in their order, with the same shapes.
+    pub(super) fn matches(&self, bodies: &[Body]) -> bool {
+        let is_same = |(member, body): (&BodyIdentity, &Body)| {
+            member.kind == body.kind
+                && member.number == body.number
+                && member.part == body.part
+                && member.moves == body.is_moving()
+                && self.forms[member.shape as usize] == shape_key(&body.shape, self.is_flat)
+        };
+        self.members.len() == bodies.len() && self.members.iter().zip(bodies).all(is_same)
+    }
+
+    /// Returns its cast, as the page gets it.
+    pub(super) fn to_table(
+        &self,
+        session: SessionId,
+        cast: u32,
+        bodies: &[Body],
+        names: &BTreeMap<(BodyKind, u32), String>,
+    ) -> BodyTable {
+        let (kinds, kind) = index_distinct(self.members.iter().map(|member| member.kind));
+        let group = |m: &BodyIdentity| (m.kind, m.number as usize % BODY_COLORS.len(), m.moves);
+        let (groups, look) = index_distinct(self.members.iter().map(group));
+        let first = |of: &_| bodies.iter().zip(&self.members).find(|(_, m)| group(m) == *of);
+        let looks = groups
+            .iter()
+            .filter_map(first)
+            .map(|(body, _)| appearances(body, if self.is_flat { 2 } else { 3 }));
+        let name = |(index, m): (u32, &BodyIdentity)| {
+            names.get(&(m.kind, m.number)).map(|name| (index, name.clone()))
+        };
+        BodyTable {
+            session,
+            cast,
+            kinds: kinds.iter().map(|kind| kind.name().into()).collect(),
+            kind: kind.iter().map(|&kind| kind as u8).collect(),
+            number: self.members.iter().map(|member| member.number).collect(),
+            part: self.members.iter().map(|m| m.part.map_or(-1, |part| part as i32)).collect(),
+            shapes: self.shapes.iter().map(convert::shape).collect(),
+            shape: self.members.iter().map(|member| member.shape).collect(),
+            looks: looks.collect(),
+            look,
+            names: (0..).zip(&self.members).filter_map(name).collect(),
+            is_agent: self.members.iter().map(|member| member.kind.is_agent()).collect(),
+        }
+    }
+}
+
+/// Returns all different items in the order in which they first come, and the number of each item among them.
+fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec<u16>) {
+    let (mut all, mut known) = (Vec::new(), BTreeMap::new());
+    let number = |item: T| {
+        *known.entry(item).or_insert_with(|| {
+            all.push(item);
+            all.len() as u16 - 1
+        })
+    };
+    let numbers = items.map(number).collect();
+    (all, numbers)
+}
+
+/// Returns the look of a body in each condition.
+fn appearances(body: &Body, dimensions: u8) -> [Appearance; 5] {
+    CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
+}
+
+fn without_points(shape: &Shape) -> Shape {
+    match shape {
+        Shape::Line { thickness_m, .. } => {
+            Shape::Line { points_m: Vec::new(), thickness_m: *thickness_m }
+        }
+        other => other.clone(),
+    }
+}
+
+fn shape_key(shape: &Shape, is_flat: bool) -> ShapeKey {
+    let height = if is_flat { 0.0 } else { 1.0 };
+    let (kind, sizes_m) = match *shape {
+        Shape::Cuboid { size_m: [x, y, z] } => (0, [x, y, height * z]),
+        Shape::Cylinder { radius_m, height_m } => (1, [radius_m, height * height_m, 0.0]),
+        Shape::Sphere { radius_m } => (2, [radius_m, 0.0, 0.0]),
+        Shape::Line { thickness_m, .. } => (3, [thickness_m, 0.0, 0.0]),
+        Shape::Dart { length_m, width_m } => (4, [length_m, width_m, 0.0]),
+    };
+    (kind, sizes_m.map(f64::to_bits))
+}

@@ -1,0 +1,133 @@
+//! Views of the kernel in the words of the protocol.
+
+use crate::protocol::{
+    Appearance, BodyId, Event, OccupancyGrid, Problem, Scan, Scene, Shape, StaticBody,
+};
+use sidestep::kernel::InputError;
+use sidestep::kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
+
+/// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
+pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
+    let still = |body: &Body| static_body(body, scenery);
+    Scene {
+        name: scenery.name.clone(),
+        world: world.into(),
+        agent: agent.into(),
+        dimensions: scenery.dimensions,
+        cycle_s: scenery.cycle_s,
+        floor: scenery.floor.as_ref().map(occupancy_grid),
+        bodies: scenery.bodies.iter().map(still).collect(),
+        is_recording,
+    }
+}
+
+fn static_body(body: &Body, scenery: &Scenery) -> StaticBody {
+    let own = |(kind, number, _): &&(_, u32, String)| (*kind, *number) == (body.kind, body.number);
+    StaticBody {
+        who: body_id(&body.id()),
+        name: scenery.names.iter().find(own).map(|(_, _, name)| name.clone()),
+        at_m: body.pose.at_m,
+        turn: body.pose.turn,
+        shape: shape(&body.shape),
+        look: appearance(body, scenery.dimensions),
+    }
+}
+
+fn occupancy_grid(floor: &view::OccupancyGrid) -> OccupancyGrid {
+    let mut runs: Vec<u32> = Vec::new();
+    for occupancy in &floor.boxes {
+        let code = match occupancy {
+            Occupancy::Free => 0,
+            Occupancy::Wall => 1,
+            Occupancy::Unknown => 2,
+        };
+        match runs.as_mut_slice() {
+            [.., last, count] if *last == code => *count += 1,
+            _ => runs.extend([code, 1]),
+        }
+    }
+    let view::OccupancyGrid { width, height, box_m, plane, .. } = *floor;
+    OccupancyGrid { width, height, box_m, origin_m: plane.origin_m, yaw_rad: plane.yaw_rad, runs }
+}
+
+/// Returns the shape of a body.
+pub(super) fn shape(shape: &view::Shape) -> Shape {
+    match *shape {
+        view::Shape::Cuboid { size_m } => Shape::Cuboid { size_m },
+        view::Shape::Cylinder { radius_m, height_m } => Shape::Cylinder { radius_m, height_m },
+        view::Shape::Sphere { radius_m } => Shape::Sphere { radius_m },
+        view::Shape::Line { ref points_m, thickness_m } => {
+            Shape::Line { points_m: points_m.clone(), thickness_m }
+        }
+        view::Shape::Dart { length_m, width_m } => Shape::Dart { length_m, width_m },
+    }
+}
+
+/// Returns the look of a body.
+pub(super) fn appearance(body: &Body, dimensions: u8) -> Appearance {
+    let view::Appearance { color, opacity, layer, .. } = body.appearance(dimensions);
+    Appearance { color, opacity, layer }
+}
+
+/// Returns the name of a body.
+pub(crate) fn body_id(who: &view::BodyId) -> BodyId {
+    BodyId { kind: who.kind.name().into(), number: who.number, part: who.part }
+}
+
+/// Returns a scan.
+pub(crate) fn scan(scan: &view::Scan) -> Scan {
+    let in_range = |range_m: &f64| range_m.is_finite().then_some(*range_m);
+    Scan {
+        of: body_id(&scan.of),
+        sensor: scan.sensor.clone(),
+        at_m: scan.pose.at_m,
+        turn: scan.pose.turn,
+        bearings_rad: scan.bearings_rad.clone(),
+        ranges_m: scan.ranges_m.iter().map(in_range).collect(),
+        true_m: scan.true_m.iter().map(in_range).collect(),
+        range_m: scan.range_m,
+    }
+}
+
+/// Returns an event.
+pub(crate) fn event(entry: &LogEvent) -> Event {
+    let level = match entry.level {
+        Severity::Info => "info",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    };
+    Event {
+        cycle: entry.cycle as f64,
+        level: level.into(),
+        kind: entry.kind.name().into(),
+        who: Some(body_id(&entry.who)),
+        with: entry.with.as_ref().map(body_id),
+        at_m: entry.at_m,
+        value: entry.value.as_ref().map(|amount| amount.value),
+        unit: entry.value.as_ref().map_or_else(String::new, |amount| amount.unit.to_string()),
+        words: entry.words.clone(),
+    }
+}
+
+/// Returns the body that a page names; `None` where there is no such kind.
+pub(crate) fn body(who: &BodyId) -> Option<view::BodyId> {
+    Some(view::BodyId::new(view::BodyKind::from_name(&who.kind)?, who.number, who.part))
+}
+
+/// Returns an error of the program's own.
+pub(crate) fn problem(error: &InputError) -> Problem {
+    let (line, column) = error.position().unzip();
+    let (end_line, end_column) = error.end().unzip();
+    let number = |n: Option<usize>| n.and_then(|n| u32::try_from(n).ok());
+    Problem {
+        place: error.place().into(),
+        line: number(line),
+        column: number(column),
+        end_line: number(end_line),
+        end_column: number(end_column),
+        key: error.key().map(Into::into),
+        cause: error.cause().into(),
+        remedy: error.remedy().into(),
+        is_warning: false,
+    }
+}

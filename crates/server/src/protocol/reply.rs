@@ -1,0 +1,331 @@
+//! The server's messages: replies, and notices without a request.
+
+use super::{BodyTable, Event, Fleet, Inspection, Scene, SessionId, Speed};
+use serde::Serialize;
+
+/// The reply to a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Reply {
+    /// The request's number; 0 for a request that could not be read.
+    pub id: u32,
+    /// The answer, or the reason why there is none.
+    #[serde(flatten)]
+    pub result: ReplyResult,
+}
+
+/// The outcome of a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
+pub enum ReplyResult {
+    /// The answer.
+    Answer(ReplyBody),
+    /// The reason why there is no answer.
+    Problem(Problem),
+}
+
+/// The answer to a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "is", rename_all = "kebab-case")]
+pub enum ReplyBody {
+    /// It was done.
+    Done,
+    /// The content of a folder.
+    Files {
+        /// Its entries that can be opened, by name.
+        entries: Vec<FileEntry>,
+    },
+    /// A session at its start.
+    Opened {
+        /// Its number.
+        session: SessionId,
+        /// The scene, which stays the same.
+        scene: Scene,
+        /// Its state.
+        status: SessionStatus,
+    },
+    /// Facts and marks of a body: its percepts, decisions and deeds.
+    Inspection(Inspection),
+    /// Samples of all metrics.
+    Metrics {
+        /// The metrics.
+        names: Vec<MetricName>,
+        /// Number of the first sample here: the one that was asked for, or the number of all samples.
+        first: u32,
+        /// The number of times that the samples were thinned by half, and numbered anew, since the session began:
+        /// ask from 0 whenever it has changed.
+        thinned: u32,
+        /// The cycle of each sample.
+        cycles: Vec<f64>,
+        /// Values in each sample, metric by metric.
+        values: Vec<Vec<Option<f64>>>,
+    },
+    /// Events, the oldest first.
+    Events {
+        /// The events.
+        entries: Vec<Event>,
+        /// Number of events of these cycles that are not here: beyond the requested number, or never kept.
+        left_out: u64,
+        /// The cycle before which all events are known: of a run those so far, of a recording soon all.
+        known_until: f64,
+    },
+    /// The scenario's text.
+    Source {
+        /// Its name in problems.
+        place: String,
+        /// The text.
+        text: String,
+        /// Whether it cannot be replaced by another text.
+        read_only: bool,
+    },
+    /// The names of a recording's tables; none for an MCAP file, or if it is no recording.
+    Tables {
+        /// The names.
+        names: Vec<String>,
+    },
+    /// The finished runs of a sweep.
+    Runs {
+        /// The sweep's name; may be empty.
+        name: String,
+        /// Whether these are all runs.
+        is_complete: bool,
+        /// The runs.
+        runs: Vec<SweepRun>,
+        /// Number of runs that are not listed.
+        left_out: u64,
+    },
+    /// The errors of a text, and its surprises.
+    Problems {
+        /// The problems; none for a valid text without surprises.
+        problems: Vec<Problem>,
+    },
+    /// A text with all edits.
+    Edited {
+        /// The text.
+        text: String,
+    },
+    /// The values in a text.
+    Model {
+        /// The table of the text: dates are strings; numbers that JSON cannot hold are null.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        value: serde_json::Value,
+        /// Files that a key of the text can name, written as it would name them: those below its folder, and those
+        /// elsewhere that it names.
+        files: Vec<String>,
+    },
+    /// The text is in a file.
+    Saved {
+        /// The file, which is the session's place from now on.
+        place: String,
+    },
+    /// Nothing was written, because the file holds something else than the session has read or written.
+    Differs {
+        /// The content of the file.
+        text: String,
+    },
+    /// The keys of a world's scenarios.
+    Schema {
+        /// JSON Schema, draft 2020-12.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        schema: serde_json::Value,
+    },
+}
+
+/// An error as people read it: place, cause, remedy.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Problem {
+    /// The file, option or request that is wrong.
+    pub place: Box<str>,
+    /// Its line, from 1.
+    pub line: Option<u32>,
+    /// Its column, from 1.
+    pub column: Option<u32>,
+    /// Line of its end, from 1.
+    pub end_line: Option<u32>,
+    /// Column after its end, from 1.
+    pub end_column: Option<u32>,
+    /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+    pub key: Option<Box<str>>,
+    /// The cause.
+    pub cause: Box<str>,
+    /// The remedy: the right way to write or to do it.
+    pub remedy: Box<str>,
+    /// Whether the text is valid all the same.
+    pub is_warning: bool,
+}
+
+impl Problem {
+    /// Returns a problem without a line.
+    pub fn new(
+        place: impl Into<Box<str>>,
+        cause: impl Into<Box<str>>,
+        remedy: impl Into<Box<str>>,
+    ) -> Self {
+        Self {
+            place: place.into(),
+            line: None,
+            column: None,
+            end_line: None,
+            end_column: None,
+            key: None,
+            cause: cause.into(),
+            remedy: remedy.into(),
+            is_warning: false,
+        }
+    }
+}
+
+/// Something in a folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct FileEntry {
+    /// Its path for other requests.
+    pub path: String,
+    /// Its name in its folder.
+    pub name: String,
+    /// Its kind.
+    pub kind: FileKind,
+    /// A few words on its content; may be empty.
+    pub about: String,
+}
+
+/// A run of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SweepRun {
+    /// The name of its variant.
+    pub variant: String,
+    /// Its seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
+    pub seed: String,
+    /// The cause of its failure; empty if it did not fail.
+    pub failure: String,
+    /// Its recording; or its variant's scenario, which needs the seed.
+    pub replay: TargetRef,
+}
+
+/// The kind of a file or a folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum FileKind {
+    /// A folder of other things.
+    Folder,
+    /// A scenario.
+    Scenario,
+    /// The folder of a run.
+    Run,
+    /// An MCAP file.
+    Recording,
+    /// A sweep: its file, or its folder.
+    Sweep,
+    /// A file of another program that stands for a scenario.
+    Foreign,
+    /// A map or an image of a floor, which a scenario can name.
+    Map,
+    /// Sensors and effectors that were learned from logs, which a scenario can name.
+    Profile,
+}
+
+/// A message of the server without a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "notice", rename_all = "kebab-case")]
+pub enum Notification {
+    /// The first of all notices.
+    Hello {
+        /// See [`VERSION`](super::VERSION).
+        version: u32,
+        /// The program and its build.
+        program: String,
+        /// The names of all worlds.
+        worlds: Vec<String>,
+        /// Whether texts of the page are refused.
+        read_only: bool,
+        /// The things that the command line asked to open.
+        open: Vec<TargetRef>,
+    },
+    /// The bodies that the columns of frames with this number stand for; sent before the first such frame.
+    Cast(BodyTable),
+    /// The state of a session; sent when it changes, at most ten times a second.
+    Status(SessionStatus),
+    /// The end of a session by itself, and the reason.
+    Ended {
+        /// The session.
+        session: SessionId,
+        /// The reason.
+        problem: Problem,
+    },
+}
+
+/// A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct TargetRef {
+    /// `scenario`, `recording`, `sweep` or `fleet`.
+    pub kind: String,
+    /// Its path, or the endpoint of a fleet.
+    pub path: String,
+}
+
+/// The state of a session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SessionStatus {
+    /// The session.
+    pub session: SessionId,
+    /// Its activity.
+    pub state: SessionState,
+    /// Cycles done.
+    pub cycle: f64,
+    /// Number of cycles of the whole run; of a recording, those that were recorded.
+    pub cycles_planned: f64,
+    /// Simulated seconds since the start.
+    pub time_s: f64,
+    /// Its speed now, or when it was last playing.
+    pub speed: Speed,
+    /// Cycles per second over the last second.
+    pub cycles_per_s: f64,
+    /// The seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
+    pub seed: String,
+    /// Digest of the state, while the run stands still.
+    pub digest: Option<String>,
+    /// The verdict on a recording: whether its digest was confirmed, or will be.
+    pub banner: Option<String>,
+    /// The nodes of a fleet.
+    pub fleet: Option<Box<Fleet>>,
+}
+
+/// The activity of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum SessionState {
+    /// It goes on.
+    Playing,
+    /// It stands still.
+    Paused,
+    /// It is on its way to a cycle that was asked for.
+    Seeking,
+    /// It goes on elsewhere, and is only watched here.
+    Watched,
+    /// It has come to its end.
+    Over,
+    /// It cannot go on; the notice [`Notification::Ended`] gives the reason.
+    Failed,
+}
+
+/// A metric.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct MetricName {
+    /// Its name in results.
+    pub key: String,
+    /// A few words for it.
+    pub words: String,
+    /// Its unit; may be empty.
+    pub unit: String,
+}

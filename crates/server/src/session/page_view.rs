@@ -1,0 +1,194 @@
+//! The output of a session: frames for which there is credit, and its state when it changes.
+
+use crate::MAX_FRAMES_PER_S;
+use crate::encode::{Encoder, body, scan};
+use crate::event_store::EventStore;
+use crate::outbox::Outbox;
+use crate::protocol::{BodyId, FrameText, Notification, SessionId, SessionStatus};
+use sidestep::kernel::Simulation;
+use sidestep::kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The time between two frames.
+const FRAME_INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / MAX_FRAMES_PER_S as u64);
+/// The time between two states.
+const STATUS_INTERVAL: Duration = Duration::from_millis(100);
+/// The time between two transfers of events without credit: a run keeps only some thousands.
+const EVENTS_INTERVAL: Duration = Duration::from_millis(250);
+/// The largest credit; any beyond it is forgotten.
+const MAX_CREDIT: u32 = 1000;
+/// The largest number of bodies of which scans are shown.
+pub(super) const MAX_SCANNED_BODIES: usize = 16;
+
+/// The view of one socket on one session.
+pub(super) struct PageView {
+    session: SessionId,
+    outbox: Arc<Outbox>,
+    encoder: Encoder,
+    credit: u32,
+    left_out: u32,
+    /// The bodies of which frames hold scans.
+    scans_of: Vec<BodyId>,
+    /// Whether the last frame is out of date.
+    is_stale: bool,
+    /// Whether the run has gone on since a frame was last due.
+    has_moved: bool,
+    frame_due: Instant,
+    events_due: Instant,
+    status_due: Instant,
+    told: Option<SessionStatus>,
+}
+
+impl PageView {
+    pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, scenery: &Scenery) -> Self {
+        let now = Instant::now();
+        Self {
+            session,
+            outbox,
+            encoder: Encoder::new(session, scenery),
+            credit: 0,
+            left_out: 0,
+            scans_of: Vec::new(),
+            is_stale: true,
+            has_moved: false,
+            frame_due: now,
+            events_due: now,
+            status_due: now,
+            told: None,
+        }
+    }
+
+    /// Switches to another run.
+    pub(super) fn restart(&mut self, scenery: &Scenery) {
+        // An unsent frame of the run before is of no use.
+        if self.outbox.clear(self.session) {
+            self.credit += 1;
+        }
+        self.encoder.restart(scenery);
+        (self.is_stale, self.has_moved, self.told) = (true, false, None);
+    }
+
+    /// Notes that the run went on, or back.
+    pub(super) fn mark_moved(&mut self) {
+        (self.is_stale, self.has_moved) = (true, true);
+    }
+
+    /// Asks for a frame, regardless of the last one.
+    pub(super) fn refresh(&mut self) {
+        self.is_stale = true;
+    }
+
+    /// Takes credit for further frames.
+    pub(super) fn add_credit(&mut self, frames: u32) {
+        self.credit = self.credit.saturating_add(frames).min(MAX_CREDIT);
+    }
+
+    /// Shows scans of these bodies.
+    pub(super) fn set_scanned_bodies(&mut self, scans_of: Vec<BodyId>) {
+        (self.scans_of, self.is_stale) = (scans_of, true);
+    }
+
+    /// Sends a frame if one is due and there is credit.
+    pub(super) fn send_due_frame(
+        &mut self,
+        run: &mut dyn Simulation,
+        log: &mut EventStore,
+        now: Instant,
+    ) {
+        if !self.is_due(now) {
+            return;
+        }
+        if !self.spend_credit(now) {
+            if now >= self.events_due {
+                self.drain(run, log, now);
+            }
+            return;
+        }
+        self.events_due = now + EVENTS_INTERVAL;
+        let mut frame = run.frame(FrameOptions {
+            scans: ScanSelection::Of(self.scans_of.iter().filter_map(body).collect()),
+        });
+        log.record(&mut frame);
+        self.send_frame(&frame, log);
+    }
+
+    /// Sends a frame made by others, with its events already noted, if it is due and there is credit.
+    pub(super) fn forward_frame(&mut self, frame: &Frame, log: &mut EventStore, now: Instant) {
+        if self.is_due(now) && self.spend_credit(now) {
+            self.send_frame(frame, log);
+        }
+    }
+
+    fn is_due(&self, now: Instant) -> bool {
+        self.is_stale && now >= self.frame_due
+    }
+
+    /// Returns whether there is credit for the frame that is due. One that cannot be sent is left out.
+    fn spend_credit(&mut self, now: Instant) -> bool {
+        let has_credit = self.credit > 0;
+        if has_credit {
+            (self.is_stale, self.has_moved) = (false, false);
+        } else if std::mem::take(&mut self.has_moved) {
+            self.left_out = self.left_out.saturating_add(1);
+        } else {
+            return false;
+        }
+        self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
+        has_credit
+    }
+
+    fn send_frame(&mut self, frame: &Frame, log: &mut EventStore) {
+        let (events, events_left_out) = log.take_unsent();
+        let scans = frame.scans.iter().map(scan).collect();
+        let text = FrameText { scans, events, events_left_out };
+        let (cast, bytes) = self.encoder.encode(frame, &text, self.left_out);
+        let cast = cast.map(Notification::Cast);
+        match self.outbox.send_frame(self.session, cast.as_ref(), bytes) {
+            // It replaces one that has cost its credit.
+            true => self.left_out = self.left_out.saturating_add(1),
+            false => self.credit -= 1,
+        }
+    }
+
+    /// Takes over the events of a run that is not shown.
+    pub(super) fn drain(&mut self, run: &mut dyn Simulation, log: &mut EventStore, now: Instant) {
+        log.record(&mut run.frame(FrameOptions::WITHOUT_SCANS));
+        self.events_due = now + EVENTS_INTERVAL;
+    }
+
+    /// Reports the state, if it is a new one and not too soon; a change of the session's activity, or of the place
+    /// where it stands still, is reported at once.
+    pub(super) fn report_status(&mut self, status: SessionStatus, now: Instant) {
+        let is_same = self.told.as_ref() == Some(&status);
+        let is_urgent = self
+            .told
+            .as_ref()
+            .is_none_or(|told| told.state != status.state || told.digest != status.digest);
+        if is_same || (now < self.status_due && !is_urgent) {
+            return;
+        }
+        self.outbox.send_status(self.session, &Notification::Status(status.clone()));
+        (self.told, self.status_due) = (Some(status), now + STATUS_INTERVAL);
+    }
+
+    /// Returns whether the last reported state differs from this one.
+    pub(super) fn needs_report(&self, status: &SessionStatus) -> bool {
+        self.told.as_ref() != Some(status)
+    }
+
+    /// Returns the last reported state.
+    pub(super) fn last_reported(&self) -> Option<SessionStatus> {
+        self.told.clone()
+    }
+
+    /// Returns when a state may be reported again.
+    pub(super) fn status_due(&self) -> Instant {
+        self.status_due
+    }
+
+    /// Returns when a frame can be sent, if there is one to send.
+    pub(super) fn frame_due(&self) -> Option<Instant> {
+        (self.is_stale && self.credit > 0).then_some(self.frame_due)
+    }
+}

@@ -1,0 +1,116 @@
+//! Frames of a run as rows of a table, one for each body.
+
+use super::FrameSink;
+use crate::Error;
+use sidestep::kernel::ports::table::label_index;
+use sidestep::kernel::ports::{Table, TableSchema, Values};
+use sidestep::kernel::view::{Body, BodyKind, Condition, Frame, FrameOptions};
+use sidestep::kernel::{Cycle, Simulation};
+use std::ops::Range;
+
+/// Name of the table.
+const FRAMES_TABLE: &str = "frames";
+
+/// A body at a moment.
+struct Row {
+    cycle: Cycle,
+    time_s: f64,
+    body: Body,
+}
+
+/// Frames kept in memory: one when the run is first looked at, then those at multiples of a number of
+/// cycles, and the last one of a run that is over.
+pub(crate) struct FrameRows {
+    every: Cycle,
+    /// The cycle at which the run was first looked at.
+    first: Option<Cycle>,
+    /// The cycle of the last frame.
+    last: Option<Cycle>,
+    rows: Vec<Row>,
+}
+
+impl FrameRows {
+    /// Returns a store of frames that are taken every `every` cycles.
+    pub(crate) fn new(every: Cycle) -> Self {
+        Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
+    }
+
+    /// Takes the rows that were kept so far.
+    pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
+        let (table, rows) = (frames_table(), std::mem::take(&mut self.rows));
+        (table.schema(), table.block(&rows))
+    }
+
+    /// Keeps only the frames of these cycles: the run is back at their end.
+    pub(crate) fn rewind(&mut self, kept: Range<Cycle>) {
+        self.rows.retain(|row| kept.contains(&row.cycle));
+        self.first = self.first.filter(|&first| first < kept.end);
+        // Any earlier frame will do: none is taken twice.
+        self.last = self.first;
+    }
+
+    fn is_due(&self, run: &dyn Simulation) -> bool {
+        let cycle = run.cycle();
+        let is_wanted = self.last.is_none() || cycle.is_multiple_of(self.every) || run.is_over();
+        is_wanted && self.last != Some(cycle)
+    }
+}
+
+impl FrameSink for FrameRows {
+    fn interval(&self) -> Cycle {
+        self.every
+    }
+
+    fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
+        // A caller that advances a run in small steps looks at it more often than frames are due.
+        if self.is_due(run) {
+            self.last = Some(run.cycle());
+            self.first = self.first.or(self.last);
+            self.rows.extend(body_rows(run.frame(FrameOptions::WITHOUT_SCANS)));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the present frame of a run as a table.
+pub fn frame_rows(run: &mut dyn Simulation) -> (TableSchema, Vec<Values>) {
+    let (table, rows) =
+        (frames_table(), body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect::<Vec<_>>());
+    (table.schema(), table.block(&rows))
+}
+
+fn body_rows(frame: Frame) -> impl Iterator<Item = Row> {
+    let Frame { cycle, time_s, bodies, .. } = frame;
+    bodies.into_iter().map(move |body| Row { cycle, time_s, body })
+}
+
+fn frames_table() -> Table<Row> {
+    let at = |k: usize| move |row: &Row| row.body.pose.at_m[k];
+    let turn = |k: usize| move |row: &Row| row.body.pose.turn[k];
+    let velocity = |k: usize| move |row: &Row| row.body.velocity_m_s[k];
+    Table::new(FRAMES_TABLE)
+        .u64("cycle", "cycles done: the frame shows the start of this cycle", |row: &Row| row.cycle)
+        .f64("time_s", "simulated time since the start", |row| row.time_s)
+        .label("kind", "kind of the body", BodyKind::ALL.map(BodyKind::name), |row| {
+            label_index(&BodyKind::ALL, &row.body.kind)
+        })
+        .u32("number", "its number among the bodies of its kind", |row| row.body.number)
+        .u32("part", "its part, where the thing has parts", |row| row.body.part)
+        .f64("x_m", "its place, east", at(0))
+        .f64("y_m", "its place, north", at(1))
+        .f64("z_m", "its place, up", at(2))
+        .f64("turn_x", "its orientation, a unit quaternion: x", turn(0))
+        .f64("turn_y", "its orientation: y", turn(1))
+        .f64("turn_z", "its orientation: z", turn(2))
+        .f64("turn_w", "its orientation: w", turn(3))
+        .f64(
+            "velocity_x_m_s",
+            "velocity, east, of a thing that is moved without acting",
+            velocity(0),
+        )
+        .f64("velocity_y_m_s", "the same, north", velocity(1))
+        .f64("velocity_z_m_s", "the same, up", velocity(2))
+        .label("condition", "its condition", Condition::ALL.map(Condition::name), |row| {
+            label_index(&Condition::ALL, &row.body.state)
+        })
+}

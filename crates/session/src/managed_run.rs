@@ -1,0 +1,443 @@
+//! One run, from its present cycle to its end, with everything that it records.
+
+use crate::driver::{RunTiming, Sinks, drive};
+use crate::files::resolve_path;
+use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink};
+use crate::identity::Producer;
+use crate::live::{LiveControl, ViewerAddress};
+use crate::orders::has_orders;
+use crate::row_store::{RowSelection, RowStore};
+use crate::run_recorder::{RunRecorder, restore_run};
+use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
+use crate::{Error, Watcher, picture};
+use sidestep::VERSION;
+use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep::scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
+use sidestep_record::{IfExists, McapRecorder, RunFolder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::Duration;
+
+mod restore;
+
+pub use restore::RestoreError;
+
+/// A run that is ready to start or continue.
+pub struct ManagedRun {
+    run: Box<dyn Simulation>,
+    recording: Option<RunRecorder>,
+    film: Option<McapSink>,
+    /// Rows and frames that are kept in memory.
+    rows: Option<RowStore>,
+    frames: Option<FrameRows>,
+    viewers: Option<LiveControl>,
+    workers: usize,
+    /// The cycle to stop at, if before the planned end.
+    until: Option<Cycle>,
+    /// The report about the file that the scenario was made from.
+    told: Option<ImportedScenario>,
+    /// Its cost so far.
+    effort: RunTiming,
+    /// The last cycle for which [`Self::order`] gave an order.
+    ordered_at: Option<Cycle>,
+}
+
+/// The places where a run is recorded.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OutputPaths<'a> {
+    /// A folder for rows, checkpoints, summary and picture.
+    pub folder: Option<&'a Path>,
+    /// An MCAP file for viewers, and the number of cycles between frames.
+    pub mcap: Option<(&'a Path, Cycle)>,
+    /// Whether existing files and folders there are replaced.
+    pub replace: bool,
+}
+
+impl OutputPaths<'_> {
+    fn if_exists(&self) -> IfExists {
+        if self.replace { IfExists::Replace } else { IfExists::Refuse }
+    }
+
+    /// Refuses places that may not be used, before anything is created.
+    ///
+    /// # Errors
+    /// When the MCAP file exists already and may not be replaced, or is at the path of the folder.
+    fn check(&self) -> Result<(), InputError> {
+        let Some((file, _)) = self.mcap else { return Ok(()) };
+        if let Some(folder) = self.folder
+            && resolve_path(folder).starts_with(resolve_path(file))
+        {
+            let cause = "the run folder is to be there";
+            let remedy = "name a file beside the folder, or in it";
+            return Err(InputError::new(file.display(), cause, remedy));
+        }
+        McapRecorder::check_vacant(file, self.if_exists())
+    }
+
+    /// Creates the places. The file comes first: if it cannot be created, no folder of a run that never existed may
+    /// be left.
+    ///
+    /// # Errors
+    /// When one cannot be created; then none is left, except a folder that the file was to be in.
+    fn create(
+        &self,
+        resolved: &ResolvedScenario,
+        run: &mut dyn Simulation,
+    ) -> Result<(Option<RunRecorder>, Option<McapSink>), Error> {
+        let film = |run: &mut dyn Simulation| -> Result<_, Error> {
+            let begin = |(file, every)| McapSink::start(file, every, resolved.clone(), run);
+            self.mcap.map(begin).transpose()
+        };
+        let recording = |run: &mut dyn Simulation| -> Result<_, Error> {
+            let create = |folder| RunRecorder::create(folder, resolved, run, self.if_exists());
+            self.folder.map(create).transpose()
+        };
+        if self.is_mcap_in_folder() {
+            return Ok((recording(run)?, film(run)?));
+        }
+        let film = film(run)?;
+        Ok((recording(run)?, film))
+    }
+
+    /// Returns whether the MCAP file is to be in the folder.
+    fn is_mcap_in_folder(&self) -> bool {
+        self.mcap
+            .zip(self.folder)
+            .is_some_and(|((file, _), folder)| resolve_path(file).starts_with(resolve_path(folder)))
+    }
+}
+
+impl ManagedRun {
+    /// Returns a run of a scenario at its start; `told` is the report about the file that the
+    /// scenario was made from.
+    ///
+    /// # Errors
+    /// When a place is taken, or cannot be created.
+    pub fn start(
+        compiled: &dyn CompiledScenario,
+        source: &Source,
+        workers: usize,
+        keep: OutputPaths<'_>,
+        told: Option<ImportedScenario>,
+    ) -> Result<Self, Error> {
+        keep.check()?;
+        if keep.folder.is_none() && keep.mcap.is_none() {
+            let run = compiled.start(source, workers);
+            return Ok(Self::new(run, None, None, workers).with_import_report(told));
+        }
+        let resolved = compiled.resolve(source)?;
+        let mut run = match keep.folder {
+            None => compiled.start(source, workers),
+            Some(folder) => {
+                let itself = Source::new("scenario.toml", &*resolved.text, folder);
+                compiled.start(&itself, workers)
+            }
+        };
+        let (recording, film) = keep.create(&resolved, run.as_mut())?;
+        Ok(Self::new(run, recording, film, workers).with_import_report(told))
+    }
+
+    /// Returns a stopped run at the point from which its folder can continue, to go on to its end
+    /// or to cycle `until`.
+    ///
+    /// # Errors
+    /// When the folder holds no run of one of `worlds` that this build can continue, or the run
+    /// is past that cycle.
+    pub fn resume(
+        worlds: Worlds,
+        path: &Path,
+        workers: usize,
+        until: Option<Cycle>,
+    ) -> Result<Self, Error> {
+        let (folder, point) = RunFolder::resume(path)?;
+        let manifest = folder.manifest();
+        let maker =
+            Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
+        maker.check(path, "run", |wrote| {
+            format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
+        })?;
+        let place = path.join("scenario.toml").display().to_string();
+        let source = Source::new(place, folder.scenario(), path);
+        let mut run = worlds.compile(&source)?.start(&source, workers);
+        restore_run(run.as_mut(), &point, path)?;
+        check_end(until, run.cycle(), run.config().cycles)?;
+        refuse_without_orders(run.as_ref(), path)?;
+        let recording = Some(RunRecorder::start(folder, run.as_mut())?);
+        Ok(Self { until, ..Self::new(run, recording, None, workers) })
+    }
+
+    fn new(
+        run: Box<dyn Simulation>,
+        recording: Option<RunRecorder>,
+        film: Option<McapSink>,
+        workers: usize,
+    ) -> Self {
+        let effort = RunTiming::default();
+        Self {
+            run,
+            recording,
+            film,
+            rows: None,
+            frames: None,
+            viewers: None,
+            workers,
+            until: None,
+            told: None,
+            effort,
+            ordered_at: None,
+        }
+    }
+
+    fn with_import_report(self, told: Option<ImportedScenario>) -> Self {
+        Self { told, ..self }
+    }
+
+    /// The run.
+    pub fn simulation(&self) -> &dyn Simulation {
+        self.run.as_ref()
+    }
+
+    /// The run, for callers that watch it or hand controls over.
+    pub fn simulation_mut(&mut self) -> &mut dyn Simulation {
+        self.run.as_mut()
+    }
+
+    /// Shows the run to viewers while it goes on.
+    ///
+    /// # Errors
+    /// When the address cannot be taken.
+    pub fn serve_viewers(&mut self, at: &ViewerAddress) -> Result<(), Error> {
+        self.viewers = Some(LiveControl::start(at, self.run.as_mut())?);
+        Ok(())
+    }
+
+    /// Returns the number of cycles done since the run's start.
+    pub fn cycle(&self) -> Cycle {
+        self.run.cycle()
+    }
+
+    /// Keeps rows, and frames where they are wanted, in memory from now on.
+    ///
+    /// # Errors
+    /// When a table does not belong to the run, or rows are already kept or go to a folder: they are handed over only
+    /// once.
+    pub fn keep_rows(&mut self, wanted: &RowSelection) -> Result<(), InputError> {
+        if let Some(recording) = &self.recording {
+            let folder = recording.folder().path().display();
+            let remedy = "read the tables from there when the run is finished";
+            return Err(InputError::new(folder, "the rows of this run go to a folder", remedy));
+        }
+        if self.rows.is_some() {
+            let remedy = "say which tables are wanted when you begin";
+            return Err(InputError::new("record", "the rows of this run are kept already", remedy));
+        }
+        if wanted.frames.is_some() && self.film.is_some() {
+            let remedy = "read them from there, or leave one of both out";
+            let cause = "the frames of this run go to an MCAP file";
+            return Err(InputError::new("frames", cause, remedy));
+        }
+        if wanted.frames == Some(0) {
+            let remedy = "give 1 or more cycles";
+            return Err(InputError::new("frames", "0 cycles cannot lie between frames", remedy));
+        }
+        self.run.start_recording();
+        let (schemas, from) = (self.run.schemas(), self.run.cycle());
+        self.rows = Some(RowStore::new(&schemas, wanted.tables.as_deref(), from)?);
+        self.frames = wanted.frames.map(FrameRows::new);
+        Ok(())
+    }
+
+    /// Returns whether rows are kept in memory.
+    pub fn keeps_rows(&self) -> bool {
+        self.rows.is_some()
+    }
+
+    /// Takes the rows that were kept in memory so far, by table; none if rows are not kept.
+    ///
+    /// # Errors
+    /// When the last ones cannot be handed over.
+    pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<Values>)>, RecordError> {
+        let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
+        self.run.record(rows)?;
+        let frames = self.frames.as_mut().map(FrameRows::take);
+        Ok(rows.take(self.run.cycle()).into_iter().chain(frames).collect())
+    }
+
+    /// Drives the run to its end, or until the watcher asks to stop, and stores everything.
+    ///
+    /// # Errors
+    /// When something cannot be stored; a bug of the simulation.
+    pub fn run_to_end(mut self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        let until = self.until.unwrap_or(self.run.config().cycles);
+        self.advance_to(until, watcher)?;
+        self.finish(watcher)
+    }
+
+    /// Drives the run to cycle `until`, or until the watcher asks to stop; [`Self::finish`] stores the rest.
+    /// Frames for viewers start again with every call.
+    ///
+    /// # Errors
+    /// When something cannot be stored; a bug of the simulation.
+    pub fn advance_to(&mut self, until: Cycle, watcher: &dyn Watcher) -> Result<(), Error> {
+        let Self { run, recording, film, rows, frames, viewers, effort, .. } = self;
+        // Only a caller that keeps rows keeps frames, and such a run has no other film.
+        let frames = frames.as_mut().map(|frames| frames as &mut dyn FrameSink);
+        let sinks = Sinks {
+            recording: recording.as_mut(),
+            rows: rows.as_mut().map(|rows| rows as &mut dyn Recorder),
+            frames: film.as_mut().map(|film| film as &mut dyn FrameSink).or(frames),
+            viewers: viewers.as_mut(),
+        };
+        let driven = drive_guarded(run.as_mut(), until, sinks, watcher);
+        *effort +=
+            driven.map_err(|e| explain_storage_error(e, run.as_ref(), recording.as_ref()))?;
+        Ok(())
+    }
+
+    /// Stores everything: a run at its planned end is complete, another can be resumed.
+    ///
+    /// # Errors
+    /// When something cannot be stored.
+    pub fn finish(self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        let Self { mut run, recording, film, workers, told, effort, .. } = self;
+        let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
+        let took = recording.as_ref().map_or(Duration::ZERO, RunRecorder::elapsed)
+            + film.as_ref().map_or(Duration::ZERO, McapSink::elapsed);
+        let cost = RunCost { workers, effort, recording: took };
+        let mut summary = Summary::new(run.as_ref(), cost, folder.as_deref());
+        if let Some(told) = told {
+            summary.set_import_report(told);
+        }
+        if let Some(film) = film {
+            let ending = match summary.status {
+                RunStatus::Complete => EndReason::Complete,
+                RunStatus::Incomplete => EndReason::Stopped,
+            };
+            let path = film.finish(run.as_ref(), ending);
+            let path =
+                path.map_err(|e| explain_storage_error(e, run.as_ref(), recording.as_ref()))?;
+            summary.set_mcap_path(path);
+        }
+        if let Some(recording) = recording {
+            store(run.as_mut(), recording, &summary, watcher)?;
+        }
+        Ok(summary)
+    }
+}
+
+/// Refuses to go on with a run of agents that had orders: they would get no more orders.
+fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), InputError> {
+    if !has_orders(folder)? {
+        return Ok(());
+    }
+    let cause = format!("its agents were decided from outside up to cycle {}", run.cycle());
+    let remedy = "continue it with the program that decided for them, or look at it with \
+                  `sidestep replay DIR --cycle N`";
+    Err(InputError::new(folder.display(), cause, remedy))
+}
+
+fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
+    let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
+    let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
+    let remedy = format!(
+        "give {now} to {planned}; for a longer run: \
+         sidestep run DIR/scenario.toml --cycles N --out NEW_DIR"
+    );
+    Err(InputError::new(format!("--cycles {end}"), cause, remedy))
+}
+
+/// Drives a recorded run to its end and stores all its results; returns whether it got there.
+///
+/// # Errors
+/// When something cannot be stored.
+pub(crate) fn record_to_end(
+    run: &mut dyn Simulation,
+    mut recording: RunRecorder,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<bool, Error> {
+    let until = run.config().cycles;
+    let sinks = Sinks { recording: Some(&mut recording), ..Sinks::default() };
+    let effort = drive_guarded(run, until, sinks, watcher)?;
+    let folder = recording.folder().path().to_path_buf();
+    let cost = RunCost { workers, effort, recording: recording.elapsed() };
+    let summary = Summary::new(run, cost, Some(&folder));
+    store(run, recording, &summary, watcher)?;
+    Ok(summary.status == RunStatus::Complete)
+}
+
+/// Completes the folder: with complete tables and pictures, or with a checkpoint to resume from.
+fn store(
+    run: &mut dyn Simulation,
+    mut recording: RunRecorder,
+    summary: &Summary,
+    watcher: &dyn Watcher,
+) -> Result<(), Error> {
+    let closed = match summary.status {
+        RunStatus::Complete => recording.finish_tables(),
+        RunStatus::Incomplete => recording.save_unfinished(run),
+    };
+    closed.map_err(|e| storage_error(run, Some(&recording), &e))?;
+    let folder = recording.into_folder();
+    if let Err(error) = picture::draw_run(run, &folder) {
+        watcher.warn(&error);
+    }
+    let (per_agent, per_pair) = (run.agent_metrics(), run.pair_metrics());
+    folder.write_summary(&SummaryFile { summary, per_agent, per_pair })?;
+    match summary.status {
+        RunStatus::Complete => folder.complete(run.cycle(), &summary.digest)?,
+        RunStatus::Incomplete => folder.stop(run.cycle())?,
+    }
+    Ok(())
+}
+
+/// Drives the run; the error of a bug contains the facts to replay it.
+fn drive_guarded(
+    run: &mut dyn Simulation,
+    until: Cycle,
+    sinks: Sinks<'_>,
+    watcher: &dyn Watcher,
+) -> Result<RunTiming, Error> {
+    let driven = catch_unwind(AssertUnwindSafe(|| drive(run, until, sinks, watcher)));
+    driven.unwrap_or_else(|_| Err(internal_error(run)))
+}
+
+/// Adds words for continuing the run, if something could not be stored.
+fn explain_storage_error(
+    error: Error,
+    run: &dyn Simulation,
+    recording: Option<&RunRecorder>,
+) -> Error {
+    match error {
+        Error::Record(error) => storage_error(run, recording, &error),
+        other => other,
+    }
+}
+
+/// Returns the facts for replaying a run up to the cycle at which it failed.
+fn replay_hint(run: &dyn Simulation) -> String {
+    let plan = run.config();
+    let (cycle, version) = (run.cycle(), VERSION);
+    let (name, seed, cycles) = (&plan.name, plan.seed, plan.cycles);
+    format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
+}
+
+/// Returns the error of a recording that failed, with words for continuing the run.
+fn storage_error(
+    run: &dyn Simulation,
+    recording: Option<&RunRecorder>,
+    error: &RecordError,
+) -> Error {
+    let remedy = match recording.map(|r| r.folder().path().display()) {
+        Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
+        None => "make room, then run it again; without --out nothing can be continued".into(),
+    };
+    Error::other(format!("{error}\n  {}", replay_hint(run)), remedy)
+}
+
+/// Returns the error of a simulation that broke one of its own rules.
+fn internal_error(run: &dyn Simulation) -> Error {
+    let cause = format!("this is a bug in sidestep, met shortly after\n  {}", replay_hint(run));
+    Error::other(cause, "please report it with the scenario and the lines above")
+}

@@ -1,0 +1,213 @@
+//! A recorded run that is computed again: from its folder, or from a recording for viewers.
+
+use crate::Error;
+use crate::identity::Producer;
+use crate::orders::replay_recorded;
+use crate::playback::RecordedPlayback;
+use crate::run_recorder::{restore_run, write_inputs};
+use sidestep::kernel::Simulation;
+use sidestep::kernel::checkpoint::decode_header;
+use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::ResolvedScenario;
+use sidestep::scenario::{Source, Worlds};
+use sidestep_record::{McapRunInfo, ResumePoint, RunReader, Status, is_mcap, tables};
+use std::path::{Path, PathBuf};
+
+/// A recorded run, in a folder or a file.
+pub struct RecordedRun {
+    /// The folder or file.
+    pub path: PathBuf,
+    worlds: Worlds,
+    maker: Producer,
+    /// Whether the run reached its end.
+    pub is_complete: bool,
+    /// Number of cycles that are certainly done.
+    pub cycles_done: Cycle,
+    /// Digest of the state after these cycles, if it is known.
+    pub digest: Option<String>,
+    /// The run folder, if the run was recorded to one.
+    pub folder: Option<PathBuf>,
+    source: Source,
+    /// The folder of the scenario's files.
+    base: PathBuf,
+    /// Deletes that folder when this value is dropped, if it is temporary.
+    _unpacked: Option<tempfile::TempDir>,
+}
+
+/// Name of the folder of files beside a resolved scenario.
+const INPUTS: &str = "inputs";
+
+impl RecordedRun {
+    /// Opens a run folder or an MCAP file of this program, with a run of one of `worlds`.
+    ///
+    /// # Errors
+    /// When it is neither, or is damaged.
+    pub fn open(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+        if is_mcap(path) {
+            Self::from_mcap(worlds, path)
+        } else {
+            Ok(Self::from_folder(worlds, path)?)
+        }
+    }
+
+    fn from_folder(worlds: Worlds, path: &Path) -> Result<Self, InputError> {
+        let view = RunReader::open(path)?;
+        let place = path.join("scenario.toml").display().to_string();
+        Ok(Self {
+            path: path.to_path_buf(),
+            worlds,
+            maker: Producer { version: view.manifest.program_version, build: view.manifest.build },
+            is_complete: view.manifest.status == Status::Complete,
+            cycles_done: view.manifest.cycles_done,
+            digest: view.manifest.digest,
+            folder: Some(path.to_path_buf()),
+            source: Source::new(place, view.scenario, path),
+            base: path.to_path_buf(),
+            _unpacked: None,
+        })
+    }
+
+    fn from_mcap(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+        let run = McapRunInfo::open(path)?;
+        let files =
+            tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
+        write_inputs(files.path(), &run.files)?;
+        let place = format!("{}: scenario.toml", path.display());
+        Ok(Self {
+            path: path.to_path_buf(),
+            worlds,
+            maker: Producer { version: run.program_version, build: run.build },
+            is_complete: run.status == Status::Complete,
+            cycles_done: run.cycles_done,
+            digest: Some(run.digest),
+            folder: None,
+            source: Source::new(place, run.scenario, files.path()),
+            base: files.path().to_path_buf(),
+            _unpacked: Some(files),
+        })
+    }
+
+    /// Returns the recorded scenario and its files.
+    ///
+    /// # Errors
+    /// When a file can no longer be read.
+    pub fn resolved_scenario(&self) -> Result<ResolvedScenario, InputError> {
+        let folder = self.base.join(INPUTS);
+        let mut files = Vec::new();
+        if folder.is_dir() {
+            let unreadable = |e: std::io::Error| {
+                let remedy = "make the folder readable, or run the scenario again";
+                InputError::new(folder.display(), e.to_string(), remedy)
+            };
+            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+                let entry = entry.map_err(unreadable)?;
+                let name = format!("{INPUTS}/{}", entry.file_name().display());
+                files.push((name, std::fs::read(entry.path()).map_err(unreadable)?));
+            }
+        }
+        Ok(ResolvedScenario { text: self.source.text.clone(), files })
+    }
+
+    /// Returns the names of the recorded tables; none for a recording for viewers.
+    ///
+    /// # Errors
+    /// When the folder can no longer be read.
+    pub fn tables(&self) -> Result<Vec<String>, InputError> {
+        self.folder.as_ref().map_or(Ok(Vec::new()), |folder| tables(folder))
+    }
+
+    /// Returns the run at its start.
+    ///
+    /// # Errors
+    /// When another build made the recording, because results may change between builds; or when
+    /// the scenario is no longer valid.
+    pub fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+        let compiled = self.worlds.compile(&self.source)?;
+        self.maker.check(&self.path, "run", |wrote| {
+            format!("use sidestep {wrote}, or run its scenario again")
+        })?;
+        let mut run = compiled.start(&self.source, workers);
+        self.check_end(run.config().cycles)?;
+        if let Some(folder) = &self.folder {
+            replay_recorded(run.as_mut(), folder)?;
+        }
+        Ok(run)
+    }
+
+    /// Refuses a recording that claims more cycles than its scenario has: its computation would take that long.
+    fn check_end(&self, planned: Cycle) -> Result<(), InputError> {
+        let done = self.cycles_done;
+        if done <= planned {
+            return Ok(());
+        }
+        let cause = format!("{done} cycles are recorded, and its scenario has {planned}");
+        let remedy = "the recording was changed: restore it, or run its scenario again";
+        Err(InputError::new(self.path.display(), cause, remedy))
+    }
+
+    /// Returns the build that made the recording, if it is another one: then it is not computed again.
+    pub fn other_build(&self) -> Option<&str> {
+        let other = self.maker.check(&self.path, "run", |_| String::new()).is_err();
+        other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
+    }
+
+    /// Returns the run at its start, for watching: computed again, or from its own tables or messages if another
+    /// build made it.
+    ///
+    /// # Errors
+    /// When the scenario is no longer valid; when the tables or messages of another build are damaged.
+    pub fn start_for_viewing(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+        if self.other_build().is_none() {
+            return self.start(workers);
+        }
+        let start = self.worlds.compile(&self.source)?.start(&self.source, 1);
+        self.check_end(start.config().cycles)?;
+        let played = match &self.folder {
+            Some(folder) => RecordedPlayback::from_tables(start, folder, self.cycles_done),
+            None => RecordedPlayback::from_messages(start, &self.path, self.cycles_done),
+        };
+        Ok(Box::new(played?))
+    }
+
+    /// Returns the run at its last checkpoint, if that is before `cycle`; otherwise at its start.
+    ///
+    /// # Errors
+    /// Those of [`Self::start`]; a damaged checkpoint.
+    pub fn start_near(
+        &self,
+        cycle: Cycle,
+        workers: usize,
+    ) -> Result<Box<dyn Simulation>, InputError> {
+        let mut run = self.start(workers)?;
+        if let Some(folder) = &self.folder
+            && let Ok(bytes) = std::fs::read(folder.join("checkpoint.bin"))
+            && decode_header(&bytes).is_ok_and(|header| header.cycle <= cycle)
+        {
+            restore_run(run.as_mut(), &ResumePoint::Checkpoint(bytes), folder)?;
+        }
+        Ok(run)
+    }
+
+    /// Compares the state of a run that was computed again with its recorded last state. Returns
+    /// whether there was anything to compare.
+    ///
+    /// # Errors
+    /// When they differ.
+    pub fn verify_digest(&self, run: &dyn Simulation) -> Result<bool, Error> {
+        let Some(recorded) = self.digest.as_ref().filter(|_| run.cycle() == self.cycles_done)
+        else {
+            return Ok(false);
+        };
+        let digest = run.digest().to_string();
+        if *recorded == digest {
+            return Ok(true);
+        }
+        let cause = format!(
+            "after {} cycles the digest is {digest}, recorded is {recorded}",
+            self.cycles_done
+        );
+        let remedy =
+            "the recording was changed, or this is a bug: please report it with the recording";
+        Err(Error::other(format!("{}: {cause}", self.path.display()), remedy))
+    }
+}

@@ -1,0 +1,215 @@
+//! Rows of a run kept in memory: of all tables, or of some.
+
+use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
+use sidestep::kernel::{Cycle, Digest, InputError};
+use std::collections::BTreeMap;
+
+/// The rows to keep in memory.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RowSelection {
+    /// Names of tables; all if `None`.
+    pub tables: Option<Vec<String>>,
+    /// Cycles between two frames, with bodies kept as the table `frames`; no frames if `None`.
+    pub frames: Option<Cycle>,
+}
+
+/// The mark of a checkpoint that identifies rows: its cycle and its digest.
+type CheckpointKey = (Cycle, [u8; 16]);
+
+/// Rows that come with a checkpoint, each block with the number of its table.
+type PendingRows = Vec<(usize, Vec<Values>)>;
+
+/// Rows of the wanted tables, of one past; those of other tables are dropped as they come.
+pub(crate) struct RowStore {
+    tables: MemoryRecorder,
+    /// The place of each of the run's tables among the kept ones.
+    places: Vec<Option<usize>>,
+    /// The cycle from which on rows are kept: earlier rows were taken, or never existed.
+    begin: Cycle,
+    /// The checkpoints of this past, with the rows of the cycle that each begins with: those of orders that were
+    /// waiting then.
+    known: BTreeMap<CheckpointKey, PendingRows>,
+}
+
+impl RowStore {
+    /// Returns the place for rows of a run with these tables, from cycle `begin` on.
+    ///
+    /// # Errors
+    /// When a wanted table is not among them.
+    pub(crate) fn new(
+        schemas: &[TableSchema],
+        wanted: Option<&[String]>,
+        begin: Cycle,
+    ) -> Result<Self, InputError> {
+        let is_known = |name: &&String| schemas.iter().any(|schema| schema.name == **name);
+        if let Some(unknown) = wanted.into_iter().flatten().find(|name| !is_known(name)) {
+            let names: Vec<_> = schemas.iter().map(|schema| schema.name.as_str()).collect();
+            let cause = format!("there is no table `{unknown}`");
+            let remedy = match names.is_empty() {
+                true => "the scenario records none: see its section [record]".to_string(),
+                false => format!("name some of {}", names.join(", ")),
+            };
+            return Err(InputError::new("record", cause, remedy));
+        }
+        let is_wanted = |schema: &TableSchema| wanted.is_none_or(|all| all.contains(&schema.name));
+        let (mut tables, mut places) = (Vec::new(), Vec::new());
+        for schema in schemas {
+            places.push(is_wanted(schema).then_some(tables.len()));
+            if is_wanted(schema) {
+                tables.push(schema.clone());
+            }
+        }
+        let tables = MemoryRecorder::new(&tables);
+        Ok(Self { tables, places, begin, known: BTreeMap::new() })
+    }
+
+    /// The cycle from which on rows are kept.
+    pub(crate) fn first_cycle(&self) -> Cycle {
+        self.begin
+    }
+
+    /// Takes out all rows, by table, of a run that is at cycle `now`. Later rows may have another past, and rows of
+    /// orders that were handed over do not come again: checkpoints need not be known any longer.
+    pub(crate) fn take(&mut self, now: Cycle) -> Vec<(TableSchema, Vec<Values>)> {
+        self.begin = now;
+        self.known.clear();
+        self.tables.take()
+    }
+
+    /// Notes a checkpoint of cycle `now`, the present one. Existing rows of this cycle come back with it.
+    pub(crate) fn add_checkpoint(&mut self, checkpoint: &[u8], now: Cycle) {
+        let ahead = |(table, (schema, columns)): (usize, (&TableSchema, &[Values]))| {
+            // Rows of the present cycle come after all others, in whichever order those are.
+            let cycles = cycle_column(schema, columns)?;
+            let count = cycles.iter().rev().take_while(|&&cycle| cycle >= now).count();
+            let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
+            let picked = || columns.iter().map(|column| column.pick(&rows)).collect();
+            (count > 0).then(|| (table, picked()))
+        };
+        let ahead = self.tables.tables().enumerate().filter_map(ahead).collect();
+        self.known.insert(checkpoint_key(checkpoint, now), ahead);
+    }
+
+    /// Returns whether all remaining rows belong to the past of this checkpoint of cycle `of`, for a run at
+    /// cycle `now`.
+    pub(crate) fn is_consistent_with(&self, checkpoint: &[u8], of: Cycle, now: Cycle) -> bool {
+        let none_stay = of <= self.begin || now == self.begin;
+        none_stay || self.known.contains_key(&checkpoint_key(checkpoint, of))
+    }
+
+    /// Drops the rows of cycle `now` and of later ones, except those that came before this checkpoint of `now`, which
+    /// [fits](Self::fits); returns whether there are such rows.
+    ///
+    /// # Errors
+    /// None: rows go back to the tables that they are from.
+    pub(crate) fn rewind(&mut self, checkpoint: &[u8], now: Cycle) -> Result<bool, RecordError> {
+        let mark = checkpoint_key(checkpoint, now);
+        let is_known = self.known.contains_key(&mark);
+        self.begin = if is_known { self.begin.min(now) } else { now };
+        let kept = self.begin..now;
+        self.tables.retain_rows(|schema, columns| {
+            let cycles = cycle_column(schema, columns)?;
+            Some(cycles.iter().map(|cycle| kept.contains(cycle)).collect())
+        });
+        // Later ones belong to an abandoned past.
+        self.known.retain(|(cycle, _), _| *cycle <= now);
+        let ahead = self.known.get(&mark).map(Vec::as_slice).unwrap_or_default();
+        ahead.iter().try_for_each(|(table, block)| self.tables.append(*table, block))?;
+        Ok(!ahead.is_empty())
+    }
+}
+
+fn checkpoint_key(checkpoint: &[u8], cycle: Cycle) -> CheckpointKey {
+    (cycle, *Digest::hash_bytes(checkpoint).as_bytes())
+}
+
+/// Returns the cycles of the rows of a table; `None` for a table without cycles.
+fn cycle_column<'a>(schema: &TableSchema, columns: &'a [Values]) -> Option<&'a [Cycle]> {
+    let place = schema.columns.iter().position(|column| column.name == "cycle")?;
+    let Some(Values::U64(cycles)) = columns.get(place) else { return None };
+    Some(cycles)
+}
+
+impl Recorder for RowStore {
+    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+        let place =
+            self.places.get(table).ok_or_else(|| RecordError::new(table, "no such table"))?;
+        place.map_or(Ok(()), |place| self.tables.append(place, block))
+    }
+
+    fn finish(&mut self) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::kernel::ports::{ColumnSpec, ColumnType};
+
+    /// Rows of three tables of cycles, the second of which is not wanted.
+    fn rows() -> RowStore {
+        let cycle = || ColumnSpec::new("cycle", ColumnType::U64, "its cycle");
+        let schemas = ["a", "b", "c"].map(|name| TableSchema::new(name, vec![cycle()]));
+        RowStore::new(&schemas, Some(&["a".into(), "c".into()]), 0).expect("they are there")
+    }
+
+    fn append(rows: &mut RowStore, table: usize, cycles: &[Cycle]) {
+        rows.append(table, &[Values::U64(cycles.to_vec().into())]).expect("it fits");
+    }
+
+    /// The cycles of the rows of both tables.
+    fn cycles(rows: &RowStore) -> [Vec<Cycle>; 2] {
+        let cycles = |table| match rows.tables.column(table, "cycle") {
+            Some(Values::U64(cycles)) => cycles.to_vec(),
+            other => panic!("{other:?}"),
+        };
+        ["a", "c"].map(cycles)
+    }
+
+    #[test]
+    fn rows_of_a_cycle_come_back_with_the_checkpoint_that_they_were_there_for() {
+        let mut rows = rows();
+        // Poses come by body within a block.
+        append(&mut rows, 0, &[0, 1, 2, 0, 1, 2]);
+        append(&mut rows, 1, &[7]);
+        append(&mut rows, 2, &[1, 3]);
+        rows.add_checkpoint(b"ordered", 3);
+        append(&mut rows, 2, &[3]);
+        rows.add_checkpoint(b"ordered twice", 3);
+        append(&mut rows, 0, &[3, 4, 3, 4]);
+        assert!(rows.rewind(b"ordered", 3).expect("they fit"));
+        assert_eq!(cycles(&rows), [vec![0, 1, 2, 0, 1, 2], vec![1, 3]]);
+        assert!(rows.rewind(b"ordered twice", 3).expect("they fit"));
+        assert_eq!(cycles(&rows), [vec![0, 1, 2, 0, 1, 2], vec![1, 3, 3]]);
+        assert!(rows.append(3, &[]).is_err(), "a table that does not exist");
+    }
+
+    #[test]
+    fn checkpoints_are_known_while_rows_of_their_past_are_kept() {
+        let mut rows = rows();
+        for number in 0..100_u8 {
+            let now = Cycle::from(number);
+            append(&mut rows, 2, &[now]);
+            // A state that is saved twice has one checkpoint.
+            (0..2).for_each(|_| rows.add_checkpoint(&[number], now));
+        }
+        assert_eq!(rows.known.len(), 100);
+        assert!(
+            rows.is_consistent_with(&[60], 60, 100) && !rows.is_consistent_with(&[61], 60, 100)
+        );
+        assert!(rows.rewind(&[60], 60).expect("they fit"));
+        assert_eq!(rows.known.len(), 61, "those of later cycles are of a past that was left");
+        assert!(!rows.is_consistent_with(&[61], 61, 62));
+        assert_eq!(rows.take(60).len(), 2);
+        assert!(rows.known.is_empty(), "nothing is left that could have two pasts");
+        assert!(!rows.rewind(&[60], 60).expect("it fits"), "its rows were handed over");
+        assert!(
+            rows.is_consistent_with(&[7], 7, 80)
+                && rows.is_consistent_with(&[99], 99, 60)
+                && !rows.is_consistent_with(&[99], 99, 80)
+        );
+        assert!(!rows.rewind(&[99], 99).expect("they fit"));
+        assert_eq!((rows.first_cycle(), cycles(&rows)), (99, [vec![], vec![]]));
+    }
+}

@@ -1,0 +1,158 @@
+//! The folder of a run while it is written.
+
+use crate::Error;
+use crate::identity::build_id;
+use sidestep::VERSION;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::{RecordError, Recorder};
+use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::ResolvedScenario;
+use sidestep_record::{IfExists, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Rows are passed on at multiples of this many cycles (and when buffers are full, and at
+/// checkpoints), never by the clock, so that their order is a function of the scenario alone.
+const BLOCK_CYCLES: Cycle = 1024;
+
+/// A folder, its recorder, and the times of its checkpoints.
+pub struct RunRecorder {
+    folder: RunFolder,
+    recorder: ParquetRecorder,
+    checkpoint_every: Cycle,
+    /// Time spent on recording.
+    took: Duration,
+}
+
+impl RunRecorder {
+    /// Creates a new folder at `path`, with the resolved scenario in it.
+    ///
+    /// # Errors
+    /// A folder that may not be used, or an I/O error.
+    pub fn create(
+        path: &Path,
+        resolved: &ResolvedScenario,
+        run: &mut dyn Simulation,
+        existing: IfExists,
+    ) -> Result<Self, Error> {
+        let plan = run.config();
+        let new = NewRun {
+            world: run.world().into(),
+            build: build_id().into(),
+            origin: Provenance {
+                program_version: VERSION.into(),
+                scenario: resolved.text.clone(),
+                seed: plan.seed,
+            },
+            cycles_planned: plan.cycles,
+        };
+        let folder = RunFolder::create(path, &new, existing)?;
+        write_inputs(path, &resolved.files)?;
+        Ok(Self::start(folder, run)?)
+    }
+
+    /// Continues the recording of a run that is at the checkpoint of its folder.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn start(folder: RunFolder, run: &mut dyn Simulation) -> Result<Self, RecordError> {
+        run.start_recording();
+        let recorder = folder.recorder(&run.schemas(), run.cycle())?;
+        let checkpoint_every = run.config().checkpoint_interval();
+        Ok(Self { folder, recorder, checkpoint_every, took: Duration::ZERO })
+    }
+
+    /// Returns the first cycle after `cycle` at which rows must be passed on.
+    pub(crate) fn next_flush(&self, cycle: Cycle) -> Cycle {
+        next_multiple(BLOCK_CYCLES, cycle).min(next_multiple(self.checkpoint_every, cycle))
+    }
+
+    /// Takes the rows, and a checkpoint if one is due.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn record(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
+        let started = Instant::now();
+        run.record(&mut self.recorder)?;
+        if run.cycle().is_multiple_of(self.checkpoint_every) {
+            self.save_checkpoint(run)?;
+        }
+        self.took += started.elapsed();
+        Ok(())
+    }
+
+    /// Makes everything recorded so far durable.
+    fn save_checkpoint(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
+        self.recorder.seal(run.cycle())?;
+        self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
+    }
+
+    /// Declares the tables complete; reports and pictures may follow.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn finish_tables(&mut self) -> Result<(), RecordError> {
+        self.recorder.finish()
+    }
+
+    /// Saves a run that stops before its end.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
+        run.record(&mut self.recorder)?;
+        self.save_checkpoint(run)
+    }
+
+    /// Returns the folder.
+    pub(crate) fn folder(&self) -> &RunFolder {
+        &self.folder
+    }
+
+    /// Returns the folder, for its last entries.
+    pub(crate) fn into_folder(self) -> RunFolder {
+        self.folder
+    }
+
+    /// Returns the time spent on recording so far.
+    pub(crate) fn elapsed(&self) -> Duration {
+        self.took
+    }
+}
+
+/// Returns the first multiple of `every` after `cycle`.
+pub(crate) fn next_multiple(every: Cycle, cycle: Cycle) -> Cycle {
+    (cycle / every + 1).saturating_mul(every)
+}
+
+/// Writes the files that a resolved scenario names beside it.
+///
+/// # Errors
+/// An I/O error.
+pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), RecordError> {
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        let parent = path.parent().unwrap_or(folder);
+        std::fs::create_dir_all(parent)
+            .and_then(|()| std::fs::write(&path, bytes))
+            .map_err(|e| RecordError::new(path.display(), e))?;
+    }
+    Ok(())
+}
+
+/// Sets a run to the point from which its folder can continue.
+///
+/// # Errors
+/// When the checkpoint is damaged or belongs to another version or scenario.
+pub(crate) fn restore_run(
+    run: &mut dyn Simulation,
+    point: &ResumePoint,
+    folder: &Path,
+) -> Result<(), InputError> {
+    let ResumePoint::Checkpoint(bytes) = point else { return Ok(()) };
+    run.restore(bytes).map_err(|e| {
+        let remedy = "run the scenario again in a new folder: \
+                      sidestep run DIR/scenario.toml --out NEW_DIR";
+        InputError::new(folder.join("checkpoint.bin").display(), e.to_string(), remedy)
+    })
+}

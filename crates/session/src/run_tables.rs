@@ -1,0 +1,89 @@
+//! Tables of a recorded run, also as CSV, the format of logs to learn from.
+
+use serde_json::Value;
+use sidestep::import::table::CsvTable;
+use sidestep::kernel::InputError;
+use sidestep::kernel::view::{Frame, PositionColumns, Scenery, Trail};
+use sidestep_draw::bodies_with_trails;
+use sidestep_record::{Table, read_table};
+use std::path::Path;
+
+/// Largest number of recorded poses that are read for trails; longer runs use the last ones.
+const MAX_TRAIL_ROWS: u64 = 4_000_000;
+
+/// Returns the tracks that led to a cycle, as far as they are recorded and worth showing.
+///
+/// # Errors
+/// When a table is damaged.
+pub(crate) fn read_trails(
+    tables: &[PositionColumns],
+    folder: &Path,
+    scenery: &Scenery,
+    frame: &Frame,
+) -> Result<Vec<Trail>, InputError> {
+    let whose = bodies_with_trails(scenery, frame);
+    let mut trails = Vec::new();
+    for rows in tables.iter().filter(|rows| has_rows(folder, rows.table)) {
+        let here = frame.bodies.iter().filter(|body| body.kind == rows.kind).count();
+        let moments = (MAX_TRAIL_ROWS / here.max(whose.len()).max(1) as u64).max(1);
+        let cycles = moments.saturating_mul(rows.interval).min(rows.history);
+        let from = frame.cycle.saturating_sub(cycles);
+        let table = read_table(folder, rows.table, from..frame.cycle)?;
+        let ways = rows.trails(scenery, frame, &whose, |name| table.column(name));
+        trails.extend(ways.unwrap_or_default());
+    }
+    Ok(trails)
+}
+
+/// Returns the table `name` of the run in `folder`; runs record it with `record.calibration =
+/// true`.
+///
+/// # Errors
+/// When the run has no such table, or it is damaged.
+pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
+    let table = read_table(folder, name, ..).map_err(|e| {
+        let remedy = "record the run with --set record.calibration=true";
+        if folder.join(name).exists() { e } else { InputError::new(e.place(), e.cause(), remedy) }
+    })?;
+    CsvTable::parse(&folder.join(name).display(), &to_csv(&table))
+}
+
+/// Returns a table as CSV: a heading, then one line per row (a beam or an action).
+fn to_csv(table: &Table) -> String {
+    let columns = &table.schema.columns;
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let mut text = names.join(",") + "\n";
+    for row in 0..table.rows() {
+        for (k, (column, values)) in columns.iter().zip(&table.columns).enumerate() {
+            let separator = if k == 0 { "" } else { "," };
+            text.push_str(separator);
+            // Writing to a string cannot fail.
+            let _ = values.write(row, &column.labels, &mut text);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Returns whether some part of the table is complete: a run that was killed early has none.
+pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
+    let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
+    [table.to_string(), format!("{table}.partial")].iter().any(|table| {
+        let entries = std::fs::read_dir(folder.join(table));
+        entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
+    })
+}
+
+/// Returns the content of `summary.json`, which a run writes at its end, if it exists.
+///
+/// # Errors
+/// Text that is not JSON.
+pub fn read_summary(folder: &Path) -> Result<Option<Value>, InputError> {
+    let path = folder.join("summary.json");
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
+    let damaged = |e: serde_json::Error| {
+        let remedy = "restore the file, or run the scenario again in a new folder";
+        InputError::new(path.display(), format!("this is no summary: {e}"), remedy)
+    };
+    serde_json::from_str(&text).map(Some).map_err(damaged)
+}

@@ -1,0 +1,184 @@
+//! Cells -> outcomes: many at once, or one after another on all workers.
+
+use super::executor::{CellBatch, CellExecutor, Engine};
+use crate::managed_run::record_to_end;
+use crate::run_recorder::RunRecorder;
+use crate::watcher::{NestedWatcher, Progress, ProgressGuard};
+use crate::{Error, Watcher};
+use serde_json::json;
+use sidestep::experiment::sweep::scheduler::{self, run_cells};
+use sidestep::experiment::sweep::{Cell, Outcome, start_cell};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Source, Worlds};
+use sidestep_record::IfExists;
+use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Number of agents from which a single world fills the caches: such runs are made one after
+/// another, each on all workers, which also bounds the memory.
+const LARGE_WORLD_AGENTS: u64 = 20_000;
+
+/// Everything that is needed to run cells.
+pub(super) struct CellRunner<'a> {
+    pub(super) worlds: Worlds,
+    /// Number of agents of the largest variant.
+    pub(super) agents: u64,
+    /// The scenario of a variant.
+    pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
+    /// Returns the folder in which the run of a cell is recorded, if it is.
+    pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
+    pub(super) engine: Engine<'a>,
+    pub(super) watcher: &'a dyn Watcher,
+}
+
+/// Takes an outcome: once it returns, the run is finished.
+pub(super) type OutcomeHandler<'a> = scheduler::ResultSink<'a, Outcome, Error>;
+
+impl CellRunner<'_> {
+    /// Runs the cells, in order as far as there are workers, until all are done, something fails,
+    /// or the watcher asks to stop. `before` and `total` are for the progress bar: the runs that
+    /// were done before, and all.
+    ///
+    /// # Errors
+    /// The error of `take`; no cell starts after that.
+    pub(super) fn run(
+        &self,
+        cells: &[Cell],
+        before: u64,
+        total: u64,
+        take: &mut OutcomeHandler<'_>,
+    ) -> Result<(), Error> {
+        let watched = ProgressGuard(self.watcher);
+        watched.report(Progress::Runs { before, done: before, of: total });
+        let mut done = before;
+        let mut take = |outcome| {
+            take(outcome)?;
+            done += 1;
+            watched.report(Progress::Runs { before, done, of: total });
+            Ok(())
+        };
+        match self.engine {
+            Engine::Executor(crew) => self.run_on_executor(crew, cells, &mut take),
+            Engine::Workers(workers) => {
+                let at_once = self.parallelism(cells.len());
+                let each = (workers / at_once).max(1);
+                run_cells(cells, at_once, |cell| self.run_cell(*cell, each), &mut take)
+            }
+        }
+    }
+
+    /// Lets a crew run the cells. The first outcome of a cell counts.
+    fn run_on_executor(
+        &self,
+        crew: &dyn CellExecutor,
+        cells: &[Cell],
+        take: &mut OutcomeHandler<'_>,
+    ) -> Result<(), Error> {
+        let mut open: BTreeSet<u64> = cells.iter().map(|cell| cell.id).collect();
+        let Self { worlds, source, .. } = *self;
+        crew.run(&CellBatch { cells, worlds, source }, &mut |outcome| match open
+            .remove(&outcome.cell)
+        {
+            true => take(outcome),
+            false => Ok(()),
+        })
+    }
+
+    /// Returns the number of `runs` in progress at once; each has its part of the workers.
+    pub(super) fn parallelism(&self, runs: usize) -> usize {
+        let most = match self.engine {
+            Engine::Executor(crew) => crew.parallelism(),
+            Engine::Workers(_) if self.agents >= LARGE_WORLD_AGENTS => 1,
+            Engine::Workers(workers) => workers,
+        };
+        most.min(runs).max(1)
+    }
+
+    /// Runs a cell; `None` if it was interrupted.
+    fn run_cell(&self, cell: Cell, workers: usize) -> Option<Result<Outcome, Error>> {
+        if !self.watcher.should_continue() {
+            return None;
+        }
+        // An error of the folder is not an outcome of a run, because it may be repaired.
+        let source = match (self.source)(cell.variant) {
+            Ok(source) => source,
+            Err(e) => return Some(Err(e.into())),
+        };
+        let run = || match self.record {
+            None => self.run_unrecorded(cell, &source, workers),
+            Some(folder) => {
+                let folder = folder(cell.id);
+                run_recorded(self.worlds, cell, source, workers, &folder, self.watcher)
+            }
+        };
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(Ok(outcome)) => outcome.map(Ok),
+            // For example a seed for which a scenario has no start: the other runs continue.
+            Ok(Err(Error::Input(e))) => Some(Ok(Outcome::from_failure(cell, e.to_string()))),
+            Ok(Err(Error::InterruptedInCycle(_))) => None,
+            Ok(Err(failure)) => Some(Err(failure)),
+            Err(payload) if self.watcher.interrupt().caused(payload.as_ref()) => None,
+            Err(_) => {
+                Some(Ok(Outcome::from_failure(cell, "a bug in sidestep: see standard error")))
+            }
+        }
+    }
+
+    /// Runs a cell and keeps only its row.
+    fn run_unrecorded(
+        &self,
+        cell: Cell,
+        variant: &Source,
+        workers: usize,
+    ) -> Result<Option<Outcome>, Error> {
+        let begun = Instant::now();
+        let started = start_cell(self.worlds, cell, variant, workers)?
+            .with_interrupt(self.watcher.interrupt());
+        let compiled = Instant::now();
+        let outcome = started.run(&|| self.watcher.should_continue());
+        Ok(outcome.map(|outcome| with_times(outcome, [compiled - begun, compiled.elapsed()])))
+    }
+}
+
+/// Runs a cell into a run folder of its own; `None` if it was interrupted. A folder left by a
+/// killed process is started again.
+///
+/// # Errors
+/// When the scenario is wrong with this seed, or something cannot be stored.
+pub(super) fn run_recorded(
+    worlds: Worlds,
+    cell: Cell,
+    variant: Source,
+    workers: usize,
+    folder: &Path,
+    watcher: &dyn Watcher,
+) -> Result<Option<Outcome>, Error> {
+    let begun = Instant::now();
+    let source = variant.with_overrides(&[format!("seed={}", cell.seed)])?;
+    let compiled = worlds.compile(&source)?;
+    let resolved = compiled.resolve(&source)?;
+    let itself = Source::new("scenario.toml", &*resolved.text, folder);
+    let mut run = compiled.start(&itself, workers);
+    let recording = RunRecorder::create(folder, &resolved, run.as_mut(), IfExists::Replace)
+        .map_err(folder_error)?;
+    let compiled = Instant::now();
+    let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
+    let outcome = is_complete.then(|| Outcome::from_simulation(cell, run.as_ref()));
+    Ok(outcome.map(|outcome| with_times(outcome, [compiled - begun, compiled.elapsed()])))
+}
+
+/// Returns an error of the folder itself as a stop, because it is not an outcome of a run.
+fn folder_error(failure: Error) -> Error {
+    match failure {
+        Error::Input(e) => Error::other(format!("{}: {}", e.place(), e.cause()), e.remedy()),
+        other => other,
+    }
+}
+
+fn with_times(mut outcome: Outcome, [compiling, running]: [std::time::Duration; 2]) -> Outcome {
+    outcome.costs.insert("compile_wall_s".into(), json!(compiling.as_secs_f64()));
+    outcome.costs.insert("run_wall_s".into(), json!(running.as_secs_f64()));
+    outcome
+}

@@ -1,0 +1,74 @@
+//! Runners of cells outside of this process: other processes, nodes of a cluster.
+//!
+//! The plan, the journal and the stopping rule stay with the process that drives the sweep. A crew gets cells and
+//! self-contained scenarios, and gives outcomes back, in any order: no common file system is needed.
+
+use crate::Error;
+use sidestep::experiment::sweep::{Cell, Outcome};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{ResolvedScenario, Source, Worlds};
+
+/// Takes an outcome; `Ok` once it is safe.
+pub type OutcomeSink<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
+
+/// A runner of cells.
+pub trait CellExecutor: Sync {
+    /// Runs all dealt cells, in any order, and passes each outcome on; an outcome that comes a second time is
+    /// ignored. Cells that it does not finish are dealt again by the next call.
+    ///
+    /// # Errors
+    /// Those of `take`; any error that ends the sweep.
+    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error>;
+
+    /// Returns the number of runs in progress at once.
+    fn parallelism(&self) -> usize;
+}
+
+/// The runner of a sweep's cells.
+#[derive(Clone, Copy)]
+pub enum Engine<'a> {
+    /// This many threads of this process.
+    Workers(usize),
+    /// A crew outside of this process.
+    Executor(&'a dyn CellExecutor),
+}
+
+impl From<usize> for Engine<'_> {
+    fn from(workers: usize) -> Self {
+        Self::Workers(workers)
+    }
+}
+
+impl Engine<'_> {
+    /// Returns the number of threads of this process that plan the sweep.
+    pub fn planning_workers(self) -> usize {
+        match self {
+            Self::Workers(workers) => workers,
+            Self::Executor(_) => 1,
+        }
+    }
+}
+
+/// Cells that a crew is to run, with their scenarios.
+pub struct CellBatch<'a> {
+    pub(super) cells: &'a [Cell],
+    pub(super) worlds: Worlds,
+    /// The scenario of a variant.
+    pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
+}
+
+impl CellBatch<'_> {
+    /// Returns the cells, first those on which others may depend.
+    pub fn cells(&self) -> &[Cell] {
+        self.cells
+    }
+
+    /// Returns the scenario of a variant, with all its files.
+    ///
+    /// # Errors
+    /// When a file can no longer be read, or was edited since the plan was made.
+    pub fn scenario(&self, variant: u32) -> Result<ResolvedScenario, InputError> {
+        let source = (self.source)(variant)?;
+        self.worlds.compile(&source)?.resolve(&source)
+    }
+}

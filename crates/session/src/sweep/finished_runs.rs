@@ -1,0 +1,80 @@
+//! The parts of a sweep that a report needs: its finished runs, and pictures of some.
+
+use super::cell_runner::run_recorded;
+use super::folder::{Folder, check_build, for_each_outcome, to_run_table};
+use crate::watcher::NestedWatcher;
+use crate::{Error, Watcher};
+use sidestep::experiment::sweep::{Cell, RunTable, RunTableBuilder};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Source, Worlds};
+use sidestep_record::RunReader;
+use std::path::Path;
+
+/// The finished runs of a sweep.
+pub struct FinishedRuns {
+    /// One row per run, with the times that it took.
+    pub table: RunTable,
+    /// Whether these are all runs.
+    pub is_complete: bool,
+}
+
+/// Returns the finished runs of a sweep, whether it is done or in progress.
+///
+/// # Errors
+/// When there are none, or they cannot be read.
+pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
+    if folder.is_complete() {
+        let mut table = to_run_table(folder.results()?);
+        let costs = to_run_table(folder.timings()?).columns;
+        let has = |name: &str| table.columns.iter().any(|c| c.name == name);
+        let costs: Vec<_> = costs.into_iter().filter(|c| !has(&c.name)).collect();
+        table.columns.extend(costs);
+        return Ok(FinishedRuns { table, is_complete: true });
+    }
+    let mut rows = RunTableBuilder::default();
+    for_each_outcome(folder, None, |outcome| rows.push(&outcome))?;
+    if rows.is_empty() {
+        let remedy = "run it first: sidestep resume DIR";
+        return Err(InputError::new(folder.path().display(), "no run is finished yet", remedy));
+    }
+    Ok(FinishedRuns { table: rows.build(folder.plan())?, is_complete: false })
+}
+
+/// Returns the picture of the run of a cell that ended with `digest`, as SVG: from its run folder, or from a repeated
+/// run. If there is none of that very run, returns the reason.
+///
+/// # Errors
+/// When nothing can be stored, or the watcher asks to stop.
+pub(crate) fn run_picture(
+    worlds: Worlds,
+    folder: &Folder,
+    cell: Cell,
+    digest: &str,
+    watcher: &dyn Watcher,
+) -> Result<Result<String, String>, Error> {
+    let kept = folder.run_folder(cell.id);
+    if let Some(svg) = stored_picture(&kept) {
+        let made = RunReader::open(&kept).ok().and_then(|view| view.manifest.digest);
+        let other = || format!("the run in {} is another one", kept.display());
+        return Ok(if made.as_deref() == Some(digest) { Ok(svg) } else { Err(other()) });
+    }
+    // Another build or another scenario makes another run.
+    if let Err(e) = check_build(folder).and_then(|()| folder.check_variant(cell.variant)) {
+        return Ok(Err(e.cause().to_string()));
+    }
+    let place = tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
+    let again = place.path().join("run");
+    let source = Source::read(&folder.scenario(cell.variant), &[])?;
+    let outcome = match run_recorded(worlds, cell, source, 1, &again, &NestedWatcher(watcher)) {
+        Err(Error::Input(e)) => return Ok(Err(e.cause().to_string())),
+        made => made?.ok_or(Error::Interrupted)?,
+    };
+    if outcome.digest != digest {
+        return Ok(Err(format!("made again, it comes to the digest {}", outcome.digest)));
+    }
+    Ok(stored_picture(&again).ok_or_else(|| "it could not be drawn".to_string()))
+}
+
+fn stored_picture(run: &Path) -> Option<String> {
+    std::fs::read_to_string(run.join("trajectories.svg")).ok()
+}

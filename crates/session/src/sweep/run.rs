@@ -1,0 +1,520 @@
+//! The path from a sweep to the table of its runs: in memory, in a folder, or share by share.
+
+use super::buckets::{BUCKET_CELLS, OutcomeBuckets};
+use super::cell_runner::{CellRunner, OutcomeHandler};
+use super::executor::Engine;
+use super::finished_runs::read_finished;
+use super::folder::{Folder, check_build, for_each_outcome, to_run_table, to_share};
+use super::journal::TimestampedOutcome;
+use super::prepare::{VariantFn, prepare};
+use super::timing::SweepTiming;
+use crate::identity::build_id;
+use crate::watcher::{Progress, ProgressGuard};
+use crate::{Error, Watcher};
+use sidestep::VERSION;
+use sidestep::experiment::sweep::rounds::Rounds;
+use sidestep::experiment::sweep::seeds::PilotRuns;
+use sidestep::experiment::sweep::{
+    Cell, Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, rows::cell_table,
+};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{ResolvedScenario, Source, Worlds};
+use sidestep_record::sweep::{ResultsWriter, fingerprint};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The result of working on a sweep, or on a share of one.
+pub enum SweepEnd {
+    /// All of its runs are finished.
+    Done(SweepResult),
+    /// The watcher asked to stop; this many runs are finished.
+    Interrupted(usize),
+}
+
+/// Finished runs.
+pub struct SweepResult {
+    /// One row per run.
+    pub table: RunTable,
+    /// The time that they took in this process.
+    pub effort: SweepTiming,
+    /// Whether all were already finished before.
+    pub was_done: bool,
+}
+
+impl SweepResult {
+    fn complete(table: RunTable, effort: SweepTiming) -> SweepEnd {
+        SweepEnd::Done(Self { table, effort, was_done: false })
+    }
+
+    fn already_complete(table: RunTable) -> SweepEnd {
+        SweepEnd::Done(Self { table, effort: SweepTiming::default(), was_done: true })
+    }
+}
+
+/// Runs a sweep in memory, without writing anything.
+///
+/// # Errors
+/// When the sweep is wrong, or the watcher asks to stop before the first run.
+pub fn run_in_memory<'a>(
+    worlds: Worlds,
+    sweep: &Sweep,
+    engine: impl Into<Engine<'a>>,
+    watcher: &dyn Watcher,
+) -> Result<(Plan, SweepEnd), Error> {
+    if sweep.record {
+        let cause = "there is no folder to record runs to";
+        return Err(InputError::new("--record-runs", cause, "name one with --out").into());
+    }
+    let engine = engine.into();
+    let make: VariantFn<'_, Source> = &|_, source, _| Ok(source.clone());
+    let (plan, sources) = prepare(worlds, sweep, engine.planning_workers(), watcher, make)?;
+    let source = |variant: u32| Ok(sources[variant as usize].clone());
+    let agents = plan.agents;
+    let work = CellRunner { worlds, agents, source: &source, record: None, engine, watcher };
+    let (mut log, mut rows) = (CellScheduler::new(&plan), RunTableBuilder::default());
+    let effort = log.run_all(&work, &mut |outcome| {
+        rows.push(outcome);
+        Ok(())
+    })?;
+    let ended = match watcher.should_continue() {
+        true => SweepResult::complete(rows.build(&plan)?, effort),
+        false => SweepEnd::Interrupted(log.finished.len()),
+    };
+    Ok((plan, ended))
+}
+
+/// Plans a sweep into a folder, on a number of workers: completely or not at all.
+///
+/// # Errors
+/// When the sweep is wrong, or the folder is taken.
+pub fn create(
+    worlds: Worlds,
+    sweep: &Sweep,
+    out: &Path,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<Folder, Error> {
+    Folder::create(out, VERSION, build_id(), |staging| {
+        let (plan, fingerprints) =
+            prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
+                let ResolvedScenario { text, files } = compiled.resolve(source)?;
+                Folder::write_variant(staging, k, &text, &files)?;
+                Ok(fingerprint(text.as_bytes(), &files))
+            })?;
+        let cells = cell_table(&plan).columns;
+        Ok::<_, Error>((plan, fingerprints, cells))
+    })
+}
+
+/// Plans a sweep into a folder, or opens the folder if it holds the same sweep already.
+///
+/// # Errors
+/// When the sweep is wrong, or the folder holds something else, or is of another build.
+pub fn open_or_create(
+    worlds: Worlds,
+    sweep: &Sweep,
+    out: &Path,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<Folder, Error> {
+    match Folder::is_at(out) {
+        false => create(worlds, sweep, out, workers, watcher),
+        true => open_same(worlds, sweep, out, workers, watcher),
+    }
+}
+
+/// Opens the sweep in the folder, which must be the given one.
+fn open_same(
+    worlds: Worlds,
+    sweep: &Sweep,
+    out: &Path,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<Folder, Error> {
+    let folder = Folder::open(out)?;
+    let (plan, fingerprints) = prepare(worlds, sweep, workers, watcher, &|_, source, compiled| {
+        let ResolvedScenario { text, files } = compiled.resolve(source)?;
+        Ok(fingerprint(text.as_bytes(), &files))
+    })?;
+    let manifest = folder.manifest();
+    if (&plan, &fingerprints) == (&manifest.plan, &manifest.fingerprints) {
+        check_build(&folder)?;
+        return Ok(folder);
+    }
+    let there = out.display();
+    let remedy =
+        format!("name another folder, or go on with what is there: sidestep resume {there}");
+    Err(InputError::new(there, "the folder holds another sweep", remedy).into())
+}
+
+/// Runs all cells that are not finished, and joins all runs into one table.
+///
+/// # Errors
+/// When runs cannot be read or stored.
+pub fn run_remaining<'a>(
+    worlds: Worlds,
+    folder: &Folder,
+    engine: impl Into<Engine<'a>>,
+    watcher: &dyn Watcher,
+) -> Result<SweepEnd, Error> {
+    if folder.is_complete() {
+        return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
+    }
+    check_build(folder)?;
+    let mut log = CellScheduler::new(folder.plan());
+    for_each_outcome(folder, Some(Shard::ALL), |outcome| log.record(&outcome))?;
+    let mut effort = SweepTiming::default();
+    // Locked until everything is joined, so that no other process begins to join.
+    let mut journal = folder.journal(to_share(Shard::ALL), |o: Outcome| log.record(&o))?;
+    if let Some(journal) = &mut journal {
+        with_cell_runner(worlds, folder, engine.into(), watcher, |work| {
+            let mut keep =
+                |outcome: &Outcome| Ok(journal.append(&TimestampedOutcome::now(outcome))?);
+            effort =
+                log.run_all(work, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+            Ok(())
+        })?;
+        journal.sync()?;
+    }
+    if !watcher.should_continue() {
+        return Ok(SweepEnd::Interrupted(log.finished.len()));
+    }
+    join_runs(folder, BUCKET_CELLS, effort, watcher)
+}
+
+/// Joins all runs into the sweep's tables, in blocks of a number of cells: only one block is in memory at a time.
+fn join_runs(
+    folder: &Folder,
+    cells: u64,
+    effort: SweepTiming,
+    watcher: &dyn Watcher,
+) -> Result<SweepEnd, Error> {
+    let watched = ProgressGuard(watcher);
+    watched.report(Progress::Stage { what: "joining the runs", share: 0.0 });
+    let mut piles = OutcomeBuckets::new(folder, cells)?;
+    for_each_outcome(folder, None, |outcome| piles.push(&outcome))?;
+    watched.report(Progress::Stage { what: "writing the results", share: 0.5 });
+    let (mut completion, mut only) = (None::<ResultsWriter>, None);
+    let of = folder.plan().len().max(1) as f64;
+    let mut written = 0;
+    piles.for_each_block(|block| {
+        let (results, timings) = (block.results(), block.timings());
+        let completion = match &mut completion {
+            Some(completion) => completion,
+            begun => begun.insert(folder.results_writer(&results, &timings)?),
+        };
+        completion.append(&results, &timings)?;
+        written += block.runs();
+        let share = 0.5 + 0.5 * (written as f64 / of).min(1.0);
+        watched.report(Progress::Stage { what: "writing the results", share });
+        only = (written == block.runs()).then_some(block);
+        Ok(())
+    })?;
+    completion.map_or(Ok(()), ResultsWriter::finish)?;
+    // A table of several blocks is read again once the data that joined them is out of memory.
+    let table = match only {
+        Some(table) => table,
+        None => read_finished(folder)?.table,
+    };
+    Ok(SweepResult::complete(table, effort))
+}
+
+/// Runs one share of the cells and writes its part.
+///
+/// # Errors
+/// When the sweep stops at a precision or is of another build, or runs cannot be read or stored.
+pub fn run_share(
+    worlds: Worlds,
+    folder: &Folder,
+    shard: Shard,
+    workers: usize,
+    watcher: &dyn Watcher,
+) -> Result<SweepEnd, Error> {
+    check_build(folder)?;
+    let plan = folder.plan();
+    if plan.until.is_some() {
+        let cause = "this sweep stops by its precision, which takes all runs to be seen";
+        let remedy =
+            "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
+        return Err(InputError::new(folder.path().display(), cause, remedy).into());
+    }
+    let (mut log, mut rows) = (CellScheduler::new(plan), RunTableBuilder::default());
+    let mut note = |outcome: Outcome| {
+        log.record(&outcome);
+        rows.push(&outcome);
+    };
+    let journal = match folder.is_complete() {
+        true => None,
+        false => folder.journal(to_share(shard), &mut note)?,
+    };
+    let Some(mut journal) = journal else {
+        return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
+    };
+    // Shares of another count, or a sweep that continued here, may have finished some of these
+    // runs.
+    let mut elsewhere = BTreeSet::new();
+    for_each_outcome(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
+    let cells: Vec<Cell> = plan.shard_cells(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
+    let mut effort = SweepTiming::default();
+    with_cell_runner(worlds, folder, workers.into(), watcher, |work| {
+        let mut keep = |outcome: &Outcome| {
+            journal.append(&TimestampedOutcome::now(outcome))?;
+            rows.push(outcome);
+            Ok(())
+        };
+        effort =
+            log.run(work, &cells, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+        Ok(())
+    })?;
+    journal.sync()?;
+    if !watcher.should_continue() {
+        return Ok(SweepEnd::Interrupted(log.finished.len()));
+    }
+    let table = rows.build(plan)?;
+    folder.finish_share(to_share(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
+    Ok(SweepResult::complete(table, effort))
+}
+
+/// Returns the finished runs of the cells of a share, regardless of their maker.
+fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
+    let own: BTreeSet<u64> = folder.plan().shard_cells(shard).map(|c| c.id).collect();
+    let mut rows = RunTableBuilder::default();
+    let mut take = |outcome: Outcome| {
+        if own.contains(&outcome.cell) {
+            rows.push(&outcome);
+        }
+    };
+    match folder.is_complete() {
+        true => to_run_table(folder.results()?).for_each_outcome(&mut take),
+        false => for_each_outcome(folder, None, &mut take)?,
+    }
+    Ok(rows.build(folder.plan())?)
+}
+
+/// Joins the shares into one table.
+///
+/// # Errors
+/// When runs are missing, cannot be read or stored, or are of another build.
+pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<SweepEnd, Error> {
+    if folder.is_complete() {
+        return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
+    }
+    check_build(folder)?;
+    let plan = folder.plan();
+    let mut log = CellScheduler::new(plan);
+    for_each_outcome(folder, None, |outcome| log.record(&outcome))?;
+    let missing = if log.rounds.is_some() { log.next_cells() } else { log.missing_cells() }.len();
+    if missing > 0 {
+        let cause = format!("{missing} of {} runs are missing", plan.runs());
+        let remedy = "run the shares that are not finished (finished ones are not run again), or \
+                      run the rest here: sidestep resume DIR";
+        return Err(Error::other(cause, remedy));
+    }
+    join_runs(folder, BUCKET_CELLS, SweepTiming::default(), watcher)
+}
+
+/// Passes on everything needed to run the cells of a folder.
+fn with_cell_runner(
+    worlds: Worlds,
+    folder: &Folder,
+    engine: Engine<'_>,
+    watcher: &dyn Watcher,
+    run: impl FnOnce(&CellRunner<'_>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let plan = folder.plan();
+    if plan.record && matches!(engine, Engine::Executor(_)) {
+        let cause = "its runs are recorded in its folder, which others cannot write to";
+        let remedy = "run it on threads of this process, or sweep without recording";
+        return Err(InputError::new(folder.path().display(), cause, remedy).into());
+    }
+    let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
+    let source = |variant: u32| {
+        // A scenario that was edited in between would make runs of another sweep.
+        let checked = &checked[variant as usize];
+        if !checked.load(Ordering::Relaxed) {
+            folder.check_variant(variant)?;
+            checked.store(true, Ordering::Relaxed);
+        }
+        Source::read(&folder.scenario(variant), &[])
+    };
+    let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
+    let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
+        if plan.record { Some(&place) } else { None };
+    run(&CellRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+}
+
+/// Adds to a storage error the runs that are saved, and words for continuing.
+fn with_resume_hint(error: Error, folder: &Path) -> Error {
+    match error {
+        Error::Record(error) => {
+            let remedy = "make room; the finished runs are saved, go on with: sidestep resume";
+            Error::other(error.to_string(), format!("{remedy} {}", folder.display()))
+        }
+        other => other,
+    }
+}
+
+/// The finished runs, as far as needed to choose the next ones: a number for each.
+struct CellScheduler<'a> {
+    plan: &'a Plan,
+    finished: Vec<u64>,
+    rounds: Option<Rounds<'a>>,
+    trials: PilotRuns<'a>,
+}
+
+/// Stores an outcome, if there is a place for it.
+type OutcomeWriter<'a> = dyn FnMut(&Outcome) -> Result<(), Error> + Send + 'a;
+
+impl<'a> CellScheduler<'a> {
+    fn new(plan: &'a Plan) -> Self {
+        let rounds = plan.until.as_ref().map(|until| Rounds::new(plan, until));
+        Self { plan, finished: Vec::new(), rounds, trials: PilotRuns::new(plan) }
+    }
+
+    fn record(&mut self, outcome: &Outcome) {
+        if let Some(rounds) = &mut self.rounds {
+            rounds.add(outcome);
+        }
+        self.trials.add(outcome);
+        self.finished.push(outcome.cell);
+    }
+
+    /// Returns the cells to run next: of the next round, or all, trials first.
+    fn next_cells(&self) -> Vec<Cell> {
+        match &self.rounds {
+            Some(rounds) => rounds.next_cells(),
+            None => self.trials.next_cells(self.missing_cells()),
+        }
+    }
+
+    /// Returns the cells of a fixed number of runs that are not finished.
+    fn missing_cells(&self) -> Vec<Cell> {
+        let cells = self.plan.shard_cells(Shard::ALL);
+        self.unfinished_of(cells.filter(|cell| self.trials.needs(cell)))
+    }
+
+    fn unfinished_of(&self, cells: impl Iterator<Item = Cell>) -> Vec<Cell> {
+        let mut finished = self.finished.clone();
+        finished.sort_unstable();
+        cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
+    }
+
+    /// Runs all open cells, round by round if a precision ends the sweep.
+    fn run_all(
+        &mut self,
+        work: &CellRunner<'_>,
+        keep: &mut OutcomeWriter<'_>,
+    ) -> Result<SweepTiming, Error> {
+        let mut effort = SweepTiming::default();
+        loop {
+            let open = self.next_cells();
+            if open.is_empty() || !work.watcher.should_continue() {
+                return Ok(effort);
+            }
+            effort.add(self.run(work, &open, keep)?);
+        }
+    }
+
+    /// Runs the cells that are not finished.
+    fn run(
+        &mut self,
+        work: &CellRunner<'_>,
+        cells: &[Cell],
+        keep: &mut OutcomeWriter<'_>,
+    ) -> Result<SweepTiming, Error> {
+        let open = self.unfinished_of(cells.iter().copied());
+        let before = self.finished.len() as u64;
+        let mut effort = SweepTiming::start();
+        let mut take = |outcome: Outcome| {
+            keep(&outcome)?;
+            effort.record(&outcome);
+            self.record(&outcome);
+            Ok(())
+        };
+        let take: &mut OutcomeHandler<'_> = &mut take;
+        let ran = work.run(&open, before, before + open.len() as u64, take);
+        effort.stop(work.parallelism(open.len()));
+        ran.map(|()| effort)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NoWatcher;
+    use serde_json::json;
+    use sidestep::experiment::sweep::Factor;
+    use sidestep::worlds::WORLDS;
+    use sidestep_record::sweep::Share;
+
+    /// A planned sweep of two times 300 runs, all of them in journals of two shares: made up, and in no order.
+    fn folder(place: &Path) -> Folder {
+        let text =
+            "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = 2\n";
+        let mut sweep = Sweep::from_source(Source::new("s.toml", text, place));
+        sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
+        sweep.replicates = 300;
+        let folder = create(WORLDS, &sweep, &place.join("sweep"), 2, &NoWatcher).expect("planned");
+        let mut cells: Vec<Cell> = folder.plan().shard_cells(Shard::ALL).collect();
+        cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
+        for index in 0..2 {
+            let share = Share { index, count: 2 };
+            let mut journal =
+                folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
+            for cell in cells.iter().filter(|cell| cell.id % 2 == u64::from(index)) {
+                journal.append(&outcome(*cell)).expect("written");
+            }
+        }
+        folder
+    }
+
+    /// Columns that come and go, and one with a type that only a late cell reveals.
+    fn outcome(cell: Cell) -> Outcome {
+        let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
+        let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);
+        if cell.id > 400 {
+            metrics.insert("late".into(), json!(cell.id.is_multiple_of(3)));
+        }
+        let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
+        let (digest, failure) = (format!("end {}", cell.id), None);
+        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(cell, "") }
+    }
+
+    #[test]
+    fn runs_joined_in_blocks_give_the_files_that_all_at_once_give() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = folder(place.path());
+        let tables = |cells| {
+            let ended =
+                join_runs(&folder, cells, SweepTiming::default(), &NoWatcher).expect("joined");
+            let SweepEnd::Done(done) = ended else { panic!("nobody interrupts") };
+            let file = read_finished(&folder).expect("it is done");
+            std::fs::remove_file(folder.results_file()).expect("there");
+            assert_eq!(done.table, file.table, "{cells} cells at a time");
+            file.table
+        };
+        let whole = tables(BUCKET_CELLS);
+        assert_eq!(whole.runs(), 600);
+        for cells in [1000, 600, 599, 64, 7] {
+            assert_eq!(tables(cells), whole, "{cells} cells at a time");
+        }
+        assert!(!folder.path().join("joining.partial").exists());
+    }
+
+    #[test]
+    fn no_more_rows_are_in_memory_than_a_block_has_cells() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = folder(place.path());
+        let mut piles = OutcomeBuckets::new(&folder, 50).expect("room");
+        for_each_outcome(&folder, None, |outcome| piles.push(&outcome)).expect("read");
+        let mut sizes = Vec::new();
+        piles
+            .for_each_block(|block| {
+                sizes.push(block.runs());
+                Ok(())
+            })
+            .expect("joined");
+        assert_eq!(sizes, [50; 12]);
+    }
+}

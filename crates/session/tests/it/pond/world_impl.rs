@@ -1,0 +1,148 @@
+//! The hooks of a run of the pond, beside its phases.
+
+use super::rows::{Event, FrogAction, Rows};
+use super::{PondState, PondWorld, Saved, Sums};
+use serde_json::{Value, json};
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::digest::Hasher;
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
+use sidestep_kernel::text::{Description, KeyValues, key_value};
+use sidestep_kernel::view::{
+    Axis, Body, BodyKind, Frame, FrameOptions, Pose, PositionColumns, Scenery, Shape,
+};
+use sidestep_kernel::{Cycle, Digest, RunStats, World};
+
+/// The part of a run that is kept beside the state.
+#[derive(Debug, Default)]
+pub(crate) struct Collector {
+    sums: Sums,
+    rows: Rows,
+    gathered: Vec<Event>,
+}
+
+impl World for PondWorld {
+    const NAME: &'static str = "pond";
+    const AGENT: &'static str = "frog";
+    const OBSERVES_EACH_CYCLE: bool = true;
+
+    type Collector = Collector;
+    type Snapshot = Saved;
+    type Metrics = Value;
+
+    fn agents(&self) -> usize {
+        self.frogs as usize
+    }
+
+    fn before_cycle(&self, state: &PondState, books: &mut Collector, now: Cycle) {
+        books.rows.poses(self, state, now);
+    }
+
+    fn collect(&self, books: &mut Collector, scratch: &mut Vec<Event>) {
+        books.gathered.append(scratch);
+    }
+
+    fn commit(&self, books: &mut Collector) {
+        let mut events = std::mem::take(&mut books.gathered);
+        events.sort_unstable_by_key(|event| (event.cycle, event.frog));
+        for event in events {
+            match event.what {
+                FrogAction::Hop => books.sums.hops += 1,
+                FrogAction::Bump => books.sums.bumps += 1,
+            }
+            books.rows.event(event);
+        }
+    }
+
+    fn start_recording(&self, _: &mut PondState, books: &mut Collector, _: Cycle) {
+        books.rows.begin();
+    }
+
+    fn enable_events(&self, _: &mut Collector) {}
+
+    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
+        books.rows.schemas()
+    }
+
+    fn record(
+        &self,
+        _: &mut PondState,
+        books: &mut Collector,
+        _: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.rows.record(recorder)
+    }
+
+    fn digest(&self, state: &PondState, now: Cycle) -> Digest {
+        let mut hasher = Hasher::default();
+        hasher.write_u64(now);
+        state.pad.iter().for_each(|pad| hasher.write_u32(pad));
+        hasher.finish()
+    }
+
+    fn save(&self, state: &PondState, books: &Collector, _: Cycle) -> Saved {
+        Saved { pads: state.pad.iter().collect(), sums: books.sums }
+    }
+
+    fn restore(&self, saved: Saved, books: &mut Collector) -> Result<PondState, CheckpointError> {
+        if saved.pads.len() != self.frogs as usize {
+            return Err(CheckpointError::Damaged);
+        }
+        books.sums = saved.sums;
+        Ok(self.with_pads(saved.pads))
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        Scenery {
+            name: name.into(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: None,
+            bodies: Vec::new(),
+            names: Vec::new(),
+        }
+    }
+
+    fn frame(&self, state: &PondState, _: &mut Collector, now: Cycle, _: FrameOptions) -> Frame {
+        let frog = |(number, pad)| {
+            let [x_m, y_m] = self.place_m(pad);
+            let shape = Shape::Cylinder { radius_m: 0.3, height_m: 0.2 };
+            Body::new(BodyKind::Robot, number, Pose::from_position([x_m, y_m, 0.1]), shape)
+        };
+        let bodies = (0..).zip(state.pad.iter()).map(frog).collect();
+        Frame { cycle: now, time_s: now as f64, bodies, ..Frame::default() }
+    }
+
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        vec![PositionColumns {
+            table: "trajectories",
+            kind: BodyKind::Robot,
+            number: "frog",
+            part: None,
+            axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
+            plane: None,
+            is_corner: false,
+            heading: None,
+            interval: 1,
+            history: 400,
+        }]
+    }
+
+    fn metrics(&self, _: &PondState, books: &Collector, _: Cycle, _: &RunStats) -> Value {
+        let Sums { hops, bumps } = books.sums;
+        json!({ "hops": hops, "bumps": bumps, "hops_per_frog": hops as f64 / f64::from(self.frogs) })
+    }
+
+    fn agent_metrics(&self, state: &PondState, _: &Collector, _: Cycle) -> Value {
+        state.pad.iter().map(|pad| json!({ "pad": pad })).collect()
+    }
+
+    fn summary_lines(&self, metrics: &Value) -> KeyValues {
+        vec![key_value("hops", metrics["hops"].to_string())]
+    }
+
+    fn poses(&self, state: &PondState, _: Cycle) -> Description {
+        let pads: Vec<u32> = state.pad.iter().collect();
+        Description { text: format!("  pads {pads:?}\n"), json: json!(pads) }
+    }
+}

@@ -1,0 +1,128 @@
+//! The columns of a table of runs, as all outcomes together make them.
+//!
+//! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be
+//! no whole number, in the last run.
+
+use super::cell::Outcome;
+use super::table::Role;
+use serde_json::Value;
+use sidestep_kernel::ports::{ColumnType, Values};
+use std::collections::BTreeMap;
+
+/// Name of the column of reasons why runs failed; it exists only if one did.
+pub(super) const FAILURE: &str = "failure";
+/// Name of the column of cycles done.
+pub(super) const CYCLES: &str = "cycles_run";
+
+/// The columns of a table of runs: results of runs and the times that they took, with the types that hold all values.
+#[derive(Debug, Clone, Default)]
+pub struct ColumnSchema(BTreeMap<(Role, String), ColumnStats>);
+
+/// The findings about a column, of the outcomes so far.
+#[derive(Debug, Clone, Copy)]
+struct ColumnStats {
+    /// Its type, once it has a value.
+    ty: Option<ColumnType>,
+    first: ColumnOrder,
+}
+
+/// The first cell in which a column has a value, and its place there: the order of columns, whoever ran what. Columns
+/// without any value come last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct ColumnOrder {
+    pub(super) cell: u64,
+    pub(super) place: usize,
+}
+
+impl ColumnSchema {
+    /// Takes note of an outcome.
+    pub fn add(&mut self, outcome: &Outcome) {
+        for_each_field(outcome, |role, name, value, place| {
+            let cell = if value.is_null() { u64::MAX } else { outcome.cell };
+            self.add_column(role, name, type_of(value), ColumnOrder { cell, place });
+        });
+    }
+
+    /// Takes note of a column of which values were seen.
+    pub(super) fn add_column(
+        &mut self,
+        role: Role,
+        name: &str,
+        ty: Option<ColumnType>,
+        first: ColumnOrder,
+    ) {
+        let seen = self.0.entry((role, name.to_string())).or_insert(ColumnStats { ty, first });
+        *seen = ColumnStats { ty: common_type(seen.ty, ty), first: seen.first.min(first) };
+    }
+
+    /// Returns role, name and type of the columns, in the order of the table.
+    pub(super) fn columns(&self) -> Vec<(Role, &str, ColumnType)> {
+        let mut columns: Vec<_> = self.0.iter().collect();
+        columns.sort_by_key(|((role, name), seen)| (*role, seen.first, name));
+        columns
+            .into_iter()
+            .map(|((role, name), seen)| (*role, name.as_str(), seen.ty.unwrap_or(ColumnType::F64)))
+            .collect()
+    }
+}
+
+/// Passes on the fields of an outcome: role, name, value, and place among those of the outcome.
+pub(super) fn for_each_field(outcome: &Outcome, mut each: impl FnMut(Role, &str, &Value, usize)) {
+    match &outcome.failure {
+        Some(why) => each(Role::Metric, FAILURE, &why.as_str().into(), 0),
+        None => {
+            each(Role::Digest, "digest", &outcome.digest.as_str().into(), 0);
+            each(Role::Metric, CYCLES, &outcome.cycles.into(), 1);
+        }
+    }
+    for (role, fields) in [(Role::Metric, &outcome.metrics), (Role::Cost, &outcome.costs)] {
+        for (place, (name, value)) in fields.iter().enumerate() {
+            each(role, name, value, place + 2);
+        }
+    }
+}
+
+/// Returns the type of column that holds a value; `None` for null, which all hold.
+pub(super) fn type_of(value: &Value) -> Option<ColumnType> {
+    match value {
+        Value::Null => None,
+        Value::Bool(_) => Some(ColumnType::Bool),
+        Value::Number(number) if number.as_i64().is_some() => Some(ColumnType::I64),
+        Value::Number(_) => Some(ColumnType::F64),
+        _ => Some(ColumnType::Text),
+    }
+}
+
+/// Returns the type that holds the values of two.
+pub(super) fn common_type(a: Option<ColumnType>, b: Option<ColumnType>) -> Option<ColumnType> {
+    use ColumnType::{F64, I64};
+    match (a, b) {
+        (None, other) | (other, None) => other,
+        (Some(a), Some(b)) if a == b => Some(a),
+        (Some(F64 | I64), Some(F64 | I64)) => Some(F64),
+        _ => Some(ColumnType::Text),
+    }
+}
+
+/// Returns the values of a column as those of a wider type.
+pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
+    let n = values.len();
+    match ty {
+        _ if values.ty() == ty => values,
+        _ if (0..n).all(|row| values.is_missing(row)) => {
+            let mut missing = Values::empty(ty);
+            missing.resize(n);
+            missing
+        }
+        ColumnType::F64 => Values::F64((0..n).map(|row| values.number(row)).collect()),
+        _ => {
+            let text = |row| (!values.is_missing(row)).then(|| value_text(&values.json(row)));
+            Values::Text((0..n).map(text).collect())
+        }
+    }
+}
+
+/// Returns a value as text.
+pub(super) fn value_text(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_string)
+}

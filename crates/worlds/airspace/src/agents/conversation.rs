@@ -1,0 +1,142 @@
+//! One talk, as one airplane takes part in it: a party, and the packets around its messages.
+
+use super::network_traffic::NetworkTraffic;
+use super::packet::{ConversationId, Packet, PacketHeader};
+use super::participant::{ConversationEnd, OutgoingMessage, Participant, Progress, WithOutcome};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::DropReason;
+use std::sync::Arc;
+
+/// The identity, participants and times of a talk.
+#[derive(Debug, Clone)]
+pub struct ConversationInfo {
+    /// The talk.
+    pub id: ConversationId,
+    /// Ids of all participants, rising.
+    pub members: Arc<[EntityId]>,
+    /// Id of the airplane itself.
+    pub me: EntityId,
+    /// Digest of scenario and build.
+    pub fingerprint: u64,
+    /// The tick in which it starts.
+    pub start_tick: u64,
+    /// The tick in which it ends at the latest.
+    pub end_tick: u64,
+    /// Whether the radio is dead.
+    pub is_silent: bool,
+}
+
+/// A talk, with the party that is aboard.
+pub struct Conversation<P: ?Sized> {
+    info: ConversationInfo,
+    others: Arc<[EntityId]>,
+    /// Number of packets sent so far.
+    sent: u32,
+    traffic: NetworkTraffic,
+    participant: Box<P>,
+}
+
+impl<P: Participant + ?Sized> Conversation<P> {
+    /// Returns a talk in which nothing has been said yet.
+    pub fn new(frame: ConversationInfo, party: Box<P>) -> Self {
+        let others = frame.members.iter().copied().filter(|&id| id != frame.me).collect();
+        Self {
+            info: frame,
+            others,
+            sent: 0,
+            traffic: NetworkTraffic::default(),
+            participant: party,
+        }
+    }
+
+    /// Its identity, members and times.
+    pub fn info(&self) -> &ConversationInfo {
+        &self.info
+    }
+
+    /// Returns how far the party has come.
+    pub fn progress(&self) -> Progress {
+        self.participant.progress()
+    }
+
+    /// Returns the count of its packets so far.
+    pub fn traffic(&self) -> NetworkTraffic {
+        self.traffic
+    }
+
+    /// Starts it.
+    pub fn start(&mut self, tick: u64, out: &mut Vec<Packet>) {
+        self.participant.start(tick);
+        self.send(out);
+    }
+
+    /// Takes a message of another airplane.
+    ///
+    /// # Errors
+    /// When that one takes no part in it, or its message has impossible content; nothing has changed then.
+    pub fn receive(
+        &mut self,
+        from: EntityId,
+        message: &[u8],
+        tick: u64,
+        out: &mut Vec<Packet>,
+    ) -> Result<(), DropReason> {
+        if from == self.info.me || self.info.members.binary_search(&from).is_err() {
+            return Err(DropReason::Sender);
+        }
+        if message.len() > self.participant.max_message_bytes() {
+            return Err(DropReason::TooLarge);
+        }
+        self.participant.on_message(from, message, tick)?;
+        self.send(out);
+        Ok(())
+    }
+
+    /// Performs the actions that are due by a tick.
+    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<Packet>) {
+        self.participant.on_timer(tick);
+        self.send(out);
+    }
+
+    /// Returns the tick in which something is due, unless a message comes before it.
+    pub fn next_timer(&self) -> Option<u64> {
+        self.participant.next_timer()
+    }
+
+    /// Returns whether the party has come to its outcome.
+    pub fn is_done(&self) -> bool {
+        self.participant.is_done()
+    }
+
+    /// Seals all that the party has to send, and counts it.
+    fn send(&mut self, out: &mut Vec<Packet>) {
+        let ConversationInfo { id, me, fingerprint, is_silent, .. } = self.info;
+        for OutgoingMessage { to, message } in self.participant.take_messages() {
+            let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
+            if is_silent || to.is_empty() {
+                continue;
+            }
+            let sequence = self.sent;
+            let seal = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
+            let payload = message.into_packet(&seal);
+            self.traffic.count(to.len(), payload.len());
+            out.push(Packet { to, sequence, payload });
+            self.sent += 1;
+        }
+    }
+}
+
+impl<P: WithOutcome + ?Sized> Conversation<P> {
+    /// Returns the end of the talk; a party that is not done ends because time is up.
+    pub fn finish(&mut self) -> ConversationEnd<P::Outcome> {
+        self.participant.finish()
+    }
+}
+
+impl<O> Conversation<dyn WithOutcome<Outcome = O>> {
+    /// Returns the talk as it remains for others once it has ended here: it answers their questions.
+    pub fn into_past(self) -> Conversation<dyn Participant> {
+        let Self { info: frame, others, sent, traffic, participant: party } = self;
+        Conversation { info: frame, others, sent, traffic, participant: party }
+    }
+}

@@ -1,0 +1,117 @@
+//! The part of an airplane that coordinators see while they are aboard, and the news that they leave
+//! there for each other.
+
+use super::HostServices;
+use super::state::RoundData;
+use crate::agents::link::ConversationEnd;
+use crate::agents::{OptimizationResult, Ownship};
+use crate::flight::{Point, distance_m};
+
+/// An airplane as coordinators see it.
+#[derive(Debug, Clone)]
+pub(super) struct HostedAircraft {
+    pub own: Ownship,
+    /// The parts of the group, each of which has a coordinator; with several there is one above them,
+    /// which has the number after theirs.
+    pub parts: Vec<Vec<usize>>,
+    /// The part that the airplane belongs to.
+    pub part: usize,
+    /// Tick in which sampling ends, so that some time is left to bring the controls.
+    pub sampling_end: u64,
+    /// News of the part's coordinator for the one above it.
+    pub report: Option<RoundData>,
+    /// News of the one above for the part's coordinator.
+    pub answer: Option<HierarchyReply>,
+    /// Whether there is no one above, and will be none.
+    pub is_orphan: bool,
+    has_news: bool,
+    /// The end of the talk for the airplane.
+    pub end: Option<ConversationEnd<OptimizationResult>>,
+}
+
+/// The news of the coordinator above for that of a part.
+#[derive(Debug, Clone)]
+pub(super) struct HierarchyReply {
+    pub gathered: RoundData,
+    /// Whether it has anything to say.
+    pub is_known: bool,
+}
+
+impl HostedAircraft {
+    pub(super) fn new(own: Ownship, parts: Vec<Vec<usize>>) -> Self {
+        let part = parts.iter().position(|part| part.contains(&own.me)).unwrap_or(0);
+        Self {
+            own,
+            parts,
+            part,
+            sampling_end: u64::MAX,
+            report: None,
+            answer: None,
+            is_orphan: false,
+            has_news: false,
+            end: None,
+        }
+    }
+
+    /// Returns the number of the coordinator above the others, if there is one.
+    pub(super) fn root_seat(&self) -> Option<usize> {
+        (self.parts.len() > 1).then_some(self.parts.len())
+    }
+
+    pub(super) fn set_report(&mut self, report: RoundData) {
+        (self.report, self.has_news) = (Some(report), true);
+    }
+
+    pub(super) fn set_reply(&mut self, answer: HierarchyReply) {
+        (self.report, self.answer, self.has_news) = (None, Some(answer), true);
+    }
+
+    /// Ends the talk for the airplane, unless it has ended: its control stays as it is.
+    pub(super) fn conclude(&mut self, conclusion: OptimizationResult, unheard: Vec<usize>) {
+        let ended = || ConversationEnd { outcome: Some(conclusion), unheard, late: false };
+        self.end.get_or_insert_with(ended);
+    }
+
+    /// Ends the talk for an airplane that no coordinator can reach.
+    pub(super) fn conclude_alone(&mut self, unheard: Vec<usize>) {
+        let beacons = vec![None; self.own.briefing.ids.len()];
+        self.conclude(OptimizationResult { decided: None, beacons }, unheard);
+    }
+}
+
+impl HostServices for HostedAircraft {
+    fn is_watching(&self, seat: usize) -> bool {
+        // Only the part's coordinator waits for the one above it.
+        let is_above = self.root_seat() == Some(seat) && self.report.is_some();
+        self.end.is_none() && (seat == self.part || is_above)
+    }
+
+    fn has_news(&mut self) -> bool {
+        std::mem::take(&mut self.has_news)
+    }
+
+    fn on_no_majority(&mut self, seat: usize, unanswering: &[usize]) {
+        if seat == self.part {
+            self.conclude_alone(unanswering.to_vec());
+        } else if self.root_seat() == Some(seat) && !self.is_orphan {
+            (self.is_orphan, self.has_news) = (true, true);
+        }
+    }
+}
+
+/// Splits a group at some places by proximity into parts of about as many members as there are
+/// parts: each time the first that is left and those nearest to it.
+pub(super) fn partition_group(at: &[Point]) -> Vec<Vec<usize>> {
+    let size = (at.len() as f64).sqrt().ceil() as usize;
+    let mut left: Vec<usize> = (0..at.len()).collect();
+    let mut parts = Vec::new();
+    while let Some(&head) = left.first() {
+        let from = |place: usize| distance_m(at[head], at[place]);
+        left.sort_by(|&a, &b| from(a).total_cmp(&from(b)).then(a.cmp(&b)));
+        let mut part: Vec<usize> = left.drain(..size.min(left.len())).collect();
+        part.sort_unstable();
+        parts.push(part);
+        left.sort_unstable();
+    }
+    parts
+}

@@ -1,0 +1,103 @@
+//! Coordinators and hosts, as they see each other.
+
+use super::epoch::Epoch;
+use crate::agents::participant::InvalidMessage;
+use sidestep_kernel::network::RetryPolicy;
+
+/// The next step of a coordinator that was run on a host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CoordinatorStep {
+    /// It hops to the host at this place.
+    Hop(usize),
+    /// It waits here for another one.
+    Stay,
+    /// It has completed all its tasks.
+    Done,
+}
+
+/// The circumstances in which a coordinator is run on a host.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct HostContext<'a> {
+    /// The newest epoch of each coordinator of the group that the host has accepted.
+    pub epochs: &'a [Epoch],
+    /// Whether each coordinator is on the host.
+    pub is_here: &'a [bool],
+    /// Whether it has waited here for long.
+    pub has_timed_out: bool,
+    /// The host's tick.
+    pub tick: u64,
+}
+
+/// A coordinator: the state that migrates.
+pub(super) trait MigratingCoordinator: Sized {
+    /// The part of a host that a coordinator can see while it is there.
+    type Services: HostServices;
+
+    /// Returns the coordinator number `seat` before it has visited any host.
+    fn new(ship: &Self::Services, seat: usize) -> Self;
+
+    /// Returns its state in the form in which it travels.
+    fn encode(&self) -> Vec<u8>;
+
+    /// Returns a state that has come to a host.
+    ///
+    /// # Errors
+    /// When any part of it is not sound.
+    fn decode(bytes: &[u8], ship: &Self::Services, seat: usize) -> Result<Self, InvalidMessage>;
+
+    /// Goes on until it has to hop, to wait, or is done.
+    fn advance(&mut self, ship: &mut Self::Services, here: &HostContext<'_>) -> CoordinatorStep;
+
+    /// Notes that a host cannot be reached.
+    fn on_unreachable(&mut self, place: usize);
+
+    /// Returns whether it would be done if a host, to which it is on its way, cannot be reached.
+    fn is_done_without(&self, place: usize) -> bool;
+}
+
+/// The part of a host that coordinators can see while they are there.
+pub(super) trait HostServices {
+    /// Returns whether the host misses a coordinator that is not heard of.
+    fn is_watching(&self, seat: usize) -> bool;
+
+    /// Returns whether a coordinator has left news for another one on the host since the last call.
+    fn has_news(&mut self) -> bool {
+        false
+    }
+
+    /// Takes the news that no majority can be found to bring a coordinator back, and which hosts
+    /// have answered nothing.
+    fn on_no_majority(&mut self, seat: usize, unanswering: &[usize]);
+}
+
+/// The rules by which a host waits for others.
+#[derive(Debug, Clone)]
+pub(super) struct HostConfig {
+    /// Size of the group.
+    pub group: usize,
+    /// Place of the host in the group.
+    pub me: usize,
+    /// Repetition of unacknowledged messages; `None` on a network that loses nothing.
+    pub retry_policy: Option<RetryPolicy>,
+    /// Whether an answer of each other host can be expected.
+    pub expected: Vec<bool>,
+    /// Number of ticks without a sign of life after which a coordinator is missed.
+    pub election_timeout_ticks: u64,
+}
+
+impl HostConfig {
+    /// Returns the ticks after which a host that has a coordinator in its care says so: a few of
+    /// them may be lost before it is missed.
+    pub(super) fn heartbeat_ticks(&self) -> u64 {
+        (self.election_timeout_ticks / 4).max(1)
+    }
+
+    /// Returns the ticks after which a coordinator goes on without another one that it waits for:
+    /// enough to bring that one back.
+    pub(super) fn wait_timeout_ticks(&self) -> u64 {
+        match self.retry_policy {
+            Some(_) => self.election_timeout_ticks.saturating_mul(2),
+            None => u64::MAX,
+        }
+    }
+}

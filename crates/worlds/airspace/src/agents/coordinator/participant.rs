@@ -1,0 +1,136 @@
+//! A host as a party to the talk of its group.
+
+use super::HostConfig;
+use super::host::CoordinatorHost;
+use super::hosted_aircraft::{HostedAircraft, partition_group};
+use super::replica::QueuedMessage;
+use super::state::{Coordinator, samples_per_round};
+use crate::agents::link::{ConversationEnd, EndpointConfig};
+use crate::agents::participant::{
+    InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome,
+};
+use crate::agents::{CommonKnowledge, OptimizationResult, Ownship};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::HEADER_BYTES;
+use std::sync::Arc;
+
+/// The program aboard one airplane that takes coordinators in, runs them, and sends them on.
+#[derive(Debug)]
+pub struct HostParticipant {
+    hosting: CoordinatorHost<Coordinator>,
+    group: Arc<[EntityId]>,
+    /// Number of ticks after which the talk ends.
+    ticks: u64,
+    is_silent: bool,
+}
+
+impl HostParticipant {
+    /// Returns the host aboard an airplane. There is one coordinator for the group, or in a hierarchy one for each
+    /// part of it and one above these.
+    pub fn new(own: Ownship, is_hierarchy: bool, radio: EndpointConfig) -> Self {
+        let EndpointConfig { group, me, patience, ticks, is_silent } = radio;
+        // No host waits forever, except where no message is lost.
+        let patience = (patience.ticks < u64::MAX).then_some(patience);
+        let at: Vec<_> = own.briefing.poses.iter().map(|pose| pose.at).collect();
+        let parts =
+            if is_hierarchy { partition_group(&at) } else { vec![(0..group.len()).collect()] };
+        let bytes = max_state_bytes(&own.briefing);
+        let miss_ticks = patience.map_or(u64::MAX, |patience| {
+            // The ticks of a tour, and those within which every host in touch answers; at most a quarter of the talk,
+            // so that enough is left to bring it back.
+            let hops = group.len() as u64 + u64::from(patience.tries);
+            hops.saturating_mul(patience.timeout_ticks(bytes)).min(ticks / 4).max(1)
+        });
+        let expected = (0..group.len()).map(|place| own.is_expected(place)).collect();
+        let rules = HostConfig {
+            group: group.len(),
+            me,
+            retry_policy: patience,
+            expected,
+            election_timeout_ticks: miss_ticks,
+        };
+        let mut stops = parts.clone();
+        if parts.len() > 1 {
+            stops.push((0..group.len()).collect());
+        }
+        let hosting = CoordinatorHost::new(HostedAircraft::new(own, parts), &stops, rules);
+        Self { hosting, group, ticks, is_silent }
+    }
+}
+
+/// Returns the number of bytes that the state of a coordinator of the whole group has at most.
+fn max_state_bytes(briefing: &CommonKnowledge) -> usize {
+    let (actions, block) = (briefing.max_actions(), samples_per_round(briefing).unwrap_or(0));
+    // A player, a decision, and the numbers beside the ways.
+    let numbers = 10 * (6 * actions + 2 * block.max(actions)) + 10 * block + 256;
+    briefing.ids.len() * (briefing.max_message_bytes(block.max(actions)) + numbers) + 512
+}
+
+impl Participant for HostParticipant {
+    fn progress(&self) -> Progress {
+        let epochs = self.hosting.seats.iter().map(|seat| seat.promised.number);
+        Progress { epoch: epochs.max().unwrap_or(0), ..Progress::default() }
+    }
+
+    fn start(&mut self, tick: u64) {
+        if self.is_silent {
+            let me = self.hosting.rules.me;
+            let others = (0..self.group.len()).filter(|&place| place != me).collect();
+            return self.hosting.ship.conclude_alone(others);
+        }
+        // A quarter of the time is left to bring the controls.
+        self.hosting.ship.sampling_end = tick.saturating_add(self.ticks / 4 * 3);
+        self.hosting.start(tick);
+    }
+
+    fn on_message(
+        &mut self,
+        from: EntityId,
+        message: &[u8],
+        tick: u64,
+    ) -> Result<(), InvalidMessage> {
+        let place = self.group.binary_search(&from).map_err(|_| InvalidMessage::Airplane)?;
+        if self.is_silent {
+            return Ok(());
+        }
+        self.hosting.on_message(place, message, tick)
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        if !self.is_silent {
+            self.hosting.on_timer(tick);
+        }
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        self.hosting.next_timer().filter(|_| !self.is_silent)
+    }
+
+    /// Returns whether the airplane has its control, and no other one depends on it for now.
+    fn is_done(&self) -> bool {
+        self.hosting.ship.end.is_some() && self.hosting.is_idle()
+    }
+
+    fn take_messages(&mut self) -> Vec<OutgoingMessage> {
+        let sent = self.hosting.take_messages().into_iter();
+        let to = |place: usize| self.group[place];
+        sent.map(|QueuedMessage { to: place, message }| OutgoingMessage {
+            to: place.map(to),
+            message,
+        })
+        .collect()
+    }
+
+    fn max_message_bytes(&self) -> usize {
+        HEADER_BYTES + max_state_bytes(&self.hosting.ship.own.briefing)
+    }
+}
+
+impl WithOutcome for HostParticipant {
+    type Outcome = OptimizationResult;
+
+    fn finish(&mut self) -> ConversationEnd<OptimizationResult> {
+        let late = || ConversationEnd { outcome: None, unheard: Vec::new(), late: true };
+        self.hosting.ship.end.clone().unwrap_or_else(late)
+    }
+}

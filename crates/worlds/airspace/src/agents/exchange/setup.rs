@@ -1,0 +1,132 @@
+//! The scene as all airplanes of a group see it before they exchange their plans.
+
+use super::Proposal;
+use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
+use crate::agents::traffic_state::StateBeacon;
+use crate::flight::Air;
+use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
+use sidestep_kernel::stream::philox4x32;
+use sidestep_kernel::{Cycle, EntityId};
+
+/// Number of cycles after which airplanes take turns.
+const PRIORITY_PERIOD_CYCLES: Cycle = 12;
+/// Bound on headings in messages, in radians.
+const MAX_HEADING_RAD: f64 = 1e6;
+
+/// An airplane as others see it, and as they know it from its filed plan.
+#[derive(Debug, Clone)]
+pub struct ObservedAircraft {
+    /// Its place, and its model. Of others, the fallback is known only where they are seen to be on it, and
+    /// neither rank nor names are.
+    pub aircraft: ShieldedAircraft,
+    /// Whether it is seen to be on its fallback.
+    pub is_on_orbit: bool,
+    /// Whether it takes part in the exchange, so that it may be heard.
+    pub takes_part: bool,
+    /// Its greatest speed in meters per second.
+    pub max_speed_m_s: f64,
+    /// Largest number of different ways that it can propose.
+    pub max_profiles: usize,
+}
+
+impl ObservedAircraft {
+    /// Checks a beacon of this airplane.
+    fn check_beacon(&self, beacon: &StateBeacon) -> Result<(), InvalidMessage> {
+        let ShieldedAircraft { pose, omega_max_rad_s, orbit_rad_s, separation_m, .. } =
+            self.aircraft;
+        let told = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
+        let is_filed = told == [omega_max_rad_s, orbit_rad_s, separation_m];
+        InvalidMessage::Plan.unless(is_filed && beacon.pose == pose)?;
+        beacon.check(self.max_speed_m_s)
+    }
+}
+
+/// The scene as all of a group see it, and numbers on which they have agreed, before they exchange
+/// their plans.
+#[derive(Debug, Clone)]
+pub struct ExchangeSetup {
+    /// The air that all fly through.
+    pub air: Air,
+    /// Airplanes at least this many meters above each other need not mind each other.
+    pub vertical_m: f64,
+    /// The present cycle.
+    pub now: Cycle,
+    /// Whether all hear all, and fly as planned.
+    pub certainty: PlanCertainty,
+    /// Number of all airplanes, also of those that are not in the group.
+    pub airplanes: usize,
+    /// All airplanes of the group as they can be seen, by rising id.
+    pub aircraft: Vec<ObservedAircraft>,
+}
+
+impl ExchangeSetup {
+    /// Returns whether the airplane at one place goes before another one: it flies on without the
+    /// other's consent, but the other does not without its own.
+    ///
+    /// One that is seen to fly a way goes before one on an orbit, so that it is soon out of the
+    /// other's reach. Among equals all go first in turn.
+    pub fn has_priority(&self, place: usize, other: usize) -> bool {
+        let key = |place: usize| {
+            let ObservedAircraft { aircraft: flyer, is_on_orbit: orbits, .. } =
+                &self.aircraft[place];
+            (*orbits, turn_order(flyer.id, self.now), flyer.id)
+        };
+        key(place) < key(other)
+    }
+
+    /// Checks the proposal of the airplane at a place.
+    pub(super) fn check_proposal(
+        &self,
+        place: usize,
+        proposal: &Proposal,
+    ) -> Result<(), InvalidMessage> {
+        let Proposal { beacon, held, named, ways, .. } = proposal;
+        self.aircraft[place].check_beacon(beacon)?;
+        let is_held = held.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(held.at);
+        InvalidMessage::Number.unless(is_held)?;
+        let are_known = named.iter().all(|&id| (id as usize) < self.airplanes);
+        InvalidMessage::Airplane.unless(are_known && is_ascending(named))?;
+        InvalidMessage::Length.unless(ways.len() <= self.aircraft[place].max_profiles)?;
+        ways.iter().try_for_each(|way| self.check_profile(place, way))
+    }
+
+    /// Checks a way that the airplane at a place may fly.
+    pub(super) fn check_profile(
+        &self,
+        place: usize,
+        way: &TurnProfile,
+    ) -> Result<(), InvalidMessage> {
+        let most_rad_s = self.aircraft[place].aircraft.omega_max_rad_s;
+        InvalidMessage::Length.unless(way.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
+        // Comparisons with NaN are false.
+        InvalidMessage::Number
+            .unless(way.omegas_rad_s.iter().all(|omega| omega.abs() <= most_rad_s))
+    }
+
+    /// Checks a list of members of the group.
+    pub(super) fn check_members(&self, ids: &[EntityId]) -> Result<(), InvalidMessage> {
+        let is_member =
+            |id: &EntityId| self.aircraft.binary_search_by_key(id, |seen| seen.aircraft.id).is_ok();
+        InvalidMessage::Airplane.unless(is_ascending(ids) && ids.iter().all(is_member))
+    }
+
+    /// Returns the largest number of bytes of a message of the exchange.
+    pub(super) fn max_message_bytes(&self) -> usize {
+        let ways = self.aircraft.iter().map(|seen| seen.max_profiles).max().unwrap_or(0);
+        let way = 8 * self.air.timing.points_per_dt() + 5;
+        256 + ways * way + 5 * self.airplanes
+    }
+}
+
+/// Returns whether ids rise, so that none stands among them twice.
+fn is_ascending(ids: &[EntityId]) -> bool {
+    ids.windows(2).all(|pair| pair[0] < pair[1])
+}
+
+/// Returns a number by which airplanes take turns: drawn without a seed, because all have to know it,
+/// and anew when one has had time to get out of the others' way.
+fn turn_order(id: EntityId, now: Cycle) -> u64 {
+    let round = now / PRIORITY_PERIOD_CYCLES;
+    let [high, low, ..] = philox4x32([id, round as u32, (round >> 32) as u32, 0], [0; 2]);
+    u64::from(high) << 32 | u64::from(low)
+}

@@ -1,0 +1,229 @@
+//! An agent's knowledge of its own airplane, and the knowledge that all agents of a group share.
+
+use super::ActionChoice;
+use super::participant::{InvalidMessage, are_valid_coordinates};
+use super::traffic_state::{StateBeacon, TrafficPicture, TrafficState};
+use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction};
+use crate::non_cooperative::NonCooperative;
+use crate::objective::{ActionPredictions, Objective};
+use crate::purpose;
+use sidestep_collectives::{Estimator, OptimizerConfig, Player};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
+
+/// The knowledge that all agents of a group share before they talk.
+#[derive(Debug, Clone)]
+pub struct CommonKnowledge {
+    /// The present cycle.
+    pub now: Cycle,
+    /// Ids of the group, rising.
+    pub ids: Arc<[EntityId]>,
+    /// The flights of the group as filed, in the order of the ids.
+    pub filed: Vec<FiledFlight>,
+    /// Poses at which all see the airplanes of the group, in the order of the ids.
+    pub poses: Vec<Pose2>,
+    /// The air that all fly through.
+    pub air: Air,
+    /// The objective that is minimized.
+    pub objective: Objective,
+    /// Settings of the optimizer.
+    pub settings: OptimizerConfig,
+    /// The random streams from which samples are drawn.
+    pub streams: Streams,
+    /// Airplanes near the group that mind no other, as all see them.
+    pub intruders: Vec<NonCooperative>,
+    /// Whether the shield keeps airplanes that are not heard on their orbits.
+    pub is_shielded: bool,
+}
+
+/// A flight as it was filed.
+#[derive(Debug, Clone)]
+pub struct FiledFlight {
+    /// Abilities of the airplane.
+    pub model: Model,
+    /// Actions from which it may choose.
+    pub actions: Vec<Action>,
+    /// The knowledge that all others have of it before they have heard it.
+    pub contact: TrafficState,
+    /// Its greatest speed in meters per second.
+    pub max_speed_m_s: f64,
+    /// Largest number of way-points that it is to reach under any orders.
+    pub max_way_points: usize,
+    /// Number of orders that it will be given.
+    pub orders: usize,
+}
+
+impl CommonKnowledge {
+    /// Returns where the actions of an airplane lead it, by the state that it sends.
+    pub fn action_predictions(
+        &self,
+        place: usize,
+        beacon: &StateBeacon,
+        mission: &[Point],
+        next: usize,
+    ) -> ActionPredictions {
+        let FiledFlight { model, actions, .. } = &self.filed[place];
+        let model = Model {
+            v_m_s: beacon.v_m_s,
+            omega_max_rad_s: beacon.omega_max_rad_s,
+            separation_m: beacon.separation_m,
+            ..model.clone()
+        };
+        let predictions = self.air.predictions(&model, actions, mission, beacon.pose, next);
+        ActionPredictions::new(predictions, beacon.separation_m, beacon.levels)
+            .with_non_cooperative(&self.intruders, &self.objective, self.air.timing.dtau_s)
+    }
+
+    /// Returns the `k`-th uniform number in [0, 1) of an airplane's stream, which all can draw.
+    pub(super) fn uniform(&self, place: usize, k: u64) -> f64 {
+        purpose::sample(&self.streams, self.ids[place], self.now, k)
+    }
+
+    /// Returns the decision of an airplane's player after some rounds, of which the last `calm` were
+    /// calm; none, if it has not learned anything.
+    pub(super) fn action_choice(
+        &self,
+        place: usize,
+        player: &Player,
+        rounds: u32,
+        calm: u32,
+    ) -> Option<ActionChoice> {
+        let OptimizerConfig { estimator, choice, stop, .. } = self.settings;
+        let drawn = match estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
+        };
+        (!player.expected().is_empty()).then(|| ActionChoice {
+            chosen: player.choose(choice, self.uniform(place, drawn)),
+            expected: player.expected().to_vec(),
+            rounds,
+            converged: calm >= stop.calm_rounds,
+            chances: player.q.clone(),
+        })
+    }
+
+    /// Checks a beacon of the airplane at a place.
+    ///
+    /// # Errors
+    /// When it is not where all see it, or cannot fly like that.
+    pub(super) fn check_beacon(
+        &self,
+        place: usize,
+        beacon: &StateBeacon,
+    ) -> Result<(), InvalidMessage> {
+        let FiledFlight {
+            contact: TrafficState { beacon: filed, .. }, max_speed_m_s: top_m_s, ..
+        } = &self.filed[place];
+        let model = |b: &StateBeacon| [b.omega_max_rad_s, b.orbit_rad_s, b.separation_m];
+        let is_filed = model(beacon) == model(filed) && beacon.pose == self.poses[place];
+        InvalidMessage::Plan.unless(is_filed)?;
+        beacon.check(*top_m_s)
+    }
+
+    /// Checks some predicted ways.
+    ///
+    /// # Errors
+    /// When there are not `expected` of them, or one does not span the whole horizon.
+    pub(super) fn check_predictions(
+        &self,
+        ways: &[Prediction],
+        expected: usize,
+    ) -> Result<(), InvalidMessage> {
+        InvalidMessage::Length.unless(ways.len() == expected)?;
+        ways.iter().try_for_each(|way| {
+            let is_whole = way.points.len() == self.air.timing.horizon;
+            InvalidMessage::Length.unless(is_whole && way.counted <= way.points.len())?;
+            InvalidMessage::Number
+                .unless(are_valid_coordinates(way.points.as_flattened().iter().copied()))
+        })
+    }
+
+    /// Checks how far an agent's probabilities have moved in a round: infinitely far before the first.
+    ///
+    /// # Errors
+    /// When there is no such round, or a distance is no number.
+    pub(super) fn check_round(&self, round: u32, change: f64) -> Result<(), InvalidMessage> {
+        InvalidMessage::Round.unless(round <= self.settings.stop.max_rounds)?;
+        InvalidMessage::Number.unless(change >= 0.0)
+    }
+
+    /// Returns the largest number of bytes of a message with this number of predicted ways.
+    pub(super) fn max_message_bytes(&self, ways: usize) -> usize {
+        let way_points = self.filed.iter().map(|filed| filed.max_way_points).max().unwrap_or(0);
+        512 + ways * (16 * self.air.timing.horizon + 20) + 16 * way_points
+    }
+
+    /// Returns the largest number of actions of any airplane of the group.
+    pub(super) fn max_actions(&self) -> usize {
+        self.filed.iter().map(|filed| filed.actions.len()).max().unwrap_or(0)
+    }
+}
+
+/// An agent's knowledge of its own airplane, and of others from messages.
+#[derive(Debug, Clone)]
+pub struct Ownship {
+    /// Place in the group.
+    pub me: usize,
+    /// State of the airplane, and the number of way-points behind it.
+    pub known: KnownAircraft,
+    /// The message in which it describes itself.
+    pub beacon: StateBeacon,
+    /// Way-points that it is to reach.
+    pub mission: Vec<Point>,
+    /// Predictions of its own actions.
+    pub options: ActionPredictions,
+    /// Knowledge of others from earlier cycles.
+    pub contacts: TrafficPicture,
+    /// The knowledge that all share.
+    pub briefing: Arc<CommonKnowledge>,
+}
+
+impl Ownship {
+    pub(super) fn settings(&self) -> &OptimizerConfig {
+        &self.briefing.settings
+    }
+
+    pub(super) fn uniform(&self, k: u64) -> f64 {
+        self.briefing.uniform(self.me, k)
+    }
+
+    /// Returns the next `block` samples of a player after `drawn`.
+    pub(super) fn samples(&self, player: &Player, drawn: u64, block: usize) -> Vec<usize> {
+        (drawn..drawn + block as u64).map(|k| player.sample(self.uniform(k))).collect()
+    }
+
+    /// Returns the decision of a player of samples or of distributions after some rounds, of which
+    /// the last `calm` were calm; none, if it has not learned anything.
+    pub(super) fn action_choice(
+        &self,
+        player: &Player,
+        rounds: u32,
+        calm: u32,
+    ) -> Option<ActionChoice> {
+        self.briefing.action_choice(self.me, player, rounds, calm)
+    }
+
+    /// Returns whether another one was heard lately, or is met for the first time.
+    pub(super) fn is_expected(&self, other: usize) -> bool {
+        let contact = self.contacts.get(&self.briefing.ids[other]);
+        contact.is_none_or(|contact| contact.heard_in + 1 >= self.briefing.now)
+    }
+
+    /// Returns the predictions for another one that is not heard.
+    pub(super) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
+        let id = self.briefing.ids[other];
+        let filed = || &self.briefing.filed[other].contact;
+        self.predictions_from_state(self.contacts.get(&id).unwrap_or_else(filed))
+    }
+
+    /// Returns the same for one that was heard a moment ago.
+    pub(super) fn predictions_from_beacon(&self, beacon: &StateBeacon) -> ActionPredictions {
+        self.predictions_from_state(&TrafficState::from_beacon(beacon.clone(), self.briefing.now))
+    }
+
+    fn predictions_from_state(&self, contact: &TrafficState) -> ActionPredictions {
+        let CommonKnowledge { air, is_shielded, now, .. } = &*self.briefing;
+        contact.presumed_predictions(air, *is_shielded, *now)
+    }
+}

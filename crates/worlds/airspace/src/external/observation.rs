@@ -1,0 +1,303 @@
+//! Percepts: the knowledge with which an airplane decides, as numbers of fixed shapes.
+
+use crate::PhaseContext;
+use crate::flight::{FlightSegment, KnownAircraft, Point, distance_m};
+use crate::non_cooperative::NonCooperative;
+use crate::world::AirspaceWorld;
+use sidestep_kernel::control::{BufferMut, Space, SpaceKind};
+use sidestep_kernel::geometry::sub;
+use sidestep_kernel::math::{atan2, hypot, wrap_angle};
+use sidestep_kernel::{EntityId, Slot};
+use std::array::from_fn;
+use std::f64::consts::PI;
+
+/// Most others that one airplane observes: the nearest.
+pub(super) const MAX_NEIGHBORS: usize = 16;
+
+/// An airplane as all of its group see it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VisibleAircraft {
+    slot: Slot,
+    at: Point,
+    altitude_m: f64,
+    heading_rad: f64,
+    speed_m_s: f64,
+    separation_m: f64,
+    is_cooperative: bool,
+}
+
+/// An airplane's knowledge of itself and of others; nothing for one that does not decide.
+#[derive(Debug, Default)]
+pub(super) struct Observation {
+    is_due: bool,
+    at: Point,
+    altitude_m: f64,
+    heading_rad: f64,
+    speed_m_s: f64,
+    turn_rate_rad_s: f64,
+    /// Its next way-point, seen from it.
+    way_point: Point,
+    way_points_left: usize,
+    delay_s: f64,
+    /// The nearest first.
+    neighbors: Vec<Neighbor>,
+}
+
+/// Another airplane, seen from one.
+#[derive(Debug)]
+struct Neighbor {
+    seen: VisibleAircraft,
+    /// Its place, seen from the airplane.
+    apart: Point,
+    above_m: f64,
+    separation_m: f64,
+    is_named: bool,
+    /// Seconds since it was heard, if it ever was.
+    unheard_s: Option<f64>,
+}
+
+impl VisibleAircraft {
+    /// Returns all airplanes of a group.
+    pub(super) fn from_group(
+        turn: &PhaseContext<'_>,
+        flown: &[KnownAircraft],
+        intruders: &[NonCooperative],
+    ) -> Vec<Self> {
+        let PhaseContext { world, state, .. } = turn;
+        let own = flown.iter().map(|known| {
+            let model = world.segment(known.slot, known.orders).model;
+            Self {
+                slot: known.slot,
+                at: known.pose.at,
+                altitude_m: known.altitude_m,
+                heading_rad: wrap_heading(known.pose.heading_rad),
+                speed_m_s: model.v_m_s,
+                separation_m: model.separation_m,
+                is_cooperative: true,
+            }
+        });
+        let others = intruders.iter().map(|one| {
+            let [vx, vy] = one.velocity_m_s;
+            Self {
+                slot: one.slot,
+                at: one.at,
+                altitude_m: state.airplanes[one.slot as usize].altitude_m.get(),
+                heading_rad: atan2(vy, vx),
+                speed_m_s: hypot(vx, vy),
+                separation_m: one.separation_m,
+                is_cooperative: false,
+            }
+        });
+        own.chain(others).collect()
+    }
+}
+
+impl Observation {
+    /// Returns the percept of one of a group.
+    pub(super) fn new(
+        turn: &PhaseContext<'_>,
+        own: &KnownAircraft,
+        all: &[VisibleAircraft],
+    ) -> Self {
+        let PhaseContext { world, state, .. } = turn;
+        let FlightSegment { model, mission, .. } = world.segment(own.slot, own.orders);
+        let ahead = mission.get(own.next..).unwrap_or_default();
+        Self {
+            is_due: true,
+            at: own.pose.at,
+            altitude_m: own.altitude_m,
+            heading_rad: wrap_heading(own.pose.heading_rad),
+            speed_m_s: model.v_m_s,
+            turn_rate_rad_s: state.turn_rate_rad_s(own.slot),
+            way_point: ahead.first().map_or([0.0; 2], |&goal| sub(goal, own.pose.at)),
+            way_points_left: ahead.len(),
+            delay_s: delay_s(turn, own, ahead),
+            neighbors: neighbors(turn, own, all),
+        }
+    }
+
+    /// Writes it into a row of each room, in the order of [`spaces`].
+    pub(super) fn write(&self, world: &AirspaceWorld, row: usize, room: &mut [BufferMut<'_>]) {
+        let mut row = Row { rooms: room.iter_mut(), row };
+        row.write_integers(&[i64::from(self.is_due)]);
+        row.write_reals(&self.at);
+        row.write_reals(&[self.altitude_m]);
+        row.write_reals(&[self.heading_rad]);
+        row.write_reals(&[self.speed_m_s]);
+        row.write_reals(&[self.turn_rate_rad_s]);
+        row.write_reals(&self.way_point);
+        row.write_integers(&[self.way_points_left as i64]);
+        row.write_reals(&[self.delay_s]);
+        row.write_integers(&[self.neighbors.len() as i64]);
+        row.write_integers(&self.neighbor_values(-1, |one| one.seen.slot.into()));
+        row.write_reals(self.neighbor_values([0.0; 2], |one| one.apart).as_flattened());
+        row.write_reals(&self.neighbor_values(0.0, |one| one.above_m));
+        row.write_reals(&self.neighbor_values(0.0, |one| one.seen.heading_rad));
+        row.write_reals(&self.neighbor_values(0.0, |one| one.seen.speed_m_s));
+        row.write_reals(&self.neighbor_values(0.0, |one| one.separation_m));
+        row.write_integers(&self.neighbor_values(0, |one| one.seen.is_cooperative.into()));
+        row.write_integers(&self.neighbor_values(0, |one| one.is_named.into()));
+        if world.network.is_some() {
+            row.write_reals(&self.neighbor_values(-1.0, |one| one.unheard_s.unwrap_or(-1.0)));
+        }
+    }
+
+    /// Returns a value of each neighbor, then `none` for the places that are left.
+    fn neighbor_values<T: Copy>(&self, none: T, of: impl Fn(&Neighbor) -> T) -> [T; MAX_NEIGHBORS] {
+        from_fn(|k| self.neighbors.get(k).map_or(none, &of))
+    }
+}
+
+/// One airplane's row in rooms that are written one after the other.
+struct Row<'a, 'b> {
+    rooms: std::slice::IterMut<'a, BufferMut<'b>>,
+    row: usize,
+}
+
+impl Row<'_, '_> {
+    fn write_integers(&mut self, values: &[i64]) {
+        let Some(room) = self.rooms.next() else { return };
+        let first = self.row * values.len();
+        (first..).zip(values).for_each(|(at, &value)| room.set_integer(at, value));
+    }
+
+    fn write_reals(&mut self, values: &[f64]) {
+        let Some(room) = self.rooms.next() else { return };
+        let first = self.row * values.len();
+        (first..).zip(values).for_each(|(at, &value)| room.set_real(at, value));
+    }
+}
+
+/// Returns the nearest others of an airplane's group, the nearest first.
+fn neighbors(
+    turn: &PhaseContext<'_>,
+    own: &KnownAircraft,
+    all: &[VisibleAircraft],
+) -> Vec<Neighbor> {
+    let PhaseContext { world, state, now, .. } = turn;
+    let others = all.iter().filter(|other| other.slot != own.slot);
+    let mut nearest: Vec<(f64, &VisibleAircraft)> =
+        others.map(|other| (distance_m(own.pose.at, other.at), other)).collect();
+    nearest.sort_unstable_by(|(a_m, a), (b_m, b)| a_m.total_cmp(b_m).then(a.slot.cmp(&b.slot)));
+    nearest.truncate(MAX_NEIGHBORS);
+    let named = state.exempt_with(own.slot);
+    let contacts = state.traffic_picture(own.slot);
+    let separation_m = world.segment(own.slot, own.orders).model.separation_m;
+    let neighbor = |(_, seen): (f64, &VisibleAircraft)| Neighbor {
+        seen: *seen,
+        apart: sub(seen.at, own.pose.at),
+        above_m: seen.altitude_m - own.altitude_m,
+        separation_m: separation_m.max(seen.separation_m),
+        is_named: named.binary_search(&seen.slot).is_ok(),
+        unheard_s: contacts
+            .get(&seen.slot)
+            .map(|contact| world.cycle_start_s(now.saturating_sub(contact.heard_in))),
+    };
+    nearest.into_iter().map(neighbor).collect()
+}
+
+/// Returns how much later an airplane will arrive than it would alone, if it now flies straight from
+/// way-point to way-point; 0 for one that goes to none, or does not arrive.
+fn delay_s(turn: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> f64 {
+    let PhaseContext { world, now, .. } = turn;
+    let i = own.slot as usize;
+    let (airplane, alone_s) = (&world.airplanes[i], world.alone_s[i]);
+    let arrives = alone_s.is_finite() && airplane.leaves_s.is_infinite();
+    if !arrives || airplane.has_fixed_heading(own.orders as usize) {
+        return 0.0;
+    }
+    let flown_s = world.cycle_start_s(*now) - world.cycle_start_s(world.first_controlled_cycle(i));
+    let (air, v_m_s) = (world.air(), world.segment(own.slot, own.orders).model.v_m_s);
+    let left_s = ahead.iter().scan(own.pose.at, |from, &to| {
+        Some(air.straight_s(std::mem::replace(from, to), to, v_m_s))
+    });
+    flown_s + left_s.sum::<f64>() - alone_s
+}
+
+/// Returns a heading within half a turn to either side; one that already is stays the same to the bit.
+fn wrap_heading(heading_rad: f64) -> f64 {
+    if heading_rad.abs() <= PI { heading_rad } else { wrap_angle(heading_rad) }
+}
+
+/// Returns the spaces of the percepts of a team's airplanes.
+pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
+    let most_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
+    let goals = |&id: &EntityId| {
+        let orders = 0..=world.airplanes[id as usize].orders.len() as u32;
+        orders.map(|done| world.segment(id, done).mission.len()).max().unwrap_or(0)
+    };
+    let most_goals = agents.iter().map(goals).max().unwrap_or(0) as i64;
+    let is = || SpaceKind::Discrete(["no", "yes"].map(String::from).into());
+    let mut spaces = vec![
+        Space::new("due", is(), "whether it decides in the next cycle; all else is padding if not"),
+        Space::new("place_m", UNBOUNDED, "its place, east and north, as all see it")
+            .with_shape([2]),
+        Space::new("altitude_m", UNBOUNDED, "its altitude"),
+        Space::new("heading_rad", ANGLE, "its heading, counterclockwise from east"),
+        Space::new("speed_m_s", POSITIVE, "its speed through the air"),
+        Space::new(
+            "turn_rate_rad_s",
+            SpaceKind::Real { low: -most_rad_s, high: most_rad_s },
+            "its turn rate in the last step, positive to the left; 0 before the first",
+        ),
+        Space::new(
+            "way_point_m",
+            UNBOUNDED,
+            "its next way-point, seen from it; 1e12 m ahead while it is to keep a heading",
+        )
+        .with_shape([2]),
+        Space::new(
+            "way_points_left",
+            SpaceKind::Integer { low: 0, high: most_goals },
+            "way-points that it is still to reach",
+        ),
+        Space::new(
+            "delay_s",
+            UNBOUNDED,
+            "how much later it arrives than alone if it flies straight to its way-points from now on; \
+             0 if it keeps a heading, or never arrives",
+        ),
+    ];
+    spaces.extend(neighbor_spaces(world));
+    spaces
+}
+
+const UNBOUNDED: SpaceKind = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
+const POSITIVE: SpaceKind = SpaceKind::Real { low: 0.0, high: f64::INFINITY };
+const ANGLE: SpaceKind = SpaceKind::Real { low: -PI, high: PI };
+
+/// Returns the spaces of the neighbors in percepts.
+fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
+    let is = || SpaceKind::Discrete(["no", "yes"].map(String::from).into());
+    let ids = SpaceKind::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
+    let each = |name: &str, bounds: SpaceKind, meaning: &str| {
+        Space::new(name, bounds, meaning).with_shape([MAX_NEIGHBORS])
+    };
+    let mut spaces = vec![
+        Space::new(
+            "neighbors",
+            SpaceKind::Integer { low: 0, high: MAX_NEIGHBORS as i64 },
+            "others of its group that follow, the nearest first; values beyond them are padding, 0 \
+             where nothing else is said",
+        ),
+        each("neighbor_id", ids, "their ids; -1 where there are no more"),
+        each(
+            "neighbor_place_m",
+            UNBOUNDED,
+            "their places, east and north, as all see them, seen from it",
+        )
+        .with_shape([MAX_NEIGHBORS, 2]),
+        each("neighbor_above_m", UNBOUNDED, "how far they are above it"),
+        each("neighbor_heading_rad", ANGLE, "their headings, counterclockwise from east"),
+        each("neighbor_speed_m_s", POSITIVE, "their speeds through the air"),
+        each("neighbor_separation_m", POSITIVE, "the distances that it and they are to keep"),
+        each("neighbor_minds", is(), "whether they mind others"),
+        each("neighbor_named", is(), "whether the shield promises nothing for it and them"),
+    ];
+    if world.network.is_some() {
+        let bounds = SpaceKind::Real { low: -1.0, high: f64::INFINITY };
+        let meaning = "time since it heard them or first met them; -1 where it has not";
+        spaces.push(each("neighbor_unheard_s", bounds, meaning));
+    }
+    spaces
+}

@@ -1,0 +1,67 @@
+//! Wishes that a caller orders, as an airplane keeps them until it decides.
+
+use super::flight::Point;
+use serde::{Deserialize, Serialize};
+
+/// An order from outside: the wish that an airplane is to have when it decides next.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ExternalAction {
+    /// Its actions by number, the best first.
+    Ranking(Vec<u16>),
+    /// A turn rate in radians per second, positive to the left.
+    TurnRate(f64),
+    /// A velocity through the air in meters per second, east and north.
+    Velocity(Point),
+}
+
+impl ExternalAction {
+    /// The order to rank the actions.
+    pub const RANKING: &'static str = "ranking";
+    /// The order of a turn rate.
+    pub const TURN_RATE: &'static str = "turn_rate_rad_s";
+    /// The order of a velocity.
+    pub const VELOCITY: &'static str = "velocity_m_s";
+
+    /// Returns the wish of an order by its name; `None` where there is no such order.
+    pub(crate) fn from_order(order: &str, values: &[f64]) -> Option<Self> {
+        match (order, values) {
+            (Self::RANKING, actions) => {
+                Some(Self::Ranking(actions.iter().map(|&action| action as u16).collect()))
+            }
+            (Self::TURN_RATE, &[omega_rad_s]) => Some(Self::TurnRate(omega_rad_s)),
+            (Self::VELOCITY, &[vx, vy]) => Some(Self::Velocity([vx, vy])),
+            _ => None,
+        }
+    }
+
+    /// Checks whether it can be flown; its numbers are within their bounds.
+    ///
+    /// # Errors
+    /// When it cannot: the reason, and the remedy.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match self {
+            Self::Ranking(actions) => check_ranking(actions),
+            Self::Velocity([0.0, 0.0]) => {
+                Err("0 has no direction; give a velocity that is not 0 in both parts".into())
+            }
+            Self::TurnRate(_) | Self::Velocity(_) => Ok(()),
+        }
+    }
+}
+
+fn check_ranking(actions: &[u16]) -> Result<(), String> {
+    let mut times = vec![0_usize; actions.len()];
+    actions.iter().for_each(|&action| times[usize::from(action)] += 1);
+    let with = |is: &dyn Fn(usize) -> bool| times.iter().position(|&times| is(times));
+    // Where no action occurs twice, none is missing.
+    let (Some(double), Some(missing)) = (with(&|times| times > 1), with(&|times| times == 0))
+    else {
+        return Ok(());
+    };
+    Err(format!(
+        "action {double} stands in it {} times and action {missing} not at all; give each action from \
+         0 to {} once, the best first",
+        times[double],
+        actions.len() - 1
+    ))
+}

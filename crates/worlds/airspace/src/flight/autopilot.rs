@@ -1,0 +1,333 @@
+//! Predictions: a pilot flies actions and missions step by step, and returns the way.
+
+use super::action::Action;
+use super::motion::{Model, Point, Pose2, Timing, distance_m, sinc};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math;
+
+/// The flight after the last way-point, in predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AfterLastWaypoint {
+    /// Flies straight on.
+    #[default]
+    Straight,
+    /// Continues to steer for the last way-point.
+    Pursue,
+}
+
+/// The rule by which an airplane is done with a way-point.
+///
+/// It is reached within a tolerance. But an airplane with a way-point inside one of its two
+/// tightest turning circles would orbit it forever, because steering for it keeps the airplane on
+/// that circle. Such a way-point counts as *passed* when it is abeam on the near side. That happens
+/// within one turn round the circle, and there the airplane is as near as it can be without flying
+/// away first.
+///
+/// An airplane that turns by more than a radian in a step looks too rarely for that: it flies over a way-point, or
+/// past where it is abeam, between two looks. It passes a way-point in the step in which it comes nearest to it, if
+/// it is less than a step's way from it at either end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WaypointRule {
+    /// Distance in meters below which a way-point is reached.
+    pub tolerance_m: f64,
+    /// Whether a way-point inside a turning circle can be passed.
+    pub passes: bool,
+}
+
+impl WaypointRule {
+    /// Returns whether an airplane at `pose`, and at `before` one step earlier, is done with the way-point `goal`;
+    /// its tightest turn has this radius, and it flies `step_m` meters from one look to the next.
+    // Asked in every step of every prediction: a call in its place takes a tenth of an optimization's time.
+    #[inline(always)]
+    pub fn is_done(
+        &self,
+        (before, pose): (Pose2, Pose2),
+        goal: Point,
+        radius_m: f64,
+        step_m: f64,
+    ) -> bool {
+        let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
+        let square = dx * dx + dy * dy;
+        if square < self.tolerance_m * self.tolerance_m {
+            return true;
+        }
+        // No point farther than a diameter lies in a turning circle. Nearly always it is farther, and predictions
+        // ask in every step: the rest stands elsewhere, so that only this much is inlined.
+        let is_far = step_m <= radius_m && square >= 4.0 * radius_m * radius_m;
+        self.passes && !is_far && is_passed((before, pose), goal, radius_m, step_m)
+    }
+}
+
+/// Returns whether an airplane has passed a way-point in its last step: flown over it, or had it abeam inside a
+/// turning circle.
+#[inline(never)]
+fn is_passed((before, pose): (Pose2, Pose2), goal: Point, radius_m: f64, step_m: f64) -> bool {
+    let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
+    let square = dx * dx + dy * dy;
+    if step_m > radius_m && is_flown_over((before, pose), goal, step_m) {
+        return true;
+    }
+    if square >= 4.0 * radius_m * radius_m {
+        return false;
+    }
+    // The circles' centers are a radius to the left and right: the goal is inside when its
+    // distance to the nearer center is below the radius.
+    let [ahead, left] = relative_position(pose, goal);
+    let is_inside = square < 2.0 * radius_m * left.abs();
+    // Abeam since the last look: on a circle, ahead changes by less than a step per step.
+    is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
+}
+
+/// Returns how far ahead of an airplane a place is, and how far to its left.
+#[inline]
+fn relative_position(pose: Pose2, place: Point) -> Point {
+    let (dx, dy) = (place[0] - pose.at[0], place[1] - pose.at[1]);
+    let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
+    [cos * dx + sin * dy, cos * dy - sin * dx]
+}
+
+/// Returns whether an airplane comes nearest to a place within a step of `step_m` meters, and is nearer than that at
+/// either end of it.
+fn is_flown_over((before, pose): (Pose2, Pose2), place: Point, step_m: f64) -> bool {
+    let comes_nearest =
+        relative_position(before, place)[0] > 0.0 && relative_position(pose, place)[0] <= 0.0;
+    comes_nearest && distance_m(before.at, place).min(distance_m(pose.at, place)) < step_m
+}
+
+/// The way that an action leads.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Positions in meters after 1, 2, ... steps of `dtau`.
+    pub points: Vec<Point>,
+    /// Number of points that count against others: those up to arrival at the last way-point.
+    pub counted: usize,
+}
+
+/// An airplane on a predicted way: a pose, and values that save computing its sine and cosine anew
+/// in every step. Equal to [`Pose2::step`] except for rounding (a test compares them).
+#[derive(Debug, Clone, Copy)]
+struct PredictionState {
+    pose: Pose2,
+    /// Cosine and sine of the heading.
+    along: Point,
+    /// The turn rate of the last step; beside it, for half of its turn, cosine, sine and sinc.
+    omega_rad_s: f64,
+    half_turn: [f64; 3],
+}
+
+impl PredictionState {
+    fn new(pose: Pose2) -> Self {
+        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
+        Self { pose, along, omega_rad_s: 0.0, half_turn: [1.0, 0.0, 1.0] }
+    }
+
+    /// Returns whether the goal lies dead ahead, so that steering for it no longer changes
+    /// anything.
+    #[inline]
+    fn is_heading_for(&self, goal: Point) -> bool {
+        let [dx, dy] = [goal[0] - self.pose.at[0], goal[1] - self.pose.at[1]];
+        let [c, s] = self.along;
+        let (ahead, across) = (dx * c + dy * s, dy * c - dx * s);
+        ahead > 0.0 && across.abs() <= 1e-12 * ahead
+    }
+
+    #[inline]
+    fn step(&mut self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) {
+        if omega_rad_s != self.omega_rad_s {
+            let half = 0.5 * omega_rad_s * dtau_s;
+            self.omega_rad_s = omega_rad_s;
+            self.half_turn = match omega_rad_s {
+                0.0 => [1.0, 0.0, 1.0],
+                _ => [math::cos(half), math::sin(half), sinc(half)],
+            };
+        }
+        let [c, s, sinc] = self.half_turn;
+        let turned = |[x, y]: Point| [x * c - y * s, x * s + y * c];
+        let chord_m = v_m_s * dtau_s * sinc;
+        let middle = turned(self.along);
+        self.along = turned(middle);
+        self.pose = Pose2 {
+            at: [self.pose.at[0] + chord_m * middle[0], self.pose.at[1] + chord_m * middle[1]],
+            heading_rad: self.pose.heading_rad + omega_rad_s * dtau_s,
+        };
+    }
+}
+
+/// Flies step by step: an action, the way-points, and the flight after the last.
+#[derive(Debug, Clone, Copy)]
+pub struct Autopilot<'a> {
+    /// The airplane's model.
+    pub model: &'a Model,
+    /// Way-points of the airplane.
+    pub mission: &'a [Point],
+    /// Rule by which way-points count as reached.
+    pub passing: WaypointRule,
+    /// The flight after the last way-point.
+    pub after: AfterLastWaypoint,
+    /// Seconds per step.
+    pub dtau_s: f64,
+}
+
+impl Autopilot<'_> {
+    /// Returns the turn rate of an action in the step that starts after `flown_s` seconds of it.
+    #[inline]
+    pub fn omega_rad_s(&self, action: Action, pose: Pose2, next: usize, flown_s: f64) -> f64 {
+        match action.turn_rate_rad_s(flown_s) {
+            Some(omega_rad_s) => omega_rad_s,
+            None => match (self.mission.get(next), self.after) {
+                (Some(&goal), _) => pose.steer(goal, self.model.omega_max_rad_s, self.dtau_s),
+                (None, AfterLastWaypoint::Pursue) => {
+                    let last = *self.mission.last().unwrap_or(&pose.at);
+                    pose.steer(last, self.model.omega_max_rad_s, self.dtau_s)
+                }
+                (None, AfterLastWaypoint::Straight) => 0.0,
+            },
+        }
+    }
+
+    /// Returns the way-point after those that are done with at a pose, which is one step after the pose `before`.
+    // For the reason of `is_done`.
+    #[inline(always)]
+    pub fn next_way_point(&self, (before, pose): (Pose2, Pose2), mut next: usize) -> usize {
+        let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
+        while let Some(&goal) = self.mission.get(next) {
+            if !self.passing.is_done((before, pose), goal, radius_m, step_m) {
+                break;
+            }
+            next += 1;
+        }
+        next
+    }
+
+    /// Predicts `timing.horizon` points of an action from `pose` toward way-point `next`.
+    pub fn predict(&self, action: Action, pose: Pose2, next: usize, timing: &Timing) -> Prediction {
+        let mut points = Vec::with_capacity(timing.horizon);
+        let (mut flight, mut next, mut counted) =
+            (PredictionState::new(pose), next, timing.horizon);
+        for k in 0..timing.horizon {
+            let (flown_s, before) = (k as f64 * self.dtau_s, flight.pose);
+            let goal = self.mission.get(next).filter(|_| action.turn_rate_rad_s(flown_s).is_none());
+            if self.after == AfterLastWaypoint::Pursue {
+                // An airplane that returns to its last way-point turns to the side that rounding
+                // decides, so the rounding must be that of the motion itself.
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
+                flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
+            } else if goal.is_some_and(|&g| flight.is_heading_for(g)) {
+                flight.step(self.model.v_m_s, 0.0, self.dtau_s);
+            } else {
+                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
+                flight.step(self.model.v_m_s, omega, self.dtau_s);
+            }
+            points.push(flight.pose.at);
+            if next < self.mission.len() {
+                next = self.next_way_point((before, flight.pose), next);
+                if next == self.mission.len() {
+                    counted = k + 1;
+                }
+            }
+        }
+        Prediction { points, counted }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::action::{Legs, actions};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn model() -> Model {
+        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
+    }
+
+    proptest! {
+        #[test]
+        fn two_half_steps_are_one_step(
+            x in -1e4f64..1e4, heading_rad in -3.0f64..3.0, omega in -0.1f64..0.1, dtau_s in 0.1f64..5.0,
+        ) {
+            let pose = Pose2 { at: [x, -x], heading_rad };
+            let once = pose.step(35.0, omega, dtau_s);
+            let twice = pose.step(35.0, omega, dtau_s / 2.0).step(35.0, omega, dtau_s / 2.0);
+            prop_assert!(distance_m(once.at, twice.at) < 1e-8);
+            prop_assert!((once.heading_rad - twice.heading_rad).abs() < 1e-12);
+        }
+
+        /// A prediction equals the motion, step by step.
+        #[test]
+        fn a_predicted_way_is_the_one_that_is_flown(
+            heading_rad in -3.2f64..3.2, x in -6000.0f64..6000.0, y in -6000.0f64..6000.0, which in 0usize..36,
+        ) {
+            let model = model();
+            let mission = [[x, y], [-y, x]];
+            let pilot = Autopilot {
+                model: &model,
+                mission: &mission,
+                passing: WaypointRule { tolerance_m: 100.0, passes: true },
+                after: AfterLastWaypoint::Straight,
+                dtau_s: 1.0,
+            };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
+            let some = Legs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
+            let held = actions(&model, 5.0, &[30.0], &Legs::default());
+            let all = [held, actions(&model, 5.0, &[], &some)].concat();
+            let action = all[which % all.len()];
+            let (mut pose, mut next) = (Pose2 { at: [0.0, 0.0], heading_rad }, 0);
+            let predicted = pilot.predict(action, pose, next, &timing);
+            for (k, point) in predicted.points.iter().enumerate() {
+                let omega = pilot.omega_rad_s(action, pose, next, k as f64);
+                let before = pose;
+                pose = before.step(model.v_m_s, omega, 1.0);
+                next = pilot.next_way_point((before, pose), next);
+                prop_assert!(distance_m(*point, pose.at) < 1e-6, "step {k}");
+            }
+        }
+
+        /// Wherever a way-point lies, an airplane that proceeds is done with it before long.
+        #[test]
+        fn nobody_orbits_a_way_point_for_ever(
+            heading_rad in -3.2f64..3.2, x in -3000.0f64..3000.0, y in -3000.0f64..3000.0,
+            tolerance_m in 1.0f64..100.0,
+        ) {
+            let model = model();
+            let mission = [[x, y]];
+            let pilot = Autopilot {
+                model: &model,
+                mission: &mission,
+                passing: WaypointRule { tolerance_m, passes: true },
+                after: AfterLastWaypoint::Straight,
+                dtau_s: 1.0,
+            };
+            let pose = Pose2 { at: [0.0, 0.0], heading_rad };
+            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
+            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            prop_assert!(flown.counted < 400, "still flying to {mission:?}");
+            // It ends within the tolerance, or where it was about as near as it ever was.
+            let apart_m = |k: usize| distance_m(flown.points[k], mission[0]);
+            let last = flown.counted - 1;
+            let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);
+            prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
+        }
+
+        /// The same for airplanes that turn as fast as scenarios allow, in steps of all lengths.
+        #[test]
+        fn nobody_orbits_a_way_point_for_ever_however_fast_it_turns(
+            heading_rad in -3.2f64..3.2, x in -300.0f64..300.0, y in -300.0f64..300.0,
+            v_m_s in 5.0f64..40.0, omega_deg_s in 20.0f64..360.0, tolerance_m in 0.001f64..3.0,
+            dtau_s in prop::sample::select(vec![0.1, 0.25, 0.5, 1.0, 2.0, 5.0]),
+        ) {
+            let omega_max_rad_s = omega_deg_s.to_radians();
+            let model = Model { v_m_s, omega_max_rad_s, ..model() };
+            let mission = [[x, y]];
+            let passing = WaypointRule { tolerance_m, passes: true };
+            let pilot = Autopilot { model: &model, mission: &mission, passing, after: AfterLastWaypoint::Straight, dtau_s };
+            let pose = Pose2 { at: [0.0, 0.0], heading_rad };
+            let timing = Timing { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
+            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            prop_assert!(flown.counted < timing.horizon, "still flying to {mission:?}");
+            let end = flown.points[flown.counted - 1];
+            let near_m = tolerance_m.max(2.0 * model.turn_radius_m()).max(2.0 * v_m_s * dtau_s);
+            prop_assert!(distance_m(end, mission[0]) < near_m, "{end:?} is not {mission:?}");
+        }
+    }
+}

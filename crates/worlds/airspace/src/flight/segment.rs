@@ -1,0 +1,109 @@
+//! Stages of a flight: the flight between two orders.
+
+use super::airplane::Airplane;
+use super::motion::{Model, Point};
+use super::order::FlightTask;
+use sidestep_kernel::math;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Distance of the point for which an airplane that keeps a heading steers: so far ahead that the
+/// bearing equals the heading wherever the airplane is.
+const FAR_AHEAD_M: f64 = 1e12;
+
+/// The part of a flight between two orders.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FlightSegment<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) mission: &'a [Point],
+    /// Altitude in meters of the level that it keeps or changes to.
+    pub(crate) altitude_m: f64,
+    /// Rate of that change, in meters per second.
+    pub(crate) climb_m_s: f64,
+}
+
+/// The part of a flight from an order on.
+#[derive(Debug, Clone)]
+pub(crate) struct SegmentAfterOrder {
+    model: Model,
+    mission: Arc<[Point]>,
+    altitude_m: f64,
+    climb_m_s: f64,
+    /// Number of way-points done with when it starts, if not as many as before.
+    pub(crate) next: Option<u32>,
+}
+
+impl SegmentAfterOrder {
+    pub(crate) fn segment(&self) -> FlightSegment<'_> {
+        let Self { model, mission, altitude_m, climb_m_s, .. } = self;
+        FlightSegment { model, mission, altitude_m: *altitude_m, climb_m_s: *climb_m_s }
+    }
+}
+
+/// Returns the parts of a flight after each of its orders. Parts on the same way share its way-points, because
+/// there may be ten thousand of each.
+pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrder> {
+    let mut route: Arc<[Point]> = airplane.mission.as_slice().into();
+    let mut straight = BTreeMap::new();
+    let mut now = SegmentAfterOrder {
+        model: airplane.model.clone(),
+        mission: Arc::clone(&route),
+        altitude_m: airplane.altitude_m,
+        climb_m_s: 0.0,
+        next: None,
+    };
+    let mut all = Vec::with_capacity(airplane.orders.len());
+    for order in &airplane.orders {
+        now.next = None;
+        match &order.task {
+            FlightTask::Heading(heading_rad) => {
+                // As many as on the route, so that the number of those done with stays valid.
+                let of = (heading_rad.to_bits(), route.len());
+                let way =
+                    straight.entry(of).or_insert_with(|| straight_route(*heading_rad, route.len()));
+                now.mission = Arc::clone(way);
+            }
+            FlightTask::Speed(v_m_s) => now.model.v_m_s = *v_m_s,
+            FlightTask::Altitude { altitude_m, climb_m_s } => {
+                (now.altitude_m, now.climb_m_s) = (*altitude_m, *climb_m_s);
+            }
+            FlightTask::Proceed => now.mission = Arc::clone(&route),
+            FlightTask::WayPoints(way_points) => {
+                route = way_points.as_slice().into();
+                (now.mission, now.next) = (Arc::clone(&route), Some(0));
+            }
+        }
+        all.push(now.clone());
+    }
+    all
+}
+
+/// Returns way-points that lead along a heading forever.
+fn straight_route(heading_rad: f64, way_points: usize) -> Arc<[Point]> {
+    let far = [FAR_AHEAD_M * math::cos(heading_rad), FAR_AHEAD_M * math::sin(heading_rad)];
+    vec![far; way_points].into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::CompiledAirspace;
+    use sidestep_scenario::Source;
+
+    #[test]
+    fn orders_after_which_an_airplane_flies_the_same_way_share_its_way_points() {
+        let text = "format = 1\nworld = \"airspace\"\n[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\n\
+                    way_points_m = [[9000, 0], [18000, 0]]\norders = [\n\
+                    { at_s = 1, speed_m_s = 30 }, { at_s = 2, altitude_m = 90 }, { at_s = 3, heading_deg = 9 },\n\
+                    { at_s = 4, speed_m_s = 31 }, { at_s = 5, proceeds = true }, { at_s = 6, heading_deg = 9 },\n\
+                    { at_s = 7, way_points_m = [[0, 9000]] }, { at_s = 8, speed_m_s = 32 }]\n";
+        let world = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario").world;
+        let all = segments_after_orders(&world.airplanes[0]);
+        let is_shared = |a: usize, b: usize| Arc::ptr_eq(&all[a].mission, &all[b].mission);
+        assert!([(0, 1), (0, 4), (2, 3), (2, 5), (6, 7)].into_iter().all(|(a, b)| is_shared(a, b)));
+        let counts: Vec<usize> = all.iter().map(|one| one.mission.len()).collect();
+        assert_eq!(counts, [2, 2, 2, 2, 2, 2, 1, 1]);
+        assert_eq!(all.iter().map(|one| one.next).collect::<Vec<_>>()[5..], [None, Some(0), None]);
+        assert_ne!(all[2].mission[0], all[0].mission[0]);
+    }
+}

@@ -1,0 +1,170 @@
+//! Traffic in other programs' files, read as scenarios.
+
+use super::traffic::{bluesky_settings, from_bluesky, from_tracks, has_length, omitted_commands};
+use serde_json::{Value, json};
+use sidestep_import::bluesky::{self, ScnFile, UnresolvedPosition};
+use sidestep_import::traffic::{self, RecordedTraffic};
+use sidestep_kernel::InputError;
+use sidestep_kernel::text::{KeyValues, group_thousands};
+use sidestep_scenario::ImportedScenario;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Forms of files, by the ends of their names.
+enum FileFormat {
+    Bluesky,
+    Tracks,
+    Other,
+}
+
+fn file_format(file: &Path) -> FileFormat {
+    let name = file.to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    match name {
+        _ if name.ends_with(".scn") => FileFormat::Bluesky,
+        _ if name.ends_with(".csv") => FileFormat::Tracks,
+        _ => FileFormat::Other,
+    }
+}
+
+/// Returns the scenario of a file of another form, and a report on the rest of the file.
+///
+/// # Errors
+/// When the file cannot be read.
+pub(super) fn translate(file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (scenario, (mut json, lines)) = match file_format(file) {
+        FileFormat::Other => return Ok(None),
+        FileFormat::Bluesky => {
+            let scn = bluesky::read(file)?;
+            let rules = bluesky_settings(&file.display().to_string(), &scn);
+            (from_bluesky(&name, &scn), bluesky_report(&scn, &rules.refused))
+        }
+        FileFormat::Tracks => {
+            let tracks = traffic::read(file)?;
+            (from_tracks(&name, &tracks), track_report(&tracks))
+        }
+    };
+    if scenario.is_none() {
+        // As for a scenario, because a reader of the number does not ask for the reason.
+        json["airplanes"] = 0.into();
+    }
+    let scenario = scenario.ok_or_else(|| {
+        let remedy = "give a file that creates aircraft at known places, with speeds";
+        InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)
+    });
+    Ok(Some(ImportedScenario { scenario, json, lines }))
+}
+
+/// Returns the report on a file; `beside` are commands that could be read but not flown.
+fn bluesky_report(scn: &ScnFile, beside: &[InputError]) -> (Value, KeyValues) {
+    let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let refused = [&scn.refused[..], beside].concat();
+    let json = json!({
+        "command_lines": scn.command_lines,
+        "unparsed_lines": scn.unparsed.len(),
+        "unparsed": words(&scn.unparsed),
+        "refused": words(&refused),
+        "commands": scn.commands,
+        "not_understood": scn.not_understood,
+        "not_flown": omitted_commands(scn),
+        "ignored": scn.ignored,
+        "unresolved_places": scn.unresolved_places.len(),
+        "unresolved_names": unresolved_places(scn).keys().collect::<Vec<_>>(),
+        "unresolved": unresolved_places(scn).into_values().flatten().map(use_as_json).collect::<Vec<_>>(),
+        "aircraft_without_place": aircraft_without_place(scn),
+    });
+    let mut lines = vec![("command lines".to_string(), group_thousands(scn.command_lines))];
+    lines.extend(count_line("not acted on", &scn.not_understood));
+    lines.extend(count_line("not flown", &omitted_commands(scn)));
+    lines.extend(count_line("display only", &scn.ignored));
+    lines.extend(first_names_line("left out, place unknown", &aircraft_without_place(scn)));
+    lines.extend(first_names_line("unknown way-points", &unresolved_uses(scn)));
+    lines.extend(error_lines("unparsed", &scn.unparsed));
+    lines.extend(error_lines("not carried out", &refused));
+    (json, lines)
+}
+
+/// Returns the aircraft that start at places known only to a navigation database, with the names of
+/// these places.
+fn aircraft_without_place(scn: &ScnFile) -> Vec<String> {
+    let unplaced = scn.traffic.unplaced.iter();
+    unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
+}
+
+/// Returns the places to fly to that the file does not define, by name, each with its uses.
+fn unresolved_places(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPosition>> {
+    let creates = |command: &str| matches!(command, "CRE" | "CREATE");
+    let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
+    let mut by_name: BTreeMap<&str, Vec<&UnresolvedPosition>> = BTreeMap::new();
+    uses.for_each(|used| by_name.entry(&used.name).or_default().push(used));
+    by_name
+}
+
+fn use_as_json(used: &UnresolvedPosition) -> Value {
+    json!({
+        "name": used.name,
+        "command": used.command,
+        "airplane": used.aircraft,
+        "line": used.line,
+    })
+}
+
+/// Returns each unknown place in words, with the command, the airplane and the line of its first use.
+fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
+    let in_words = |(name, uses): (&str, Vec<&UnresolvedPosition>)| {
+        let UnresolvedPosition { command, aircraft, line, .. } = uses[0];
+        let whose = aircraft.as_ref().map_or(String::new(), |id| format!(" of {id}"));
+        let more = match uses.len() - 1 {
+            0 => String::new(),
+            more => format!(", and {} more", group_thousands(more as u64)),
+        };
+        format!("{name} ({command}{whose}, line {line}{more})")
+    };
+    unresolved_places(scn).into_iter().map(in_words).collect()
+}
+
+fn track_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
+    let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
+    let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
+    let json = json!({
+        "rows": rows,
+        "aircraft": recorded.tracks.len(),
+        "repeated_rows": repeated,
+        "aircraft_of_one_row": single,
+    });
+    let aircraft = group_thousands(recorded.tracks.len() as u64);
+    let mut lines =
+        vec![("rows".to_string(), format!("{} of {aircraft} aircraft", group_thousands(rows)))];
+    let mut left_out = |name: &str, n: u64| {
+        if n > 0 {
+            lines.push((name.to_string(), format!("{}, left out", group_thousands(n))));
+        }
+    };
+    left_out("repeated rows", repeated);
+    left_out("aircraft of one row", single);
+    (json, lines)
+}
+
+/// Returns names with their counts on one line; no line for none.
+fn count_line(name: &str, counts: &BTreeMap<String, u64>) -> Option<(String, String)> {
+    let words: Vec<String> = counts.iter().map(|(name, n)| format!("{name} {n}")).collect();
+    (!words.is_empty()).then(|| (name.to_string(), words.join(", ")))
+}
+
+/// Returns the first few names, and the number of others; no line for none.
+fn first_names_line(name: &str, all: &[String]) -> Option<(String, String)> {
+    const MAX_NAMES: usize = 5;
+    let mut words = all[..all.len().min(MAX_NAMES)].join(", ");
+    if all.len() > MAX_NAMES {
+        words.push_str(&format!(" and {} more", group_thousands((all.len() - MAX_NAMES) as u64)));
+    }
+    (!all.is_empty()).then(|| (name.to_string(), words))
+}
+
+/// Returns a line per error, which says where in the file it is.
+fn error_lines(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
+    // The remedy is on a line of its own, which would look like a line of the report.
+    let in_one_line = |error: &InputError| error.to_string().replace("\n  help: ", "; ");
+    errors.iter().map(move |error| (name.to_string(), in_one_line(error)))
+}

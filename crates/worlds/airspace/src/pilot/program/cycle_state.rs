@@ -1,0 +1,165 @@
+//! A cycle of one airplane, up to its present stage.
+
+use crate::agents::network_traffic::NetworkTraffic;
+use crate::agents::packet::{ConversationId, Protocol};
+use crate::agents::traffic_state::TrafficPicture;
+use crate::agents::{Conversation, ConversationEnd};
+use crate::decide::ManeuverCandidates;
+use crate::events::{Event, EventKind};
+use crate::pilot::control::Control;
+use crate::pilot::conversations::{ConversationOutcome, DynParticipant};
+use crate::pilot::percept::{Percept, SurveillanceReport};
+use crate::pilot::schedule::Schedule;
+use crate::world::AirspaceWorld;
+use sidestep_kernel::EntityId;
+use std::sync::Arc;
+
+/// A cycle of one airplane.
+pub(super) struct CycleState {
+    pub(super) percept: Percept,
+    pub(super) schedule: Schedule,
+    /// Ids of the airplanes that decide together as far as it knows, rising.
+    pub(super) members: Arc<[EntityId]>,
+    /// Airplanes near it that are not among them, by rising id.
+    pub(super) unheard: Vec<SurveillanceReport>,
+    pub(super) phase: CyclePhase,
+    pub(super) candidates: ManeuverCandidates,
+    /// Its control, as far as that is decided.
+    pub(super) control: Control,
+}
+
+/// The part of a cycle that an airplane is in.
+pub(super) enum CyclePhase {
+    /// A talk that finds the group.
+    Grouping(Conversation<DynParticipant>),
+    /// A talk about the wishes of each.
+    Deciding(Conversation<DynParticipant>),
+    /// It has chosen its wishes, and waits until the shield's exchange starts.
+    Decided,
+    /// The shield's exchange; the places of the ways that it has proposed, among all that it considers.
+    Shielding(Conversation<DynParticipant>, Vec<usize>),
+    /// The control is there.
+    Over,
+}
+
+/// The place of a talk beside those of a cycle.
+pub(super) enum ConversationTiming {
+    /// It comes later.
+    Later,
+    /// It comes so much later that no airplane can be there.
+    TooFarAhead,
+    /// It is of the same cycle and subject, and of other members.
+    OtherMembers,
+    /// It is over.
+    Past,
+}
+
+impl CycleState {
+    /// Returns the talk that it is in.
+    pub(super) fn conversation(&mut self) -> Option<&mut Conversation<DynParticipant>> {
+        match &mut self.phase {
+            CyclePhase::Grouping(talk)
+            | CyclePhase::Deciding(talk)
+            | CyclePhase::Shielding(talk, _) => Some(talk),
+            CyclePhase::Decided | CyclePhase::Over => None,
+        }
+    }
+
+    /// Returns where a talk stands that is none of those that it has been in.
+    pub(super) fn timing_of(&self, talk: &ConversationId) -> ConversationTiming {
+        let topic = match self.phase {
+            CyclePhase::Grouping(_) => Protocol::Group,
+            CyclePhase::Deciding(_) | CyclePhase::Decided => Protocol::Decision,
+            CyclePhase::Shielding(..) | CyclePhase::Over => Protocol::Shield,
+        };
+        let here = ConversationId {
+            topic,
+            ..ConversationId::new(self.percept.cycle, topic, &self.members)
+        };
+        // No airplane begins a cycle before all have ended the one before it.
+        let last = self.percept.cycle.saturating_add(1);
+        match () {
+            () if talk.cycle > last => ConversationTiming::TooFarAhead,
+            () if here.is_before(talk) => ConversationTiming::Later,
+            () if (talk.cycle, talk.topic) == (here.cycle, here.topic) => {
+                ConversationTiming::OtherMembers
+            }
+            () => ConversationTiming::Past,
+        }
+    }
+
+    /// Notes the packets of the talk that it is in, and the time that it took.
+    pub(super) fn record_traffic(&mut self, ticks: u64) {
+        let (traffic, noted) = match &self.phase {
+            CyclePhase::Grouping(talk) => (talk.traffic(), &mut self.control.grouping),
+            CyclePhase::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
+            CyclePhase::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
+            CyclePhase::Decided | CyclePhase::Over => return,
+        };
+        *noted = NetworkTraffic { ticks, ..traffic };
+    }
+
+    /// Notes how a talk has ended, and the others that it no longer hears.
+    pub(super) fn record_end(
+        &mut self,
+        world: &AirspaceWorld,
+        end: &ConversationEnd<ConversationOutcome>,
+        contacts: &TrafficPicture,
+    ) {
+        // Where groups are found, missing airplanes are noted once the members are known.
+        let is_group = matches!(self.phase, CyclePhase::Grouping(_));
+        let missing = end.unheard.iter().filter(|_| !is_group);
+        self.record_unheard(
+            world,
+            missing.map(|&place| self.conversation_members()[place]).collect(),
+            contacts,
+        );
+        if end.late {
+            let event = Event::new(self.percept.cycle, EventKind::Deadline, self.percept.own.id);
+            self.control.events.push(event);
+        }
+    }
+
+    /// Returns the ids of those that the party to a talk is to know, rising.
+    pub(super) fn members_of(&self, topic: Protocol) -> Arc<[EntityId]> {
+        match topic {
+            Protocol::Shield => self.exchange_members().into(),
+            Protocol::Group | Protocol::Decision => self.members.clone(),
+        }
+    }
+
+    /// Returns the ids of the airplanes that the party to the present talk knows, by their places.
+    fn conversation_members(&self) -> Vec<EntityId> {
+        match self.phase {
+            CyclePhase::Shielding(..) => self.exchange_members(),
+            _ => self.members.to_vec(),
+        }
+    }
+
+    /// Returns the ids of all airplanes that the shield minds: its group, and those nearby that are not heard,
+    /// rising.
+    fn exchange_members(&self) -> Vec<EntityId> {
+        let unheard = self.unheard.iter().map(|one| one.id);
+        let mut all: Vec<EntityId> = self.members.iter().copied().chain(unheard).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Notes the others that are no longer heard.
+    pub(super) fn record_unheard(
+        &mut self,
+        world: &AirspaceWorld,
+        unheard: Vec<EntityId>,
+        contacts: &TrafficPicture,
+    ) {
+        let (id, now) = (self.percept.own.id, self.percept.cycle);
+        let heard_in = |other: &EntityId| match contacts.get(other) {
+            Some(contact) => contact.heard_in,
+            None => world.first_cycle(*other as usize),
+        };
+        let lost = unheard.into_iter().filter(|other| heard_in(other) + 1 >= now);
+        let lost: Vec<Event> =
+            lost.map(|other| Event::new_pair(now, EventKind::Unheard, id, other)).collect();
+        self.control.events.extend(lost);
+    }
+}

@@ -1,0 +1,133 @@
+//! Plans: a way for one `dt`, and then an orbit forever.
+
+use super::orbit::{Orbit, Side, stays_apart_for};
+use super::shielded_aircraft::ShieldedAircraft;
+use crate::flight::{Pose2, distance_m};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
+
+/// Motion for one `dt`: a turn rate per step of `dtau`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct TurnProfile {
+    /// Turn rate in each step, in radians per second.
+    pub omegas_rad_s: Vec<f64>,
+}
+
+/// A way, and an orbit on which the airplane waits after that.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SafeManeuver {
+    aircraft: ShieldedAircraft,
+    /// Poses at the start of each step, and at the end.
+    poses: Vec<Pose2>,
+    omegas_rad_s: Vec<f64>,
+    dtau_s: f64,
+    orbit: Orbit,
+    /// Number of the candidate, `None` for the fallback.
+    pub(super) candidate: Option<usize>,
+    pub(super) side: Side,
+}
+
+impl SafeManeuver {
+    /// Returns a plan: a way, and then an orbit to a side.
+    pub(crate) fn new(flyer: ShieldedAircraft, way: &TurnProfile, dtau_s: f64, side: Side) -> Self {
+        Self::from_candidate(flyer, way, dtau_s, None, side)
+    }
+
+    /// Returns the same for a candidate, by its number.
+    pub(super) fn from_candidate(
+        flyer: ShieldedAircraft,
+        way: &TurnProfile,
+        dtau_s: f64,
+        candidate: Option<usize>,
+        side: Side,
+    ) -> Self {
+        let flown =
+            Self::from_turn_rates(flyer.pose, flyer, way.omegas_rad_s.clone(), dtau_s, side);
+        Self { candidate, ..flown }
+    }
+
+    /// Returns the same plan with an orbit to a side.
+    pub(super) fn with_side(&self, side: Side) -> Self {
+        let omega_rad_s = side.sign() * self.aircraft.orbit_rad_s;
+        let orbit = Orbit::from_pose(self.end(), self.aircraft.v_m_s, omega_rad_s);
+        Self { orbit, side, ..self.clone() }
+    }
+
+    fn from_turn_rates(
+        start: Pose2,
+        flyer: ShieldedAircraft,
+        omegas_rad_s: Vec<f64>,
+        dtau_s: f64,
+        side: Side,
+    ) -> Self {
+        let mut poses = vec![start];
+        for &omega in &omegas_rad_s {
+            let last = poses[poses.len() - 1];
+            poses.push(last.step(flyer.v_m_s, omega, dtau_s));
+        }
+        let end = poses[poses.len() - 1];
+        let orbit = Orbit::from_pose(end, flyer.v_m_s, side.sign() * flyer.orbit_rad_s);
+        Self { aircraft: flyer, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
+    }
+
+    /// Returns the stored fallback as a plan, for some steps and forever after them.
+    pub(crate) fn fallback(flyer: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
+        let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
+        let side = flyer.fallback;
+        Self::from_turn_rates(flyer.orbit_pose, flyer, vec![omega; steps], dtau_s, side)
+    }
+
+    /// Returns the pose at the end of `dt`.
+    pub(crate) fn end(&self) -> Pose2 {
+        self.poses[self.poses.len() - 1]
+    }
+
+    /// Returns the side of the orbit.
+    pub(crate) fn side(&self) -> Side {
+        self.side
+    }
+
+    /// Returns whether two plans stay apart during `dt` and on the orbits forever after it.
+    pub(crate) fn is_compatible(&self, other: &Self) -> bool {
+        if !self.aircraft.is_protected_from(&other.aircraft) {
+            return true;
+        }
+        if !self.aircraft.is_in_reach(&other.aircraft, self.dtau_s * self.omegas_rad_s.len() as f64)
+        {
+            return true;
+        }
+        let gap_m = self.aircraft.gap_m(&other.aircraft);
+        interrupt::check();
+        self.orbit.stays_apart(&other.orbit, gap_m) && self.profiles_stay_apart(other, gap_m)
+    }
+
+    fn profiles_stay_apart(&self, other: &Self, gap_m: f64) -> bool {
+        let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s;
+        (0..self.omegas_rad_s.len()).all(|k| {
+            let at = |plan: &Self, t_s: f64| {
+                plan.poses[k].step(plan.aircraft.v_m_s, plan.omegas_rad_s[k], t_s).at
+            };
+            let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
+            stays_apart_for(&apart, self.dtau_s, closing_m_s, gap_m)
+        })
+    }
+
+    /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
+    /// and on orbits forever after it.
+    pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        let (centers, radius_m) = other.reach(dt_s);
+        let apart_m = radius_m + self.aircraft.gap_m(other);
+        // Between two poses it is within half a step of one of them.
+        let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
+        centers.iter().all(|&center| {
+            let is_far = |pose: &Pose2| distance_m(pose.at, center) >= apart_m + half_step_m;
+            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
+        })
+    }
+
+    /// Returns whether this is the stored fallback.
+    pub(super) fn is_fallback(&self) -> bool {
+        self.candidate.is_none()
+    }
+}

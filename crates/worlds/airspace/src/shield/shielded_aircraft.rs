@@ -1,0 +1,110 @@
+//! An airplane as the shield knows it.
+
+use super::orbit::{Orbit, Side};
+use crate::flight::{Levels, Point, Pose2, distance_m};
+use sidestep_kernel::EntityId;
+use std::sync::Arc;
+
+/// Meters that new plans keep in addition to the separation.
+pub(super) const MARGIN_M: f64 = 0.01;
+
+/// The others with which an airplane is named, by rising id: pairs for which the shield promises
+/// nothing.
+pub(crate) type ExemptIds = Arc<[EntityId]>;
+
+/// An airplane as the shield knows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShieldedAircraft {
+    /// The airplane whose orbit this is. One that may be on several orbits takes part once with
+    /// each.
+    pub id: EntityId,
+    /// Its pose, as all see it.
+    pub pose: Pose2,
+    /// The pose that it would have on its stored orbit without errors of heading, as all see it.
+    pub orbit_pose: Pose2,
+    /// Airspeed in meters per second.
+    pub v_m_s: f64,
+    /// Largest turn rate of its ways in radians per second.
+    pub omega_max_rad_s: f64,
+    /// Turn rate of its orbits in radians per second, at most the largest one.
+    pub orbit_rad_s: f64,
+    /// Its separation in meters; of two airplanes the larger one counts.
+    pub separation_m: f64,
+    /// Bound in meters on how far it may be from where all see it, and from its orbit.
+    pub error_m: f64,
+    /// The levels it keeps or passes in the next `dt`.
+    pub levels: Levels,
+    /// Height in meters above which airplanes need not mind each other.
+    pub vertical_m: f64,
+    /// Its stored fallback.
+    pub fallback: Side,
+    /// The others with which it came in too close: with each of them it is left to the method
+    /// until their fallbacks are apart.
+    pub exempt: Arc<[EntityId]>,
+    /// Rank, unique; airplanes of higher rank keep their wishes.
+    pub rank: u64,
+}
+
+impl ShieldedAircraft {
+    /// Returns whether two airplanes are named as a pair. They are left to the method, because
+    /// falling back would bring these two together. For all other pairs the invariant holds, also
+    /// for those that one of the two forms with others.
+    pub(super) fn is_exempt_with(&self, other: &Self) -> bool {
+        self.exempt.binary_search(&other.id).is_ok()
+    }
+
+    /// Returns whether two airplanes are on levels that do not meet, or have fallbacks that stay
+    /// apart: the pair no longer needs a name.
+    pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
+        let fallback = |flyer: &Self| flyer.orbit(flyer.fallback);
+        !self.is_on_level(other) || fallback(self).stays_apart(&fallback(other), self.gap_m(other))
+    }
+
+    /// Returns the orbit to a side that it holds, or that it enters where it is.
+    pub(crate) fn orbit(&self, side: Side) -> Orbit {
+        Orbit::from_pose(self.orbit_pose, self.v_m_s, side.sign() * self.orbit_rad_s)
+    }
+
+    /// Returns the distance in meters that two airplanes have to keep on new plans, as they are
+    /// seen.
+    pub(super) fn gap_m(&self, other: &Self) -> f64 {
+        self.separation_m.max(other.separation_m) + self.error_m + other.error_m + MARGIN_M
+    }
+
+    /// Returns whether some ways of `dt_s` seconds, and orbits after them, could bring two airplanes
+    /// too near each other.
+    pub(super) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
+        let reach_m = |f: &Self| f.v_m_s * dt_s + 2.0 * (f.v_m_s / f.orbit_rad_s);
+        let apart_m = distance_m(self.pose.at, other.pose.at);
+        apart_m < self.gap_m(other) + reach_m(self) + reach_m(other)
+    }
+
+    /// Returns two discs that it cannot leave, whichever way it flies for `dt_s` seconds and to
+    /// whichever side it turns forever after that: their centers, and their radius in meters.
+    ///
+    /// At any time it is on the circle to its left that it would fly from there, whose center is at
+    /// right angles to its heading. Flown straight on, that center ends `v dt` ahead, which is the
+    /// center of the disc. A turn shifts the airplane by at most `v omega dt^2 / 2`, and the center
+    /// about it by at most `r omega dt`. Earlier it is nearer, because `r omega` is not less than
+    /// `v`. The same holds to the right.
+    pub(super) fn reach(&self, dt_s: f64) -> ([Point; 2], f64) {
+        let ahead = self.pose.step(self.v_m_s, 0.0, dt_s);
+        let orbit =
+            |side: Side| Orbit::from_pose(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
+        let centers = Side::BOTH.map(|side| orbit(side).center());
+        let (turn_rad, radius_m) = (self.omega_max_rad_s * dt_s, orbit(Side::Left).radius_m);
+        let shift_m = 0.5 * self.v_m_s * dt_s * turn_rad;
+        (centers, radius_m * (1.0 + turn_rad) + shift_m)
+    }
+
+    /// Returns whether two different airplanes are on levels that meet.
+    pub(super) fn is_on_level(&self, other: &Self) -> bool {
+        let vertical_m = self.vertical_m.max(other.vertical_m);
+        self.id != other.id && self.levels.overlaps(&other.levels, vertical_m)
+    }
+
+    /// Returns whether the shield keeps two airplanes apart.
+    pub(crate) fn is_protected_from(&self, other: &Self) -> bool {
+        self.is_on_level(other) && !self.is_exempt_with(other)
+    }
+}

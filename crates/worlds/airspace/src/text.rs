@@ -1,0 +1,323 @@
+//! Texts for people: a scenario's contents, a run's outcome, and the place of every airplane.
+
+use super::metrics::{BeyondBound, Metrics, TooClose};
+use super::scenario::CompiledAirspace;
+use super::state::{AirplaneRecord, Snapshot};
+use super::world::AirspaceWorld;
+use serde_json::json;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands, key_value};
+
+/// Returns the contents of a compiled scenario.
+pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
+    let world = &*compiled.world;
+    let shield = if world.shield { "on" } else { "off" };
+    let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
+    // JSON has no infinity, so a time that is never reached is null.
+    let until_s = match world.replay_cycles {
+        Cycle::MAX => f64::INFINITY,
+        cycles => world.cycle_start_s(cycles),
+    };
+    let intruders = world.airplanes.iter().filter(|a| a.is_intruder).count() as u64;
+    let json = json!({
+        "airplanes": world.airplanes.len(),
+        "intruders": intruders,
+        "method": world.method.name(),
+        "deployment": world.deployment.name(),
+        "shield": shield,
+        "dt_s": world.timing.dt_s,
+        "horizon_s": world.timing.horizon_s(),
+        "cycles": compiled.cycles,
+        "seed": compiled.seed,
+        "too_close": compiled.too_close,
+        "origin_deg": world.origin_deg,
+        "start_utc_s": world.start_utc_s,
+        "recorded": recorded,
+        "replay_until_s": (recorded > 0).then_some(until_s),
+    });
+    let mut lines = vec![key_value("airplanes", group_thousands(world.airplanes.len() as u64))];
+    if intruders > 0 {
+        lines.push(key_value("intruders", group_thousands(intruders)));
+    }
+    lines.extend(abilities(world));
+    if recorded > 0 {
+        let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
+        lines.push(key_value(
+            "recorded",
+            format!("{}, replayed {until}", group_thousands(recorded)),
+        ));
+    }
+    lines.extend(times(compiled));
+    lines.extend(origin(world));
+    lines.extend(too_close(world, &compiled.too_close));
+    Description { json, text: align_pairs(&lines) }
+}
+
+/// Returns how often the airplanes decide, and for how long they fly.
+fn times(compiled: &CompiledAirspace) -> KeyValues {
+    let dt_s = compiled.world.timing.dt_s;
+    let (cycles, lasts_s) = (group_thousands(compiled.cycles), compiled.cycles as f64 * dt_s);
+    let look_ahead_s = compiled.world.reactive_settings().look_ahead_s;
+    vec![
+        key_value("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
+        key_value("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
+    ]
+}
+
+/// Returns the place of the origin on earth, if it has one.
+fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
+    let [lat, lon] = world.origin_deg?;
+    Some(key_value("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
+}
+
+/// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
+fn abilities(world: &AirspaceWorld) -> KeyValues {
+    let models = || world.airplanes.iter().map(|airplane| &airplane.model);
+    let height_m = world.vertical_m.round();
+    let (method, deployment) = (world.method.name(), world.deployment.name());
+    let shield = if world.shield { "on" } else { "off" };
+    vec![
+        key_value(
+            "separation",
+            format!(
+                "{} m, or {height_m} m of height",
+                range_text(models().map(|m| m.separation_m))
+            ),
+        ),
+        key_value("speed", format!("{} m/s", range_text(models().map(|m| m.v_m_s)))),
+        key_value(
+            "turn rate",
+            format!("{} deg/s", range_text(models().map(|m| m.omega_max_rad_s.to_degrees()))),
+        ),
+        key_value("method", format!("{method}, {deployment}, shield {shield}")),
+    ]
+}
+
+/// Returns a number that all have, or the least and the greatest, to a tenth.
+fn range_text(numbers: impl Iterator<Item = f64>) -> String {
+    let (least, greatest) =
+        numbers.fold((f64::INFINITY, 0.0_f64), |(least, most), x| (least.min(x), most.max(x)));
+    let rounded = |x: f64| ((x * 10.0).round() / 10.0).to_string();
+    match (rounded(least), rounded(greatest)) {
+        (one, other) if one == other => one,
+        (one, other) => format!("{one} to {other}"),
+    }
+}
+
+/// Returns the outcome of a run.
+pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
+    let mut lines = flights(metrics);
+    lines.extend(not_appeared(metrics));
+    lines.extend(network(metrics));
+    lines.extend(on_the_way(metrics));
+    lines.extend(warning(&metrics.too_close));
+    lines.extend(beyond_bound(&metrics.beyond_bound));
+    lines
+}
+
+/// Returns the place of every airplane, by entity id.
+pub(super) fn poses(snapshot: &Snapshot) -> Description {
+    let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
+    let heading = "  airplane       x_m         y_m    heading_deg\n".to_string();
+    let row = |(id, a): (usize, &AirplaneRecord)| {
+        let ([x, y], heading_deg) = (a.pose.at, a.pose.heading_rad.to_degrees());
+        format!("  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}\n")
+    };
+    let text = snapshot.airplanes.iter().enumerate().map(row).fold(heading, |t, r| t + &r);
+    Description { json, text }
+}
+
+/// Returns the first pairs with first fallbacks that are not apart, and the number of others.
+fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
+    let named =
+        |&(a, b): &(u32, u32)| format!("{} and {}", world.display_name(a), world.display_name(b));
+    let told = first_names(pairs, named)?;
+    Some(key_value("warning", format!("start too close for the shield: {told}")))
+}
+
+/// Returns the traffic on the network, and its faults.
+fn network(m: &Metrics) -> KeyValues {
+    let mut lines = KeyValues::new();
+    if m.beacons > 0 {
+        let sent =
+            format!("{}, {} bytes", group_thousands(m.beacons), group_thousands(m.beacon_bytes));
+        lines.push(key_value("beacons", sent));
+    }
+    if m.messages > 0 {
+        let sent = format!("{}, {} bytes", group_thousands(m.messages), group_thousands(m.bytes));
+        let took = m.network_s.map_or(String::new(), |s| format!(", {s:.1} s on the network"));
+        lines.push(key_value("messages", sent + &took));
+    }
+    let counts = [
+        (m.contacts_lost, "contacts lost"),
+        (m.deadlines_missed, "agents out of time"),
+        (m.shield_held_back, "plans held back"),
+        (m.groups_too_large, "groups too large to optimize"),
+    ];
+    let said = counts.iter().filter(|(n, _)| *n > 0);
+    let said: Vec<String> =
+        said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
+    if !said.is_empty() {
+        lines.push(key_value("trouble", said.join(", ")));
+    }
+    lines
+}
+
+/// Returns the warning that a run was too short for some airplanes to be seen at all: they count among those
+/// that have not arrived.
+fn not_appeared(m: &Metrics) -> Option<(String, String)> {
+    let many = match m.not_appeared {
+        0 => return None,
+        1 => "1 airplane has".into(),
+        n => format!("{} airplanes have", group_thousands(n)),
+    };
+    Some(key_value("WARNING", format!("{many} not appeared by now: more cycles would show them")))
+}
+
+/// Returns lines on recorded ways, orders and removals; none where there were none.
+fn on_the_way(m: &Metrics) -> KeyValues {
+    let mut lines = Vec::new();
+    if m.replayed > 0 {
+        lines.push(key_value(
+            "replayed",
+            format!("{} to the end of their tracks", group_thousands(m.replayed)),
+        ));
+    }
+    if m.left > 0 {
+        lines.push(key_value(
+            "left",
+            format!("{} before they had arrived", group_thousands(m.left)),
+        ));
+    }
+    if m.orders + m.orders_delayed > 0 {
+        let (done, waits) = (group_thousands(m.orders), group_thousands(m.orders_delayed));
+        lines.push(key_value(
+            "orders",
+            format!("{done} carried out, delayed {waits} times by one dt"),
+        ));
+    }
+    lines
+}
+
+/// Number of pairs or airplanes that a warning names.
+const MAX_NAMES: usize = 5;
+
+/// Returns the first of many in words, and the number of others; `None` without any.
+fn first_names<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
+    let mut named: Vec<String> = all.iter().take(MAX_NAMES).map(words).collect();
+    if all.len() > MAX_NAMES {
+        named.push(format!("and {} more", group_thousands((all.len() - MAX_NAMES) as u64)));
+    }
+    (!named.is_empty()).then(|| named.join(", "))
+}
+
+/// Returns the first airplanes with errors beyond the shield's bounds, and the number of others.
+fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
+    let told = first_names(all, |one| {
+        let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
+        format!("{name} at {} s", one.at_s)
+    })?;
+    Some(key_value("WARNING", format!("errors beyond the bound: {told}")))
+}
+
+/// Returns the first pairs for which the shield promises nothing, and the number of others.
+fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
+    let told = first_names(too_close, |TooClose { at_s, airplanes, callsigns }| {
+        let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
+        if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
+    })?;
+    Some(key_value("WARNING", format!("too close for the shield: {told}")))
+}
+
+fn flights(m: &Metrics) -> KeyValues {
+    let nearest = m.min_separation_m.map_or("nobody came near".into(), |d| format!("{d:.1} m"));
+    let lost = match m.losses_of_separation {
+        0 => "none".into(),
+        n => format!("{}, {:.1} s in all", group_thousands(n), m.lost_s),
+    };
+    let delay = m.mean_delay_percent.map_or("-".into(), |d| format!("{d:.1} % on average"));
+    let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
+    vec![
+        key_value(
+            "arrived",
+            format!("{} of {}", group_thousands(m.arrived), group_thousands(m.airplanes)),
+        ),
+        key_value("nearest approach", nearest),
+        key_value("losses of separation", lost),
+        key_value("delay", delay),
+        key_value("optimizations", format!("{}{rounds}", group_thousands(m.optimizations))),
+        key_value(
+            "shield",
+            format!(
+                "{} decisions changed, {} of them to orbits",
+                group_thousands(m.shield_overrides),
+                group_thousands(m.shield_orbits)
+            ),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contents;
+    use crate::airspace_run;
+    use crate::scenario::CompiledAirspace;
+    use sidestep_kernel::{Simulation, World};
+    use sidestep_scenario::Source;
+
+    /// Many airplanes close together.
+    fn heap(airspace: &str) -> Source {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\n{airspace}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 40\nradius_m = 2000\n"
+        );
+        Source::new("heap", text, "")
+    }
+
+    #[test]
+    fn check_names_the_first_pairs_without_a_promise_and_counts_the_others() {
+        let compiled = CompiledAirspace::new(&heap("")).expect("a scenario");
+        let pairs = compiled.too_close.len();
+        assert!(pairs > 50, "{pairs}");
+        let told = contents(&compiled).text;
+        let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words.matches("too close for the shield").count(), 1, "{told}");
+        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{told}");
+    }
+
+    #[test]
+    fn nothing_is_too_close_for_a_shield_that_is_not_there() {
+        let source = heap("shield = \"off\"");
+        let compiled = CompiledAirspace::new(&source).expect("a scenario");
+        assert_eq!(compiled.too_close, []);
+        assert!(!contents(&compiled).text.contains("too close"));
+        let mut run = compiled.start(&source, 1);
+        run.advance(3);
+        assert_eq!(run.metrics().too_close, []);
+        let lines = run.world().summary_lines(&run.metrics());
+        assert!(lines.iter().all(|(_, words)| !words.contains("too close")), "{lines:?}");
+    }
+
+    #[test]
+    fn a_run_that_ends_before_an_airplane_appears_says_so() {
+        let one = |y: u32, appears_s: u32| {
+            format!(
+                "[[airplanes]]\nat_m = [0, {y}]\nheading_deg = 0\nway_points_m = [[700, {y}]]\n\
+                 appears_s = {appears_s}\n"
+            )
+        };
+        let head = "format = 1\nworld = \"airspace\"\ncycles = 20\n";
+        let text = format!("{head}{}{}", one(0, 0), one(9000, 50));
+        let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+        let told = |run: &crate::AirspaceRun| {
+            let lines = run.world().summary_lines(&run.metrics());
+            lines.into_iter().any(|(_, words)| words.contains("1 airplane has not appeared"))
+        };
+        assert_eq!(run.metrics().not_appeared, 1, "the other one is there from the start");
+        run.advance(10);
+        assert_eq!(run.metrics().not_appeared, 1, "it would come in with the next cycle");
+        assert!(told(&run));
+        run.advance(1);
+        assert!(!told(&run) && run.metrics().not_appeared == 0);
+    }
+}

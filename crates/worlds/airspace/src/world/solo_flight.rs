@@ -1,0 +1,112 @@
+//! Flights alone: how long each airplane would fly if there were no other.
+
+use super::AirspaceWorld;
+use crate::flight::{Airplane, FlightSegment, Pose2, Track};
+use sidestep_kernel::{Slot, interrupt};
+
+/// Seconds, or steps where these are longer, after which a flight is taken to be endless.
+const MAX_FLIGHT_S: f64 = 1e6;
+/// Most steps computed singly, enough for 1e6 s in steps of 0.1 s; beyond it a flight also counts as endless. Long
+/// stretches straight on are flown at once, and cost one.
+const MAX_COMPUTED_STEPS: usize = 10_000_000;
+
+/// An airplane on its flight alone.
+struct SoloFlight<'a> {
+    world: &'a AirspaceWorld,
+    airplane: &'a Airplane,
+    slot: Slot,
+    /// The time at which the method takes it over, in seconds after the start of the run.
+    joins_s: f64,
+    pose: Pose2,
+    orders: u32,
+    next: usize,
+    /// Number of steps flown, those at once among them.
+    steps: usize,
+    /// Whether it flies on forever after its last order.
+    keeps_a_heading: bool,
+}
+
+impl SoloFlight<'_> {
+    fn elapsed_s(&self) -> f64 {
+        self.steps as f64 * self.world.timing.dtau_s
+    }
+
+    /// Carries out the orders that are due.
+    fn apply_orders(&mut self) {
+        let Self { world, slot, orders, next, .. } = *self;
+        if self.steps.is_multiple_of(world.timing.points_per_dt()) {
+            let now_s = self.joins_s + self.elapsed_s();
+            (self.orders, self.next) = world.after_orders(slot as usize, orders, next, now_s);
+        }
+    }
+
+    /// Returns the seconds of the flight if it is over, infinite if it never will be.
+    fn end_s(&self) -> Option<f64> {
+        let (flown_s, airplane) = (self.elapsed_s(), self.airplane);
+        let way_points = self.world.segment(self.slot, self.orders).mission.len();
+        if self.next == way_points || self.joins_s + flown_s >= airplane.leaves_s {
+            return Some(flown_s);
+        }
+        // Endless only after the last order, because the flight may end before that one.
+        let is_endless = self.keeps_a_heading && self.orders as usize == airplane.orders.len();
+        let most_s = MAX_FLIGHT_S * self.world.timing.dtau_s.max(1.0);
+        (is_endless || flown_s >= most_s).then_some(f64::INFINITY)
+    }
+
+    /// Flies a step, and all those before it in which it certainly flies straight on, at once.
+    fn step(&mut self) {
+        let (world, air) = (self.world, self.world.air());
+        let FlightSegment { model, mission, .. } = world.segment(self.slot, self.orders);
+        let pilot = air.autopilot(model, mission);
+        let is_told_nothing =
+            self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
+        if is_told_nothing {
+            let straight = air.straight_steps(&pilot, self.pose, self.next);
+            self.pose = air.after_straight_steps(self.pose, model.v_m_s, straight);
+            self.steps = self.steps.saturating_add(straight);
+        }
+        let omega = air.steer(&pilot, self.pose, self.next);
+        let before = self.pose;
+        self.pose = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
+        let next = pilot.next_way_point((before, self.pose), self.next);
+        // Where rounding swallows a step, it swallows all later ones.
+        let is_stuck = is_told_nothing && self.pose == before && self.next == next;
+        self.next = next;
+        self.steps = if is_stuck { usize::MAX } else { self.steps.saturating_add(1) };
+    }
+}
+
+impl AirspaceWorld {
+    /// Returns the seconds that a flight would take alone, from when the method takes it over;
+    /// infinite if it would never end.
+    pub(super) fn solo_s(&self, i: usize) -> f64 {
+        let airplane = &self.airplanes[i];
+        let joins_s = self.cycle_start_s(self.first_controlled_cycle(i));
+        if airplane.track.as_ref().is_some_and(|track| track.end_s() <= joins_s) {
+            return 0.0;
+        }
+        let start = |track: &Track| track.pose_at(joins_s);
+        let keeps_a_heading =
+            airplane.has_fixed_heading(airplane.orders.len()) && airplane.leaves_s == f64::INFINITY;
+        let mut flight = SoloFlight {
+            world: self,
+            airplane,
+            slot: i as Slot,
+            joins_s,
+            pose: airplane.track.as_ref().map_or(airplane.start, start),
+            orders: 0,
+            next: 0,
+            steps: 0,
+            keeps_a_heading,
+        };
+        for _ in 0..MAX_COMPUTED_STEPS {
+            interrupt::check();
+            flight.apply_orders();
+            if let Some(ends_s) = flight.end_s() {
+                return ends_s;
+            }
+            flight.step();
+        }
+        f64::INFINITY
+    }
+}

@@ -1,0 +1,275 @@
+//! The hooks by which a run asks the world for more than its phases.
+
+use super::decide::Optimization;
+use super::events::Event;
+use super::metrics::{self, Counters, Metrics};
+use super::rows::{FlownLeg, Rows};
+use super::scenario::CompiledAirspace;
+use super::state::{AirspaceState, Snapshot};
+use super::world::AirspaceWorld;
+use super::{Scratch, text, view};
+use serde_json::Value;
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
+use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::view::{
+    BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
+};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_scenario::Source;
+use std::sync::Arc;
+
+/// A run of an airspace.
+pub type AirspaceRun = Run<AirspaceWorld>;
+
+/// Returns a run of a scenario at its start.
+///
+/// # Errors
+/// When the scenario is wrong.
+pub fn airspace_run(source: &Source, workers: usize) -> Result<AirspaceRun, InputError> {
+    Ok(CompiledAirspace::new(source)?.start(source, workers))
+}
+
+impl CompiledAirspace {
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
+    pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
+        let state = AirspaceState::restore(&self.world, &self.start_snapshot());
+        let mut ledger = Counters::default();
+        self.too_close.iter().for_each(|&pair| ledger.add_too_close(0, pair));
+        let books =
+            Collector { counters: ledger, rows: Rows::new(self.record), ..Collector::default() };
+        let plan = self.plan();
+        Run::new(self.world, plan, state, books, &source.text, workers)
+    }
+
+    /// Returns the plan that the scenario asks for.
+    pub fn plan(&self) -> RunConfig {
+        RunConfig {
+            name: self.name.clone(),
+            seed: self.seed,
+            cycles: self.cycles,
+            checkpoint_every: self.record.checkpoint_every,
+        }
+    }
+}
+
+/// Rows in the order in which the workers have gathered them.
+#[derive(Debug, Default)]
+struct PendingRows {
+    events: Vec<Event>,
+    optimizations: Vec<Optimization>,
+    flown: Vec<FlownLeg>,
+}
+
+/// Data that a run keeps beside its state.
+#[derive(Debug, Default)]
+pub struct Collector {
+    /// Sums from which metrics are computed.
+    pub counters: Counters,
+    /// Processor time in nanoseconds spent deciding in this process.
+    decide_ns: u64,
+    /// Rows that wait to be recorded; none without recording.
+    rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
+    /// Rows as the workers have gathered them.
+    pending: PendingRows,
+}
+
+impl World for AirspaceWorld {
+    const NAME: &'static str = "airspace";
+    const AGENT: &'static str = "airplane";
+    const OBSERVES_EACH_CYCLE: bool = true;
+
+    type Collector = Collector;
+    type Snapshot = (Snapshot, Counters);
+    type Metrics = Metrics;
+
+    fn agents(&self) -> usize {
+        self.airplanes.len()
+    }
+
+    fn cycles_until_flush(&self, _: &AirspaceState, books: &Collector, _: Cycle) -> u64 {
+        if books.rows.is_full() { 0 } else { u64::MAX }
+    }
+
+    fn is_over(&self, state: &AirspaceState) -> bool {
+        metrics::have_all_ended(state)
+    }
+
+    fn collect(&self, books: &mut Collector, scratch: &mut Scratch) {
+        let ledger = &mut books.counters;
+        for (pair, record) in std::mem::take(&mut scratch.pairs) {
+            ledger.add_pair(pair, record);
+        }
+        ledger.effort.beacons.add(std::mem::take(&mut scratch.grouped));
+        ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
+        for (now, a, b) in std::mem::take(&mut scratch.too_close) {
+            ledger.add_too_close(now, (a, b));
+        }
+        books.decide_ns += std::mem::take(&mut scratch.decide_ns);
+        books.pending.events.append(&mut scratch.events);
+        books.pending.optimizations.append(&mut scratch.optimizations);
+        books.pending.flown.append(&mut scratch.flown);
+    }
+
+    fn commit(&self, books: &mut Collector) {
+        let PendingRows { mut events, mut optimizations, mut flown } =
+            std::mem::take(&mut books.pending);
+        // Stable, because a pair may lose separation more than once in a cycle.
+        events.sort_by_key(Event::key);
+        optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
+        // Stable, because an airplane may fly several legs in a cycle.
+        flown.sort_by_key(FlownLeg::key);
+        flown.into_iter().for_each(|leg| books.rows.push_leg(leg));
+        for event in events {
+            books.counters.add_event(&event);
+            books.log.push(event);
+            books.rows.push_event(event);
+        }
+        for optimization in optimizations {
+            books.counters.effort.add(&optimization);
+            books.rows.push_optimization(optimization);
+        }
+    }
+
+    fn start_recording(&self, _: &mut AirspaceState, books: &mut Collector, _: Cycle) {
+        books.rows.start(self);
+    }
+
+    fn enable_events(&self, books: &mut Collector) {
+        books.log.is_enabled = true;
+    }
+
+    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
+        books.rows.schemas()
+    }
+
+    fn record(
+        &self,
+        _: &mut AirspaceState,
+        books: &mut Collector,
+        _: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.rows.record(recorder)
+    }
+
+    fn digest(&self, state: &AirspaceState, now: Cycle) -> Digest {
+        state.snapshot(now).digest()
+    }
+
+    fn save(&self, state: &AirspaceState, books: &Collector, now: Cycle) -> (Snapshot, Counters) {
+        (state.snapshot(now), books.counters.clone())
+    }
+
+    fn restore(
+        &self,
+        saved: Self::Snapshot,
+        books: &mut Collector,
+    ) -> Result<AirspaceState, CheckpointError> {
+        let (snapshot, ledger) = saved;
+        if snapshot.airplanes.len() != self.airplanes.len() {
+            return Err(CheckpointError::Damaged);
+        }
+        books.counters = ledger;
+        Ok(AirspaceState::restore(self, &snapshot))
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        view::scenery(self, name)
+    }
+
+    fn frame(
+        &self,
+        state: &AirspaceState,
+        books: &mut Collector,
+        now: Cycle,
+        _: FrameOptions,
+    ) -> Frame {
+        let (events, log_left_out) = books.log.take();
+        Frame {
+            cycle: now,
+            time_s: self.cycle_start_s(now),
+            bodies: view::visible_bodies(self, state, now),
+            scans: Vec::new(),
+            odometry: Vec::new(),
+            log: events.iter().map(view::log_event).collect(),
+            log_left_out,
+        }
+    }
+
+    fn inspect(
+        &self,
+        state: &AirspaceState,
+        _: &Collector,
+        now: Cycle,
+        who: BodyId,
+    ) -> Option<Inspection> {
+        AirspaceWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        self.teams.clone()
+    }
+
+    fn check_order(&self, order: &Order<'_>) -> Result<(), String> {
+        self.external_action(order).map_or(Ok(()), |wish| wish.check())
+    }
+
+    fn order(&self, state: &mut AirspaceState, order: &Order<'_>) {
+        self.store_order(state, order);
+    }
+
+    fn submit_controls(
+        &self,
+        state: &mut AirspaceState,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        self.store_controls(state, now, controls)
+    }
+
+    fn records_controls(&self, books: &Collector) -> bool {
+        books.rows.has_controls()
+    }
+
+    fn observe(&self, state: &AirspaceState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
+        AirspaceWorld::observe(self, state, now, team, room);
+    }
+
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        view::position_columns()
+    }
+
+    fn metrics(
+        &self,
+        state: &AirspaceState,
+        books: &Collector,
+        now: Cycle,
+        _: &RunStats,
+    ) -> Metrics {
+        metrics::metrics(self, state, now, &books.counters, books.decide_ns as f64 / 1e9)
+    }
+
+    fn agent_metrics(&self, state: &AirspaceState, _: &Collector, _: Cycle) -> Value {
+        let one = |id| {
+            serde_json::to_value(metrics::airplane_metrics(self, state, id)).unwrap_or_default()
+        };
+        (0..self.airplanes.len() as EntityId).map(one).collect()
+    }
+
+    fn pair_metrics(&self, books: &Collector) -> Value {
+        serde_json::to_value(metrics::pair_metrics(self, &books.counters)).unwrap_or_default()
+    }
+
+    fn summary_lines(&self, metrics: &Metrics) -> KeyValues {
+        text::outcome(metrics)
+    }
+
+    fn poses(&self, state: &AirspaceState, now: Cycle) -> Description {
+        text::poses(&state.snapshot(now))
+    }
+}

@@ -1,0 +1,93 @@
+//! The world as it appears to code that runs scenarios of any world.
+
+use super::scenario::CompiledAirspace;
+use super::{AirspaceWorld, bundle, import, text};
+use sidestep_kernel::text::Description;
+use sidestep_kernel::{InputError, RunConfig, Simulation, World};
+use sidestep_scenario::{
+    CompiledScenario as AnyCompiled, ImportedScenario, MetricInfo, ResolvedScenario, SeedEffect,
+    Source, WorldType,
+};
+use std::any::Any;
+use std::path::Path;
+
+/// Airplanes that avoid each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Airspace;
+
+impl WorldType for Airspace {
+    fn name(&self) -> &'static str {
+        AirspaceWorld::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        AirspaceWorld::AGENT
+    }
+
+    fn about(&self) -> &'static str {
+        "Airplanes that avoid each other"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        include_str!("default.toml")
+    }
+
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections()
+    }
+
+    fn random_quantities(&self) -> &'static str {
+        "airspace.generator, airspace.position_noise_m, airspace.heading_noise_deg, airspace.network, and \
+         the search of method pc"
+    }
+
+    fn metric_infos(&self) -> &'static [MetricInfo] {
+        super::metric_info::METRIC_INFO
+    }
+
+    fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+        import::translate(file)
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
+        Ok(Box::new(CompiledAirspace::new(source)?))
+    }
+}
+
+impl AnyCompiled for CompiledAirspace {
+    fn world(&self) -> &'static str {
+        AirspaceWorld::NAME
+    }
+
+    fn plan(&self) -> RunConfig {
+        CompiledAirspace::plan(self)
+    }
+
+    fn body_count(&self) -> usize {
+        self.world.airplanes.len()
+    }
+
+    fn contents(&self, _: &Source) -> Description {
+        text::contents(self)
+    }
+
+    fn seed_effect(&self) -> SeedEffect {
+        self.seeds
+    }
+
+    fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
+        bundle::resolve(source, self)
+    }
+
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        Some(CompiledAirspace::reseeded(self, seed).map(|compiled| Box::new(compiled) as Box<_>))
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        Box::new(self.clone().start(source, workers))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

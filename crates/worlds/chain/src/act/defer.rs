@@ -1,0 +1,60 @@
+//! Motions to which nothing can object: the rest of the chain follows later, several at once.
+
+use super::situation::goal_distance_m;
+use super::{ChainContext, Initiator};
+use crate::driver::{Task, TaskKind};
+use crate::motion::recovery::RecoveryOutcome;
+use crate::rods::chain::{Chain, MAX_COORDINATE_M};
+use crate::rods::geometry::{Point, distance};
+use crate::rods::veto::CompletedMotion;
+use crate::state::Body;
+
+/// Returns whether the chain may follow the initiator's motion of this cycle later. The first cycle
+/// measures all rods, so that later only those count that move.
+pub(super) fn may_defer<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> bool {
+    let world = setting.world;
+    let leads_in_range = |task: &Task<D>| leads_in_range(task, &body.chain, world.dt_s);
+    world.is_open()
+        && world.rules.step_m.is_none()
+        && setting.spec.robots.is_none()
+        && body.scattered.is_none()
+        && body.chain.is_plain()
+        && body.tally.steps > 0
+        && !body.driving.ladder.is_pulling_back()
+        && setting.task(body).is_some_and(leads_in_range)
+}
+
+/// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
+fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
+    let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * dt_s;
+    task.agent == 0
+        && !matches!(task.driver, TaskKind::Navigate(_) | TaskKind::External)
+        && chain.points()[0].iter().all(|x| x.abs() < most_m)
+}
+
+/// Moves the initiator alone.
+pub(super) fn move_initiator_only<const D: usize>(
+    who: Initiator<'_, D>,
+    body: &mut Body<D>,
+    to: Point<D>,
+) -> RecoveryOutcome<D> {
+    let world = who.setting.world;
+    let goal_m = goal_distance_m(who.task, body);
+    body.driving.ladder.record_free_motion(who.task.source(), goal_m, &world.rungs);
+    let way_m = distance(body.chain.points()[0], to);
+    if way_m > body.chain.min_move_m() {
+        let dt_s = world.dt_s;
+        body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(way_m / dt_s);
+        if body.put_off.move_initiator(&mut body.chain, to, dt_s) {
+            body.catch_up();
+        }
+    }
+    let nothing = CompletedMotion {
+        touched: 0..0,
+        changed: 0,
+        rotated: 0,
+        max_slave_step_m: 0.0,
+        cut_short: None,
+    };
+    RecoveryOutcome::Straight(nothing)
+}

@@ -1,0 +1,181 @@
+//! Orders from outside, for one cycle, and the answer to them.
+
+use super::joints::ArmFollower;
+use super::situation::out_of_range_veto;
+use super::{ActState, ChainContext, Initiator};
+use crate::driver::external::{OrderOutcome, Orders, Target};
+use crate::driver::step_motion::StepMotion;
+use crate::motion::recovery::RecoveryOutcome;
+use crate::motion::request::execute_request;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{norm, normalized, sub, with_dimensions};
+use crate::rods::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
+use crate::state::Body;
+
+/// Number of times that the way is halved to find how far it goes: to 1/256 of it.
+const BISECTIONS: usize = 8;
+
+/// Takes the orders for this cycle. They are gone after it, whether anybody heeds them or not.
+pub(super) fn take_orders<const D: usize>(body: &mut Body<D>) -> Orders {
+    let orders = std::mem::take(&mut body.external).orders;
+    if orders.target.is_some() {
+        body.external.answer.came = OrderOutcome::Unheard;
+    }
+    orders
+}
+
+/// Returns the errand on which orders send a chain in this cycle, if they have a target.
+pub(super) fn step_from_orders<const D: usize>(
+    who: Initiator<'_, D>,
+    chain: &Chain<D>,
+    orders: Orders,
+) -> Option<StepMotion<D>> {
+    let Orders { connector, rod, target, goes_far } = orders;
+    let agent = who.task.agent;
+    let motion = match target? {
+        Target::Connector(to) => {
+            let k = connector.map_or(agent, |k| k as usize);
+            let (to, at) = (with_dimensions(to), chain.points()[k]);
+            let connector = &chain.connectors()[k];
+            let mobility = &connector.mobility;
+            let is_there = !goes_far || connector.is_still() || mobility.allows(to, at);
+            Motion::Connector { k, to: if is_there { to } else { mobility.project(to, at) } }
+        }
+        Target::Rod(to) => {
+            let last = chain.rods().len().checked_sub(1)?;
+            let i = rod.map_or(agent.min(last), |i| i as usize);
+            Motion::Rod { i, to: to.map(with_dimensions) }
+        }
+    };
+    Some(StepMotion::new(chain, &motion, who.step_m()))
+}
+
+/// The manner of going on an errand.
+#[derive(Clone, Copy)]
+pub(super) struct StepOptions {
+    /// Whether the chain waits, because parts have to get out of the way.
+    pub(super) gives_way: bool,
+    /// Whether it goes as far as it can where it cannot go all the way.
+    pub(super) goes_far: bool,
+}
+
+/// Goes on an errand, unless parts have to get out of the way.
+pub(super) fn execute_step<const D: usize>(
+    who: Initiator<'_, D>,
+    acting: &mut ActState<'_, D>,
+    errand: &StepMotion<D>,
+    manner: StepOptions,
+) {
+    let at = acting.body.chain.points()[errand.first];
+    acting.body.driving.way_m.wanted += norm(sub(errand.to[0], at));
+    let climbed = match manner.gives_way {
+        true => RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) },
+        false => request_or_bisect(who.setting, acting, errand, manner.goes_far),
+    };
+    let body = &mut *acting.body;
+    body.tally.rungs.record(&climbed);
+    acting.told.trace(|notes| notes.climbed = Some(climbed));
+    let way = sub(body.chain.points()[errand.first], at);
+    let driving = &mut body.driving;
+    driving.way_m.gone += norm(way);
+    driving.idle = if way == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
+    if let Some(ahead) = normalized(way).filter(|_| errand.first == who.task.agent) {
+        driving.ahead = with_dimensions(ahead);
+    }
+    body.tally.way_m += norm(way);
+}
+
+/// Requests all of the way and, where that is vetoed and as much as goes is wanted, halves of what is
+/// left; tells the objection to the rest.
+fn request_or_bisect<const D: usize>(
+    setting: ChainContext<'_, D>,
+    acting: &mut ActState<'_, D>,
+    errand: &StepMotion<D>,
+    goes_far: bool,
+) -> RecoveryOutcome<D> {
+    let mut veto = match request_fraction(setting, acting, errand, 1.0) {
+        Outcome::Moved(moved) => {
+            match &moved.cut_short {
+                Some(veto) => record_veto(acting, veto),
+                None => acting.body.driving.told = None,
+            }
+            return RecoveryOutcome::Straight(moved);
+        }
+        Outcome::Vetoed(veto) => veto,
+    };
+    let (mut done, mut half, mut last) = (0.0, 0.5, None);
+    for _ in 0..if goes_far { BISECTIONS } else { 0 } {
+        match request_fraction(setting, acting, errand, done + half) {
+            Outcome::Moved(moved) => {
+                done += half;
+                last = Some(moved);
+            }
+            Outcome::Vetoed(nearer) => veto = nearer,
+        }
+        half *= 0.5;
+    }
+    record_veto(acting, &veto);
+    match last {
+        Some(moved) => RecoveryOutcome::Shorter { part: done, moved },
+        None => RecoveryOutcome::Vetoed(veto),
+    }
+}
+
+/// Requests a part of an errand's way, counted from its start: all of that part, or nothing.
+fn request_fraction<const D: usize>(
+    setting: ChainContext<'_, D>,
+    acting: &mut ActState<'_, D>,
+    errand: &StepMotion<D>,
+    part: f64,
+) -> Outcome<D> {
+    let motion = errand.motion(part);
+    let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
+    let ActState { body, before, propagator, .. } = acting;
+    let outcome = execute_request(propagator, &mut body.chain, setting.obstacles, &request);
+    let outcome =
+        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, errand.first)));
+    let outcome = match ArmFollower::from_body(setting, before, body) {
+        Some(mut arm) => arm.execute_order(errand, part, outcome),
+        None => outcome,
+    };
+    if let Outcome::Moved(moved) = &outcome {
+        body.tally.add_motion(moved);
+    }
+    outcome
+}
+
+/// Counts a veto to an errand, and notes it in the answer.
+fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
+    acting.record_veto(veto);
+    record_result_veto(acting.body, veto);
+}
+
+/// Notes in the answer who objects.
+pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto<D>) {
+    let answer = &mut body.external.answer;
+    (answer.veto, answer.obstacle) = (body.driving.objection, veto.obstacle);
+    answer.reached_m = with_dimensions(veto.reached);
+}
+
+/// Completes the answer at the end of the chain's motions.
+pub(super) fn complete_result<const D: usize>(
+    body: &mut Body<D>,
+    errand: &StepMotion<D>,
+    gives_way: bool,
+) {
+    let chain = &body.chain;
+    let done_share = errand.done_fraction(chain);
+    let reached = chain.points()[errand.first];
+    let answer = &mut body.external.answer;
+    answer.wish_m = errand.to.map(with_dimensions);
+    answer.came = match answer.veto {
+        None if gives_way => OrderOutcome::Waited,
+        None => OrderOutcome::Moved,
+        Some(_) if done_share > 0.0 => OrderOutcome::CutShort,
+        Some(_) => OrderOutcome::Vetoed,
+    };
+    answer.done_share = if answer.came == OrderOutcome::Moved { 1.0 } else { done_share };
+    if answer.came != OrderOutcome::Vetoed {
+        answer.reached_m = with_dimensions(reached);
+    }
+}

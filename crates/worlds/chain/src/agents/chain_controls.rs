@@ -1,0 +1,74 @@
+//! Decisions of a chain's agents in a cycle, wherever they run.
+
+use super::control::{Control, LeaderOutcome};
+use crate::motion::recovery::RecoveryOutcome;
+use crate::rods::veto::Veto;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::Cycle;
+
+/// Decisions of a chain's agents in a cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChainControls<const D: usize> {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// The decisions, by connector; none of one that has not come to a decision in time.
+    pub controls: Vec<Option<Control<D>>>,
+    /// Connectors whose agents are gone: the chain stands until they are back.
+    pub gone: Vec<u32>,
+}
+
+impl<const D: usize> ChainControls<D> {
+    /// The bytes that stand for the decision of an agent that is gone: too few for any decision.
+    pub const ABSENT_CONTROL: &'static [u8] = &[0];
+
+    /// Returns the decisions of a chain of `n` whose agents were not heard.
+    pub fn empty(cycle: Cycle, n: usize) -> Self {
+        Self { cycle, controls: vec![None; n], gone: Vec::new() }
+    }
+
+    /// Checks that they are of a chain of `n`; an error has the cause and the remedy.
+    pub(crate) fn check(&self, n: usize) -> Result<(), (String, &'static str)> {
+        if self.controls.len() != n {
+            let cause = format!("{} decisions for {n} connectors", self.controls.len());
+            return Err((cause, "give one for each, or none of it"));
+        }
+        if let Some(k) = self.gone.iter().find(|&&k| k as usize >= n) {
+            let cause = format!("connector {k} is said to be gone, and there are {n}");
+            return Err((cause, "name connectors of this chain"));
+        }
+        for (k, control) in self.controls.iter().enumerate() {
+            let Some(control) = control else { continue };
+            if control.connector as usize != k || control.cycle != self.cycle {
+                let Control { connector, cycle, .. } = control;
+                let cause = format!("number {k} is of connector {connector}, cycle {cycle}");
+                return Err((cause, "give them by connector, of the cycle to come"));
+            }
+            if !is_valid(control, n) {
+                let cause = format!("that of connector {k} names connectors that do not exist");
+                return Err((cause, "hand over what agents of this chain have decided"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns whether a decision is about connectors of a chain of `n`.
+fn is_valid<const D: usize>(control: &Control<D>, n: usize) -> bool {
+    let is_there = |k: u32| (k as usize) < n;
+    let is_veto = |veto: &Veto<D>| veto.by < n && veto.from < n;
+    let ended = match &control.ended {
+        Some(LeaderOutcome::Climbed { climbed, objection, .. }) => {
+            let climbed = match climbed {
+                RecoveryOutcome::PulledBack { by, .. } => *by < n,
+                RecoveryOutcome::Stuck { vetoes } => vetoes.iter().all(is_veto),
+                RecoveryOutcome::Vetoed(veto) => is_veto(veto),
+                _ => true,
+            };
+            climbed && objection.as_ref().is_none_or(is_veto)
+        }
+        Some(LeaderOutcome::Stands { missing }) => is_there(*missing),
+        Some(LeaderOutcome::Rested) | None => true,
+    };
+    let led = control.led.is_none_or(|led| led.first <= led.last && is_there(led.last));
+    ended && led && control.missing.iter().flatten().all(|&k| is_there(k))
+}

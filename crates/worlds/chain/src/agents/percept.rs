@@ -1,0 +1,142 @@
+//! Perception of a connector at the start of a cycle: all that its agent is given.
+
+use crate::motion::recovery::{RecoveryMemory, Situation};
+use crate::rods::chain::is_in_range;
+use crate::rods::geometry::{Core, Cuboid, Point, distance};
+use crate::rods::obstacle::Obstacle;
+use crate::rods::serde_point::WirePoint;
+use crate::rods::veto::RequestSource;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId, InputError};
+use std::f64::consts::PI;
+
+/// A connector's perception at the start of a cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConnectorPercept<const D: usize> {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// Its place, meters.
+    pub at: WirePoint<D>,
+    /// The places of the neighbors below and above, where there is one.
+    pub neighbors: [Option<WirePoint<D>>; 2],
+    /// Its bend limit in this cycle, rad.
+    pub max_bend_rad: f64,
+    /// Obstacles that its sensors see: all those to which a motion of this cycle may bring it near.
+    pub seen: Vec<SensedObstacle>,
+    /// Whether its radio is dead in this cycle.
+    pub is_silent: bool,
+    /// The nearest lost connectors below and above, as it knew at the end of the cycle before.
+    pub missing: [Option<u32>; 2],
+    /// Its part in this cycle.
+    pub role: Role<D>,
+}
+
+/// Perception of the connectors of a chain, by connector.
+pub type ChainPercepts<const D: usize> = (EntityId, Vec<ConnectorPercept<D>>);
+
+/// The part of a connector in a cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Role<const D: usize> {
+    /// It follows.
+    Follows,
+    /// It leads the chain, which rests.
+    Rests,
+    /// It leads the chain.
+    Leads(Intention<D>),
+}
+
+/// A leader's wish in a cycle: on its own account, or on the order of a planner or an operator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Intention<const D: usize> {
+    /// Its target: its wished place at the end of the cycle, meters.
+    pub to: WirePoint<D>,
+    /// The source of the wish.
+    pub source: RequestSource,
+    /// Its knowledge beside its neighborhood.
+    pub situation: Situation,
+    /// Its memory of vetoes in earlier cycles.
+    pub memory: RecoveryMemory,
+    /// Whether it is known that there is no obstacle anywhere,
+    pub is_empty: bool,
+    /// and that therefore nothing can object.
+    pub is_open: bool,
+}
+
+/// An obstacle, as sensors see it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SensedObstacle {
+    /// Its name in vetoes.
+    pub id: u32,
+    /// Its reach beyond its core, meters.
+    pub radius_m: f64,
+    /// Coordinates of its core in `D` dimensions, meters: of a point (`D`), of the two ends of a segment
+    /// (`2 D`), or of a box: middle, directions of its edges, half its extents (`D (D + 2)`).
+    pub core: Vec<f64>,
+}
+
+impl SensedObstacle {
+    /// Returns an obstacle as sensors see it.
+    pub fn from_obstacle<const D: usize>(obstacle: &Obstacle<D>) -> Self {
+        let core = match &obstacle.core {
+            Core::Point(at) => at.to_vec(),
+            Core::Segment(ends) => ends.as_flattened().to_vec(),
+            Core::Cuboid(Cuboid { center, axes, half_m }) => {
+                [center, axes.as_flattened(), half_m].concat()
+            }
+        };
+        Self { id: obstacle.id, radius_m: obstacle.radius_m, core }
+    }
+
+    /// Returns the obstacle; none if its core is of no shape.
+    pub fn to_obstacle<const D: usize>(&self) -> Option<Obstacle<D>> {
+        let point = |k: usize| -> Point<D> { std::array::from_fn(|i| self.core[k * D + i]) };
+        let core = match self.core.len() {
+            n if n == D => Core::Point(point(0)),
+            n if n == 2 * D => Core::Segment([point(0), point(1)]),
+            n if n == D * (D + 2) => Core::Cuboid(Cuboid {
+                center: point(0),
+                axes: std::array::from_fn(|axis| point(1 + axis)),
+                half_m: point(1 + D),
+            }),
+            _ => return None,
+        };
+        Some(Obstacle::still(self.id, core, self.radius_m))
+    }
+}
+
+impl<const D: usize> ConnectorPercept<D> {
+    /// Returns the distances to the neighbors below and above, where there is one, meters.
+    pub fn neighbor_distances_m(&self) -> [Option<f64>; 2] {
+        self.neighbors.map(|place| place.map(|WirePoint(at)| distance(self.at.0, at)))
+    }
+
+    /// Returns the obstacles in sight.
+    ///
+    /// # Errors
+    /// When some number of the sight makes no sense for connector `me` of `n`.
+    pub(super) fn validated_obstacles(
+        &self,
+        me: u32,
+        n: u32,
+    ) -> Result<Vec<Obstacle<D>>, InputError> {
+        let wrong = |what: &str| {
+            let remedy = "give what its sensors have measured: finite numbers, up to 1e6 m";
+            InputError::new(format!("sight of connector {me}"), what.to_string(), remedy)
+        };
+        let places = self.neighbors.iter().flatten().chain(std::iter::once(&self.at));
+        if !places.map(|WirePoint(at)| at).all(is_in_range) {
+            return Err(wrong("a place is out of range"));
+        }
+        if self.neighbors.map(|place| place.is_some()) != [me > 0, me + 1 < n] {
+            return Err(wrong("its neighbors are not those of its place in the chain"));
+        }
+        if !(self.max_bend_rad > 0.0 && self.max_bend_rad <= PI) {
+            return Err(wrong("its bend limit is not in (0, pi]"));
+        }
+        if self.missing.iter().flatten().any(|&k| k >= n || k == me) {
+            return Err(wrong("a lost connector is none of its chain"));
+        }
+        let seen = self.seen.iter().map(SensedObstacle::to_obstacle);
+        seen.collect::<Option<_>>().ok_or_else(|| wrong("an obstacle has no shape"))
+    }
+}

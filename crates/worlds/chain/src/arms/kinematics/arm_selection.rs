@@ -1,0 +1,96 @@
+//! An arm of a robot model: the files, and the links or the group that choose it.
+
+use super::body::ArmBody;
+use super::serial::SerialChain;
+use sidestep_import::urdf::srdf::Semantics;
+use sidestep_import::urdf::{Model, Solids};
+use sidestep_kernel::InputError;
+use std::path::PathBuf;
+
+/// The files of a robot model, and the part of it that is the arm. Errors name it by the options of the
+/// command: `--base`, `--tip`, `--group`, `--posture`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ArmFiles {
+    /// The URDF file.
+    pub urdf: PathBuf,
+    /// The base link; the root where it is absent.
+    pub base: Option<String>,
+    /// The tip link; the end of the longest arm where it is absent.
+    pub tip: Option<String>,
+    /// The SRDF file.
+    pub srdf: Option<PathBuf>,
+    /// The group of the SRDF file that base and tip are taken from.
+    pub group: Option<String>,
+}
+
+/// An arm that was chosen.
+#[derive(Debug, Clone)]
+pub struct ArmSelection {
+    /// The robot.
+    pub model: Model,
+    /// The content of the SRDF file.
+    pub semantics: Option<Semantics>,
+    /// The joints from base to tip.
+    pub chain: SerialChain,
+    urdf: PathBuf,
+}
+
+impl ArmFiles {
+    /// Reads the files and returns the arm.
+    ///
+    /// # Errors
+    /// When a file, a link or a group is wrong.
+    pub fn load(&self) -> Result<ArmSelection, InputError> {
+        let model = Model::load(&self.urdf)?;
+        let semantics = self.srdf.as_ref().map(|path| Semantics::load(path, &model)).transpose()?;
+        let chain = self.chain(&model, semantics.as_ref())?;
+        Ok(ArmSelection { model, semantics, chain, urdf: self.urdf.clone() })
+    }
+
+    fn chain(
+        &self,
+        model: &Model,
+        semantics: Option<&Semantics>,
+    ) -> Result<SerialChain, InputError> {
+        if let (Some(name), Some(semantics)) = (&self.group, semantics) {
+            let (base, tip) = semantics.ends("--group", name, model)?;
+            return SerialChain::new(model, base, tip, "--group");
+        }
+        let link = |option, name: &Option<String>, otherwise| match name {
+            Some(name) => model.link(option, name),
+            None => Ok(otherwise),
+        };
+        let base = link("--base", &self.base, model.root)?;
+        let tip = link("--tip", &self.tip, model.default_tip())?;
+        let place = match (&self.tip, &self.base) {
+            (Some(_), _) => "--tip".into(),
+            (None, Some(_)) => "--base".into(),
+            (None, None) => self.urdf.display().to_string(),
+        };
+        SerialChain::new(model, base, tip, &place)
+    }
+}
+
+impl ArmSelection {
+    /// Returns the joint values of a named posture of the SRDF file, or those at rest.
+    ///
+    /// # Errors
+    /// When there is no such posture.
+    pub fn posture(&self, name: Option<&str>) -> Result<Vec<f64>, InputError> {
+        let Some(name) = name else { return Ok(self.chain.rest_values()) };
+        let Some(semantics) = &self.semantics else {
+            let cause = format!("`{name}` is a posture of an SRDF file, and there is none");
+            return Err(InputError::new("--posture", cause, "name the SRDF file as well"));
+        };
+        let posture = semantics.posture("--posture", name)?;
+        Ok(self.chain.with_posture(&self.model, &posture))
+    }
+
+    /// Returns the shapes of its links, and remarks on those that are not among them.
+    pub fn body(&self) -> (ArmBody, Vec<String>) {
+        let Solids { solids, remarks } = self.model.solids(&self.urdf);
+        let masks = self.semantics.iter().flat_map(|s| &s.disabled_collisions);
+        let may_touch: Vec<_> = masks.map(|mask| mask.links).collect();
+        (ArmBody::new(&self.model, &self.chain, &solids, &may_touch), remarks)
+    }
+}

@@ -1,0 +1,147 @@
+//! The agents of a chain on a network in memory, which can lose, delay, double and reorder packets,
+//! cut links, and silence a connector.
+//!
+//! Its faults are those of any network ([`sidestep_kernel::network`]).
+
+use crate::agents::{ConnectorAgent, ConnectorPercept, Control, OutgoingPacket};
+use crate::rods::geometry::distance;
+use crate::world::{ChainWorld, purpose};
+use sidestep_kernel::interrupt;
+use sidestep_kernel::network::{Distances, FaultInjector, FaultStreams, FaultyTransport, Network};
+use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{Cycle, EntityId};
+
+/// The network of a chain for the talk of a cycle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NegotiationContext<'a> {
+    /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
+    pub(super) network: Option<&'a Network>,
+    pub(super) streams: Streams,
+    pub(super) first_id: EntityId,
+    /// Its first tick, and the time of that in seconds after the start of the run.
+    pub(super) begins: (u64, f64),
+}
+
+impl<'a> NegotiationContext<'a> {
+    /// Returns the talk of a chain in a cycle.
+    pub(super) fn new<const D: usize>(
+        world: &'a ChainWorld<D>,
+        chain: EntityId,
+        now: Cycle,
+    ) -> Self {
+        let (network, streams) = (world.network.as_ref(), world.streams);
+        Self {
+            network,
+            streams,
+            first_id: world.first_id(chain),
+            begins: world.negotiation_start(now),
+        }
+    }
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the first tick of a cycle's talk, and its time in seconds after the start of the run.
+    pub fn negotiation_start(&self, now: Cycle) -> (u64, f64) {
+        (first_tick(self.network.as_ref(), now), self.start_time_s(now))
+    }
+
+    /// Returns the faults of one connector's packets where each has a process of its own; none where the
+    /// network is reliable.
+    pub fn fault_injector(&self) -> Option<FaultInjector> {
+        Some(FaultInjector::new(self.network.clone()?, draws(self.streams)))
+    }
+}
+
+/// Returns the tick in which the talk of a cycle starts.
+pub(super) fn first_tick(network: Option<&Network>, now: Cycle) -> u64 {
+    network.map_or(0, |network| now * (network.deadline_ticks() + 1))
+}
+
+fn draws(streams: Streams) -> FaultStreams {
+    let (network, burst, burst_loss) = (purpose::NETWORK, purpose::BURST, purpose::BURST_LOSS);
+    FaultStreams { streams, network, burst, burst_loss }
+}
+
+/// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
+struct StartPositions<'a, const D: usize>(EntityId, &'a [ConnectorPercept<D>]);
+
+impl<const D: usize> Distances for StartPositions<'_, D> {
+    fn distance_m(&self, link: [EntityId; 2]) -> f64 {
+        let [a, b] = link.map(|id| self.1[(id - self.0) as usize].at.0);
+        distance(a, b)
+    }
+}
+
+/// The network, and until when something may still arrive at each agent.
+struct SimulatedNetwork<'a> {
+    talk: NegotiationContext<'a>,
+    carrier: FaultyTransport<'a, MemoryTransport>,
+    longest: u64,
+    busy_until: Vec<u64>,
+}
+
+impl SimulatedNetwork<'_> {
+    /// Hands an agent's packets to the network.
+    fn send<const D: usize>(&mut self, agent: &mut ConnectorAgent<D>, tick: u64) {
+        let sender = agent.id();
+        for OutgoingPacket { to, sequence, payload } in agent.take_packets() {
+            self.busy_until[(to - self.talk.first_id) as usize] = tick.saturating_add(self.longest);
+            self.carrier.send(Envelope { cycle: tick, sender, sequence, receiver: to, payload });
+        }
+    }
+
+    /// Lets an agent take the arrived packets, look at the clock, and answer.
+    fn step<const D: usize>(&mut self, k: usize, agent: &mut ConnectorAgent<D>, tick: u64) {
+        let is_due = agent.next_timer().is_some_and(|due| due <= tick);
+        if self.busy_until[k] >= tick {
+            for envelope in self.carrier.receive(agent.id(), tick) {
+                agent.on_packet(envelope.sender, &envelope.payload, tick);
+                // Where no time is counted, a process answers each packet when it comes.
+                if self.talk.network.is_none() {
+                    self.send(agent, tick);
+                }
+            }
+        } else if !is_due {
+            return;
+        }
+        agent.on_timer(tick);
+        self.send(agent, tick);
+    }
+}
+
+/// Lets the agents of a chain talk until all are done; `sights[k]` is that of `agents[k]`. Returns their
+/// decisions in the same order.
+///
+/// # Panics
+/// When a sight makes no sense.
+pub(super) fn run_agents<const D: usize>(
+    talk: NegotiationContext<'_>,
+    agents: &mut [ConnectorAgent<D>],
+    sights: Vec<ConnectorPercept<D>>,
+) -> Vec<Option<Control<D>>> {
+    let (places, begins) = (StartPositions(talk.first_id, &sights), [talk.begins]);
+    let draws = draws(talk.streams);
+    let carrier = FaultyTransport::in_memory(talk.network, draws, Some(&places), &begins);
+    let longest = talk.network.map_or(1, max_ticks);
+    let mut air = SimulatedNetwork { talk, carrier, longest, busy_until: vec![0; agents.len()] };
+    let mut tick = talk.begins.0;
+    for (agent, sight) in agents.iter_mut().zip(&sights) {
+        agent.start(sight.clone(), tick).expect("a world shows its connectors what is there");
+        air.send(agent, tick);
+    }
+    while !agents.iter().all(ConnectorAgent::is_done) {
+        interrupt::check();
+        let timers = agents.iter().filter_map(ConnectorAgent::next_timer);
+        let next = timers.chain(air.carrier.next_arrival()).min();
+        tick = tick.max(next.expect("agents that are not done wait for something"));
+        agents.iter_mut().enumerate().for_each(|(k, agent)| air.step(k, agent, tick));
+    }
+    agents.iter().map(ConnectorAgent::control).collect()
+}
+
+/// Returns the most ticks that a packet takes; no bound where large ones take their time on a link.
+fn max_ticks(network: &Network) -> u64 {
+    let is_narrow = network.bandwidth_bit_s < f64::INFINITY;
+    if is_narrow { u64::MAX } else { 1 + u64::from(network.faults().max_delay_cycles) }
+}

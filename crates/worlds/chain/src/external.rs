@@ -1,0 +1,303 @@
+//! Chains as a caller sees them: their observations, and the orders for those whose driver is outside.
+//! An agent is a chain, by its number.
+
+use super::clearance::part_clearance;
+use super::driver::external::{OrderOutcome, Orders};
+use super::driver::{Task, TaskKind, VetoRecord};
+use super::rods::chain::MAX_COORDINATE_M;
+use super::rods::geometry::{Bounds as Box, Point, distance};
+use super::rods::motion_context::is_length_allowed;
+use super::rods::obstacle::Obstacles;
+use super::rods::veto::VetoReason;
+use super::scratch::Scratch;
+use super::state::{Body, ChainState};
+use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
+use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
+use sidestep_kernel::{Cycle, EntityId, Slot};
+
+#[cfg(test)]
+mod tests;
+
+/// The noun for an agent that observes and takes orders.
+const CHAIN: &str = "chain";
+/// Sorts of causes of vetoes.
+const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
+
+impl<const D: usize> ChainSpec<D> {
+    /// Returns whether some task of it takes orders.
+    fn is_external(&self) -> bool {
+        self.tasks.iter().any(takes_orders)
+    }
+}
+
+fn takes_orders<const D: usize>(task: &Task<D>) -> bool {
+    matches!(task.driver, TaskKind::External)
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the teams: chains of one name and one number of connectors, that take orders or do not.
+    pub(super) fn find_teams(&self) -> Teams {
+        type TeamKey<'a, const D: usize> = (&'a ChainSpec<D>, Vec<EntityId>);
+        let mut alike: Vec<TeamKey<'_, D>> = Vec::new();
+        for (id, spec) in (0..).zip(self.chains.iter()) {
+            let traits = |s: &ChainSpec<D>| (s.start.points().len(), s.is_external());
+            let is_same = |(other, _): &&mut TeamKey<'_, D>| {
+                other.name == spec.name && traits(other) == traits(spec)
+            };
+            match alike.iter_mut().rev().find(is_same) {
+                Some((_, agents)) => agents.push(id),
+                None => alike.push((spec, vec![id])),
+            }
+        }
+        let team = |(spec, agents): TeamKey<'_, D>| {
+            let (n, is_external) = (spec.start.points().len(), spec.is_external());
+            let mut observed = self.observation_spaces(n);
+            if is_external {
+                observed.extend(order_result_spaces::<D>());
+            }
+            let ordered = if is_external { action_spaces::<D>(n) } else { Vec::new() };
+            let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
+            Team { name, agents, observation_spaces: observed, action_spaces: ordered }
+        };
+        Teams::new(alike.into_iter().map(team).collect(), CHAIN)
+    }
+
+    /// Returns the spaces of the perception of a chain of `n` connectors, in the order of [`Self::observe`].
+    fn observation_spaces(&self, n: usize) -> Vec<Space> {
+        let look_m = self.look_m;
+        let up_to_look = || SpaceKind::Real { low: f64::NEG_INFINITY, high: look_m };
+        let part = SpaceKind::Integer { low: -1, high: n as i64 - 1 };
+        let reasons = std::iter::once("none").chain(VetoReason::ALL.iter().map(|r| r.name()));
+        let gap = format!(
+            "gap between each connector and the nearest obstacle or other chain, below 0 inside it; {look_m} \
+             where nothing is as near"
+        );
+        vec![
+            Space::new("joints_m", any_coordinate(), "places of its connectors").with_shape([n, D]),
+            Space::new("gap_m", up_to_look(), gap).with_shape([n]),
+            Space::new(
+                "nearest_m",
+                any_coordinate(),
+                "way from each connector's middle to the surface of that; 0 where nothing is near",
+            )
+            .with_shape([n, D]),
+            Space::new("rod_gap_m", up_to_look(), "the same gap of each rod").with_shape([n - 1]),
+            Space::new("leads", part.clone(), "connector that leads; -1 where none does"),
+            Space::new("is_broken", choice(["no", "yes"]), "whether its parts are scattered"),
+            Space::new("veto", choice(reasons), "reason of the last objection to what it wanted"),
+            Space::new("veto_part", part, "connector that objected; -1 where none did"),
+        ]
+    }
+
+    /// Returns an error, with the remedy, if no rod of a chain can ever be as an order wants it.
+    pub(super) fn check_possible(&self, order: &Order<'_>) -> Result<(), String> {
+        if self.order_name(order) != Orders::ROD_TO {
+            return Ok(());
+        }
+        let (first, second) = order.values.split_at(D);
+        let place = |at: &[f64]| -> Point<D> { std::array::from_fn(|i| at[i]) };
+        let long_m = distance(place(first), place(second));
+        let rods = self.chains[order.agent as usize].start.rods();
+        if rods.iter().any(|rod| is_length_allowed(*rod, long_m)) {
+            return Ok(());
+        }
+        let least_m = rods.iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
+        let most_m = rods.iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+        Err(format!(
+            "its places are {long_m} m apart, and no rod of the chain is as long; give places {least_m} m to \
+             {most_m} m apart"
+        ))
+    }
+
+    fn order_name(&self, order: &Order<'_>) -> &str {
+        &self.teams.all()[order.team].action_spaces[order.space].name
+    }
+
+    /// Notes an order in the state of its chain.
+    pub(super) fn record_order(&self, state: &ChainState<D>, order: &Order<'_>) {
+        let external = &mut state.body_mut(order.agent as usize).external;
+        external.orders.record(self.order_name(order), order.values);
+    }
+
+    /// Writes a team's perception.
+    pub(super) fn observe(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        team: usize,
+        room: &mut [BufferMut<'_>],
+    ) {
+        let Team { agents, action_spaces: ordered, .. } = &self.teams.all()[team];
+        let scratch = &mut Scratch::new(self);
+        let boxes: Vec<Box<D>> =
+            (0..state.len()).map(|slot| self.bounding_box(&state.body(slot))).collect();
+        for (row, &id) in agents.iter().enumerate() {
+            let near = |slot: &Slot| {
+                *slot != id && boxes[*slot as usize].meets(&boxes[id as usize].grown(self.look_m))
+            };
+            scratch.around.gather(self, state, now, (0..state.len() as Slot).filter(near));
+            let body = &state.body(id as usize);
+            let mut row = ObservationRow { row, rooms: room.iter_mut() };
+            self.observe_body(id, body, &scratch.around.all, &mut row);
+            if !ordered.is_empty() {
+                self.observe_order_result(id, body, &mut row);
+            }
+        }
+    }
+
+    /// Returns the box around a chain.
+    fn bounding_box(&self, body: &Body<D>) -> Box<D> {
+        let radii_m = body.chain.connectors().iter().map(|connector| connector.radius_m);
+        Box::from_points(body.chain.points()).grown(radii_m.fold(0.0, f64::max))
+    }
+
+    fn current_task(&self, id: EntityId, body: &Body<D>) -> Option<&Task<D>> {
+        self.chains[id as usize].tasks.get(body.driving.task as usize)
+    }
+
+    fn observe_body(
+        &self,
+        id: EntityId,
+        body: &Body<D>,
+        obstacles: &Obstacles<D>,
+        row: &mut ObservationRow<'_, '_>,
+    ) {
+        let (chain, n) = (&body.chain, body.chain.points().len());
+        let is_whole = body.scattered.is_none();
+        let all: Vec<_> =
+            (0..n).map(|k| part_clearance(chain, obstacles, k, self.look_m, is_whole)).collect();
+        row.push_reals(chain.points().as_flattened().iter().copied());
+        row.push_reals(all.iter().map(|near| near.gap_m));
+        row.push_reals(
+            all.iter().map(|near| near.way).collect::<Vec<_>>().as_flattened().iter().copied(),
+        );
+        row.push_reals(all[..n - 1].iter().map(|near| near.rod_gap_m));
+        let leads =
+            self.current_task(id, body).filter(|task| !matches!(task.driver, TaskKind::Rest));
+        row.push_integer(leads.map_or(-1, |task| task.agent as i64));
+        row.push_integer(i64::from(!is_whole));
+        let veto = match self.chains[id as usize].is_external() {
+            true => body.external.answer.veto,
+            false => body.driving.objection,
+        };
+        row.push_integer(veto.map_or(0, |VetoRecord { reason, .. }| reason.number() as i64 + 1));
+        row.push_integer(veto.map_or(-1, |VetoRecord { by, .. }| i64::from(by)));
+    }
+
+    fn observe_order_result(&self, id: EntityId, body: &Body<D>, row: &mut ObservationRow<'_, '_>) {
+        let answer = &body.external.answer;
+        let (cause, number) = match answer.obstacle {
+            None => (0, -1),
+            Some(obstacle) if obstacle < OTHER_CHAIN => (1, i64::from(obstacle)),
+            Some(part) => (2, i64::from(part - OTHER_CHAIN)),
+        };
+        let heeds =
+            body.scattered.is_none() && self.current_task(id, body).is_some_and(takes_orders);
+        row.push_integer(cause);
+        row.push_integer(number);
+        row.push_integer(i64::from(heeds));
+        row.push_integer(answer.came as i64);
+        row.push_reals(answer.wish_m[0][..D].iter().chain(&answer.wish_m[1][..D]).copied());
+        row.push_reals(answer.reached_m[..D].iter().copied());
+        row.push_reals([answer.done_share]);
+    }
+}
+
+/// Returns the spaces of the answers to a chain that takes orders.
+fn order_result_spaces<const D: usize>() -> Vec<Space> {
+    let number = SpaceKind::Integer { low: -1, high: i64::from(u32::MAX) };
+    let share = SpaceKind::Real { low: 0.0, high: 1.0 };
+    vec![
+        Space::new("veto_cause", choice(CAUSES), "sort of thing because of which it objected"),
+        Space::new("veto_cause_id", number, "number of that obstacle or chain; -1 for none"),
+        Space::new("heeds", choice(["no", "yes"]), "whether it takes orders in this cycle"),
+        Space::new("answer", choice(OrderOutcome::NAMES), "what came of the orders in the last cycle"),
+        Space::new(
+            "wish_m",
+            any_coordinate(),
+            "places that both ends of the rod, or twice that the connector, should have reached in the \
+             last cycle; 0 where there was no errand",
+        )
+        .with_shape([2, D]),
+        Space::new(
+            "reached_m",
+            any_coordinate(),
+            "place that the first of them has reached or, vetoed, could have reached; 0 where there was \
+             no errand",
+        )
+        .with_shape([D]),
+        Space::new("done_share", share, "part of the last cycle's way that was done"),
+    ]
+}
+
+/// Returns the spaces of the orders for a chain of `n` connectors.
+fn action_spaces<const D: usize>(n: usize) -> Vec<Space> {
+    let place = || SpaceKind::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
+    let number = |most: usize| SpaceKind::Integer { low: 0, high: most as i64 };
+    let mut spaces = vec![
+        Space::new(
+            Orders::TO,
+            place(),
+            "place toward which a connector goes, at its task's speed; without `to_m` and `rod_to_m` nothing \
+             moves, and the last of them counts",
+        )
+        .with_shape([D]),
+        Space::new(
+            Orders::CONNECTOR,
+            number(n - 1),
+            "that connector, from 0; the one that leads where this is not ordered",
+        ),
+        Space::new(
+            Orders::REACH,
+            choice(["exact", "as-far-as-it-goes"]),
+            "what comes of a cycle's way that cannot all be gone: nothing, or as much as goes; exact where \
+             this is not ordered",
+        ),
+    ];
+    if n > 1 {
+        spaces.push(
+            Space::new(
+                Orders::ROD_TO,
+                place(),
+                "places toward which the ends of a rod go, none faster than its task's speed",
+            )
+            .with_shape([2, D]),
+        );
+        spaces.push(Space::new(
+            Orders::ROD,
+            number(n - 2),
+            "that rod, from 0; the one behind the leading connector where this is not ordered",
+        ));
+    }
+    spaces
+}
+
+fn any_coordinate() -> SpaceKind {
+    SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY }
+}
+
+fn choice<'a>(names: impl IntoIterator<Item = &'a str>) -> SpaceKind {
+    SpaceKind::Discrete(names.into_iter().map(String::from).collect())
+}
+
+/// One agent's row in the rooms of its team, filled room by room.
+struct ObservationRow<'a, 'b> {
+    row: usize,
+    rooms: std::slice::IterMut<'a, BufferMut<'b>>,
+}
+
+impl ObservationRow<'_, '_> {
+    fn push_integer(&mut self, value: i64) {
+        if let Some(room) = self.rooms.next() {
+            room.set_integer(self.row, value);
+        }
+    }
+
+    fn push_reals(&mut self, values: impl IntoIterator<Item = f64>) {
+        let Some(room) = self.rooms.next() else { return };
+        let values: Vec<f64> = values.into_iter().collect();
+        for (k, value) in values.iter().enumerate() {
+            room.set_real(self.row * values.len() + k, *value);
+        }
+    }
+}

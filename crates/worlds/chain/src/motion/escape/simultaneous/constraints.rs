@@ -1,0 +1,95 @@
+//! The laws that every motion keeps, in any case.
+
+use super::super::threat::ChainPart;
+use super::contacts::{Contacts, nearest};
+use super::posture::{PartPoint, TrialPosture, ends};
+use super::solve_input::SolveInput;
+use crate::rods::chain::{Chain, LENGTH_TOLERANCE_M};
+use crate::rods::geometry::{Point, angle_rad, distance, normalized, sub};
+use crate::rods::motion_context::{BEND_TOLERANCE_RAD, TOLERANCE_M};
+use crate::rods::sweep::Sweep;
+use sidestep_kernel::math::cos;
+
+/// A bend limit: that of a connector, or its bend before the tick where that was sharper.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BendConstraint {
+    connector: usize,
+    most_rad: f64,
+}
+
+impl BendConstraint {
+    /// Returns the limit of an inner connector.
+    pub(super) fn from_connector<const D: usize>(
+        chain: &Chain<D>,
+        connector: usize,
+    ) -> Option<Self> {
+        let limit_rad = chain.connectors()[connector].max_bend_rad;
+        let most_rad = chain.bend_rad(connector)?.max(limit_rad);
+        Some(Self { connector, most_rad })
+    }
+
+    /// Moves the neighbors of a connector that bends too far apart; returns the correction, meters.
+    pub(super) fn correct<const D: usize>(&self, posture: &mut TrialPosture<'_, D>) -> f64 {
+        let [a, b, c] = [0, 1, 2].map(|k| posture.points[self.connector - 1 + k]);
+        let (into_m, out_m) = (distance(a, b), distance(b, c));
+        let least2 = into_m * into_m + out_m * out_m + 2.0 * into_m * out_m * cos(self.most_rad);
+        let short_m = least2.max(0.0).sqrt() * (1.0 + BEND_MARGIN) - distance(a, c);
+        let Some(away) = normalized(sub(c, a)).filter(|_| short_m > 0.0) else { return 0.0 };
+        let spot = |k: usize| PartPoint { part: ChainPart::Connector(k), along_rod: 0.0 };
+        posture.separate(spot(self.connector - 1), spot(self.connector + 1), away, short_m);
+        short_m
+    }
+
+    fn is_met<const D: usize>(&self, points: &[Point<D>]) -> bool {
+        let [a, b, c] = [0, 1, 2].map(|k| points[self.connector - 1 + k]);
+        angle_rad(sub(b, a), sub(c, b)) <= self.most_rad + BEND_TOLERANCE_RAD
+    }
+}
+
+/// Part by which corrected bends stay below their limits.
+const BEND_MARGIN: f64 = 1e-6;
+/// Rounding of ways, meters.
+const ROUNDING_M: f64 = 1e-12;
+
+/// Places that are checked.
+pub(super) struct Constraints<'a, 'b, const D: usize> {
+    pub(super) given: &'a SolveInput<'b, D>,
+    pub(super) points: &'a [Point<D>],
+}
+
+impl<const D: usize> Constraints<'_, '_, D> {
+    /// Returns whether all laws hold.
+    pub(super) fn are_met(&self, contacts: &Contacts<D>, bends: &[BendConstraint]) -> bool {
+        self.are_lengths_met()
+            && self.are_travels_met()
+            && bends.iter().all(|bend| bend.is_met(self.points))
+            && contacts.pairs.iter().all(|pair| {
+                nearest(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
+            })
+            && contacts.walls.iter().all(|wall| {
+                let to = ends(self.points, wall.part);
+                let apart_m = wall.core.nearest_to_segment(to).distance_m;
+                let from = ends(self.given.chain.points(), wall.part);
+                apart_m >= wall.keep_m - TOLERANCE_M
+                    && Sweep { from, to }.is_clear(&wall.core, wall.keep_m)
+            })
+    }
+
+    fn are_lengths_met(&self) -> bool {
+        let ways = self.points.windows(2).map(|w| distance(w[0], w[1]));
+        ways.zip(self.given.chain.rods()).all(|(length_m, rod)| {
+            let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
+            allowed.contains(&length_m)
+        })
+    }
+
+    fn are_travels_met(&self) -> bool {
+        let SolveInput { chain, start, .. } = *self.given;
+        self.points.iter().enumerate().all(|(k, p)| {
+            let (connector, was) = (&chain.connectors()[k], chain.points()[k]);
+            distance(start[k], *p) <= self.given.max_travel_m(k) + ROUNDING_M
+                && connector.mobility.allows(*p, was)
+                && (!connector.is_still() || *p == was)
+        })
+    }
+}

@@ -1,0 +1,218 @@
+//! A way out for parts that are caught.
+//!
+//! A part between two obstacles that close like tongs, or of a chain that others hold taut, gets
+//! out only through an obstacle, and the sooner the better. The ways that are tried: through any
+//! obstacle that touches the chain, in some directions. Each is rolled out on the chain around the
+//! place, with obstacles going straight on, and the one with the least time inside is taken.
+
+use super::super::EscapeRules;
+use super::super::threat::{ChainPart, gap_m};
+use super::posture::ends;
+use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
+use super::solve::{EscapeSolver, direction_away};
+use super::solve_input::{ExitDirection, SolveInput};
+use crate::rods::geometry::{
+    Point, add, add_scaled, cross, normalized, perpendicular, scaled, with_dimensions,
+};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::math::{cos, sin};
+use std::f64::consts::FRAC_PI_6;
+use std::ops::RangeInclusive;
+
+/// A chain's memory of its way out of where it was caught, and of how its leader keeps it out.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EscapePlan {
+    passing: Option<ActiveExit>,
+    /// Ticks until another way may be looked for.
+    pause: u32,
+    /// Whether its leader rests.
+    rests: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct ActiveExit {
+    obstacle: u32,
+    toward: [f64; 3],
+}
+
+/// Ticks from one choice of a way to the next.
+const CHOICE_INTERVAL_TICKS: u32 = 4;
+/// Distance at which a chain is in danger: another way is looked for, meters.
+const DANGER_DISTANCE_M: f64 = 0.12;
+/// Most work of a choice: ticks of roll-outs times connectors in them.
+const MAX_WORK: usize = 100_000;
+/// Connectors to either side of those in contact that roll-outs take along.
+const SIDE_CONNECTORS: usize = 12;
+
+impl EscapePlan {
+    /// Returns whether nothing is remembered.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns whether the chain is on its way through an obstacle.
+    pub(super) fn is_exiting(&self) -> bool {
+        self.passing.is_some()
+    }
+
+    /// Returns whether the chain's leader rests, to keep it out.
+    pub(crate) fn is_resting(&self) -> bool {
+        self.rests
+    }
+
+    /// Remembers whether the leader rests.
+    pub(crate) fn set_resting(&mut self, rests: bool) {
+        self.rests = rests;
+    }
+
+    /// Forgets the way out of a chain with no obstacle near.
+    pub(super) fn clear(&mut self) {
+        *self = Self { rests: self.rests, ..Self::default() };
+    }
+
+    pub(super) fn tick(&mut self) {
+        self.pause = self.pause.saturating_sub(1);
+    }
+
+    pub(super) fn exit_direction<const D: usize>(&self) -> Option<ExitDirection<D>> {
+        self.passing
+            .map(|p| ExitDirection { obstacle: p.obstacle, toward: with_dimensions(p.toward) })
+    }
+
+    /// Ends a way once no part is near the obstacle.
+    pub(super) fn clear_if_passed<const D: usize>(
+        &mut self,
+        given: &SolveInput<'_, D>,
+        solver: &EscapeSolver<D>,
+    ) {
+        if self.exit_direction().is_some_and(|through| solver.has_passed(given, &through)) {
+            self.passing = None;
+        }
+    }
+
+    /// Looks for the best way out; returns whether it is another than before.
+    pub(super) fn plan<const D: usize>(
+        &mut self,
+        rules: &EscapeRules,
+        given: &SolveInput<'_, D>,
+        solver: &EscapeSolver<D>,
+        gap_m: f64,
+    ) -> bool {
+        if self.pause > 0 || gap_m > DANGER_DISTANCE_M {
+            return false;
+        }
+        self.pause = CHOICE_INTERVAL_TICKS;
+        let around = endangered_connectors(given, solver);
+        let Some(stage) = Rollout::cut(rules, given, around) else { return false };
+        let now = self.exit_direction();
+        let mut left = stage.ticks_for(MAX_WORK);
+        let cost_now = stage.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
+        let mut best = (IMPROVEMENT_FACTOR * cost_now - 0.5, now);
+        for way in std::iter::once(None).chain(exit_candidates(given, solver).into_iter().map(Some))
+        {
+            if left == 0 {
+                break;
+            }
+            let cost = stage.cost(&RolloutOptions::with_exit(way), best.0, &mut left);
+            if cost < best.0 {
+                best = (cost, way);
+            }
+        }
+        self.passing = best
+            .1
+            .map(|way| ActiveExit { obstacle: way.obstacle, toward: with_dimensions(way.toward) });
+        best.1 != now
+    }
+}
+
+/// Returns the ways through the obstacles that touch the chain.
+fn exit_candidates<const D: usize>(
+    given: &SolveInput<'_, D>,
+    solver: &EscapeSolver<D>,
+) -> Vec<ExitDirection<D>> {
+    let mut ways = Vec::new();
+    let threats = &solver.contacts.threats;
+    for (k, mover) in given.obstacles.moving().iter().enumerate() {
+        let near = threats.iter().filter(|t| t.mover == k);
+        let gaps = near.map(|t| (gap_m(given.chain, t.part, mover), t.part));
+        let Some((gap_m, part)) = gaps.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        if gap_m < 2.0 * DANGER_DISTANCE_M {
+            let nearest = mover.core.nearest_to_segment(ends(given.chain.points(), part));
+            let through = scaled(direction_away(mover, &nearest), -1.0);
+            let way = |toward| ExitDirection { obstacle: mover.id, toward };
+            ways.push(exit_directions(through, mover.velocity_m_s).into_iter().map(way));
+        }
+    }
+    // Of each obstacle in turn, because there may be more than time allows.
+    let mut all = Vec::new();
+    while ways.iter().any(|ways| ways.len() > 0) {
+        all.extend(ways.iter_mut().filter_map(Iterator::next));
+    }
+    all
+}
+
+/// Returns the directions that are tried: straight through, against the obstacle's way, between
+/// the two, and around.
+fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) -> Vec<Point<D>> {
+    let mut all = vec![through];
+    if let Some(against) = normalized(scaled(velocity_m_s, -1.0)) {
+        all.push(against);
+        all.extend(normalized(add(against, through)));
+    }
+    let first = perpendicular(through);
+    let mut axes = vec![first];
+    if D == 3 {
+        let normal = cross(through, first);
+        axes.extend(normalized(with_dimensions::<3, D>([normal[0], normal[1], normal[2]])));
+    }
+    for axis in axes {
+        let turned = |k: i32| {
+            let turn_rad = f64::from(k) * FRAC_PI_6;
+            add_scaled(scaled(through, cos(turn_rad)), axis, sin(turn_rad))
+        };
+        all.extend((1..12).map(turned));
+    }
+    all
+}
+
+/// Returns the connectors of the chain around what is in danger.
+fn endangered_connectors<const D: usize>(
+    given: &SolveInput<'_, D>,
+    solver: &EscapeSolver<D>,
+) -> RangeInclusive<usize> {
+    let SolveInput { chain, obstacles, .. } = *given;
+    let near = |mover: usize, part: ChainPart| {
+        gap_m(chain, part, &obstacles.moving()[mover]) < 2.0 * DANGER_DISTANCE_M
+    };
+    let threats = solver.contacts.threats.iter().filter(|t| near(t.mover, t.part));
+    let (from, to) = threats.fold((usize::MAX, 0), |(from, to), threat| {
+        let k = threat.part.connector();
+        (from.min(k), to.max(k))
+    });
+    let last = chain.points().len() - 1;
+    from.min(to).saturating_sub(SIDE_CONNECTORS)..=(to + 1 + SIDE_CONNECTORS).min(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::geometry::{dot, norm};
+
+    #[test]
+    fn ways_are_unit_vectors_that_differ() {
+        fn check<const D: usize>(n: usize) {
+            let mut up = [0.0; D];
+            up[1] = 1.0;
+            let mut velocity = [0.1; D];
+            velocity[0] = 0.4;
+            let all = exit_directions(up, velocity);
+            assert_eq!(all.len(), n);
+            for (k, u) in all.iter().enumerate() {
+                assert!((norm(*u) - 1.0).abs() < 1e-12);
+                assert!(all[..k].iter().filter(|v| dot(**v, *u) > 1.0 - 1e-9).count() <= 1);
+            }
+        }
+        check::<2>(3 + 11);
+        check::<3>(3 + 22);
+    }
+}

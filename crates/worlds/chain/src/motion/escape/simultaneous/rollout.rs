@@ -1,0 +1,207 @@
+//! The chain around a place, and the moving obstacles near it: where motions are rolled out.
+
+use super::super::{EscapeRules, Margin};
+use super::solve::EscapeSolver;
+use super::solve_input::{ExitDirection, LeadMotion, SoftConstraints, SolveInput};
+use super::{PRESSED_SPEED_FRACTION, TOUCH_M};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Point, add, distance, norm};
+use crate::rods::obstacle::{Obstacle, Obstacles};
+use crate::rods::propagate::Propagator;
+use crate::rods::rules::Rules;
+use crate::rods::veto::Request;
+use std::ops::RangeInclusive;
+
+/// A part of a chain, and the obstacles that may come near it.
+pub(super) struct Rollout<'a, const D: usize> {
+    rules: &'a Rules,
+    chain: Chain<D>,
+    obstacles: Obstacles<D>,
+    margin: Margin,
+    dt_s: f64,
+    most_m: f64,
+    ticks: usize,
+}
+
+/// The motions of a roll-out, beside those out of the way.
+#[derive(Clone, Copy)]
+pub(super) struct RolloutOptions<const D: usize> {
+    through: Option<ExitDirection<D>>,
+    /// The connector that leads.
+    lead: Option<LeadMotion<D>>,
+    /// Ticks without contact after which the roll-out ends.
+    clear: usize,
+}
+
+/// Factor by which a choice must be better than the present one.
+pub(super) const IMPROVEMENT_FACTOR: f64 = 0.8;
+/// Longest time of a roll-out, s, and most ticks.
+const MAX_HORIZON_S: f64 = 3.0;
+const MAX_TICKS: usize = 150;
+/// Ticks without contact after which a way out has ended.
+const CLEAR_TICKS: usize = 75;
+/// Cost of depth, in ticks per meter and tick.
+const DEPTH_COST: f64 = 0.2;
+/// Rounds of a solve in a roll-out, with margins and without.
+const ROUNDS: [usize; 2] = [12, 20];
+
+impl<const D: usize> RolloutOptions<D> {
+    /// Returns a way through an obstacle, or none, while no connector leads.
+    pub(super) fn with_exit(through: Option<ExitDirection<D>>) -> Self {
+        Self { through, lead: None, clear: CLEAR_TICKS }
+    }
+
+    /// Returns the way of a connector that leads.
+    pub(super) fn with_lead(lead: LeadMotion<D>) -> Self {
+        Self { through: None, lead: Some(lead), clear: MAX_TICKS }
+    }
+}
+
+impl<'a, const D: usize> Rollout<'a, D> {
+    /// Cuts out the stage between two connectors; none if there is nothing to cut.
+    pub(super) fn cut(
+        rules: &EscapeRules,
+        given: &SolveInput<'a, D>,
+        between: RangeInclusive<usize>,
+    ) -> Option<Self> {
+        let (from, to) = between.into_inner();
+        let SolveInput { chain, obstacles, most_m, .. } = *given;
+        let cut = Chain::new_broken(
+            chain.points()[from..=to].to_vec(),
+            chain.connectors()[from..=to].to_vec(),
+            chain.rods()[from..to].to_vec(),
+        );
+        let horizon_s = MAX_HORIZON_S.min(MAX_TICKS as f64 * rules.dt_s);
+        let mut near = obstacles.clone();
+        let middle = chain.points()[usize::midpoint(from, to)];
+        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+        let is_near = |o: &&Obstacle<D>| {
+            let way_m = horizon_s * (norm(o.velocity_m_s) + rules.speed_max_m_s);
+            o.core.nearest_to_point(middle).distance_m - o.radius_m < reach_m + way_m
+        };
+        let moving: Vec<_> = obstacles.moving().iter().filter(is_near).copied().collect();
+        near.set_moving(&moving).ok()?;
+        Some(Self {
+            rules: given.rules,
+            chain: cut.ok()?,
+            obstacles: near,
+            margin: rules.look_ahead_margin(),
+            dt_s: rules.dt_s,
+            most_m,
+            ticks: (horizon_s / rules.dt_s).ceil() as usize,
+        })
+    }
+
+    /// Returns whether a moving obstacle may come near it.
+    pub(super) fn is_approached(&self) -> bool {
+        self.obstacles.moving().iter().any(Obstacle::is_moving)
+    }
+
+    /// Returns the ticks of roll-outs that an amount of work allows, in ticks times connectors.
+    pub(super) fn ticks_for(&self, work: usize) -> usize {
+        work / self.chain.points().len()
+    }
+
+    /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
+    /// `enough`, or when no tick is `left`.
+    pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut usize) -> f64 {
+        let (mut chain, mut obstacles) = (self.chain.clone(), self.obstacles.clone());
+        let (mut solver, mut propagator) = (EscapeSolver::default(), self.propagator());
+        let RolloutOptions { mut through, lead, clear: clear_ticks } = *tried;
+        let (mut cost, mut clear) = (0.0, 0);
+        if let Some(lead) = lead {
+            // This cycle's escape is over.
+            let start = chain.points().to_vec();
+            self.move_leader(&mut chain, &start, &obstacles, &mut propagator, lead);
+            obstacles.advance(self.dt_s);
+        }
+        for _ in 0..self.ticks {
+            if *left == 0 {
+                return f64::INFINITY;
+            }
+            *left -= 1;
+            let start = chain.points().to_vec();
+            let given = SolveInput {
+                chain: &chain,
+                obstacles: &obstacles,
+                rules: self.rules,
+                start: &start,
+                most_m: self.most_m,
+            };
+            let gap_m = self.tick(&given, &mut solver, &mut through);
+            chain.points_mut().copy_from_slice(&solver.points);
+            clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
+            if clear == 0 {
+                cost += 1.0 - DEPTH_COST * gap_m;
+            }
+            if clear > clear_ticks || cost >= enough {
+                break;
+            }
+            if let Some(lead) = lead.filter(|_| clear > 0) {
+                self.move_leader(&mut chain, &start, &obstacles, &mut propagator, lead);
+            }
+            obstacles.advance(self.dt_s);
+        }
+        cost
+    }
+
+    fn propagator(&self) -> Propagator<D> {
+        let slave_step_max_m = self.rules.slave_step_max_m.min(self.most_m);
+        Propagator::new(Rules { slave_step_max_m, ..*self.rules })
+    }
+
+    /// Leads the chain on, unless it needs its speed to get out of the way. `start` holds the places at the start
+    /// of the tick.
+    fn move_leader(
+        &self,
+        chain: &mut Chain<D>,
+        start: &[Point<D>],
+        obstacles: &Obstacles<D>,
+        propagator: &mut Propagator<D>,
+        lead: LeadMotion<D>,
+    ) {
+        let longest_m = |chain: &Chain<D>| {
+            let ways = start.iter().zip(chain.points());
+            ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
+        };
+        if longest_m(chain) > PRESSED_SPEED_FRACTION * self.most_m {
+            return;
+        }
+        let escaped = chain.points().to_vec();
+        let to = add(chain.points()[lead.k], lead.way_m);
+        // Out of the range of coordinates there is no leading.
+        let went = propagator.propagate(chain, obstacles, &Request::exact(lead.k, to));
+        if went.is_err() || longest_m(chain) > self.most_m {
+            chain.points_mut().copy_from_slice(&escaped);
+        }
+    }
+
+    /// Makes one tick of a roll-out; the new places are the solver's. Returns the least gap,
+    /// meters.
+    fn tick(
+        &self,
+        given: &SolveInput<'_, D>,
+        solver: &mut EscapeSolver<D>,
+        through: &mut Option<ExitDirection<D>>,
+    ) -> f64 {
+        if !solver.find_contacts(given, self.margin) {
+            solver.points.clear();
+            solver.points.extend_from_slice(given.chain.points());
+            return f64::INFINITY;
+        }
+        if through.is_some_and(|through| solver.has_passed(given, &through)) {
+            *through = None;
+        }
+        let (before_m, _) = solver.min_gap(given, given.chain.points());
+        let wishes = SoftConstraints { margin: self.margin, through: *through, rounds: ROUNDS };
+        if solver.solve(given, &wishes) {
+            let (gap_m, _) = solver.min_gap(given, &solver.points);
+            if through.is_some() || gap_m >= before_m.min(0.0) {
+                return gap_m;
+            }
+        }
+        solver.points.clear();
+        solver.points.extend_from_slice(given.chain.points());
+        before_m
+    }
+}

@@ -1,0 +1,53 @@
+//! The givens of a solve, and its wishes.
+
+use super::super::Margin;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Point, distance};
+use crate::rods::obstacle::Obstacles;
+use crate::rods::rules::Rules;
+
+/// The givens of a solve.
+#[derive(Clone, Copy)]
+pub(super) struct SolveInput<'a, const D: usize> {
+    pub(super) chain: &'a Chain<D>,
+    pub(super) obstacles: &'a Obstacles<D>,
+    pub(super) rules: &'a Rules,
+    /// Positions from which ways count.
+    pub(super) start: &'a [Point<D>],
+    /// The longest way of a connector, meters.
+    pub(super) most_m: f64,
+}
+
+impl<const D: usize> SolveInput<'_, D> {
+    /// Returns the distance from its start that a connector may have, meters: as far as its speed
+    /// allows, or as far as it already is.
+    pub(super) fn max_travel_m(&self, k: usize) -> f64 {
+        self.most_m.max(distance(self.start[k], self.chain.points()[k]))
+    }
+}
+
+/// A leader and its wish.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeadMotion<const D: usize> {
+    /// The connector that leads.
+    pub(crate) k: usize,
+    /// The way that it wants to go in this tick, meters.
+    pub(crate) way_m: Point<D>,
+}
+
+/// A way through an obstacle: parts in it leave in one direction, even if another is shorter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ExitDirection<const D: usize> {
+    pub(super) obstacle: u32,
+    /// Unit vector.
+    pub(super) toward: Point<D>,
+}
+
+/// The wishes of a solve, beside the laws.
+#[derive(Clone, Copy)]
+pub(super) struct SoftConstraints<const D: usize> {
+    pub(super) margin: Margin,
+    pub(super) through: Option<ExitDirection<D>>,
+    /// Rounds with margins, and rounds without.
+    pub(super) rounds: [usize; 2],
+}

@@ -1,0 +1,470 @@
+//! Alternatives of an autonomous initiator after a veto (slides R8, R9).
+//!
+//! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, letting the
+//! other end of the chain lead for a while, and the report that it is stuck. Each rung is tried
+//! once in a tick, and the first that works ends the climb. The slides leave open the reaction to a
+//! veto; the other end leads because a chain can be pulled out of a fold that it was pushed into. A
+//! planner or an operator gets the veto and no ladder.
+
+mod memory;
+#[cfg(test)]
+mod tests;
+
+use super::request::execute_request;
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{
+    Point, add, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
+};
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::Propagator;
+use crate::rods::veto::{
+    CompletedMotion, Motion, Outcome, Request, RequestSource, Veto, VetoEffect,
+};
+pub(crate) use memory::RecoveryMemory;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{cos, sin};
+
+/// Parts of a step that are tried when the whole step is vetoed.
+const STEP_FRACTIONS: [f64; 3] = [0.5, 0.25, 0.125];
+/// Other headings that are tried, rad.
+const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
+
+/// Lengths of the rungs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecoveryLimits {
+    /// Turns on the spot in a row before this rung is given up.
+    pub turns: u32,
+    /// Ticks of waiting in a row while an obstacle moves nearby.
+    pub waits: u32,
+    /// Ticks for which the other end leads.
+    pub pull_back: u32,
+    /// Number of times that the other end may lead without progress before the chain is stuck.
+    pub hand_overs: u32,
+    /// Number of times that a detour may lead through the same place without progress.
+    pub visits: u32,
+    /// Straight ticks after which the good side is forgotten.
+    pub straight: u32,
+}
+
+impl Default for RecoveryLimits {
+    fn default() -> Self {
+        Self { turns: 16, waits: 50, pull_back: 50, hand_overs: 3, visits: 3, straight: 25 }
+    }
+}
+
+/// An initiator's knowledge beside its neighborhood.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Situation {
+    /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
+    /// and detours through the same place are not counted.
+    pub goal_distance_m: Option<f64>,
+    /// Whether an obstacle moves nearby, so that waiting may help.
+    pub movers_near: bool,
+    /// Whether its drive can turn on the spot.
+    pub can_turn: bool,
+    /// Whether it only goes where it looks, as robots on wheels do: then no other headings are
+    /// tried.
+    pub keeps_heading: bool,
+}
+
+/// Outcome of a climb. The chain has moved only in the variants that hold a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum RecoveryOutcome<const D: usize> {
+    /// The motion as wanted.
+    Straight(CompletedMotion<D>),
+    /// A part of the step.
+    Shorter {
+        /// The part.
+        part: f64,
+        /// The motion.
+        moved: CompletedMotion<D>,
+    },
+    /// A motion in another direction.
+    Sideways {
+        /// The turn from the wanted direction, rad; positive to the left, in space toward the axis.
+        turn_rad: f64,
+        /// The plane of the turn in space: 0 if it was toward the second axis, 1 if toward the third.
+        plane: usize,
+        /// The motion.
+        moved: CompletedMotion<D>,
+    },
+    /// Nothing moved: the drive shall turn.
+    TurnOnTheSpot {
+        /// 1 to the left, -1 to the right.
+        side: i8,
+    },
+    /// Nothing moved: the obstacle nearby may go away.
+    Waiting {
+        /// Ticks waited so far.
+        n: u32,
+    },
+    /// The other end led.
+    PulledBack {
+        /// The end that led.
+        by: usize,
+        /// The motion.
+        moved: CompletedMotion<D>,
+    },
+    /// Nothing moved, and no rung is left; all objections, each once.
+    Stuck {
+        /// Vetoes from the wanted motion to the last rung; empty if the wanted motion would now be free
+        /// and only detours have led here.
+        vetoes: Vec<Veto<D>>,
+    },
+    /// Nothing moved: a planner or an operator wanted the motion, and gets the veto.
+    Vetoed(Veto<D>),
+}
+
+/// A ladder, and an initiator's position on it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RecoveryLadder {
+    /// Lengths of the rungs.
+    pub rungs: RecoveryLimits,
+    /// Memory from tick to tick; part of a checkpoint.
+    pub memory: RecoveryMemory,
+}
+
+/// The chain, as its initiator moves it: all of it at once, or by asking its neighbors.
+pub(crate) trait ChainMover<const D: usize> {
+    /// Reason for which a request has no outcome.
+    type Failure;
+
+    /// Returns the place of a connector that leads.
+    fn place(&self, k: usize) -> Point<D>;
+
+    /// Makes a motion: all of it, or nothing moves.
+    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, Self::Failure>;
+
+    /// Returns the objection to a motion, if there is one; nothing moves.
+    fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, Self::Failure>;
+
+    /// Returns the end farther from an initiator; `None` if there is none that could lead.
+    fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, Self::Failure>;
+}
+
+/// An end of a chain that may lead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ChainEnd<const D: usize> {
+    /// The connector.
+    pub(crate) by: usize,
+    /// Its place.
+    pub(crate) at: Point<D>,
+    /// The direction in which its rod points out of the chain, a unit vector.
+    pub(crate) ahead: Point<D>,
+}
+
+/// A chain that is moved at once.
+struct DirectMover<'a, const D: usize> {
+    chain: &'a mut Chain<D>,
+    obstacles: &'a Obstacles<D>,
+    propagator: &'a mut Propagator<D>,
+}
+
+impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
+    type Failure = InputError;
+
+    fn place(&self, k: usize) -> Point<D> {
+        self.chain.points()[k]
+    }
+
+    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, InputError> {
+        execute_request(self.propagator, self.chain, self.obstacles, request)
+    }
+
+    fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, InputError> {
+        let tried =
+            execute_request(self.propagator, &mut self.chain.clone(), self.obstacles, request)?;
+        Ok(tried.veto().copied())
+    }
+
+    fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, InputError> {
+        let points = self.chain.points();
+        let by = farther_end(k, points.len());
+        let neighbor = if by == 0 { points.get(1) } else { points.get(by - 1) };
+        let ahead = neighbor.and_then(|neighbor| normalized(sub(points[by], *neighbor)));
+        Ok(ahead.map(|ahead| ChainEnd { by, at: points[by], ahead }))
+    }
+}
+
+/// The working data of a climb.
+struct RecoveryAttempt<'a, M, const D: usize> {
+    by: &'a mut M,
+    wanted: Request<D>,
+    vetoes: Vec<Veto<D>>,
+}
+
+impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
+    /// Tries all of a motion, or none.
+    fn attempt(&mut self, motion: Motion<D>) -> Result<Option<CompletedMotion<D>>, M::Failure> {
+        let request = Request { motion, mode: VetoEffect::Exact, ..self.wanted };
+        Ok(match self.by.request(&request)? {
+            Outcome::Moved(moved) => Some(moved),
+            Outcome::Vetoed(veto) => {
+                self.record_veto(veto);
+                None
+            }
+        })
+    }
+
+    fn record_veto(&mut self, veto: Veto<D>) {
+        let what = |v: &Veto<D>| (v.from, v.by, v.reason, v.obstacle);
+        if !self.vetoes.iter().any(|v| what(v) == what(&veto)) {
+            self.vetoes.push(veto);
+        }
+    }
+
+    /// Returns the wanted motion with another way from the initiator's place.
+    fn with_displacement(&self, way: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
+        let to = |k: usize, to: Point<D>| {
+            let at = self.by.place(k);
+            add(at, way(sub(to, at)))
+        };
+        match self.wanted.motion {
+            Motion::Connector { k, to: t } => Motion::Connector { k, to: to(k, t) },
+            Motion::Rod { i, to: t } => Motion::Rod { i, to: [to(i, t[0]), to(i + 1, t[1])] },
+        }
+    }
+
+    /// Returns the initiator and its wanted way.
+    fn wanted_displacement(&self) -> (usize, Point<D>) {
+        let (k, to) = moving_head(&self.wanted.motion);
+        (k, sub(to, self.by.place(k)))
+    }
+}
+
+impl RecoveryLadder {
+    /// Returns a ladder whose initiator has met no veto yet.
+    pub fn new(rungs: RecoveryLimits) -> Self {
+        Self { rungs, memory: RecoveryMemory::default() }
+    }
+
+    /// Moves as wanted, or as near to it as a rung allows. The wanted motion is requested exactly,
+    /// whatever its mode, because part of the way is a rung of its own.
+    ///
+    /// # Errors
+    /// As [`Propagator::propagate`].
+    pub fn climb<const D: usize>(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        propagator: &mut Propagator<D>,
+        wanted: &Request<D>,
+        situation: &Situation,
+    ) -> Result<RecoveryOutcome<D>, InputError> {
+        let told = self.climb_with_veto(chain, obstacles, propagator, wanted, situation);
+        told.map(|(climbed, _)| climbed)
+    }
+
+    /// Climbs, and also returns the objection to the wanted motion itself, if there was one.
+    ///
+    /// # Errors
+    /// As [`Propagator::propagate`].
+    pub fn climb_with_veto<const D: usize>(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        propagator: &mut Propagator<D>,
+        wanted: &Request<D>,
+        situation: &Situation,
+    ) -> Result<(RecoveryOutcome<D>, Option<Veto<D>>), InputError> {
+        self.climb_with(&mut DirectMover { chain, obstacles, propagator }, wanted, situation)
+    }
+
+    /// Climbs with a chain that is moved in any way, and also returns the objection to the wanted motion itself,
+    /// if there was one.
+    pub(crate) fn climb_with<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        by: &mut M,
+        wanted: &Request<D>,
+        situation: &Situation,
+    ) -> Result<(RecoveryOutcome<D>, Option<Veto<D>>), M::Failure> {
+        if wanted.source != RequestSource::Autonomous {
+            return Ok(match by.request(wanted)? {
+                Outcome::Moved(moved) => (RecoveryOutcome::Straight(moved), None),
+                Outcome::Vetoed(veto) => (RecoveryOutcome::Vetoed(veto), Some(veto)),
+            });
+        }
+        let mut climb = RecoveryAttempt { by, wanted: *wanted, vetoes: Vec::new() };
+        self.memory.record_goal(situation.goal_distance_m);
+        if self.memory.pulling_back > 0 {
+            return Ok((self.pull_back(&mut climb)?, None));
+        }
+        if let Some(moved) = climb.attempt(wanted.motion)? {
+            self.memory.record_straight(self.rungs.straight);
+            return Ok((RecoveryOutcome::Straight(moved), None));
+        }
+        let objection = climb.vetoes.first().copied();
+        Ok((self.try_rungs(&mut climb, situation)?, objection))
+    }
+
+    /// Tries the rungs one after the other.
+    fn try_rungs<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        climb: &mut RecoveryAttempt<'_, M, D>,
+        situation: &Situation,
+    ) -> Result<RecoveryOutcome<D>, M::Failure> {
+        if let Some(came) = try_shorter(climb)? {
+            self.memory.reset_failures();
+            return Ok(came);
+        }
+        match self.try_sideways(climb, situation)? {
+            Some(came) => Ok(came),
+            None => self.try_stationary_rungs(climb, situation),
+        }
+    }
+
+    /// Tries other headings, first those on the side where one was good.
+    fn try_sideways<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        climb: &mut RecoveryAttempt<'_, M, D>,
+        situation: &Situation,
+    ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
+        let (k, way) = climb.wanted_displacement();
+        let Some(u) = normalized(way).filter(|_| !situation.keeps_heading) else { return Ok(None) };
+        let axes = axes_across(u);
+        for (plane, turn_rad) in fan(&self.memory, D - 1) {
+            let turn = |v| turn_toward(v, u, axes[plane], turn_rad);
+            let Some(moved) = climb.attempt(climb.with_displacement(turn))? else { continue };
+            self.memory.record_sideways(plane, turn_rad);
+            let place = memory::visit_key(climb.by.place(k), u);
+            if self.memory.record_visit(place, situation.goal_distance_m) > self.rungs.visits {
+                self.memory.pulling_back = self.rungs.pull_back;
+            }
+            return Ok(Some(RecoveryOutcome::Sideways { turn_rad, plane, moved }));
+        }
+        Ok(None)
+    }
+
+    /// Tries the rungs for an initiator that cannot move at all.
+    fn try_stationary_rungs<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        climb: &mut RecoveryAttempt<'_, M, D>,
+        situation: &Situation,
+    ) -> Result<RecoveryOutcome<D>, M::Failure> {
+        let memory = &mut self.memory;
+        if situation.can_turn && memory.turns < self.rungs.turns {
+            memory.turns += 1;
+            return Ok(RecoveryOutcome::TurnOnTheSpot { side: memory.side_or_left() });
+        }
+        if situation.movers_near && memory.waits < self.rungs.waits {
+            memory.waits += 1;
+            return Ok(RecoveryOutcome::Waiting { n: memory.waits });
+        }
+        memory.pulling_back = self.rungs.pull_back;
+        self.pull_back(climb)
+    }
+
+    /// Lets the other end go on along its rod, or beside it; the initiator is dragged.
+    fn pull_back<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        climb: &mut RecoveryAttempt<'_, M, D>,
+    ) -> Result<RecoveryOutcome<D>, M::Failure> {
+        let (k, way) = climb.wanted_displacement();
+        let begins = self.memory.pulling_back == self.rungs.pull_back;
+        if begins && self.memory.hand_overs >= self.rungs.hand_overs {
+            return self.report_stuck(climb);
+        }
+        self.memory.hand_overs += u32::from(begins);
+        let Some(ChainEnd { by, at, ahead: u }) = climb.by.other_end(k)? else {
+            return self.report_stuck(climb);
+        };
+        let axes = axes_across(u);
+        let step = scaled(u, norm(way));
+        let ways = fan(&RecoveryMemory::default(), D - 1);
+        for (plane, turn_rad) in std::iter::once((0, 0.0)).chain(ways) {
+            let to = add(at, turn_toward(step, u, axes[plane], turn_rad));
+            if let Some(moved) = climb.attempt(Motion::Connector { k: by, to })? {
+                self.memory.record_pull_back();
+                return Ok(RecoveryOutcome::PulledBack { by, moved });
+            }
+        }
+        self.report_stuck(climb)
+    }
+
+    fn report_stuck<M: ChainMover<D>, const D: usize>(
+        &mut self,
+        climb: &mut RecoveryAttempt<'_, M, D>,
+    ) -> Result<RecoveryOutcome<D>, M::Failure> {
+        self.memory.reset();
+        if climb.vetoes.is_empty() {
+            // Its detours have led nowhere, and it has tried nothing since, so ask for the objection.
+            let request = Request { mode: VetoEffect::Exact, ..climb.wanted };
+            climb.by.find_veto(&request)?.into_iter().for_each(|veto| climb.record_veto(veto));
+        }
+        Ok(RecoveryOutcome::Stuck { vetoes: std::mem::take(&mut climb.vetoes) })
+    }
+}
+
+fn try_shorter<M: ChainMover<D>, const D: usize>(
+    climb: &mut RecoveryAttempt<'_, M, D>,
+) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
+    for part in STEP_FRACTIONS {
+        if let Some(moved) = climb.attempt(climb.with_displacement(|way| scaled(way, part)))? {
+            return Ok(Some(RecoveryOutcome::Shorter { part, moved }));
+        }
+    }
+    Ok(None)
+}
+
+fn moving_head<const D: usize>(motion: &Motion<D>) -> (usize, Point<D>) {
+    match *motion {
+        Motion::Connector { k, to } => (k, to),
+        Motion::Rod { i, to } => (i, to[0]),
+    }
+}
+
+/// Returns the end of a chain of `n` connectors that is farther from connector `k`.
+pub(crate) fn farther_end(k: usize, n: usize) -> usize {
+    if 2 * k < n { n - 1 } else { 0 }
+}
+
+/// Returns planes and turns in the order in which they are tried. If no side is known to be good,
+/// the least turn comes first; otherwise all of that side before the other, so that the chain does
+/// not alternate between two ways around.
+fn fan(memory: &RecoveryMemory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
+    let side = f64::from(memory.side_or_left());
+    let keeps_side = memory.side != 0;
+    let first = memory.plane.min(planes - 1);
+    let tries = 2 * FAN_RAD.len();
+    (0..planes).flat_map(move |p| {
+        let plane = (first + p) % planes;
+        (0..tries).map(move |t| {
+            let (angle, is_other) =
+                if keeps_side { (t % FAN_RAD.len(), t / FAN_RAD.len()) } else { (t / 2, t % 2) };
+            let sign = if is_other == 0 { side } else { -side };
+            (plane, sign * FAN_RAD[angle])
+        })
+    })
+}
+
+/// Returns unit vectors across a direction: in the plane to its left, in space toward the second
+/// and the third axis.
+fn axes_across<const D: usize>(u: Point<D>) -> [Point<D>; 2] {
+    if D == 2 {
+        return [perpendicular(u); 2];
+    }
+    [1, 2].map(|axis| {
+        let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
+        let across = add_scaled(e, u, -dot(e, u));
+        // Along an axis there is no turn toward that axis, and any other does.
+        if norm(across) > 1e-6 {
+            normalized(across).unwrap_or(first_axis())
+        } else {
+            perpendicular(u)
+        }
+    })
+}
+
+/// Returns a vector, turned in the plane of two unit vectors from the first toward the second.
+fn turn_toward<const D: usize>(
+    v: Point<D>,
+    u: Point<D>,
+    across: Point<D>,
+    turn_rad: f64,
+) -> Point<D> {
+    let (x, y) = (dot(v, u), dot(v, across));
+    let (c, s) = (cos(turn_rad), sin(turn_rad));
+    let rest = add_scaled(add_scaled(v, u, -x), across, -y);
+    add_scaled(add_scaled(rest, u, c * x - s * y), across, s * x + c * y)
+}

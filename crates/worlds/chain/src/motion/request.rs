@@ -1,0 +1,428 @@
+//! One motion of a chain: by propagation, or by a reach if a held connector objects.
+
+use crate::arms::ik::{ChainIkGoal, Engine, IkSolver};
+use crate::rods::chain::{Chain, Connector, Mobility};
+use crate::rods::geometry::{Point, distance, lerp};
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::Propagator;
+use crate::rods::reach::{ReachOutcome, ReachRequest, reach};
+use crate::rods::rules::Rules;
+use crate::rods::tunneling::find_tunneling;
+use crate::rods::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoReason};
+use sidestep_kernel::InputError;
+
+/// Moves a chain as requested; if a connector objects that must stay at its place, or on its line, its plane
+/// or in its box, by [`reach`].
+///
+/// # Errors
+/// As [`Propagator::propagate`].
+pub(crate) fn execute_request<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    request: &Request<D>,
+) -> Result<Outcome<D>, InputError> {
+    if let Motion::Connector { k, to } = request.motion
+        && let Some(base) = sliding_connector(chain, k)
+    {
+        let order = ReachRequest { k, target: to, base, tolerance_m: TOLERANCE_M };
+        return move_sliding(propagator, chain, obstacles, &order, request);
+    }
+    let outcome = propagator.propagate(chain, obstacles, request)?;
+    let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
+        return Ok(outcome);
+    };
+    if !is_held_veto(veto.reason) || veto.by == k {
+        return Ok(outcome);
+    }
+    let order = ReachRequest { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
+    move_with_base(propagator, chain, obstacles, &order, veto)
+}
+
+/// Returns whether an objection is that of a connector that is held.
+fn is_held_veto(reason: VetoReason) -> bool {
+    matches!(reason, VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility)
+}
+
+/// Returns the first connector, other than the one that moves, that belongs on a line, on a plane or in a
+/// box.
+fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
+    let slides = |i: &usize| {
+        let connector = &chain.connectors()[*i];
+        let is_free = matches!(connector.mobility, Mobility::Free | Mobility::Fixed);
+        *i != k && !connector.failed && !is_free
+    };
+    if chain.is_plain() { None } else { (0..chain.connectors().len()).find(slides) }
+}
+
+/// Moves a chain one of whose connectors slides. Where that one could only come along by going much farther
+/// than the initiator, as the foot of a rod that stands across its line, or from one side of its master to
+/// the other, return passes find a place nearby.
+fn move_sliding<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &ReachRequest<D>,
+    request: &Request<D>,
+) -> Result<Outcome<D>, InputError> {
+    let (k, joints_m) = (order.k, propagator.rules.joint_step_max_m);
+    try_slowed(chain, k, order.target, joints_m, |chain, before, to| {
+        let request = Request { motion: Motion::Connector { k, to }, ..*request };
+        let veto = match propagator.propagate(chain, obstacles, &request)? {
+            Outcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
+            Outcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
+                chain.points_mut().copy_from_slice(before);
+                let (reason, reached) = (VetoReason::Mobility, before[k]);
+                Veto { by: order.base, from: k, reason, obstacle: None, reached }
+            }
+            outcome => return Ok((outcome, f64::INFINITY)),
+        };
+        let order = ReachRequest { target: to, base: veto.by, ..*order };
+        move_to_target(propagator, chain, before, obstacles, &order, &veto)
+    })
+}
+
+/// Moves a chain whose base objects as far as the limit of its joints allows.
+fn move_with_base<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &ReachRequest<D>,
+    objection: &Veto<D>,
+) -> Result<Outcome<D>, InputError> {
+    // A connector that has failed is no base of an arm: the parts that hang on it swing as they did.
+    let joints_m = match objection.reason {
+        VetoReason::Fixed => propagator.rules.joint_step_max_m,
+        _ => f64::INFINITY,
+    };
+    try_slowed(chain, order.k, order.target, joints_m, |chain, before, target| {
+        let order = ReachRequest { target, ..*order };
+        move_to_target(propagator, chain, before, obstacles, &order, objection)
+    })
+}
+
+/// Tries a motion, shortened until no connector goes farther than `joints_m`. Near a singular posture
+/// connectors go much farther than the initiator. An attempt also returns the longest way of a connector
+/// for which its outcome counts as a motion, meters.
+fn try_slowed<const D: usize>(
+    chain: &mut Chain<D>,
+    k: usize,
+    to: Point<D>,
+    joints_m: f64,
+    mut attempt: impl FnMut(
+        &mut Chain<D>,
+        &[Point<D>],
+        Point<D>,
+    ) -> Result<(Outcome<D>, f64), InputError>,
+) -> Result<Outcome<D>, InputError> {
+    let before = chain.points().to_vec();
+    let from = before[k];
+    let slow = |by: usize, reached: Point<D>| Veto {
+        by,
+        from: k,
+        reason: VetoReason::StepLimit,
+        obstacle: None,
+        reached,
+    };
+    let (mut part, mut fastest) = (1.0, k);
+    for _ in 0..MAX_SLOWED_TRIES {
+        let target = if part < 1.0 { lerp(from, to, part) } else { to };
+        let (outcome, jump_m) = attempt(chain, &before, target)?;
+        let moved = match outcome {
+            Outcome::Moved(moved) => moved,
+            vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
+        };
+        let most_m = joints_m.min(jump_m);
+        let (by, longest_m) = max_displacement(&before, chain.points());
+        if longest_m <= most_m {
+            let slowed = slow(by, chain.points()[k]);
+            let cut_short = if part < 1.0 { Some(slowed) } else { moved.cut_short };
+            return Ok(Outcome::Moved(CompletedMotion { cut_short, ..moved }));
+        }
+        chain.points_mut().copy_from_slice(&before);
+        (part, fastest) = (part * SLOWED_FRACTION * most_m / longest_m, by);
+    }
+    Ok(Outcome::Vetoed(slow(fastest, from)))
+}
+
+/// Returns the connector that has moved farthest, and its way, meters.
+fn max_displacement<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, f64) {
+    let ways_m = before.iter().zip(points).map(|(a, b)| distance(*a, *b)).enumerate();
+    ways_m.fold((0, 0.0), |most, way| if way.1 > most.1 { way } else { most })
+}
+
+/// Moves a chain whose base objects by passes there and back, or straight to a posture; returns also
+/// the longest way of a connector for which the outcome counts as a motion, meters.
+fn move_to_target<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    before: &[Point<D>],
+    obstacles: &Obstacles<D>,
+    order: &ReachRequest<D>,
+    objection: &Veto<D>,
+) -> Result<(Outcome<D>, f64), InputError> {
+    Ok(match reach(propagator, chain, obstacles, order)? {
+        ReachOutcome::There { .. } => {
+            (Outcome::Moved(motion_since(before, chain, order.k)), f64::INFINITY)
+        }
+        ReachOutcome::Short { veto: Some(veto), .. } => (Outcome::Vetoed(veto), f64::INFINITY),
+        ReachOutcome::Short { nearest, veto: None } => {
+            let objection = Veto { reached: nearest, ..*objection };
+            let rules = propagator.rules;
+            let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+            let jump_m = rules.slave_step_max_m.min(MAX_JUMP * longest_m);
+            (move_to_posture(rules, chain, before, obstacles, order, objection)?, jump_m)
+        }
+    })
+}
+
+/// Most attempts to find the distance that an initiator may go.
+const MAX_SLOWED_TRIES: usize = 16;
+/// Part of the limit that an attempt aims at, because near singular postures joints slow down less
+/// than the initiator.
+const SLOWED_FRACTION: f64 = 0.9;
+
+/// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
+/// is nearly straight, and not at all along a straight line, so damped least squares find the nearest
+/// posture that gets there, and the chain goes straight to it if neither the posture nor the way to it
+/// is blocked.
+fn move_to_posture<const D: usize>(
+    rules: Rules,
+    chain: &mut Chain<D>,
+    before: &[Point<D>],
+    obstacles: &Obstacles<D>,
+    order: &ReachRequest<D>,
+    objection: Veto<D>,
+) -> Result<Outcome<D>, InputError> {
+    let ReachRequest { k, target, base, tolerance_m } = *order;
+    if let Some(by) = out_of_reach(chain, order) {
+        return Ok(Outcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
+    }
+    let goal = ChainIkGoal {
+        engine: Engine::Dls,
+        restarts: 0,
+        tolerance_m,
+        ..ChainIkGoal::new(k, base, target)
+    };
+    let answer = IkSolver::new(rules).solve(chain, obstacles, &goal)?;
+    // The solver knows of no held connector other than the base.
+    let is_held = |c: &Connector<D>, at: Point<D>, to: Point<D>| match c.is_still() {
+        true => at == to,
+        false => c.mobility.allows(to, at),
+    };
+    let mut held = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
+    if !answer.reached || !held.all(|(c, (at, to))| is_held(c, *at, *to)) {
+        return Ok(Outcome::Vetoed(objection));
+    }
+    chain.points_mut().copy_from_slice(&answer.points);
+    if let Some(passed) = find_tunneling(chain, before, obstacles, 0.0) {
+        chain.points_mut().copy_from_slice(before);
+        let (by, obstacle) = (passed.rod, Some(passed.obstacle));
+        return Ok(Outcome::Vetoed(Veto {
+            by,
+            obstacle,
+            reason: VetoReason::WouldTunnel,
+            ..objection
+        }));
+    }
+    Ok(Outcome::Moved(motion_since(before, chain, k)))
+}
+
+/// Returns the connector, if there is one, from whose places the rods do not reach the target.
+fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &ReachRequest<D>) -> Option<usize> {
+    let holds_too_far = |i: &usize| {
+        let (connector, at) = (&chain.connectors()[*i], chain.points()[*i]);
+        let [from, to] = [order.k.min(*i), order.k.max(*i)];
+        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+        // A failed connector may be repaired, so it is reported as failed.
+        !connector.failed
+            && distance(connector.mobility.project(order.target, at), order.target)
+                > reach_m + order.tolerance_m
+    };
+    (0..chain.points().len()).filter(|i| *i != order.k).find(holds_too_far)
+}
+
+/// Longest move of a connector, as a part of the longest rod, for which a posture is accepted as a
+/// motion.
+const MAX_JUMP: f64 = 0.5;
+
+/// Distance at which a connector's step counts as complete, meters.
+pub(crate) const TOLERANCE_M: f64 = 1e-7;
+
+/// Returns the connectors that have moved, by comparison.
+fn motion_since<const D: usize>(
+    before: &[Point<D>],
+    chain: &Chain<D>,
+    k: usize,
+) -> CompletedMotion<D> {
+    let ways_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+    let slaves = ways_m.enumerate().filter(|(i, _)| *i != k);
+    CompletedMotion {
+        touched: 0..before.len(),
+        changed: before.iter().zip(chain.points()).filter(|(a, b)| a != b).count(),
+        rotated: 0,
+        max_slave_step_m: slaves.map(|(_, way_m)| way_m).fold(0.0, f64::max),
+        cut_short: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::chain::Rod;
+    use crate::rods::veto::{RequestSource, VetoEffect};
+
+    /// An arm of two rods, bent a little; the base is fixed.
+    fn arm() -> Chain<2> {
+        let points = vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let mut arm =
+            Chain::new(points, vec![Connector::free(0.05); 3], vec![Rod::fixed(1.0, 0.02); 2])
+                .unwrap();
+        arm.set_mobility(0, Mobility::Fixed).unwrap();
+        arm
+    }
+
+    /// Drags the tool out to 0.1 mm less than the reach; returns the longest way of any connector in a
+    /// request, and the greatest distance of the tool from the base.
+    fn dragged_out(joint_step_max_m: f64) -> (f64, f64) {
+        let (mut chain, step_m) = (arm(), 0.01);
+        let mut propagator = Propagator::new(Rules { joint_step_max_m, ..Rules::default() });
+        let mut most_m = 0.0;
+        for _ in 0..400 {
+            let (before, at) = (chain.points().to_vec(), chain.points()[2]);
+            let to = crate::rods::geometry::move_toward(at, [1.199_94, 1.599_92], step_m);
+            let motion = Motion::Connector { k: 2, to };
+            let request =
+                Request { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
+            execute_request(&mut propagator, &mut chain, &Obstacles::default(), &request).unwrap();
+            most_m = f64::max(most_m, max_displacement(&before, chain.points()).1);
+        }
+        (most_m, distance(chain.points()[2], [0.0; 2]))
+    }
+
+    #[test]
+    fn a_straight_arm_is_drawn_inward_and_no_joint_is_faster_than_it_may_be() {
+        let joint_step_max_m = 0.08;
+        let rules = Rules { joint_step_max_m, ..Rules::default() };
+        for n_rods in [3, 7, 11, 25] {
+            let rod = Rod::fixed(1.0, 0.03);
+            let mut arm =
+                Chain::straight([0.0; 2], [1.0, 0.0], n_rods, rod, Connector::free(0.05)).unwrap();
+            arm.set_mobility(0, Mobility::Fixed).unwrap();
+            let target = [0.5 * n_rods as f64, 0.0];
+            for _ in 0..4000 {
+                let before = arm.points().to_vec();
+                let to = crate::rods::geometry::move_toward(before[n_rods], target, 0.04);
+                let request = Request::exact(n_rods, to);
+                execute_request(
+                    &mut Propagator::new(rules),
+                    &mut arm,
+                    &Obstacles::default(),
+                    &request,
+                )
+                .unwrap();
+                assert!(max_displacement(&before, arm.points()).1 <= joint_step_max_m);
+            }
+            let left_m = distance(arm.points()[n_rods], target);
+            assert!(left_m < 1e-6, "{n_rods} rods: {left_m} m are left");
+        }
+    }
+
+    /// Leads connector `k` of seven to places one after the other; returns the remaining distance of
+    /// the one farthest from its place, and the longest way of a connector in a request.
+    fn led(held: &[(usize, Mobility<2>)], k: usize, places: &[Point<2>]) -> (f64, f64) {
+        let points = vec![
+            [0.0, 0.0],
+            [0.6, 0.8],
+            [1.2, 1.6],
+            [2.2, 1.6],
+            [3.2, 1.6],
+            [3.8, 0.8],
+            [4.4, 0.0],
+        ];
+        let rods = vec![Rod::fixed(1.0, 0.02); 6];
+        let mut chain = Chain::new(points, vec![Connector::free(0.05); 7], rods).unwrap();
+        for (i, mobility) in held {
+            chain.set_mobility(*i, *mobility).unwrap();
+        }
+        let rules = Rules { joint_step_max_m: 0.02, ..Rules::default() };
+        let (mut left_m, mut most_m) = (0.0, 0.0);
+        for place in places {
+            for _ in 0..2000 {
+                let before = chain.points().to_vec();
+                let to = crate::rods::geometry::move_toward(before[k], *place, 0.01);
+                let request = Request::exact(k, to);
+                let came = execute_request(
+                    &mut Propagator::new(rules),
+                    &mut chain,
+                    &Obstacles::default(),
+                    &request,
+                )
+                .unwrap();
+                assert_eq!(came.veto(), None, "{held:?}, on the way to {place:?}");
+                most_m = f64::max(most_m, max_displacement(&before, chain.points()).1);
+                assert!(chain.max_rod_violation_m() <= 1e-9);
+                assert!(held.iter().all(|(i, m)| m.allows(chain.points()[*i], before[*i])));
+            }
+            left_m = f64::max(left_m, distance(chain.points()[k], *place));
+        }
+        (left_m, most_m)
+    }
+
+    #[test]
+    fn who_is_led_gets_wherever_a_rail_a_plane_a_box_and_two_ends_let_it() {
+        let rail = Mobility::OnSegment([[0.0, 0.0], [6.0, 0.0]]);
+        let upper = Mobility::OnSegment([[0.0, 1.6], [6.0, 1.6]]);
+        let line = Mobility::OnPlane { normal: [0.0, 1.0], offset_m: 0.0 };
+        let room = Mobility::InBox { lo: [0.0, -1.0], hi: [6.0, 1.0] };
+        let anywhere = [[-2.0, 2.0], [4.0, 3.0], [8.0, -2.0], [3.0, -5.0], [3.0, 5.9]];
+        let between = [[2.2, 0.5], [2.0, -1.0], [2.0, 1.2], [2.9, -0.3]];
+        let two_rails = [(0, rail), (6, rail)];
+        for (held, k, places) in [
+            (&[(0, rail)][..], 6, &anywhere[..]),
+            (&[(0, line)], 6, &anywhere),
+            (&[(0, room)], 6, &anywhere),
+            (&[(6, rail)], 0, &anywhere),
+            (&[(3, upper)], 0, &[[-1.0, 2.0], [4.0, 3.5], [8.0, 0.0]]),
+            (&[(0, Mobility::Fixed), (6, Mobility::Fixed)], 3, &between),
+            (&[(0, Mobility::Fixed), (6, rail)], 3, &between),
+            (&two_rails, 3, &[[2.2, 0.5], [5.0, -2.0], [1.0, 2.0]]),
+        ] {
+            let (left_m, most_m) = led(held, k, places);
+            assert!(left_m < 1e-6, "{held:?}: {left_m} m are left");
+            assert!(most_m <= 0.02, "{held:?}: {most_m} m in a request");
+        }
+    }
+
+    #[test]
+    fn a_target_that_no_place_on_the_rail_reaches_is_told_as_such() {
+        let mut chain = arm();
+        chain.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
+        let request = Request::exact(2, [1.5, 4.0]);
+        let came = execute_request(
+            &mut Propagator::default(),
+            &mut chain,
+            &Obstacles::default(),
+            &request,
+        )
+        .unwrap();
+        assert_eq!(
+            came.veto().map(|veto| (veto.by, veto.reason)),
+            Some((0, VetoReason::OutOfReach))
+        );
+        assert_eq!(chain, {
+            let mut same = arm();
+            same.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
+            same
+        });
+    }
+
+    #[test]
+    fn joints_keep_their_limit_near_a_singular_posture_and_the_tool_still_gets_there() {
+        let (free_m, _) = dragged_out(f64::INFINITY);
+        assert!(free_m > 0.04, "without a limit the elbow goes {free_m} m for 0.01 m of the tool");
+        let (limited_m, reached_m) = dragged_out(0.02);
+        assert!(limited_m <= 0.02, "{limited_m}");
+        assert!(reached_m > 1.9998, "{reached_m} of 2 m");
+    }
+}

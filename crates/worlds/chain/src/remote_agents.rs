@@ -1,0 +1,190 @@
+//! The agents of a chain elsewhere: their perception in a cycle, and the decisions that a world takes from them.
+//!
+//! A caller that runs agents in processes of their own asks for [`ChainWorld::percepts_at`], sends each
+//! connector's sight to its agent, hands the decisions over ([`ChainWorld::submit_controls`]), and repeats
+//! that until no sights are left: chains that may meet move one after the other. Then it advances the
+//! run by a cycle. A chain for which nothing was handed over talks in memory.
+//!
+//! A run that is to be recorded and computed again is handed all decisions of a cycle, as bytes, before it advances
+//! ([`sidestep_kernel::Simulation::submit_controls`]): in such a cycle no chain talks in memory, and one whose connectors
+//! said nothing stands.
+
+use super::agents::{ChainControls, ChainPercepts, Control};
+use super::deploy::Deployment;
+use super::perceive::Perceiver;
+use super::scratch::Scratch;
+use super::state::ChainState;
+use super::world::ChainWorld;
+use super::{act, claim, join};
+use sidestep_kernel::conflict::ConflictGroups;
+use sidestep_kernel::control::OrderError;
+use sidestep_kernel::ports::ManualClock;
+use sidestep_kernel::{Cycle, EntityId, InputError, PhaseContext, Slot};
+use std::collections::BTreeSet;
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the perception of chains' connectors in the cycle to come, `now`: of those chains whose
+    /// turn it is, because those before them have handed over their decisions. Nothing changes. Where no
+    /// team is deployed there is no perception.
+    pub fn percepts_at(&self, state: &ChainState<D>, now: Cycle) -> Vec<ChainPercepts<D>> {
+        let (state, clock) = (&state.trial_copy(), &ManualClock::default());
+        let mut scratch = Scratch::new(self);
+        scratch.shown = Some(Vec::new());
+        let turn = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };
+        let groups = ConflictGroups::new(state.len());
+        (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
+        join::join(turn, 0..state.len(), &groups);
+        for slot in 0..state.len() {
+            let mut looking = Perceiver { world: self, state, now, scratch: turn.scratch };
+            let decision = looking.decide(slot as Slot);
+            state.set_decision(slot, decision);
+        }
+        for slot in (0..state.len() as Slot).filter(|&slot| groups.leader(slot) == slot) {
+            let mut group = Vec::new();
+            groups.members(slot, &mut group);
+            group.sort_unstable();
+            let is_shown =
+                |turn: &PhaseContext<'_, Self>| turn.scratch.shown.as_ref().map(Vec::len);
+            let before = is_shown(turn);
+            for &member in &group {
+                act::act_one(turn, &group, member);
+                if is_shown(turn) != before {
+                    break;
+                }
+            }
+        }
+        scratch.shown.unwrap_or_default()
+    }
+
+    /// Hands over the decisions of a chain's agents for the cycle to come. Unless all that take part in a
+    /// motion agree, no connector moves; nor does any where an agent is gone.
+    ///
+    /// # Errors
+    /// When the chain does not exist, or a decision is not that of its connector in this cycle.
+    pub fn submit_controls(
+        &self,
+        state: &ChainState<D>,
+        chain: EntityId,
+        handed: ChainControls<D>,
+    ) -> Result<(), InputError> {
+        let wrong = |cause: String, remedy: &str| {
+            Err(InputError::new(format!("decisions of chain {chain}"), cause, remedy))
+        };
+        let Some(spec) = self.chains.get(chain as usize) else {
+            return wrong(format!("there are {} chains", self.chains.len()), "count from 0");
+        };
+        if let Err((cause, remedy)) = handed.check(spec.start.points().len()) {
+            return wrong(cause, remedy);
+        }
+        state.body_mut(chain as usize).handed = Some(handed);
+        Ok(())
+    }
+
+    /// Reads the decision of a connector for cycle `now`, by its id on the network; none if its agent is gone
+    /// ([`ChainControls::ABSENT_CONTROL`]).
+    ///
+    /// # Errors
+    /// With the cause, when it is no decision, or none of this connector in this cycle.
+    pub fn read_control(
+        &self,
+        now: Cycle,
+        id: EntityId,
+        bytes: &[u8],
+    ) -> Result<Option<Control<D>>, String> {
+        let Some((chain, connector)) = self.find_connector(id) else {
+            return Err("there is no such connector; give ids of connectors".into());
+        };
+        if bytes == ChainControls::<D>::ABSENT_CONTROL {
+            return Ok(None);
+        }
+        let read = postcard::take_from_bytes::<Control<D>>(bytes).ok();
+        let Some((control, _)) = read.filter(|(_, rest)| rest.is_empty()) else {
+            return Err("its bytes are none of a decision of this build".into());
+        };
+        let n = self.connector_count(chain);
+        let mut alone = ChainControls::empty(now, n as usize);
+        alone.controls[connector as usize] = Some(control);
+        alone.check(n as usize).map_err(|(cause, _)| cause)?;
+        Ok(alone.controls.swap_remove(connector as usize))
+    }
+
+    /// Reads the decisions of connectors for cycle `now`, by their ids on the network; returns those of each chain.
+    ///
+    /// # Errors
+    /// When one of them is none of its connector in this cycle.
+    pub fn read_controls(
+        &self,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<Vec<ChainControls<D>>, OrderError> {
+        let lengths = self.chains.iter().map(|spec| spec.start.points().len());
+        let mut all: Vec<_> = lengths.map(|n| ChainControls::empty(now, n)).collect();
+        let mut known = BTreeSet::new();
+        for (id, bytes) in controls {
+            let refused =
+                |cause: String| OrderError::Control { who: self.connector_name(*id), cause };
+            let control = self.read_control(now, *id, bytes).map_err(refused)?;
+            if !known.insert(*id) {
+                return Err(refused("there are two of it; give one for each connector".into()));
+            }
+            let Some((chain, connector)) = self.find_connector(*id) else { continue };
+            let handed = &mut all[chain as usize];
+            match control {
+                Some(control) => handed.controls[connector as usize] = Some(control),
+                None => handed.gone.push(connector),
+            }
+        }
+        Ok(all)
+    }
+
+    /// Notes the decisions of connectors in cycle `now`, by their ids on the network: no chain talks in memory in it.
+    ///
+    /// # Errors
+    /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is noted then.
+    pub(crate) fn record_controls(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        if self.deployment == Deployment::Direct {
+            let cause =
+                "one process moves the chains (deployment = \"direct\"); set deployment = \"team\"";
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
+        }
+        for (chain, handed) in self.read_controls(now, controls)?.into_iter().enumerate() {
+            state.body_mut(chain).handed = Some(handed);
+        }
+        Ok(())
+    }
+
+    /// Returns the number of connectors of a chain; 0 of one that does not exist.
+    pub fn connector_count(&self, chain: EntityId) -> u32 {
+        self.chains.get(chain as usize).map_or(0, |spec| spec.start.points().len() as u32)
+    }
+
+    /// Returns the id on the network of a connector of a chain, if there is one.
+    pub fn connector_id(&self, chain: EntityId, connector: u32) -> Option<EntityId> {
+        (connector < self.connector_count(chain)).then(|| self.first_id(chain) + connector)
+    }
+
+    /// Returns the chain of a connector and its number there, by its id on the network.
+    pub fn find_connector(&self, id: EntityId) -> Option<(EntityId, u32)> {
+        let mut k = id;
+        for chain in 0..self.chains.len() as EntityId {
+            match k.checked_sub(self.connector_count(chain)) {
+                Some(beyond) => k = beyond,
+                None => return Some((chain, k)),
+            }
+        }
+        None
+    }
+
+    /// Returns the name of a connector for people.
+    fn connector_name(&self, id: EntityId) -> String {
+        match self.find_connector(id) {
+            Some((chain, k)) => format!("connector {k} of chain {chain}"),
+            None => format!("connector of id {id}"),
+        }
+    }
+}

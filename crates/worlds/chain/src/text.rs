@@ -1,0 +1,249 @@
+//! Texts for people: a scenario's contents, a run's outcome, and all positions.
+
+use super::deploy::deployment::Deployment;
+use super::metrics::{ChainAbandonedPart, Metrics, RobotMetrics};
+use super::scenario::ChainScenario;
+use super::state::Snapshot;
+use serde_json::{Value, json};
+use sidestep_kernel::World;
+use sidestep_kernel::text::{
+    Description, KeyValues, align_pairs, format_fixed, group_thousands, key_value,
+};
+
+/// Returns the contents of a compiled scenario.
+pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Description {
+    let world = &compiled.world;
+    let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
+    let plan = compiled.plan();
+    let connectors = world.agents();
+    let json = json!({
+        "name": plan.name,
+        "seed": plan.seed,
+        "cycles": plan.cycles,
+        "chains": world.chains.len(),
+        "connectors": connectors,
+        "rods": rods,
+        "obstacles": world.obstacles.still().len(),
+        "movers": world.movers.len(),
+        "dimensions": D,
+        "dt_s": world.dt_s,
+        "deployment": world.deployment,
+    });
+    let count = |n: usize| group_thousands(n as u64);
+    let (chains, dt_s) = (count(world.chains.len()), world.dt_s);
+    let parts = count(connectors);
+    let (still, moving) = (count(world.obstacles.still().len()), count(world.movers.len()));
+    let (cycles, lasts_s) = (group_thousands(plan.cycles), plan.cycles as f64 * dt_s);
+    let mut lines = vec![
+        key_value("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
+        key_value("obstacles", format!("{still}, and {moving} that move")),
+        key_value("run", format!("{cycles} cycles of {dt_s} s ({lasts_s} s), seed {}", plan.seed)),
+    ];
+    if world.deployment == Deployment::Team {
+        let network = match &world.network {
+            None => "loses nothing".into(),
+            Some(n) => format!(
+                "{} s a message, loses {} %, a cycle's talk ends after {} s",
+                n.latency_s,
+                100.0 * n.loss,
+                n.deadline_s
+            ),
+        };
+        lines.push(key_value(
+            "deployment",
+            format!("an agent per connector; the network: {network}"),
+        ));
+    }
+    Description { json, text: align_pairs(&lines) }
+}
+
+/// Returns the position of every connector.
+pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Description {
+    let mut rows = Vec::new();
+    let axes: String =
+        ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
+    let mut text = format!("  chain  connector{axes}\n");
+    for (chain, record) in snapshot.chains.iter().enumerate() {
+        for (connector, at) in record.points_m.chunks_exact(D).enumerate() {
+            rows.push(json!({ "chain": chain, "connector": connector, "at_m": at }));
+            let at = at.iter().map(|x| format!("{x:>12.4}")).collect::<String>();
+            text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
+        }
+    }
+    Description { json: Value::Array(rows), text }
+}
+
+/// Returns the outcome of a run.
+pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
+    let mut lines = motion(m);
+    lines.extend(m.robots.as_ref().map(robots));
+    lines.extend(after_vetoes(m));
+    lines.extend(network(m));
+    if m.reformed > 0 {
+        lines.push(key_value("re-formed", format!("{} times", group_thousands(m.reformed))));
+    }
+    if m.not_reformed > 0 {
+        lines.push(key_value("NOT re-formed", not_reformed(m)));
+    }
+    lines.extend(m.given_up.iter().take(MAX_LISTED_PARTS).map(abandoned_part));
+    if m.given_up.len() > MAX_LISTED_PARTS {
+        let more = group_thousands((m.given_up.len() - MAX_LISTED_PARTS) as u64);
+        lines.push(key_value("given up", format!("and {more} more")));
+    }
+    lines
+}
+
+/// Length below which a rod out of its limits is a matter of rounding, m.
+const ROUNDING_M: f64 = 1e-9;
+
+fn rods(violation_m: f64) -> String {
+    match violation_m <= ROUNDING_M {
+        true => "within their limits".into(),
+        false => format!("out of their limits by up to {} m", format_fixed(violation_m, 6)),
+    }
+}
+
+/// Returns the chains' progress, its cost, and the limits that they kept.
+fn motion(m: &Metrics) -> KeyValues {
+    let clearance = match m.min_clearance_m {
+        None => "nothing came near".into(),
+        Some(c) if c.abs() < TOUCH_M => "touched".into(),
+        Some(c) => format!("{} m", format_fixed(c, 4)),
+    };
+    let penetrations = match m.penetrations {
+        0 => "none".into(),
+        n => {
+            let in_a_row = group_thousands(m.longest_inside_steps);
+            format!(
+                "{} steps with a part in an obstacle, up to {in_a_row} in a row",
+                group_thousands(n)
+            )
+        }
+    };
+    let (moved, turned) = (m.moved_per_step, group_thousands(m.rotations));
+    let mut lines = vec![
+        key_value("progress", format!("{:.1} %", 100.0 * m.progress)),
+        key_value("vetoes", vetoes(m)),
+        key_value("penetrations", penetrations),
+        key_value("least clearance", clearance),
+        key_value("rods", rods(m.max_rod_violation_m)),
+        key_value("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
+        key_value("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
+    ];
+    lines.extend(m.min_own_gap_m.map(|gap_m| key_value("own parts", own_parts(gap_m))));
+    lines
+}
+
+/// Returns how near the parts of a chain came to each other.
+fn own_parts(gap_m: f64) -> String {
+    match gap_m {
+        overlap_m if overlap_m < -TOUCH_M => {
+            format!("overlapped by up to {} m", format_fixed(-gap_m, 4))
+        }
+        touch_m if touch_m < TOUCH_M => "touched each other".into(),
+        _ => format!("at least {} m apart", format_fixed(gap_m, 4)),
+    }
+}
+
+/// Returns how well the robots of swarms kept to their connectors.
+fn robots(robots: &RobotMetrics) -> (String, String) {
+    let bumpers = match robots.bumper_events {
+        0 => "no bumper pressed".into(),
+        n => format!("bumpers pressed {} times", group_thousands(n)),
+    };
+    let (mean_m, max_m) = (robots.mean_lag_m, robots.max_lag_m);
+    key_value(
+        "robots",
+        format!(
+            "{bumpers}; behind their connectors by {mean_m:.2} m on average, {max_m:.2} m at most"
+        ),
+    )
+}
+
+fn not_reformed(m: &Metrics) -> String {
+    let times = format!("{} times", group_thousands(m.not_reformed));
+    match m.missing_parts {
+        0 => times,
+        1 => format!("{times}; 1 part is missing"),
+        n => format!("{times}; {} parts are missing", group_thousands(n)),
+    }
+}
+
+/// Returns how initiators continued after vetoes, and the results of getting out of the way; no
+/// lines if there were none.
+fn after_vetoes(m: &Metrics) -> KeyValues {
+    let some = |counts: &[(u64, &str)]| {
+        let said = counts.iter().filter(|(n, _)| *n > 0);
+        let said: Vec<String> =
+            said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
+        (!said.is_empty()).then(|| said.join(", "))
+    };
+    let (rungs, escapes) = (&m.rungs, &m.escapes);
+    let went_on = some(&[
+        (rungs.shorter, "shorter steps"),
+        (rungs.sideways, "to the side"),
+        (rungs.turned, "turns on the spot"),
+        (rungs.waited, "waited"),
+        (rungs.pulled_back, "pulled by the other end"),
+        (rungs.stuck, "stuck"),
+        (rungs.planned, "ways planned"),
+        (rungs.not_planned, "plans without a way"),
+    ]);
+    let escaped = some(&[
+        (escapes.moves, "parts moved away"),
+        (escapes.vetoes, "could not"),
+        (escapes.capped, "of these too slow"),
+    ]);
+    let went_on = went_on.map(|said| key_value("after vetoes", said));
+    went_on.into_iter().chain(escaped.map(|said| key_value("escapes", said))).collect()
+}
+
+/// Returns the traffic on the network of the agents, and its faults; no lines where there are no agents.
+fn network(m: &Metrics) -> KeyValues {
+    let mut lines = KeyValues::new();
+    if m.messages > 0 {
+        let sent = format!("{}, {} bytes", group_thousands(m.messages), group_thousands(m.bytes));
+        lines.push(key_value("messages", sent));
+    }
+    let counts = [
+        (m.contacts_lost, "contacts lost"),
+        (m.deadlines_missed, "leaders out of time"),
+        (m.stood, "steps stood because of that"),
+        (m.dropped, "messages that made no sense"),
+    ];
+    let said = counts.iter().filter(|(n, _)| *n > 0);
+    let said: Vec<String> =
+        said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
+    if !said.is_empty() {
+        lines.push(key_value("network", said.join(", ")));
+    }
+    lines
+}
+
+/// Distance below which bodies touch, meters.
+const TOUCH_M: f64 = 1e-6;
+/// Largest number of given-up parts that are listed; the others are only counted.
+const MAX_LISTED_PARTS: usize = 5;
+
+fn vetoes(m: &Metrics) -> String {
+    if m.vetoes == 0 {
+        return "none".into();
+    }
+    let reasons = m.vetoes_by_reason.iter().filter(|(_, n)| **n > 0);
+    let reasons = reasons.map(|(reason, n)| format!("{reason} {}", group_thousands(*n)));
+    format!("{}: {}", group_thousands(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
+}
+
+fn abandoned_part(told: &ChainAbandonedPart) -> (String, String) {
+    let what = &told.what;
+    let why = match (&what.by, &what.reason) {
+        (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
+        _ => "nobody objected".into(),
+    };
+    let nearest = match what.nearest_m.is_finite() {
+        true => format!(", came within {:.4} m", what.nearest_m),
+        false => String::new(),
+    };
+    let who = format!("chain {}, task {}, part {}", told.chain, what.task, what.part);
+    key_value("given up", format!("{who}{nearest}; {why}"))
+}

@@ -1,0 +1,272 @@
+//! The hooks that a run calls on the world beside its phases.
+
+use super::arms::arm::Arm;
+use super::events::Event;
+use super::metrics::{ChainMetrics, ChainTally, Metrics};
+use super::rows::Rows;
+use super::scenario::{AnyChainScenario, ChainScenario};
+use super::scratch::Scratch;
+use super::state::{ChainState, Snapshot};
+use super::text;
+use super::view::view_event;
+use super::world::ChainWorld;
+use serde_json::Value;
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
+use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
+use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::view::{
+    BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
+};
+use sidestep_kernel::{
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, Simulation, World,
+};
+use sidestep_scenario::Source;
+use std::sync::Arc;
+
+/// A run of chains in `D` dimensions.
+pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
+
+/// Returns a run of a scenario at its start, in the plane or in space: a [`ChainRun`] behind the face that all worlds
+/// share. Generic code is compiled again wherever it is named, and this is its name that is not generic.
+///
+/// # Errors
+/// When the scenario is wrong; the error points at the place.
+pub fn chain_run(source: &Source, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+    Ok(match AnyChainScenario::new(source)? {
+        AnyChainScenario::Plane(compiled) => Box::new(compiled.start(source, workers)),
+        AnyChainScenario::Space(compiled) => Box::new(compiled.start(source, workers)),
+    })
+}
+
+impl<const D: usize> ChainScenario<D> {
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
+    ///
+    /// # Panics
+    /// Never, because scripts are tried out when they are compiled.
+    pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
+        let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
+        let books = Collector { rows: Rows::new(self.record), ..Collector::default() };
+        let plan = self.plan();
+        Run::new(self.world, plan, state, books, &source.text, workers)
+    }
+
+    /// Returns the plan that the scenario asks for.
+    pub fn plan(&self) -> RunConfig {
+        RunConfig {
+            name: self.name.clone(),
+            seed: self.seed,
+            cycles: self.cycles,
+            checkpoint_every: self.record.checkpoint_every,
+        }
+    }
+}
+
+/// Bookkeeping of a run beside its state.
+#[derive(Debug, Default)]
+pub struct Collector {
+    /// Steps made before this process resumed the run.
+    steps_before: u64,
+    /// Rows to be recorded; none without recording.
+    rows: Rows,
+    /// Events that wait for the next frame.
+    log: Log<Event>,
+    /// Events gathered from the workers.
+    gathered: Vec<Event>,
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the metrics of one chain.
+    pub fn chain_metrics(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
+        let body = state.body(slot);
+        let spec = &self.chains[slot];
+        let named = |(arm, values): (&Arc<Arm>, &Vec<f64>)| {
+            let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
+            names.zip(values.iter().copied()).collect()
+        };
+        ChainMetrics {
+            chain: slot as EntityId,
+            name: spec.name.clone(),
+            joints: spec.arm.as_ref().zip(body.joints.as_ref()).map(named),
+            progress: self.progress(slot, &body),
+            tally: body.tally.clone(),
+        }
+    }
+}
+
+impl<const D: usize> World for ChainWorld<D> {
+    const NAME: &'static str = "chain";
+    const AGENT: &'static str = "connector";
+    const OBSERVES_EACH_CYCLE: bool = true;
+
+    type Collector = Collector;
+    type Snapshot = (Snapshot, Vec<ChainTally>);
+    type Metrics = Metrics;
+
+    fn agents(&self) -> usize {
+        self.chains.iter().map(|spec| spec.start.points().len()).sum()
+    }
+
+    fn cycles_until_flush(&self, _: &ChainState<D>, books: &Collector, _: Cycle) -> u64 {
+        if books.rows.is_full() { 0 } else { u64::MAX }
+    }
+
+    fn before_cycle(&self, state: &ChainState<D>, books: &mut Collector, now: Cycle) {
+        books.rows.record_positions(self, state, now);
+    }
+
+    fn is_over(&self, state: &ChainState<D>) -> bool {
+        self.is_all_done(state)
+    }
+
+    fn collect(&self, books: &mut Collector, scratch: &mut Scratch<D>) {
+        books.gathered.append(&mut scratch.events);
+    }
+
+    fn commit(&self, books: &mut Collector) {
+        // Events of one chain are already in order, so a stable sort by cycle and chain is enough.
+        books.gathered.sort_by_key(|event| (event.cycle, event.chain));
+        for event in books.gathered.drain(..) {
+            books.log.push(event);
+            books.rows.add_event(event);
+        }
+    }
+
+    fn start_recording(&self, _: &mut ChainState<D>, books: &mut Collector, _: Cycle) {
+        books.rows.start(self);
+    }
+
+    fn enable_events(&self, books: &mut Collector) {
+        books.log.is_enabled = true;
+    }
+
+    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
+        books.rows.schemas()
+    }
+
+    fn record(
+        &self,
+        _: &mut ChainState<D>,
+        books: &mut Collector,
+        _: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.rows.record(recorder)
+    }
+
+    fn digest(&self, state: &ChainState<D>, now: Cycle) -> Digest {
+        state.snapshot(now).digest()
+    }
+
+    fn save(
+        &self,
+        state: &ChainState<D>,
+        _: &Collector,
+        now: Cycle,
+    ) -> (Snapshot, Vec<ChainTally>) {
+        (state.snapshot(now), state.tallies())
+    }
+
+    fn restore(
+        &self,
+        (snapshot, tallies): (Snapshot, Vec<ChainTally>),
+        books: &mut Collector,
+    ) -> Result<ChainState<D>, CheckpointError> {
+        books.steps_before = tallies.iter().map(|t| t.steps).sum();
+        ChainState::restore(self, &snapshot, tallies)
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        ChainWorld::scenery(self, name)
+    }
+
+    fn frame(
+        &self,
+        state: &ChainState<D>,
+        books: &mut Collector,
+        now: Cycle,
+        look: FrameOptions,
+    ) -> Frame {
+        let (events, log_left_out) = books.log.take();
+        Frame {
+            cycle: now,
+            time_s: self.start_time_s(now),
+            bodies: self.visible_bodies(state, now),
+            scans: self.scans(state, now, &look.scans),
+            odometry: Vec::new(),
+            log: events.iter().map(view_event).collect(),
+            log_left_out,
+        }
+    }
+
+    fn inspect(
+        &self,
+        state: &ChainState<D>,
+        _: &Collector,
+        now: Cycle,
+        who: BodyId,
+    ) -> Option<Inspection> {
+        ChainWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        self.teams.clone()
+    }
+
+    fn check_order(&self, order: &Order<'_>) -> Result<(), String> {
+        self.check_possible(order)
+    }
+
+    fn order(&self, state: &mut ChainState<D>, order: &Order<'_>) {
+        self.record_order(state, order);
+    }
+
+    fn submit_controls(
+        &self,
+        state: &mut ChainState<D>,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        self.record_controls(state, now, controls)
+    }
+
+    fn records_controls(&self, books: &Collector) -> bool {
+        books.rows.keeps_controls()
+    }
+
+    fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
+        ChainWorld::observe(self, state, now, team, room);
+    }
+
+    fn position_columns(&self, books: &Collector) -> Vec<PositionColumns> {
+        ChainWorld::<D>::position_columns(books.rows.interval())
+    }
+
+    fn metrics(
+        &self,
+        state: &ChainState<D>,
+        books: &Collector,
+        _: Cycle,
+        effort: &RunStats,
+    ) -> Metrics {
+        let tallies = state.tallies();
+        let progress: Vec<f64> =
+            (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
+        let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - books.steps_before;
+        Metrics::from_tallies(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
+    }
+
+    fn agent_metrics(&self, state: &ChainState<D>, _: &Collector, _: Cycle) -> Value {
+        let one = |slot| serde_json::to_value(self.chain_metrics(state, slot)).unwrap_or_default();
+        (0..state.len()).map(one).collect()
+    }
+
+    fn summary_lines(&self, metrics: &Metrics) -> KeyValues {
+        text::summary_lines(metrics)
+    }
+
+    fn poses(&self, state: &ChainState<D>, now: Cycle) -> Description {
+        text::poses::<D>(&state.snapshot(now))
+    }
+}

@@ -1,0 +1,100 @@
+//! The world's entry in the list of worlds, for code that runs scenarios without knowing any world.
+
+use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
+use super::{bundle, remarks, text, world::ChainWorld};
+use sidestep_kernel::text::Description;
+use sidestep_kernel::{InputError, RunConfig, Simulation, World};
+use sidestep_scenario::{
+    CompiledScenario as AnyCompiled, MetricInfo, Remark, ResolvedScenario, SeedEffect, Source,
+    WorldType,
+};
+use std::any::Any;
+
+/// Chains of connectors and rods, in the plane or in space.
+#[derive(Debug, Clone, Copy)]
+pub struct Chains;
+
+impl WorldType for Chains {
+    fn name(&self) -> &'static str {
+        ChainWorld::<2>::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        ChainWorld::<2>::AGENT
+    }
+
+    fn about(&self) -> &'static str {
+        "Chains that creep among obstacles"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        include_str!("default.toml")
+    }
+
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections()
+    }
+
+    fn random_quantities(&self) -> &'static str {
+        "fields, anywhere = true of a chain, tasks of kind wander, navigator.noise_m, and planned ways"
+    }
+
+    fn metric_infos(&self) -> &'static [MetricInfo] {
+        super::metric_info::METRIC_INFO
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
+        Ok(match EitherCompiled::new(source)? {
+            EitherCompiled::Plane(compiled) => Box::new(compiled),
+            EitherCompiled::Space(compiled) => Box::new(compiled),
+        })
+    }
+}
+
+impl<const D: usize> AnyCompiled for ChainScenario<D> {
+    fn world(&self) -> &'static str {
+        ChainWorld::<D>::NAME
+    }
+
+    fn plan(&self) -> RunConfig {
+        ChainScenario::plan(self)
+    }
+
+    fn body_count(&self) -> usize {
+        self.world.agents()
+    }
+
+    fn contents(&self, _: &Source) -> Description {
+        text::contents(self)
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        remarks::remarks(self)
+    }
+
+    fn seed_effect(&self) -> SeedEffect {
+        // Where the start does not follow from the seed, few parts draw, and only on occasion: a leader that
+        // wanders, a laser that errs, parts that are thrown about, a way that is planned.
+        match &self.recipe {
+            Some(recipe) if !recipe.is_start_random() => SeedEffect::Perhaps,
+            _ => SeedEffect::Decide,
+        }
+    }
+
+    fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
+        bundle::resolve(source, self)
+    }
+
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        let compiled = ChainScenario::reseeded(self, seed)?;
+        Some(compiled.map(|compiled| Box::new(compiled) as Box<_>))
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        Box::new(self.clone().start(source, workers))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

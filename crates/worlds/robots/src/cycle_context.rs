@@ -1,0 +1,75 @@
+//! The data of a phase: world, state and cycle, with the floor in the width of its words.
+
+use super::RobotsState;
+use super::state::BodyState;
+use super::world::{BodyType, RobotsWorld};
+use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::{Column, Cycle, EntityId, Slot};
+
+/// The world and its state in one cycle, as every phase sees them.
+#[derive(Debug)]
+pub(super) struct CycleContext<'a, T: BoxWord> {
+    pub(super) world: &'a RobotsWorld,
+    pub(super) state: &'a RobotsState,
+    /// The body that stands in each box or claims it.
+    pub(super) floor: &'a Column<T>,
+    pub(super) now: Cycle,
+}
+
+/// Evaluates an expression with the scene of a world's state. The phases are compiled for each
+/// width of the floor's words; this picks the right one.
+macro_rules! with_scene {
+    ($world:expr, $state:expr, $now:expr, |$scene:ident| $value:expr) => {{
+        let (world, state, now) = ($world, $state, $now);
+        match &state.floor {
+            sidestep_kernel::space::Floor::Narrow(floor) => {
+                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                $value
+            }
+            sidestep_kernel::space::Floor::Wide(floor) => {
+                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                $value
+            }
+        }
+    }};
+}
+pub(super) use with_scene;
+
+impl<'a, T: BoxWord> CycleContext<'a, T> {
+    /// Returns the changing part of a body.
+    #[inline(always)]
+    pub(super) fn cell(&self, slot: Slot) -> &'a BodyState {
+        &self.state.bodies[slot as usize]
+    }
+
+    /// Returns the properties that a body shares with others of its type.
+    #[inline(always)]
+    pub(super) fn type_of(&self, cell: &BodyState) -> &'a BodyType {
+        &self.world.types[usize::from(cell.ty)]
+    }
+
+    /// Returns the index of a body's lower-left box on the floor.
+    #[inline(always)]
+    pub(super) fn base(&self, cell: &BodyState) -> u32 {
+        cell.position().index(self.world.stride)
+    }
+
+    /// Returns the draws of a body's action: that of its outcome, and that of its priority.
+    #[inline]
+    pub(super) fn act_words(&self, id: EntityId) -> [u32; 2] {
+        let [effect, priority, ..] = self.world.streams.block(id, self.now, super::purpose::ACT, 0);
+        [effect, priority]
+    }
+}
+
+/// Returns the index of the box at an offset from a body's lower-left one.
+#[inline(always)]
+pub(super) fn box_index(base: u32, offset: i32) -> usize {
+    base.wrapping_add_signed(offset) as usize
+}
+
+/// Returns whether some boxes are all empty.
+#[inline]
+pub(super) fn are_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
+    offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(box_index(base, offset))).is_free()
+}

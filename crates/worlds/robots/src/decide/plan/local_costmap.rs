@@ -1,0 +1,233 @@
+//! Boxes that beams report: the places around a robot where it cannot stand now.
+
+use super::super::Percept;
+use crate::ray::crossings;
+use crate::ray::turn_crossing;
+use crate::sensor::{NOTHING, Reading};
+use crate::state::WALL;
+use crate::world::{MountedSensor, RobotBody};
+use sidestep_map::planning::FreeSpace;
+use std::sync::Arc;
+
+/// Distance in boxes up to which a robot plans.
+pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
+/// Side of the square in which it plans.
+pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
+/// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for.
+const SEARCH_SIDE_BOXES: i32 = 32;
+/// Most boxes in which one thing is believed to be, where the class does not say more exactly; the
+/// nearest class is believed however many boxes it spans.
+const MAX_VAGUE_BOXES: usize = 2;
+
+/// A set of places around a robot, by the columns and rows from its own place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct LocalBoxSet(u128);
+
+impl LocalBoxSet {
+    /// Returns the number of a place, row by row from the southwest; none outside the square.
+    pub(super) fn index(col: i32, row: i32) -> Option<usize> {
+        let inside = col.abs() <= PLAN_RADIUS_BOXES && row.abs() <= PLAN_RADIUS_BOXES;
+        inside.then_some(
+            ((row + PLAN_RADIUS_BOXES) * PLAN_SIDE_BOXES + col + PLAN_RADIUS_BOXES) as usize,
+        )
+    }
+
+    /// Returns whether a place is in the set; none outside the square is.
+    pub(super) fn contains(self, col: i32, row: i32) -> bool {
+        Self::index(col, row).is_some_and(|n| self.0 >> n & 1 == 1)
+    }
+
+    pub(super) fn insert(&mut self, col: i32, row: i32) {
+        if let Some(n) = Self::index(col, row) {
+            self.0 |= 1 << n;
+        }
+    }
+}
+
+/// Places around a robot where something is that the static map does not show.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LocalCostmap {
+    /// Places where the robot cannot stand.
+    pub(super) blocked: LocalBoxSet,
+    /// Places of which it cannot stand in some.
+    pub(super) vague: LocalBoxSet,
+}
+
+/// The eyes of a robot type: its beams, and the walls that it knows.
+#[derive(Debug)]
+pub(super) struct BeamModel {
+    walls: Arc<FreeSpace>,
+    size: i32,
+    /// Whether all readings are true.
+    pub(super) are_reliable: bool,
+    /// All beams in the order of the readings, at each heading.
+    beams: [Box<[BeamPath]>; 4],
+}
+
+/// One beam, as far as a robot plans.
+#[derive(Debug)]
+struct BeamPath {
+    /// The observation that walls truly have.
+    wall: u8,
+    crossed: Box<[BeamBox]>,
+}
+
+/// A box that a beam crosses, seen from the robot's lower-left box.
+#[derive(Debug, Clone, Copy)]
+struct BeamBox {
+    col: i32,
+    row: i32,
+    class: u8,
+}
+
+/// Votes of the beams for and against each box that is looked at being free.
+struct OccupancyVotes([[i8; SEARCH_SIDE_BOXES as usize]; SEARCH_SIDE_BOXES as usize]);
+
+impl Default for OccupancyVotes {
+    fn default() -> Self {
+        Self([[0; SEARCH_SIDE_BOXES as usize]; SEARCH_SIDE_BOXES as usize])
+    }
+}
+
+impl OccupancyVotes {
+    fn add(&mut self, crossed: &BeamBox, votes: i8) {
+        let sum = &mut self.0[(crossed.row + PLAN_RADIUS_BOXES) as usize]
+            [(crossed.col + PLAN_RADIUS_BOXES) as usize];
+        *sum = sum.saturating_add(votes);
+    }
+
+    fn is_free(&self, crossed: &BeamBox) -> bool {
+        self.0[(crossed.row + PLAN_RADIUS_BOXES) as usize]
+            [(crossed.col + PLAN_RADIUS_BOXES) as usize]
+            > 0
+    }
+}
+
+/// The boxes in which something was reported: a stretch of a beam.
+struct OccupiedSegment<'a> {
+    boxes: &'a [BeamBox],
+    is_near: bool,
+}
+
+impl BeamModel {
+    pub(super) fn new(walls: Arc<FreeSpace>, size: u32, body: &RobotBody, box_size_m: f64) -> Self {
+        let at = |heading| {
+            let all =
+                body.sensors.iter().flat_map(|sensor| beams(sensor, size, heading, box_size_m));
+            all.collect()
+        };
+        let are_reliable = body.sensors.iter().all(MountedSensor::is_error_free);
+        Self { walls, size: size as i32, are_reliable, beams: [0, 1, 2, 3].map(at) }
+    }
+
+    /// Returns the things that the robot's readings report and the static map does not explain; none
+    /// where there are no such things, near or far.
+    pub(super) fn local_costmap(&self, percept: &Percept<'_>) -> Option<LocalCostmap> {
+        let beams = &self.beams[usize::from(percept.heading)];
+        let mut sight = LocalCostmap::default();
+        let reports = || beams.iter().zip(percept.readings);
+        // Mostly nothing unknown is there, and then the free boxes need not be found.
+        if !reports()
+            .any(|(beam, &reading)| self.occupied_segment(beam, reading, percept.at).is_some())
+        {
+            return None;
+        }
+        let suspicions = || reports().filter_map(|(b, &r)| self.occupied_segment(b, r, percept.at));
+        let mut votes = OccupancyVotes::default();
+        for (beam, &reading) in reports() {
+            self.vote_free(beam, reading, percept.at, &mut votes);
+        }
+        for suspicion in suspicions() {
+            suspicion.boxes.iter().for_each(|c| votes.add(c, -1));
+        }
+        for suspicion in suspicions() {
+            let left = || suspicion.boxes.iter().filter(|c| !votes.is_free(c));
+            let is_exact = suspicion.is_near || left().count() <= MAX_VAGUE_BOXES;
+            let places = if is_exact { &mut sight.blocked } else { &mut sight.vague };
+            left().for_each(|c| self.block(c, places));
+        }
+        Some(sight)
+    }
+
+    fn is_wall(&self, (col, row): (u32, u32), crossed: &BeamBox) -> bool {
+        let at = (col.wrapping_add_signed(crossed.col), row.wrapping_add_signed(crossed.row));
+        !self.walls.is_free(at.0, at.1)
+    }
+
+    /// Returns the stretch of a beam in which there is something that is not the wall behind it.
+    fn occupied_segment<'a>(
+        &self,
+        beam: &'a BeamPath,
+        reading: Reading,
+        at: (u32, u32),
+    ) -> Option<OccupiedSegment<'a>> {
+        if reading.observation == NOTHING {
+            return None;
+        }
+        let first = beam.crossed.iter().position(|c| c.class >= reading.class)?;
+        let mut end = first;
+        for crossed in &beam.crossed {
+            if self.is_wall(at, crossed) {
+                let explains = crossed.class == reading.class && reading.observation == beam.wall;
+                if explains || crossed.class < reading.class {
+                    return None;
+                }
+                break;
+            }
+            if crossed.class > reading.class {
+                break;
+            }
+            end += usize::from(crossed.class == reading.class);
+        }
+        let boxes = &beam.crossed[first..end];
+        (!boxes.is_empty()).then_some(OccupiedSegment { boxes, is_near: reading.class == 0 })
+    }
+
+    /// Votes for the boxes that a beam has passed: all up to the wall if it reports nothing or that
+    /// wall, else those that are nearer than the thing it reports. One beam decides where beams are
+    /// reliable, and most of them where they are not.
+    fn vote_free(
+        &self,
+        beam: &BeamPath,
+        reading: Reading,
+        at: (u32, u32),
+        votes: &mut OccupancyVotes,
+    ) {
+        let to_wall = beam.crossed.iter().position(|c| self.is_wall(at, c));
+        let wall =
+            to_wall.map(|n| Reading { observation: beam.wall, class: beam.crossed[n].class });
+        let is_clear = reading.observation == NOTHING || wall == Some(reading);
+        let before_wall = &beam.crossed[..to_wall.unwrap_or(beam.crossed.len())];
+        let passed = before_wall.iter().take_while(|c| is_clear || c.class < reading.class);
+        let weight = if self.are_reliable { 64 } else { 1 };
+        passed.for_each(|c| votes.add(c, weight));
+    }
+
+    /// Blocks the places from which the robot would cover a box.
+    fn block(&self, crossed: &BeamBox, blocked: &mut LocalBoxSet) {
+        for row in 0..self.size {
+            (0..self.size).for_each(|col| blocked.insert(crossed.col - col, crossed.row - row));
+        }
+    }
+}
+
+/// Returns the beams of a sensor at a heading, as far as their boxes are looked at.
+fn beams(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -> Vec<BeamPath> {
+    let model = &sensor.model;
+    let reach = f64::from(PLAN_RADIUS_BOXES + 1 + size as i32) * 1.5;
+    let range = (model.range_m / box_size_m).min(reach);
+    let inside = |v: i32| (-PLAN_RADIUS_BOXES..SEARCH_SIDE_BOXES - PLAN_RADIUS_BOXES).contains(&v);
+    let beam = |&deg: &f64| {
+        let crossed = crossings(size, deg, range).into_iter().map(|c| {
+            let turned = turn_crossing(c, size, heading);
+            BeamBox {
+                col: turned.dx,
+                row: turned.dy,
+                class: model.class_of(c.distance, box_size_m),
+            }
+        });
+        let crossed = crossed.take_while(|c| inside(c.col) && inside(c.row)).collect();
+        BeamPath { wall: model.designates[usize::from(WALL)], crossed }
+    };
+    model.bearings_deg.iter().map(beam).collect()
+}

@@ -1,0 +1,279 @@
+use crate::{RobotsRun, robots_run};
+use sidestep_kernel::control::{BufferMut, OrderLog, Orders, Team};
+use sidestep_kernel::ports::{MemoryRecorder, Recorder};
+use sidestep_kernel::{Cycle, EntityId, Simulation};
+use sidestep_scenario::Source;
+use std::collections::BTreeMap;
+
+/// Six robots under orders, one of them slow, two that decide for themselves, and a door: sensors lie,
+/// wheels slip, the radio loses words.
+const MIXED: &str = r#"
+format = 1
+world = "robots"
+seed = 7
+cycles = 60
+[map]
+ascii = """
+..........
+..........
+....##....
+..........
+..........
+"""
+[radio]
+range_m = 100
+loss = 0.2
+[record]
+calibration = true
+[[robots]]
+count = 5
+sensors = ["sonar-8"]
+effector = "nomad"
+behaviour.kind = "external"
+[[robots]]
+count = 1
+period = 3
+behaviour.kind = "external"
+[[robots]]
+count = 2
+sensors = ["sonar-8"]
+[[doors]]
+at = [[9, 0]]
+random = { p_open = 0.1, p_close = 0.1 }
+"#;
+
+fn source(text: &str) -> Source {
+    Source::new("s.toml", text, "")
+}
+
+fn run(workers: usize) -> RobotsRun {
+    robots_run(&source(MIXED), workers).expect("it compiles")
+}
+
+/// Observations of a team: one vector per space.
+fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<i64>> {
+    let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
+    let mut rooms: Vec<_> = observed.iter().map(|s| vec![0; s.width() * agents.len()]).collect();
+    let mut room: Vec<_> = rooms.iter_mut().map(|room| BufferMut::Integer(room)).collect();
+    run.observe(team, &mut room).expect("the room fits");
+    observed.iter().map(|space| space.name.clone()).zip(rooms).collect()
+}
+
+/// A policy that depends on its observations: ahead unless something is reported there.
+fn decide(run: &dyn Simulation, team: usize) -> Vec<f64> {
+    let seen = observed(run, team);
+    let n = run.teams()[team].agents.len();
+    let beams = seen.get("sonar-8_report").map_or(0, |reports| reports.len() / n);
+    let action = |k: usize| {
+        let is_blocked = beams > 0 && seen["sonar-8_report"][k * beams] != 0;
+        if is_blocked || seen["contact"][k] != 0 { 1.0 } else { 0.0 }
+    };
+    (0..n).map(action).collect()
+}
+
+/// Decides for all that take orders, for `cycles` cycles.
+fn decided(run: &mut RobotsRun, cycles: u64) {
+    for _ in 0..cycles {
+        let teams: Vec<Team> = run.teams().to_vec();
+        for (k, team) in teams.iter().enumerate().filter(|(_, team)| !team.action_spaces.is_empty())
+        {
+            let values = decide(run, k);
+            let agents = &team.agents;
+            run.order(&Orders { order: "action", agents, values: &values }).expect("right");
+            let word = run.cycle() as f64 + 10.0;
+            let said = Orders { order: "broadcast", agents: &agents[..1], values: &[word] };
+            run.order(&said).expect("right");
+        }
+        run.advance(1);
+    }
+}
+
+/// The book of all orders that were recorded.
+fn book(recorder: &MemoryRecorder) -> OrderLog {
+    OrderLog::from_recorder(recorder).expect("orders are recorded")
+}
+
+fn recorded(run: &mut RobotsRun, until: Cycle, go_on: impl Fn(&mut RobotsRun)) -> MemoryRecorder {
+    run.start_recording();
+    let mut recorder = MemoryRecorder::new(&run.schemas());
+    while run.cycle() < until {
+        go_on(run);
+        run.record(&mut recorder).expect("memory suffices");
+    }
+    recorder.finish().expect("memory suffices");
+    recorder
+}
+
+#[test]
+fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers_and_wherever_it_is_resumed() {
+    let mut first = run(1);
+    let rows = recorded(&mut first, 60, |run| decided(run, 7.min(60 - run.cycle())));
+    assert!(rows.rows("orders") > 300, "{}", rows.rows("orders"));
+    for workers in [1, 2, 3, 8] {
+        let mut again = run(workers);
+        again.replay_orders(book(&rows)).expect("they were obeyed once");
+        let its = recorded(&mut again, 60, |run| {
+            run.advance(60 - run.cycle());
+        });
+        assert_eq!(again.digest(), first.digest(), "{workers} workers");
+        assert_eq!(book(&its), book(&rows), "{workers} workers");
+    }
+    for at in 0..60 {
+        let mut before = run(1);
+        decided(&mut before, at);
+        // An order that was given before the checkpoint is in it.
+        before.order(&Orders { order: "trip", agents: &[5], values: &[1.0] }).expect("right");
+        let checkpoint = before.checkpoint();
+        decided(&mut before, 60 - at);
+        let mut after = run(2);
+        after.restore(&checkpoint).expect("the same scenario");
+        decided(&mut after, 60 - at);
+        assert_eq!(after.digest(), before.digest(), "resumed at {at}");
+    }
+}
+
+#[test]
+fn going_back_gives_the_same_orders_again() {
+    let mut first = run(1);
+    let rows = recorded(&mut first, 60, |run| decided(run, 60));
+    let mut again = run(1);
+    again.replay_orders(book(&rows)).expect("they were obeyed once");
+    again.advance(20);
+    let checkpoint = again.checkpoint();
+    for _ in 0..3 {
+        again.restore(&checkpoint).expect("its own");
+        again.advance(40);
+        assert_eq!(again.digest(), first.digest());
+    }
+}
+
+#[test]
+fn what_is_observed_is_what_the_robot_would_perceive_in_the_cycle() {
+    let mut seen = Vec::new();
+    let mut run = run(1);
+    run.start_recording();
+    let mut recorder = MemoryRecorder::new(&run.schemas());
+    for now in 0..60 {
+        for team in [0, 2] {
+            let agents = run.teams()[team].agents.clone();
+            let all = observed(&run, team);
+            let beams = all["sonar-8_report"].len() / agents.len();
+            for (k, &agent) in agents.iter().enumerate() {
+                let names = |space: &str, k: usize| all[space][k];
+                for beam in k * beams..(k + 1) * beams {
+                    let report = names("sonar-8_report", beam) as usize;
+                    let class = names("sonar-8_class", beam) as usize;
+                    seen.push((now, agent, report, class));
+                }
+            }
+        }
+        decided(&mut run, 1);
+        run.record(&mut recorder).expect("memory suffices");
+    }
+    seen.sort_by_key(|&(now, agent, ..)| (now, agent));
+    let schema = run.schemas().into_iter().find(|schema| schema.name == "readings").expect("kept");
+    let team = &run.teams()[0].observation_spaces;
+    let names = |space: usize, number: usize| match &team[space].kind {
+        sidestep_kernel::control::SpaceKind::Discrete(names) => names[number].clone(),
+        _ => panic!("a choice"),
+    };
+    let column = |name: &str| {
+        let at = schema.columns.iter().position(|column| column.name == name).expect("a column");
+        let values = recorder.column("readings", name).expect("a column");
+        (0..seen.len()).map(|row| schema.columns[at].text(values, row)).collect::<Vec<_>>()
+    };
+    let reports: Vec<_> = seen.iter().map(|&(.., report, _)| names(0, report)).collect();
+    let classes: Vec<_> = seen.iter().map(|&(.., class)| names(1, class)).collect();
+    assert_eq!(recorder.rows("readings"), seen.len());
+    assert_eq!(column("reported"), reports);
+    assert_eq!(column("reported_class"), classes);
+}
+
+#[test]
+fn readings_that_nobody_records_change_nothing_when_they_are_left_out() {
+    let with = |calibration: bool| {
+        let text = MIXED.replace("calibration = true", &format!("calibration = {calibration}"));
+        let mut run = robots_run(&source(&text), 1).expect("it compiles");
+        run.start_recording();
+        decided(&mut run, 50);
+        run.digest()
+    };
+    assert_eq!(with(true), with(false));
+}
+
+#[test]
+fn an_order_stands_until_the_slow_robot_has_its_turn_and_the_last_one_counts() {
+    let text = "format = 1\nworld = \"robots\"\nmap.ascii = \".....\"\n[[robots]]\n\
+                at = [[0, 0, 0]]\nperiod = 3\nphase = 0\nbehaviour.kind = \"external\"\n";
+    let mut run = robots_run(&source(text), 1).expect("it compiles");
+    let place = |run: &RobotsRun| observed(run, 0)["at_boxes"][0];
+    run.advance(1);
+    for action in [1.0, 0.0] {
+        run.order(&Orders { order: "action", agents: &[0], values: &[action] }).expect("right");
+    }
+    let places: Vec<_> = (0..6)
+        .map(|_| {
+            run.advance(1);
+            place(&run)
+        })
+        .collect();
+    assert_eq!(places, [0, 0, 1, 1, 1, 1]);
+}
+
+#[test]
+fn words_are_heard_by_those_in_range_and_observed_in_the_order_of_senders() {
+    let mut run = run(1);
+    let mut heard = BTreeMap::new();
+    for _ in 0..60 {
+        let all = observed(&run, 1);
+        for (from, word) in all["heard_from"].iter().zip(&all["heard_word"]) {
+            if *from >= 0 {
+                heard.insert((run.cycle(), *from), *word);
+            }
+        }
+        assert!(all["heard_from"].iter().filter(|id| **id >= 0).is_sorted());
+        decided(&mut run, 1);
+    }
+    // Robot 0 says the cycle plus 10, each word one cycle before it is heard, and a fifth gets lost.
+    let of_first: Vec<_> = heard.iter().filter(|((_, from), _)| *from == 0).collect();
+    assert!((30..59).contains(&of_first.len()), "{}", of_first.len());
+    assert!(of_first.iter().all(|((now, _), word)| **word == *now as i64 + 9), "{of_first:?}");
+}
+
+/// Refusals, and a part of the message that gives the remedy.
+#[test]
+fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
+    let mut run = run(1);
+    let before = run.digest();
+    let last = run.world().bodies.len() as EntityId - 1;
+    let refused: [(Orders<'_>, &str); 9] = [
+        (Orders { order: "action", agents: &[99], values: &[0.0] }, "there is no robot 99"),
+        (Orders { order: "action", agents: &[last], values: &[0.0] }, "there is no robot 8"),
+        (Orders { order: "action", agents: &[6], values: &[0.0] }, "robot 6 decides for itself"),
+        (
+            Orders { order: "jump", agents: &[0], values: &[0.0] },
+            "it takes action, trip, broadcast",
+        ),
+        (Orders { order: "action", agents: &[0, 1], values: &[0.0] }, "needs 2 x 1 values, not 1"),
+        (Orders { order: "action", agents: &[0, 1], values: &[0.0, 99.0] }, "one of 0 forward"),
+        (
+            Orders { order: "action", agents: &[0], values: &[f64::NAN] },
+            "is NaN; it must be one of",
+        ),
+        (Orders { order: "broadcast", agents: &[0], values: &[-1.0] }, "a whole number from 0"),
+        (Orders { order: "action", agents: &[], values: &[1.0] }, "needs 0 values, not 1"),
+    ];
+    for (orders, words) in refused {
+        let error = run.order(&orders).expect_err(words).to_string();
+        assert!(error.contains(words), "{error}");
+        assert_eq!(run.digest(), before, "{error}");
+    }
+    let mut book = OrderLog::default();
+    book.add(3, &Orders { order: "action", agents: &[0], values: &[77.0] });
+    let error = run.replay_orders(book).expect_err("out of bounds").to_string();
+    assert!(error.contains("is 77"), "{error}");
+    let mut short = [0; 3];
+    let error = run.observe(0, &mut [BufferMut::Integer(&mut short)]).expect_err("too short");
+    assert!(error.to_string().contains("sonar-8_report of 5 x"), "{error}");
+    assert!(run.observe(7, &mut []).is_err());
+}

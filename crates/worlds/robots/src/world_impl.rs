@@ -1,0 +1,217 @@
+//! The hooks by which a run asks the world for more than its phases.
+
+use super::metrics::Metrics;
+use super::rows::Collector;
+use super::scenario::{Behaviours, Compiled, StorageOrder};
+use super::state::{BodyRecord, Facing, LastContact, RobotsState, Snapshot};
+use super::view::CYCLE_S;
+use super::world::RobotsWorld;
+use super::{Scratch, text};
+use serde_json::{Value, json};
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{BufferMut, Order, Teams};
+use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_scenario::Source;
+use std::sync::Arc;
+
+/// A run of a robots world.
+pub type RobotsRun = Run<RobotsWorld>;
+
+/// Returns a run of a scenario at its start.
+///
+/// # Errors
+/// When the scenario is wrong.
+pub fn robots_run(source: &Source, workers: usize) -> Result<RobotsRun, InputError> {
+    let compiled = Compiled::new(source, &Behaviours::new(), StorageOrder::Spatial)?;
+    Ok(compiled.start(source, workers))
+}
+
+impl Compiled {
+    /// Returns a run at its start; the world is shared, not copied. `source` names it in
+    /// checkpoints.
+    pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
+        let state = RobotsState::restore(&self.world, &self.start_snapshot());
+        let (plan, books) = (self.plan(), Collector::new(self.record));
+        Run::new(self.world, plan, state, books, &source.text, workers)
+    }
+
+    /// Returns the plan that the scenario asks for.
+    pub fn plan(&self) -> RunConfig {
+        RunConfig {
+            name: self.name.clone(),
+            seed: self.seed,
+            cycles: self.cycles,
+            checkpoint_every: self.record.checkpoint_every,
+        }
+    }
+
+    /// Returns the state at the start, by entity id.
+    pub(crate) fn start_snapshot(&self) -> Snapshot {
+        let kinds = self.world.kinds.len();
+        let record = |&(at, heading): &((u32, u32), u8)| BodyRecord {
+            at,
+            facing: Facing::from_heading(heading),
+            contact: LastContact::NONE,
+            memory: [0; 4],
+            voice: None,
+            counts: [0; 3],
+            trip: [0; 2],
+            contacts: vec![0; kinds],
+        };
+        let visited = vec![0; self.world.map.cells().len().div_ceil(8)];
+        Snapshot { cycle: 0, bodies: self.start.iter().map(record).collect(), visited }
+    }
+}
+
+impl World for RobotsWorld {
+    const NAME: &'static str = "robots";
+    const AGENT: &'static str = "robot";
+
+    type Collector = Collector;
+    type Snapshot = Snapshot;
+    type Metrics = Metrics;
+
+    fn agents(&self) -> usize {
+        self.robots.len()
+    }
+
+    fn cycles_until_flush(&self, state: &RobotsState, _: &Collector, now: Cycle) -> u64 {
+        state.frames.as_ref().map_or(u64::MAX, |f| f.first + f.capacity as u64 - now)
+    }
+
+    fn collect(&self, books: &mut Collector, scratch: &mut Scratch) {
+        books.collect(scratch);
+    }
+
+    fn commit(&self, books: &mut Collector) {
+        books.commit(self);
+    }
+
+    fn start_recording(&self, state: &mut RobotsState, books: &mut Collector, now: Cycle) {
+        books.start(self, state, now);
+    }
+
+    fn enable_events(&self, books: &mut Collector) {
+        books.watch();
+    }
+
+    fn enable_odometry(&self, books: &mut Collector) {
+        books.watch_odometry(self);
+    }
+
+    fn prepare(&self, books: &Collector, scratch: &mut Scratch) {
+        books.prepare(scratch);
+    }
+
+    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
+        books.schemas()
+    }
+
+    fn record(
+        &self,
+        state: &mut RobotsState,
+        books: &mut Collector,
+        now: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<(), RecordError> {
+        books.record(self, state, now, recorder)
+    }
+
+    fn digest(&self, state: &RobotsState, now: Cycle) -> Digest {
+        state.snapshot(self, now).digest()
+    }
+
+    fn save(&self, state: &RobotsState, _: &Collector, now: Cycle) -> Snapshot {
+        state.snapshot(self, now)
+    }
+
+    fn restore(
+        &self,
+        saved: Snapshot,
+        books: &mut Collector,
+    ) -> Result<RobotsState, CheckpointError> {
+        let fits = saved.bodies.len() == self.bodies.len()
+            && saved.visited.len() == self.map.cells().len().div_ceil(8);
+        if !fits {
+            return Err(CheckpointError::Damaged);
+        }
+        let mut state = RobotsState::restore(self, &saved);
+        books.resume(self, &mut state, saved.cycle);
+        Ok(state)
+    }
+
+    fn scenery(&self, name: &str) -> Scenery {
+        RobotsWorld::scenery(self, name)
+    }
+
+    fn frame(
+        &self,
+        state: &RobotsState,
+        books: &mut Collector,
+        now: Cycle,
+        look: FrameOptions,
+    ) -> Frame {
+        let (events, log_left_out) = books.log.take();
+        Frame {
+            cycle: now,
+            time_s: now as f64 * CYCLE_S,
+            bodies: self.visible_bodies(state),
+            scans: self.scans(state, now, &look.scans),
+            odometry: self.odometry_poses(books.odometry()),
+            log: events.iter().map(|event| self.view_event(event)).collect(),
+            log_left_out,
+        }
+    }
+
+    fn inspect(
+        &self,
+        state: &RobotsState,
+        _: &Collector,
+        now: Cycle,
+        who: BodyId,
+    ) -> Option<Inspection> {
+        RobotsWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        Arc::clone(&self.teams)
+    }
+
+    fn order(&self, state: &mut RobotsState, order: &Order<'_>) {
+        self.record_order(state, order);
+    }
+
+    fn observe(&self, state: &RobotsState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
+        RobotsWorld::observe(self, state, now, team, room);
+    }
+
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        RobotsWorld::position_columns(self)
+    }
+
+    fn metrics(
+        &self,
+        state: &RobotsState,
+        _: &Collector,
+        now: Cycle,
+        effort: &RunStats,
+    ) -> Metrics {
+        RobotsWorld::metrics(self, state, now, &effort.groups)
+    }
+
+    fn agent_metrics(&self, state: &RobotsState, _: &Collector, now: Cycle) -> Value {
+        let one = |&id: &EntityId| json!({ "body": id, "counts": self.counts(state, now, id) });
+        self.robots.iter().map(one).collect()
+    }
+
+    fn summary_lines(&self, metrics: &Metrics) -> KeyValues {
+        text::summary_lines(metrics)
+    }
+
+    fn poses(&self, state: &RobotsState, now: Cycle) -> Description {
+        text::poses(self, &state.snapshot(self, now))
+    }
+}

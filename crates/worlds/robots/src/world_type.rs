@@ -1,0 +1,120 @@
+//! The world as it appears to code that runs scenarios of any world.
+
+use super::scenario::{Behaviours, Compiled, StorageOrder};
+use super::{RobotsWorld, bundle, remarks, text};
+use sidestep_kernel::text::Description;
+use sidestep_kernel::{InputError, RunConfig, Simulation, World};
+use sidestep_scenario::{
+    CompiledScenario as AnyCompiled, MetricInfo, Remark, ResolvedScenario, SeedEffect, Source,
+    WorldType,
+};
+use std::any::Any;
+
+/// Situated agents on a grid.
+#[derive(Debug, Clone)]
+pub struct Robots {
+    own: Behaviours,
+}
+
+impl Robots {
+    /// Returns the world with its own behaviors only.
+    pub const fn new() -> Self {
+        Self { own: Behaviours::new() }
+    }
+
+    /// Returns the world with further behaviors, which scenarios call by these names.
+    pub const fn with(own: Behaviours) -> Self {
+        Self { own }
+    }
+}
+
+impl Default for Robots {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl WorldType for Robots {
+    fn name(&self) -> &'static str {
+        RobotsWorld::NAME
+    }
+
+    fn agent(&self) -> &'static str {
+        RobotsWorld::AGENT
+    }
+
+    fn about(&self) -> &'static str {
+        "Stochastic robots on a grid"
+    }
+
+    fn default_scenario(&self) -> &'static str {
+        include_str!("default.toml")
+    }
+
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections(&self.own)
+    }
+
+    fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
+        vec![("profile", super::scenario::profile_schema(self.default_scenario()))]
+    }
+
+    fn random_quantities(&self) -> &'static str {
+        "errors (a regime other than reliable), random places and doors, and behaviors that draw"
+    }
+
+    fn metric_infos(&self) -> &'static [MetricInfo] {
+        super::metric_info::METRIC_INFO
+    }
+
+    fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
+        let compiled = Compiled::new(source, &self.own, StorageOrder::Spatial)?;
+        Ok(Box::new(compiled))
+    }
+}
+
+impl AnyCompiled for Compiled {
+    fn world(&self) -> &'static str {
+        RobotsWorld::NAME
+    }
+
+    fn plan(&self) -> RunConfig {
+        Compiled::plan(self)
+    }
+
+    fn body_count(&self) -> usize {
+        self.world.bodies.len()
+    }
+
+    fn contents(&self, source: &Source) -> Description {
+        text::contents(self, source)
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        remarks::remarks(self)
+    }
+
+    fn seed_effect(&self) -> SeedEffect {
+        match self.is_always_random() {
+            true => SeedEffect::Decide,
+            // Behaviors and conflicts may draw: runs show it.
+            false => SeedEffect::Perhaps,
+        }
+    }
+
+    fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
+        bundle::resolve(source, self)
+    }
+
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        Some(Compiled::reseeded(self, seed).map(|compiled| Box::new(compiled) as Box<_>))
+    }
+
+    fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
+        Box::new(self.clone().start(source, workers))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

@@ -1,0 +1,142 @@
+//! Functions in Python that decide for a team, between observing and acting.
+
+use crate::error::OrderError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use sidestep::kernel::control::Team;
+use sidestep::kernel::{Cycle, RunConfig};
+use std::sync::Arc;
+
+/// A team, preceded by its number.
+pub(crate) type IndexedTeam = (usize, Arc<Team>);
+
+/// A run, as far as functions decide in it.
+pub(crate) trait PolicyRun {
+    /// Returns the cycles done.
+    fn now(&self, py: Python<'_>) -> PyResult<Cycle>;
+    /// Returns whether nothing can happen anymore.
+    fn has_ended(&self, py: Python<'_>) -> PyResult<bool>;
+    /// Returns the plan of its scenario.
+    fn plan(&self) -> RunConfig;
+    /// Returns a team by number or name, with its number.
+    fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<IndexedTeam>;
+    /// Returns the teams that take orders, with their numbers.
+    fn ordered_teams(&self) -> Vec<IndexedTeam>;
+    /// Returns the observations of a team.
+    fn observed<'py>(&self, py: Python<'py>, team: &IndexedTeam) -> PyResult<Bound<'py, PyDict>>;
+    /// Gives an order to all agents of a team.
+    fn give_order(
+        &self,
+        py: Python<'_>,
+        order: &str,
+        values: &Bound<'_, PyAny>,
+        team: &Team,
+    ) -> PyResult<()>;
+    /// Advances by one cycle.
+    fn advance(&self, py: Python<'_>) -> PyResult<()>;
+}
+
+/// A team, its number, and the function that decides for it.
+struct TeamPolicy<'py> {
+    team: IndexedTeam,
+    decide: Bound<'py, PyAny>,
+}
+
+/// Advances a run to a cycle in which functions decide, and returns the number of cycles done.
+pub(crate) fn run_with_policies(
+    py: Python<'_>,
+    run: &impl PolicyRun,
+    decide: &Bound<'_, PyAny>,
+    state: Option<Bound<'_, PyAny>>,
+    until: Cycle,
+) -> PyResult<u64> {
+    let deciders = team_policies(run, decide)?;
+    let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
+    let from = run.now(py)?;
+    while run.now(py)? < until && !run.has_ended(py)? {
+        for decider in &deciders {
+            decider.order(py, run, &state).inspect_err(|raised| {
+                // The traceback shows the cycle of the run; nothing else depends on it.
+                let _ = add_cycle_note(py, run, raised);
+            })?;
+        }
+        run.advance(py)?;
+    }
+    Ok(run.now(py)? - from)
+}
+
+/// Adds the cycle of the run to an exception of a function, in versions of Python that can do so.
+fn add_cycle_note(py: Python<'_>, run: &impl PolicyRun, raised: &PyErr) -> PyResult<()> {
+    let (plan, cycle, version) = (run.plan(), run.now(py)?, sidestep::VERSION);
+    let words = format!(
+        "deciding for cycle {cycle} of `{}`, seed {}, sidestep {version}; the run is at that cycle still",
+        plan.name, plan.seed
+    );
+    raised.value(py).call_method1("add_note", (words,)).map(drop)
+}
+
+/// Returns the functions by team: one function decides for all that take orders.
+fn team_policies<'py>(
+    run: &impl PolicyRun,
+    decide: &Bound<'py, PyAny>,
+) -> PyResult<Vec<TeamPolicy<'py>>> {
+    let mut deciders = Vec::new();
+    if let Ok(by_team) = decide.cast::<PyMapping>() {
+        for entry in by_team.items()?.iter() {
+            let (team, decide): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
+            deciders.push(TeamPolicy::new(run.team(&team)?, &decide)?);
+        }
+        return Ok(deciders);
+    }
+    for team in run.ordered_teams() {
+        deciders.push(TeamPolicy::new(team, decide)?);
+    }
+    if deciders.is_empty() {
+        let words = "no agent of this scenario takes orders; let it say that some are `external`";
+        return Err(OrderError::new_err(words));
+    }
+    Ok(deciders)
+}
+
+impl<'py> TeamPolicy<'py> {
+    /// Returns the decider of a team: the function, or its result for that team if it makes a function for each.
+    fn new(team: IndexedTeam, decide: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let decide = match decide.getattr_opt("of_team")? {
+            Some(of_team) => of_team.call1((crate::space::Team(Arc::clone(&team.1)),))?,
+            None => decide.clone(),
+        };
+        Ok(Self { team, decide })
+    }
+
+    /// Calls the function, and gives its orders.
+    fn order(
+        &self,
+        py: Python<'_>,
+        run: &impl PolicyRun,
+        state: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let observed = run.observed(py, &self.team)?;
+        let decided = self.decide.call1((observed, state))?;
+        let (_, team) = &self.team;
+        if decided.is_none() {
+            // This is far more often a forgotten `return` than a decision.
+            let words = format!(
+                "the function that decides for team `{}` returned None; return its orders, {{}} for none",
+                team.name
+            );
+            return Err(OrderError::new_err(words));
+        }
+        let Ok(by_name) = decided.cast::<PyMapping>() else {
+            let Some(first) = team.action_spaces.first() else {
+                let words = format!("the agents of team `{}` decide for themselves", team.name);
+                return Err(OrderError::new_err(words));
+            };
+            return run.give_order(py, &first.name, &decided, team);
+        };
+        for entry in by_name.items()?.iter() {
+            let (order, values): (String, Bound<'_, PyAny>) = entry.extract()?;
+            run.give_order(py, &order, &values, team)?;
+        }
+        Ok(())
+    }
+}
