@@ -1,9 +1,9 @@
 //! Tools of the house, started by `cargo xtask`: `test` runs all tests, `shape` counts the sources.
 
 mod arguments;
-mod counts;
 #[cfg(test)]
-mod features;
+mod builds;
+mod counts;
 mod lines;
 mod measures;
 mod members;
