@@ -9,10 +9,10 @@
 
 use cpu_time::ProcessTime;
 use sidestep::import::urdf::Model;
-use sidestep::worlds::chain::geometry::{Point, along, angle_rad, distance, scaled, sub, unit};
-use sidestep::worlds::chain::ik::{Engine, Goal, Kind, Solver};
-use sidestep::worlds::chain::kinematics::{ArmGoal, SerialChain};
-use sidestep::worlds::chain::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod};
+use sidestep::rods::geometry::{Point, along, angle_rad, distance, scaled, sub, unit};
+use sidestep::arms::ik::{Engine, Goal, Kind, Solver};
+use sidestep::arms::kinematics::{ArmGoal, SerialChain};
+use sidestep::rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod};
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::powf;
@@ -271,7 +271,7 @@ impl<const D: usize> Scene<D> {
         };
         let next = along(last, u, 1.0);
         let clear = self.balls.iter().all(|(c, r)| {
-            let foot = sidestep::worlds::chain::geometry::nearest_on_segment(*c, last, next);
+            let foot = sidestep::rods::geometry::nearest_on_segment(*c, last, next);
             distance(*c, foot) > r + CONNECTOR_M + 1e-3
         });
         let bends = into.is_none_or(|v| angle_rad(v, u) <= self.max_bend_rad - 1e-6);

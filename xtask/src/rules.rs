@@ -39,7 +39,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 10] = [
+const WITHOUT_WORLDS: [&str; 11] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -49,6 +49,7 @@ const WITHOUT_WORLDS: [&str; 10] = [
     "crates/import",
     "crates/statistics",
     "crates/collectives",
+    "crates/rods",
     "crates/map",
 ];
 

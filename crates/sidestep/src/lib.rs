@@ -70,6 +70,7 @@ mod problems;
 pub mod worlds;
 
 pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
+pub use sidestep_chain::arms;
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_import as import;
@@ -77,6 +78,7 @@ pub use sidestep_kernel as kernel;
 pub use sidestep_map as map;
 pub use sidestep_map::{Cell, GridMap, office, planning};
 pub use sidestep_robots::learn;
+pub use sidestep_rods as rods;
 pub use sidestep_scenario as scenario;
 pub use sidestep_statistics as statistics;
 

@@ -6,12 +6,12 @@ use crate::arms::plan::{
 };
 use crate::driver::Targets;
 use crate::events::EventKind;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::tunneling::find_tunneling;
 use crate::scratch::PositionBuffer;
 use crate::state::{Body, MotionPlan};
 use crate::world::purpose;
 use sidestep_kernel::InputError;
+use sidestep_rods::find_tunneling;
+use sidestep_rods::geometry::{Point, distance};
 use std::collections::VecDeque;
 
 /// Least part of a piece of the way that a cycle is worth.

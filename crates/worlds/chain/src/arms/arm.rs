@@ -1,9 +1,9 @@
 //! An arm of joints as a chain of this world (slides K1 to K4).
 
 use super::kinematics::{ArmGoal, JointTracker, SerialChain, Skeleton, Vector};
-use crate::rods::chain::{Chain, Connector, Mobility, Rod};
-use crate::rods::geometry::{Point, sub, with_dimensions};
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, sub, with_dimensions};
+use sidestep_rods::{Chain, Connector, Mobility, Rod};
 use std::f64::consts::PI;
 
 /// Least length of rods with a joint that can bring their ends together.

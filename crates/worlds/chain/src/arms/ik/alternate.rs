@@ -7,7 +7,7 @@
 
 use super::dls::bow;
 use super::limb::Span;
-use crate::rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
+use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
 
 /// Most double passes before the search is given up.
 pub(super) const MAX_DOUBLE_PASSES: usize = 1000;

@@ -8,11 +8,9 @@ use super::goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, Engine, SolutionKi
 use super::motion::{self, MotionResult};
 use super::relax::{self, RelaxResult};
 use super::{IkSolver, direct, limb, starts};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, distance, sub};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::veto::Veto;
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, add, distance, sub};
+use sidestep_rods::{Chain, Obstacles, Veto};
 
 /// Meets `goal`, with a target within the shell that the rods reach.
 pub(super) fn solve<const D: usize>(

@@ -1,11 +1,11 @@
 //! A check that a posture is good in itself: rods, bends, mobilities, obstacles and the chain's own
 //! body, as propagation judges them, but without a motion that led there.
 
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
-use crate::rods::motion_context::{BEND_TOLERANCE_RAD, contact_distance_m, is_length_allowed};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::veto::{Veto, VetoReason};
+use sidestep_rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
+use sidestep_rods::{
+    BEND_TOLERANCE_RAD, Chain, Obstacle, Obstacles, Veto, VetoReason, contact_distance_m,
+    is_length_allowed,
+};
 use std::f64::consts::PI;
 
 /// A chain and its constraints.

@@ -7,7 +7,7 @@
 //! reach every other posture looks like it.
 
 use super::limb::{Shell, Span};
-use crate::rods::geometry::{
+use sidestep_rods::geometry::{
     Point, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 

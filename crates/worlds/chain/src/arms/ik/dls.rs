@@ -16,7 +16,7 @@
 //! first if it has far to go.
 
 use super::limb::Span;
-use crate::rods::geometry::{
+use sidestep_rods::geometry::{
     Point, add, add_scaled, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 

@@ -1,7 +1,7 @@
 //! Goals of a chain, and the answers.
 
-use crate::rods::geometry::Point;
-use crate::rods::veto::Veto;
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::Point;
 use std::fmt;
 
 /// The method that finds a posture.

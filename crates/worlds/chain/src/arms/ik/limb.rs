@@ -1,8 +1,8 @@
 //! The part of a chain that a solve moves: the rods from the base to the connector that has a
 //! target, in that order.
 
-use crate::rods::chain::{Chain, Mobility, Rod};
-use crate::rods::geometry::{Point, first_axis, norm, scaled, sub};
+use sidestep_rods::geometry::{Point, first_axis, norm, scaled, sub};
+use sidestep_rods::{Chain, Mobility, Rod};
 
 /// Rods from a base outward, and the target of the tip, relative to the base.
 #[derive(Debug, Clone, Default)]

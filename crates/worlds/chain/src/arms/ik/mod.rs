@@ -32,13 +32,10 @@ mod tests;
 pub use goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, Engine, SolutionKind};
 pub use limb::Shell;
 
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, add_scaled, distance, first_axis, is_finite, norm, sub};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::Propagator;
-use crate::rods::rules::Rules;
 use limb::{Limb, Span};
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, is_finite, norm, sub};
+use sidestep_rods::{Chain, Obstacles, Propagator, Rules};
 
 /// Number of rods up to which the chain's own rule is faster (bench `ik`, part `free`).
 const MAX_CHAIN_RULE_RODS: usize = 10;

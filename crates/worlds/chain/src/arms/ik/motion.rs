@@ -2,15 +2,11 @@
 //! with other headings if one is blocked. The result is a motion: every state was checked.
 
 use super::ChainIkGoal;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
+use sidestep_kernel::{InputError, math};
+use sidestep_rods::geometry::{
     Point, add, add_scaled, distance, first_axis, normalized, perpendicular, scaled, sub,
 };
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::Propagator;
-use crate::rods::reach::{ReachOutcome, ReachRequest, reach};
-use crate::rods::veto::Veto;
-use sidestep_kernel::{InputError, math};
+use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach};
 
 /// Headings to either side of the target's, in rad.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];

@@ -6,12 +6,12 @@
 use super::constraints::{ConstraintChecker, OwnPair, bend_rad};
 use super::limb::{self, Limb};
 use super::{ChainIkGoal, dls, follow_beyond};
-use crate::rods::geometry::{
+use sidestep_kernel::math;
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::{
     NearestPoints, Point, add, add_scaled, between_segments, distance, dot, first_axis, norm,
     normalized, perpendicular, scaled, sub,
 };
-use crate::rods::veto::Veto;
-use sidestep_kernel::math;
 use std::f64::consts::PI;
 
 /// Most rounds before relaxation is given up.

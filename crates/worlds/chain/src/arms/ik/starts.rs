@@ -2,11 +2,11 @@
 
 use super::ChainIkGoal;
 use super::limb;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, add_scaled, dot, first_axis, normalized, scaled, sub};
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use sidestep_rods::Chain;
+use sidestep_rods::geometry::{Point, add, add_scaled, dot, first_axis, normalized, scaled, sub};
 
 /// Random draws for starts.
 const START: Purpose = Purpose(0x1C);

@@ -1,10 +1,8 @@
 use super::alternate;
 use super::*;
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{angle_rad, nearest_on_segment, normalized};
-use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::VetoReason;
 use proptest::prelude::*;
+use sidestep_rods::geometry::{angle_rad, nearest_on_segment, normalized};
+use sidestep_rods::{Connector, Mobility, Obstacle, Rod, VetoReason};
 
 const ENGINES: [Engine; 4] = [Engine::Auto, Engine::Chain, Engine::Dls, Engine::Direct];
 
@@ -137,7 +135,7 @@ proptest! {
 }
 
 fn scaled_by(a: Point<3>, k: f64) -> Point<3> {
-    crate::rods::geometry::scaled(a, k)
+    sidestep_rods::geometry::scaled(a, k)
 }
 
 #[test]
@@ -330,7 +328,7 @@ fn a_chain_that_minds_itself_does_not_cross_itself() {
         for i in 0..10 {
             for j in i + 3..10 {
                 let apart =
-                    crate::rods::geometry::between_segments([p[i], p[i + 1]], [p[j], p[j + 1]]);
+                    sidestep_rods::geometry::between_segments([p[i], p[i + 1]], [p[j], p[j + 1]]);
                 assert!(apart.distance_m >= 0.1 - 1e-8, "rods {i} and {j}");
             }
             for j in i + 2..=10 {

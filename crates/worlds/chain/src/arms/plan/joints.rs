@@ -4,12 +4,10 @@ use super::{ConfigurationSpace, PlanningQuery};
 use crate::arms::arm::Arm;
 use crate::arms::ik::constraints::ConstraintChecker;
 use crate::arms::kinematics::{ArmGoal, Dof, JointMotion};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::veto::Veto;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
+use sidestep_rods::geometry::Point;
+use sidestep_rods::{Chain, Obstacles, Veto};
 use std::f64::consts::PI;
 
 /// Distinct postures at a target that are looked for, and random ones that the search starts from.

@@ -17,13 +17,11 @@ mod tests;
 mod tree;
 
 use super::ik::{ChainIkGoal, IkSolver};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::rules::Rules;
 pub(crate) use joints::JointSpace;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
+use sidestep_rods::geometry::Point;
+use sidestep_rods::{Chain, Obstacles, Rules};
 pub(crate) use space::RodSpace;
 
 /// Most postures at the target from which the second tree grows, and searches for them.

@@ -2,14 +2,13 @@
 
 use super::{ChainPosture, ConfigurationSpace};
 use crate::arms::ik::constraints::ConstraintChecker;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
-    Point, add, add_scaled, distance, first_axis, lerp, norm, norm_squared, normalized, scaled, sub,
-};
-use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, distance, first_axis, lerp, norm, norm_squared, normalized, scaled, sub,
+};
+use sidestep_rods::{Chain, Obstacles};
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.

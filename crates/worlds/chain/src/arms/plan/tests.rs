@@ -2,11 +2,10 @@
 
 use super::*;
 use crate::fixtures::clearance_m;
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::Seed;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_rods::{Connector, Mobility, Obstacle, Rod};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn draws(seed: u64) -> Draws {
@@ -49,7 +48,7 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
                 assert!(at.max_rod_violation_m() < 1e-9 && at.points()[0] == [0.0; 2], "{seed}");
             }
         }
-        let left_m = crate::rods::geometry::distance(at.points()[5], BEHIND.target);
+        let left_m = sidestep_rods::geometry::distance(at.points()[5], BEHIND.target);
         assert!(left_m <= BEHIND.tolerance_m, "{seed}: {left_m}");
     }
 }
@@ -61,7 +60,7 @@ fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
     let points = vec![[0.0, 0.0], [0.69383, 0.72014], [-0.29946, 0.83574], [0.70042, 0.82014]];
     let rods: Vec<_> = points
         .windows(2)
-        .map(|w| Rod::fixed(crate::rods::geometry::distance(w[0], w[1]), 0.03))
+        .map(|w| Rod::fixed(sidestep_rods::geometry::distance(w[0], w[1]), 0.03))
         .collect();
     let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();

@@ -6,8 +6,8 @@ use super::super::transform::Vector;
 use super::fast_fk::LinkTransforms;
 use super::goal::{ArmGoal, Sphere};
 use super::result::{ArmPart, CollidesWith, Collision};
-use crate::rods::geometry::nearest_on_segment;
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
+use sidestep_rods::geometry::nearest_on_segment;
 
 /// Distance from all bodies that steps aim at, in parts of the reach.
 const MARGIN: f64 = 1e-4;

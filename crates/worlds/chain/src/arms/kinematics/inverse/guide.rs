@@ -5,9 +5,9 @@ use super::super::skeleton::Skeleton;
 use super::super::transform::Vector;
 use super::goal::ArmGoal;
 use crate::arms::ik::{ChainIkGoal, IkSolver};
-use crate::rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{add, scaled};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
 
 /// Least length, in m, of rods that a prismatic joint can close altogether.
 const MIN_ROD_M: f64 = 1e-6;

@@ -27,20 +27,20 @@ const RETURN_TOLERANCE_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 
 /// The target of a connector, and the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ReachRequest<const D: usize> {
+pub struct ReachRequest<const D: usize> {
     /// The connector that is to move.
-    pub(crate) k: usize,
+    pub k: usize,
     /// Its target.
-    pub(crate) target: Point<D>,
+    pub target: Point<D>,
     /// The connector that keeps its place even if it is free to move.
-    pub(crate) base: usize,
+    pub base: usize,
     /// Distance at which the target counts as reached, meters.
-    pub(crate) tolerance_m: f64,
+    pub tolerance_m: f64,
 }
 
 /// Outcome of a reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum ReachOutcome<const D: usize> {
+pub enum ReachOutcome<const D: usize> {
     /// The connector is at the target.
     There {
         /// Distance from the target, meters.
@@ -82,7 +82,7 @@ impl<const D: usize> HeldConnector<D> {
 ///
 /// # Errors
 /// As [`Propagator::propagate`]; also when the chain does not have the base.
-pub(crate) fn reach<const D: usize>(
+pub fn reach<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,

@@ -17,11 +17,11 @@ use super::sweep::Sweep;
 
 /// A rod that passed through an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct TunneledRod {
+pub struct TunneledRod {
     /// Index of the rod.
-    pub(crate) rod: usize,
+    pub rod: usize,
     /// The obstacle's id.
-    pub(crate) obstacle: u32,
+    pub obstacle: u32,
 }
 
 /// Returns the first rod that passed through an obstacle, while the chain went straight from
@@ -29,7 +29,7 @@ pub(crate) struct TunneledRod {
 /// to its present place. Of several obstacles, it names the one with the lowest id.
 ///
 /// `before` has one point for every connector.
-pub(crate) fn find_tunneling<const D: usize>(
+pub fn find_tunneling<const D: usize>(
     chain: &Chain<D>,
     before: &[Point<D>],
     obstacles: &Obstacles<D>,
@@ -62,7 +62,7 @@ const ROUNDING_M: f64 = 1e-12;
 
 /// Returns the obstacle that a capsule would pass through, or come deeper into than it was, on its way from one place
 /// to another with both ends going straight; of several that with the lowest id. A ball is a capsule of no length.
-pub(crate) fn blocking_obstacle<const D: usize>(
+pub fn blocking_obstacle<const D: usize>(
     Sweep { from, to }: Sweep<D>,
     radius_m: f64,
     obstacles: &Obstacles<D>,

@@ -52,12 +52,12 @@ impl<const D: usize> Obstacle<D> {
 
     /// Returns whether it is in the range of coordinates: an obstacle that flies on and on leaves it in the
     /// end.
-    pub(crate) fn is_in_range(&self) -> bool {
+    pub fn is_in_range(&self) -> bool {
         self.check().is_ok()
     }
 
     /// Refuses numbers that are not finite or out of range.
-    pub(crate) fn check(&self) -> Result<(), InputError> {
+    pub fn check(&self) -> Result<(), InputError> {
         let wrong = |cause: String, remedy: &str| {
             Err(InputError::new(format!("obstacle {}", self.id), cause, remedy))
         };
@@ -80,7 +80,7 @@ impl<const D: usize> Obstacle<D> {
 
 /// Returns the walls of a plane polygon, all with one id. They guard its inside: a chain that
 /// starts outside never gets in.
-pub(crate) fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
+pub fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
     let wall =
         |k: usize| Obstacle::capsule(id, [corners[k], corners[(k + 1) % corners.len()]], radius_m);
     (0..corners.len()).map(wall).collect()
@@ -112,7 +112,7 @@ const MAX_LINEAR_SCAN: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
     /// Returns the same obstacles for a world in the plane; none if `D` is not 2.
-    pub(crate) fn in_plane(&self) -> Option<&Obstacles<2>> {
+    pub fn in_plane(&self) -> Option<&Obstacles<2>> {
         (self as &dyn Any).downcast_ref()
     }
 
@@ -193,7 +193,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns the obstacle with the lowest id among those that a capsule overlaps.
-    pub(crate) fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
+    pub fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
         self.visit(&Bounds::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
@@ -224,7 +224,7 @@ pub(super) fn swept_bounds<const D: usize>(points: [Point<D>; 4], by_m: f64) -> 
 
 /// Returns a box of `half_m` around a point.
 #[inline]
-pub(crate) fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
+pub fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
     Bounds { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }
 }
 

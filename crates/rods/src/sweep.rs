@@ -10,11 +10,11 @@ use super::geometry::{Core, Point, add_scaled, cross_2d, dot, lerp, segments_cro
 
 /// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sweep<const D: usize> {
+pub struct Sweep<const D: usize> {
     /// The rod before: master, slave.
-    pub(crate) from: [Point<D>; 2],
+    pub from: [Point<D>; 2],
     /// The rod after.
-    pub(crate) to: [Point<D>; 2],
+    pub to: [Point<D>; 2],
 }
 
 /// The part of the distance at rest that a rod keeps on its way in space.
@@ -34,7 +34,7 @@ impl<const D: usize> Sweep<D> {
 
     /// Returns whether the rod passes no point of the core on its way; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
-    pub(crate) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
+    pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.max_travel_m();
         core.is_clear_of_segment(self.to, Self::safe_distance_m(way_m, keep_m))
             || self.is_clear_on_the_way(core, keep_m, way_m)

@@ -1,7 +1,7 @@
 //! No part passes through anything, however thin.
 
 use super::*;
-use crate::rods::geometry::{Core, Cuboid, segments_cross};
+use crate::geometry::{Core, Cuboid, segments_cross};
 
 #[test]
 fn nobody_passes_a_thin_wall() {

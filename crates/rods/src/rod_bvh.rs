@@ -12,7 +12,7 @@ const RODS_PER_LEAF: usize = 4;
 
 /// Boxes around the rods and their connectors, and around groups of them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct RodBvh<const D: usize> {
+pub struct RodBvh<const D: usize> {
     rods: Vec<Bounds<D>>,
     /// A binary heap: node 1 is the root, `leaves..2 * leaves` are the leaves.
     nodes: Vec<Bounds<D>>,
@@ -23,7 +23,7 @@ pub(crate) struct RodBvh<const D: usize> {
 
 impl<const D: usize> RodBvh<D> {
     /// Fits the tree to boxes: all of it if their number is new, otherwise only around those that differ.
-    pub(crate) fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Bounds<D>>) {
+    pub fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Bounds<D>>) {
         if boxes.len() != self.rods.len() {
             return self.rebuild(boxes);
         }
@@ -37,7 +37,7 @@ impl<const D: usize> RodBvh<D> {
     }
 
     /// Builds the tree anew.
-    pub(crate) fn rebuild(&mut self, boxes: impl Iterator<Item = Bounds<D>>) {
+    pub fn rebuild(&mut self, boxes: impl Iterator<Item = Bounds<D>>) {
         self.rods.clear();
         self.rods.extend(boxes);
         self.leaves = self.rods.len().div_ceil(RODS_PER_LEAF).next_power_of_two();
@@ -79,7 +79,7 @@ impl<const D: usize> RodBvh<D> {
     }
 
     /// Updates the box of a rod that has moved.
-    pub(crate) fn set(&mut self, rod: usize, bounds: Bounds<D>) {
+    pub fn set(&mut self, rod: usize, bounds: Bounds<D>) {
         self.rods[rod] = bounds;
         self.mark_loose(rod / RODS_PER_LEAF);
         let mut node = self.leaves + rod / RODS_PER_LEAF;
@@ -92,7 +92,7 @@ impl<const D: usize> RodBvh<D> {
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
     #[inline]
-    pub(crate) fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
         // The depth of the tree is at most the number of bits of a usize.
         let mut waiting = [0usize; 66];
         let mut n = usize::from(!self.rods.is_empty());

@@ -4,7 +4,7 @@ use super::geometry::{Bounds, Point};
 
 /// Boxes, and for every cell the list of the boxes that meet it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Grid<const D: usize> {
+pub struct Grid<const D: usize> {
     cells: CellLayout<D>,
     starts: Vec<u32>,
     entries: Vec<u32>,
@@ -20,7 +20,7 @@ const MAX_CELLS_PER_BOX: usize = 64;
 impl<const D: usize> Grid<D> {
     /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which determines
     /// the size of the cells, never the result.
-    pub(crate) fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
+    pub fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
         self.bounds.clear();
         self.bounds.extend(bounds);
         if !self.bounds.is_empty() {
@@ -56,7 +56,7 @@ impl<const D: usize> Grid<D> {
 
     /// Visits every box that meets `near`, each once.
     #[inline]
-    pub(crate) fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
         if self.bounds.is_empty() {
             return;
         }

@@ -63,18 +63,18 @@ pub fn pull_first<const D: usize>(
 
 /// Measures of several motions, as if the chain had been measured after each.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct WavefrontMeasures {
+pub struct WavefrontMeasures {
     /// Connectors that have changed, the initiator included, summed over the motions.
-    pub(crate) changed: u64,
+    pub changed: u64,
     /// Longest way of a connector other than the initiator, meters.
-    pub(crate) longest_m: f64,
+    pub longest_m: f64,
     /// Greatest amount by which a rod that moved was outside its limits, meters.
-    pub(crate) max_rod_violation_m: f64,
+    pub max_rod_violation_m: f64,
 }
 
 /// Moves the first connector of a plain chain through at most [`LANES`] heads, each farther from the
 /// one before than the least move.
-pub(crate) fn pull_and_measure<const D: usize>(
+pub fn pull_and_measure<const D: usize>(
     chain: &mut Chain<D>,
     heads: &[Point<D>],
 ) -> WavefrontMeasures {

@@ -23,7 +23,7 @@ impl<'de, const D: usize> Deserialize<'de> for WirePoint<D> {
 }
 
 /// Writes a point; for `#[serde(with = "...")]`.
-pub(crate) fn serialize<const D: usize, S: Serializer>(
+pub fn serialize<const D: usize, S: Serializer>(
     point: &Point<D>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
@@ -33,7 +33,7 @@ pub(crate) fn serialize<const D: usize, S: Serializer>(
 }
 
 /// Reads a point; for `#[serde(with = "...")]`.
-pub(crate) fn deserialize<'de, const D: usize, S: Deserializer<'de>>(
+pub fn deserialize<'de, const D: usize, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Point<D>, S::Error> {
     deserializer.deserialize_tuple(D, Coordinates::<D>)

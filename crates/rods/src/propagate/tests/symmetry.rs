@@ -2,7 +2,7 @@
 
 use super::random_worlds::apart_m;
 use super::*;
-use crate::rods::geometry::first_axis;
+use crate::geometry::first_axis;
 
 /// Returns the places that a chain reaches among balls, with other balls far away and cells of any size.
 fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> {
@@ -113,7 +113,7 @@ proptest! {
         let mut chain = crooked::<2>(seed, 8, Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.02 }, 0.1);
         let field = ball_field::<2>(seed, 8.0, 0.05, 0.3, 0.4);
         let turned_field = field.iter().map(|o| {
-            let crate::rods::geometry::Core::Point(c) = o.core else { unreachable!() };
+            let crate::geometry::Core::Point(c) = o.core else { unreachable!() };
             Obstacle::ball(o.id, turn(c), o.radius_m)
         }).collect();
         let (walls, turned_walls) = (Obstacles::new(field, 1.3).unwrap(), Obstacles::new(turned_field, 1.3).unwrap());

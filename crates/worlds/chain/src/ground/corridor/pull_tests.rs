@@ -1,7 +1,8 @@
 //! Convoys that are pulled through the pinned corridor.
 
-use super::*;
-use crate::fixtures::{convoy, corridor_line, corridor_walls};
+use crate::fixtures::{clearance_m, convoy, corridor_line, corridor_walls};
+use sidestep_rods::geometry::distance;
+use sidestep_rods::{Obstacles, Outcome, Propagator, Request, Rod, Rotation, Rules};
 
 /// The leader's start: in the first, straight part, which is 14 m long.
 const LEAD_M: f64 = 13.0;
@@ -62,7 +63,7 @@ fn fits_round(width_m: f64, rod: Rod) -> bool {
     !(width_m == 1.2 && rod.max_m == 1.5 && rod.radius_m == 0.25)
 }
 
-/// The whole table is printed by the bench `chain`, part `corridors`.
+/// The whole table is printed by the bench of `sidestep-rods`, part `corridors`.
 #[test]
 fn a_pulled_chain_never_objects_in_the_pinned_corridor() {
     for width_m in WIDTHS_M {

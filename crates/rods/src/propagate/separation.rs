@@ -1,11 +1,11 @@
 //! Motions of a chain in its own way in which no part comes near another.
 
 use super::{DrivenConnectors, MotionTally, Propagator, is_open};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::distance;
-use crate::rods::motion_bounds::MotionBounds;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::open::{self, StayRule};
+use crate::chain::Chain;
+use crate::geometry::distance;
+use crate::motion_bounds::MotionBounds;
+use crate::obstacle::Obstacles;
+use crate::open::{self, StayRule};
 use std::ops::Range;
 
 /// Motions among obstacles until a proof is tried again. Where one fails, its effort is lost, so every

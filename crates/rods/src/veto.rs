@@ -119,7 +119,7 @@ impl VetoReason {
     ];
 
     /// Returns its number among all, from 0.
-    pub(crate) fn number(self) -> usize {
+    pub fn number(self) -> usize {
         self as usize
     }
 

@@ -1,17 +1,17 @@
-//! Speed of the chain world's core.
+//! Speed of motions of chains.
 //!
-//! `cargo bench -p sidestep-chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
+//! `cargo bench -p sidestep-rods [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
 //! `own`, `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets
 //! the prototype's time.
 
 use cpu_time::ProcessTime;
-use sidestep_chain::geometry::{Point, add, add_scaled, first_axis, norm, normalized, scaled, sub};
-use sidestep_chain::{
-    Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, wavefront,
-};
 use sidestep_kernel::Seed;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_rods::geometry::{Point, add, add_scaled, first_axis, norm, normalized, scaled, sub};
+use sidestep_rods::{
+    Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, wavefront,
+};
 
 /// Numbers in [0, 1), always the same.
 struct Numbers {

@@ -605,7 +605,7 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &DrivenConnectors<D>) -> Resul
     heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
-pub(crate) mod local_solver;
+pub mod local_solver;
 mod separation;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

@@ -8,14 +8,14 @@ use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
 /// Tolerance of the rods' lengths, meters.
-pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
+pub const LENGTH_TOLERANCE_M: f64 = 1e-9;
 
 /// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
-pub(crate) const MAX_COORDINATE_M: f64 = 1e6;
+pub const MAX_COORDINATE_M: f64 = 1e6;
 
 /// Returns whether a connector may be at a point at all: the point must be finite, and at most 1e6 m
 /// from the origin along every axis.
-pub(crate) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
+pub fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
     point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
 
@@ -248,7 +248,9 @@ impl<const D: usize> Chain<D> {
         &self.points
     }
 
-    pub(crate) fn points_mut(&mut self) -> &mut [Point<D>] {
+    /// Returns the positions of all connectors, for a caller that itself sees to it that rods, bends and constraints keep
+    /// their limits: none is checked.
+    pub fn points_mut(&mut self) -> &mut [Point<D>] {
         &mut self.points
     }
 

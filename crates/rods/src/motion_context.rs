@@ -83,9 +83,11 @@ impl BlockOwner {
 
 /// An objection, before the length of the motion is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PendingVeto {
-    pub(crate) reason: VetoReason,
-    pub(crate) obstacle: Option<u32>,
+pub struct PendingVeto {
+    /// Its reason.
+    pub reason: VetoReason,
+    /// The obstacle in the way, if there is one.
+    pub obstacle: Option<u32>,
 }
 
 impl PendingVeto {
@@ -130,7 +132,7 @@ impl<const D: usize> SlaveStep<D> {
 }
 
 /// Returns the distance at which a body and an obstacle only touch, meters.
-pub(crate) fn contact_distance_m(radius_m: f64) -> f64 {
+pub fn contact_distance_m(radius_m: f64) -> f64 {
     (radius_m - TOLERANCE_M).max(TOUCH_M)
 }
 
@@ -286,6 +288,6 @@ fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &SlaveStep<D>, block:
 }
 
 /// Returns whether a rod's length is within its limits, up to the tolerance.
-pub(crate) fn is_length_allowed(rod: Rod, length_m: f64) -> bool {
+pub fn is_length_allowed(rod: Rod, length_m: f64) -> bool {
     (rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M).contains(&length_m)
 }

@@ -21,25 +21,24 @@
 //! 14. blocked intervals agree with distances: `interval.rs`, a million cases on request
 //! 15. a veto names the decisive constraint: [`laws`]
 //!     `a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere`
-//! 16. pushed, no chain runs into itself; pulled through a corridor, none objects: [`laws`]
-//!     `a_chain_that_is_pushed_never_runs_into_itself`, [`corridor`]
-//! 17. joints to connectors and back: `arms/kinematics/tests.rs`,
+//! 16. pushed, no chain runs into itself: [`laws`] `a_chain_that_is_pushed_never_runs_into_itself`; pulled through
+//!     a corridor, none objects: `ground/corridor/pull_tests.rs` of `sidestep-chain`
+//! 17. joints to connectors and back: `kinematics/tests.rs` of `sidestep-arms`,
 //!     `joint_values_come_back_from_connectors_where_they_are_determined`
 //! 18. one connector, one rod, coincidence, no motion, NaN, a base inside: [`degenerate`]
 
 use super::*;
+use crate::chain::{Connector, Mobility, Rod};
 use crate::fixtures::{TestRng, Wanderer, ball_field, clearance_m, own_clearance_m};
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{add, norm, scaled, sub};
-use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::RequestSource;
+use crate::geometry::{add, norm, scaled, sub};
+use crate::obstacle::Obstacle;
+use crate::veto::RequestSource;
 use proptest::prelude::*;
 
 mod apart;
-mod corridor;
 mod degenerate;
 mod laws;
-pub(crate) mod random_worlds;
+mod random_worlds;
 mod symmetry;
 mod tunnel;
 

@@ -2,16 +2,16 @@
 //! judges whole chains. It knows its neighbors' messages and its own surroundings, and nothing else.
 
 use super::{DrivenConnectors, check, count_sub_steps, project};
-use crate::rods::candidates::{CandidateScratch, guide};
-use crate::rods::chain::{Chain, Rod};
-use crate::rods::geometry::{Point, distance};
-use crate::rods::motion_context::{
+use crate::candidates::{CandidateScratch, guide};
+use crate::chain::{Chain, Rod};
+use crate::geometry::{Point, distance};
+use crate::motion_context::{
     MotionContext, PendingVeto, SlaveStep, TentativePositions, is_length_allowed,
 };
-use crate::rods::obstacle::Obstacles;
-use crate::rods::rod_bvh::RodBvh;
-use crate::rods::rules::{Rotation, Rules};
-use crate::rods::veto::{Motion, VetoEffect};
+use crate::obstacle::Obstacles;
+use crate::rod_bvh::RodBvh;
+use crate::rules::{Rotation, Rules};
+use crate::veto::{Motion, VetoEffect};
 use sidestep_kernel::InputError;
 
 /// Index of the connector in a chain of its own, and the one that its master would have.
@@ -20,7 +20,7 @@ const MASTER_INDEX: usize = 1;
 
 /// A connector by itself.
 #[derive(Debug, Clone)]
-pub(crate) struct LocalSolver<const D: usize> {
+pub struct LocalSolver<const D: usize> {
     /// A chain of this connector only, with the measures of the whole one.
     chain: Chain<D>,
     rules: Rules,
@@ -31,40 +31,40 @@ pub(crate) struct LocalSolver<const D: usize> {
 
 /// A master's motion, as its slave hears of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MasterMotion<const D: usize> {
+pub struct MasterMotion<const D: usize> {
     /// The master before,
-    pub(crate) mo: Point<D>,
+    pub mo: Point<D>,
     /// and after.
-    pub(crate) mn: Point<D>,
+    pub mn: Point<D>,
     /// The connector on the master's other side, if its place is settled.
-    pub(crate) prev: Option<Point<D>>,
+    pub prev: Option<Point<D>>,
     /// Bend limit of the master, rad.
-    pub(crate) max_bend_rad: f64,
+    pub max_bend_rad: f64,
     /// Whether nothing in the world can object.
-    pub(crate) is_open: bool,
+    pub is_open: bool,
     /// Whether a rod that turns tries all its lengths.
-    pub(crate) all_lengths: bool,
+    pub all_lengths: bool,
 }
 
 /// A slave's reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reaction<const D: usize> {
+pub struct Reaction<const D: usize> {
     /// Its new place; the old one, bit for bit, if it stays.
-    pub(crate) at: Point<D>,
+    pub at: Point<D>,
     /// Whether the motion ends here, because the slave stays and everything beyond it is good as it is.
-    pub(crate) ends: bool,
+    pub ends: bool,
     /// Whether its rod turned from the guide line.
-    pub(crate) rotated: bool,
+    pub rotated: bool,
     /// Whether it could have gone elsewhere.
-    pub(crate) has_others: bool,
+    pub has_others: bool,
     /// Whether its rod found a way by turning.
-    pub(crate) has_turned: bool,
+    pub has_turned: bool,
 }
 
 impl<const D: usize> LocalSolver<D> {
     /// Returns a connector of a chain, which reacts by the chain's rules. Parts of its own chain are not
     /// in its way.
-    pub(crate) fn new(chain: &Chain<D>, k: usize, rules: &Rules) -> Self {
+    pub fn new(chain: &Chain<D>, k: usize, rules: &Rules) -> Self {
         let rules = Rules { self_collision: false, ..*rules };
         let (work, overlay, own) =
             (CandidateScratch::default(), TentativePositions::default(), RodBvh::default());
@@ -72,7 +72,7 @@ impl<const D: usize> LocalSolver<D> {
     }
 
     /// Returns its bend limit, rad.
-    pub(crate) fn max_bend_rad(&self) -> f64 {
+    pub fn max_bend_rad(&self) -> f64 {
         self.chain.connectors()[SELF_INDEX].max_bend_rad
     }
 
@@ -80,17 +80,17 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// When the limit is out of range.
-    pub(crate) fn set_max_bend_rad(&mut self, max_bend_rad: f64) -> Result<(), InputError> {
+    pub fn set_max_bend_rad(&mut self, max_bend_rad: f64) -> Result<(), InputError> {
         self.chain.set_max_bend_rad(SELF_INDEX, max_bend_rad)
     }
 
     /// Returns whether trying all lengths could find more places than trying one, for the rod to a master.
-    pub(crate) fn has_more_places(rod: Rod) -> bool {
+    pub fn has_more_places(rod: Rod) -> bool {
         D == 2 || rod.min_m < rod.max_m
     }
 
     /// Returns whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
-    pub(crate) fn should_repeat(&self) -> bool {
+    pub fn should_repeat(&self) -> bool {
         self.rules.rotation == Rotation::Union
     }
 
@@ -99,7 +99,7 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// The constraint because of which it objects.
-    pub(crate) fn react(
+    pub fn react(
         &mut self,
         so: Point<D>,
         rod: Rod,
@@ -162,7 +162,7 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// When the target is out of the range of coordinates, or too far away.
-    pub(crate) fn sub_steps(
+    pub fn sub_steps(
         &self,
         from: Point<D>,
         to: Point<D>,
@@ -179,14 +179,14 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// The constraint because of which it objects.
-    pub(crate) fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
+    pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
         let mut heads = DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to });
         project(&self.chain, &mut heads, VetoEffect::Exact).map_err(|(_, refusal)| refusal)
     }
 
     /// Returns whether a sub-step is too short to count.
-    pub(crate) fn is_negligible(&self, from: Point<D>, to: Point<D>) -> bool {
+    pub fn is_negligible(&self, from: Point<D>, to: Point<D>) -> bool {
         distance(to, from) <= self.chain.min_move_m()
     }
 
@@ -194,7 +194,7 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// The constraint because of which it objects.
-    pub(crate) fn check_initiator(
+    pub fn check_initiator(
         &mut self,
         from: Point<D>,
         to: Point<D>,
