@@ -39,7 +39,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 11] = [
+const WITHOUT_WORLDS: [&str; 12] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -50,6 +50,7 @@ const WITHOUT_WORLDS: [&str; 11] = [
     "crates/statistics",
     "crates/collectives",
     "crates/rods",
+    "crates/arms",
     "crates/map",
 ];
 

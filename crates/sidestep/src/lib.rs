@@ -70,7 +70,7 @@ mod problems;
 pub mod worlds;
 
 pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
-pub use sidestep_chain::arms;
+pub use sidestep_arms as arms;
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_import as import;

@@ -5,7 +5,6 @@
 //! the modules say why. The same code serves two and three dimensions.
 //!
 //! ```text
-//! arms/:   joints as rods, inverse kinematics
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
 //! agents/: the program aboard a connector                deploy/: agents on a network in memory; elsewhere.rs
 //! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
@@ -14,12 +13,11 @@
 //! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs
 //! ```
 //!
-//! Chains, their constraints, and the propagation of one motion are the crate `sidestep-rods`.
-//! `arms` knows neither the world nor runs.
+//! Chains, their constraints, and the propagation of one motion are the crate `sidestep-rods`; joints as rods, inverse
+//! kinematics and plans are `sidestep-arms`.
 
 mod act;
 pub mod agents;
-pub mod arms;
 mod bundle;
 mod claim;
 mod clearance;
@@ -57,7 +55,6 @@ mod world;
 mod world_impl;
 mod world_type;
 
-pub use arms::{ik, kinematics};
 pub use deploy::Deployment;
 pub use motion::escape::{EscapeMethod, EscapePlan, EscapeReport, EscapeRules, Escaper};
 pub use motion::recovery::{RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation};

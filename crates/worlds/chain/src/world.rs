@@ -1,6 +1,5 @@
 //! A compiled world of chains: everything that never changes during a run.
 
-use super::arms::arm::Arm;
 use super::deploy::deployment::Deployment;
 use super::driver::{Task, TaskKind, TaskProgress};
 use super::formation::{Robot, Robots};
@@ -9,6 +8,7 @@ use super::motion::escape::EscapeRules;
 use super::motion::recovery::RecoveryLimits;
 use super::script::ScriptMotion;
 use super::swarm::drive::Pose2;
+use sidestep_arms::Arm;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::network::Network;

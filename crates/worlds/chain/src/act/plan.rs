@@ -1,14 +1,14 @@
 //! Ways that are planned once local rules come no nearer to a target.
 
 use super::{ActState, ChainContext, Initiator};
-use crate::arms::plan::{
-    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
-};
 use crate::driver::Targets;
 use crate::events::EventKind;
 use crate::scratch::PositionBuffer;
 use crate::state::{Body, MotionPlan};
 use crate::world::purpose;
+use sidestep_arms::plan::{
+    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
+};
 use sidestep_kernel::InputError;
 use sidestep_rods::find_tunneling;
 use sidestep_rods::geometry::{Point, distance};

@@ -1,6 +1,6 @@
 //! One motion of a chain: by propagation, or by a reach if a held connector objects.
 
-use crate::arms::ik::{ChainIkGoal, Engine, IkSolver};
+use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{

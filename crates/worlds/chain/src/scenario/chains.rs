@@ -1,6 +1,5 @@
 //! Chains: their shape, their limits, and their start.
 
-use super::super::arms::arm::Arm;
 use super::super::driver::{Task, TaskKind};
 use super::super::formation::Robots;
 use super::super::ground::Site;
@@ -16,6 +15,7 @@ use super::tasks::TaskSection;
 use super::{BoxSection, Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_arms::Arm;
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacles, Rod};

@@ -1,10 +1,10 @@
 //! Refusals of tasks that their connector can never do.
 
-use super::super::arms::arm::Arm;
 use super::super::driver::{Task, TaskKind};
 use super::Compiler;
 use super::chains::ChainSection;
 use super::tasks::TaskSection;
+use sidestep_arms::Arm;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{Chain, Mobility};

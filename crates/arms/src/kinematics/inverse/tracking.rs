@@ -33,7 +33,7 @@ const ARRIVAL_TOLERANCE: f64 = 1e-13;
 
 /// An arm whose joints follow the places of its connectors.
 #[derive(Debug)]
-pub(crate) struct JointTracker {
+pub struct JointTracker {
     quick: FastFk,
     anchors: Vec<Anchor>,
     limits: JointRanges,
@@ -48,15 +48,16 @@ pub(crate) struct JointTracker {
 
 /// A place for a connector.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ConnectorTarget {
+pub struct ConnectorTarget {
     /// Index of the connector.
-    pub(crate) connector: usize,
+    pub connector: usize,
     /// Its place in m, in the base's frame.
-    pub(crate) at_m: Vector,
+    pub at_m: Vector,
 }
 
 impl JointTracker {
-    pub(crate) fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
+    /// Returns the tracker of an arm.
+    pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
         let anchors = skeleton.connectors.clone();
         Self {
             quick: FastFk::new(chain),
@@ -70,33 +71,33 @@ impl JointTracker {
     }
 
     /// Returns a bound on the way of any connector per unit of each variable, in m.
-    pub(crate) fn levers_m(&self) -> &[f64] {
+    pub fn levers_m(&self) -> &[f64] {
         &self.levers_m
     }
 
     /// Returns the distance at which a connector that leads counts as being at its place, in m.
-    pub(crate) fn arrival_tolerance_m(&self) -> f64 {
+    pub fn arrival_tolerance_m(&self) -> f64 {
         1e4 * ARRIVAL_TOLERANCE * self.reach_m
     }
 
     /// Returns the highest speed of each variable, in rad/s or m/s.
-    pub(crate) fn speeds(&self) -> &[f64] {
+    pub fn speeds(&self) -> &[f64] {
         &self.speeds
     }
 
     /// Returns the range of each variable.
-    pub(crate) fn limits(&self) -> &[[f64; 2]] {
+    pub fn limits(&self) -> &[[f64; 2]] {
         &self.limits.ranges
     }
 
     /// Returns values inside the limits: those that are beyond by rounding are put at their ends.
-    pub(crate) fn clamp(&self, mut values: Vec<f64>) -> Vec<f64> {
+    pub fn clamp(&self, mut values: Vec<f64>) -> Vec<f64> {
         self.limits.clamp(&mut values);
         values
     }
 
     /// Returns the places of all connectors in m, in the base's frame.
-    pub(crate) fn connector_positions(&self, values: &[f64]) -> Vec<Vector> {
+    pub fn connector_positions(&self, values: &[f64]) -> Vec<Vector> {
         let mut placed = self.blank.clone();
         self.quick.compute(values, &mut placed);
         self.anchors
@@ -106,7 +107,7 @@ impl JointTracker {
     }
 
     /// Returns the range of each variable within `dt_s` seconds from these values.
-    pub(crate) fn reachable_ranges(&self, values: &[f64], dt_s: f64) -> Vec<[f64; 2]> {
+    pub fn reachable_ranges(&self, values: &[f64], dt_s: f64) -> Vec<[f64; 2]> {
         let of_one = |((value, speed), [lower, upper]): ((&f64, &f64), &[f64; 2])| {
             [(value - speed * dt_s).max(*lower), (value + speed * dt_s).min(*upper)]
         };
@@ -114,7 +115,7 @@ impl JointTracker {
     }
 
     /// Returns the part, at most 1, of the way from one posture to another that all joints can go in `dt_s` seconds.
-    pub(crate) fn reachable_fraction(&self, from: &[f64], to: &[f64], dt_s: f64) -> f64 {
+    pub fn reachable_fraction(&self, from: &[f64], to: &[f64], dt_s: f64) -> f64 {
         let ways = from.iter().zip(to).zip(&self.speeds);
         ways.fold(1.0, |part, ((a, b), speed)| match (b - a).abs() {
             0.0 => part,
@@ -123,14 +124,14 @@ impl JointTracker {
     }
 
     /// Returns whether a variable is at an end of its limits.
-    pub(crate) fn is_at_limit(&self, values: &[f64]) -> bool {
+    pub fn is_at_limit(&self, values: &[f64]) -> bool {
         let ends = values.iter().zip(&self.limits.ranges);
         ends.into_iter().any(|(value, range)| range.contains(value))
     }
 
     /// Returns values in their `room` at which the connectors are near the guide's places, if there is one, and those
     /// that lead as near to theirs as the room allows.
-    pub(crate) fn track(
+    pub fn track(
         &self,
         start: &[f64],
         room: &[[f64; 2]],

@@ -8,7 +8,7 @@ use super::goal::{ArmGoal, OrientationMask, PoseMask, Sphere};
 use super::guide;
 use super::result::{Collision, IkFailure, IkResult, IkSolution};
 use super::step::{JointRanges, Stepper};
-use crate::arms::ik::Engine;
+use crate::ik::Engine;
 use sidestep_kernel::Seed;
 use sidestep_kernel::geometry::{norm, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};

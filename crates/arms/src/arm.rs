@@ -1,4 +1,4 @@
-//! An arm of joints as a chain of this world (slides K1 to K4).
+//! An arm of joints as a chain of rods (slides K1 to K4).
 
 use super::kinematics::{ArmGoal, JointTracker, SerialChain, Skeleton, Vector};
 use sidestep_kernel::InputError;
@@ -22,7 +22,8 @@ pub struct Arm {
     pub at_m: Vector,
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
-    pub(crate) follower: JointTracker,
+    /// Finds joint values that follow its connectors.
+    pub follower: JointTracker,
 }
 
 impl Arm {
@@ -56,18 +57,18 @@ impl Arm {
     }
 
     /// Returns the places of the connectors in the world at these joint values.
-    pub(crate) fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
+    pub fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
         let in_world = |p: &Vector| with_dimensions(self.to_world(*p));
         self.follower.connector_positions(values).iter().map(in_world).collect()
     }
 
     /// Returns a place of the world in the frame of the base.
-    pub(crate) fn to_base<const D: usize>(&self, p: Point<D>) -> Vector {
+    pub fn to_base<const D: usize>(&self, p: Point<D>) -> Vector {
         sub(with_dimensions(p), self.at_m)
     }
 
     /// Returns a goal for connector `k` at a place of the world, and the arm up to it.
-    pub(crate) fn goal<const D: usize>(
+    pub fn goal<const D: usize>(
         &self,
         k: usize,
         at: Point<D>,

@@ -69,7 +69,7 @@ impl SerialChain {
 
     /// Returns the arm up to connector `k` of `skeleton` (this chain's), as if that were its tip, with all its
     /// variables.
-    pub(crate) fn up_to(&self, skeleton: &Skeleton, k: usize) -> Self {
+    pub fn up_to(&self, skeleton: &Skeleton, k: usize) -> Self {
         let anchor = &skeleton.connectors[k];
         Self {
             tip: format!("connector {k}"),

@@ -4,7 +4,7 @@ use super::super::serial::SerialChain;
 use super::super::skeleton::Skeleton;
 use super::super::transform::Vector;
 use super::goal::ArmGoal;
-use crate::arms::ik::{ChainIkGoal, IkSolver};
+use crate::ik::{ChainIkGoal, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{add, scaled};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};

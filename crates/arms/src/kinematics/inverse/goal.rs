@@ -2,7 +2,7 @@
 
 use super::super::body::ArmBody;
 use super::super::transform::{Transform, Vector};
-use crate::arms::ik::Engine;
+use crate::ik::Engine;
 use sidestep_kernel::InputError;
 
 /// The most postures that one goal may ask for.

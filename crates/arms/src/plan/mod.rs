@@ -17,12 +17,12 @@ mod tests;
 mod tree;
 
 use super::ik::{ChainIkGoal, IkSolver};
-pub(crate) use joints::JointSpace;
+pub use joints::JointSpace;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Rules};
-pub(crate) use space::RodSpace;
+pub use space::RodSpace;
 
 /// Most postures at the target from which the second tree grows, and searches for them.
 const MAX_GOALS: usize = 4;
@@ -32,20 +32,21 @@ const MAX_RESTARTS: usize = 25;
 
 /// The target of a way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PlanningQuery<const D: usize> {
+pub struct PlanningQuery<const D: usize> {
     /// The connector that is to move,
-    pub(crate) k: usize,
+    pub k: usize,
     /// where to,
-    pub(crate) target: Point<D>,
+    pub target: Point<D>,
     /// and how near, meters.
-    pub(crate) tolerance_m: f64,
+    pub tolerance_m: f64,
 }
 
 /// A posture: the places of all connectors.
-pub(crate) type ChainPosture<const D: usize> = Vec<Point<D>>;
+pub type ChainPosture<const D: usize> = Vec<Point<D>>;
 
 /// The postures of a body that moves from one to another.
-pub(crate) trait ConfigurationSpace {
+pub trait ConfigurationSpace {
+    /// One posture.
     type Posture: Clone;
 
     /// Returns the present posture.
@@ -79,7 +80,7 @@ pub(crate) trait ConfigurationSpace {
 ///
 /// # Errors
 /// As [`IkSolver::solve`]; also when no connector of the chain keeps its place.
-pub(crate) fn plan<const D: usize>(
+pub fn plan<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     rules: Rules,
@@ -95,7 +96,7 @@ pub(crate) fn plan<const D: usize>(
 ///
 /// # Errors
 /// As [`SerialChain::solve`](crate::kinematics::SerialChain::solve).
-pub(crate) fn plan_joints<const D: usize>(
+pub fn plan_joints<const D: usize>(
     space: &JointSpace<'_, D>,
     errand: &PlanningQuery<D>,
     draws: &mut Draws,

@@ -37,7 +37,7 @@ mod tracking;
 
 pub use goal::{ArmGoal, Axis, MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere};
 pub use result::{ArmPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
-pub(crate) use tracking::{ConnectorTarget, JointTracker};
+pub use tracking::{ConnectorTarget, JointTracker};
 
 use super::serial::SerialChain;
 use search::IkSearch;

@@ -1,9 +1,9 @@
 //! Postures of an arm's joints, inside their limits, and the straight way between two.
 
 use super::{ConfigurationSpace, PlanningQuery};
-use crate::arms::arm::Arm;
-use crate::arms::ik::constraints::ConstraintChecker;
-use crate::arms::kinematics::{ArmGoal, Dof, JointMotion};
+use crate::arm::Arm;
+use crate::ik::constraints::ConstraintChecker;
+use crate::kinematics::{ArmGoal, Dof, JointMotion};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
@@ -19,7 +19,7 @@ const MAX_GOALS: usize = 4;
 const MIN_STEP: f64 = 1e-3;
 
 /// The postures of one arm among obstacles: a value for each of its joints.
-pub(crate) struct JointSpace<'a, const D: usize> {
+pub struct JointSpace<'a, const D: usize> {
     arm: &'a Arm,
     present: &'a [f64],
     judge: ConstraintChecker<'a, D>,
@@ -31,7 +31,7 @@ pub(crate) struct JointSpace<'a, const D: usize> {
 impl<'a, const D: usize> JointSpace<'a, D> {
     /// Returns the postures that bring connector `k` to places. `chain` is the arm's chain at its `present` joint
     /// values.
-    pub(crate) fn new(
+    pub fn new(
         arm: &'a Arm,
         present: &'a [f64],
         chain: &'a Chain<D>,
@@ -45,7 +45,7 @@ impl<'a, const D: usize> JointSpace<'a, D> {
     }
 
     /// Returns the objection to the places of an arm's connectors, if there is one.
-    pub(crate) fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
+    pub fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
         self.judge.find_veto(points, self.k)
     }
 

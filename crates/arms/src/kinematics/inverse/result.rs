@@ -1,6 +1,6 @@
 //! Answers to the goals of an arm.
 
-use crate::arms::ik::Engine;
+use crate::ik::Engine;
 
 /// The answer to a goal.
 #[derive(Debug, Clone, PartialEq)]

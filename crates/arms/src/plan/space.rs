@@ -1,7 +1,7 @@
 //! Postures of a chain with a fixed base, and the straight way between two.
 
 use super::{ChainPosture, ConfigurationSpace};
-use crate::arms::ik::constraints::ConstraintChecker;
+use crate::ik::constraints::ConstraintChecker;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
@@ -12,7 +12,7 @@ use sidestep_rods::{Chain, Obstacles};
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
-pub(crate) struct RodSpace<'a, const D: usize> {
+pub struct RodSpace<'a, const D: usize> {
     judge: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
@@ -26,7 +26,7 @@ impl<'a, const D: usize> RodSpace<'a, D> {
     ///
     /// # Errors
     /// When no other connector keeps its place.
-    pub(crate) fn new(
+    pub fn new(
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
         self_collision: bool,

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arms::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, Sphere};
+use crate::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, Sphere};
 use proptest::prelude::*;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_testing::robot_model as shared;

@@ -1,7 +1,6 @@
 //! Ways among obstacles, each checked posture by posture by another measure than the planner's.
 
 use super::*;
-use crate::fixtures::clearance_m;
 use sidestep_kernel::Seed;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -10,6 +9,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn draws(seed: u64) -> Draws {
     Streams::new(Seed(seed)).draws(0, 0, Purpose(9))
+}
+
+/// Returns the least clearance of any connector and any rod from obstacles, up to 1 m.
+fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f64 {
+    let points = chain.points();
+    let tip = |i: usize| obstacles.clearance_m([points[i]; 2], chain.connectors()[i].radius_m, 1.0);
+    let rod =
+        |i: usize| obstacles.clearance_m([points[i], points[i + 1]], chain.rods()[i].radius_m, 1.0);
+    let tips = (0..points.len()).map(tip).fold(1.0, f64::min);
+    (0..chain.rods().len()).map(rod).fold(tips, f64::min)
 }
 
 /// An arm of five rods along the first axis.

@@ -40,7 +40,7 @@ pub use inverse::{
     ArmGoal, ArmPart, Axis, CollidesWith, Collision, IkFailure, IkResult, IkSolution,
     MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere,
 };
-pub(crate) use inverse::{ConnectorTarget, JointTracker};
+pub use inverse::{ConnectorTarget, JointTracker};
 pub use recover::{RecoverError, RecoveredJoints};
 pub use serial::{Dof, Frames, JointMotion, SerialChain};
 pub use skeleton::{Skeleton, SkeletonRod};

@@ -10,16 +10,16 @@ use std::f64::consts::PI;
 
 /// A chain and its constraints.
 #[derive(Clone, Copy)]
-pub(in crate::arms) struct ConstraintChecker<'a, const D: usize> {
-    pub(in crate::arms) chain: &'a Chain<D>,
-    pub(in crate::arms) obstacles: &'a Obstacles<D>,
-    pub(in crate::arms) self_collision: bool,
+pub(crate) struct ConstraintChecker<'a, const D: usize> {
+    pub(crate) chain: &'a Chain<D>,
+    pub(crate) obstacles: &'a Obstacles<D>,
+    pub(crate) self_collision: bool,
 }
 
 impl<const D: usize> ConstraintChecker<'_, D> {
     /// Returns the first objection to a posture, in the order of the connectors. Parts at their old
     /// places in the chain are not judged.
-    pub(in crate::arms) fn find_veto(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
+    pub(crate) fn find_veto(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
         let veto =
             |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
         (0..points.len())
