@@ -330,6 +330,7 @@ impl<const D: usize> MotionContext<'_, D> {
 
 /// Keeps the first refusal that is more informative than the first objection: a free direction that fails
 /// for another reason.
+#[inline]
 fn keep_informative(why: &mut Option<PendingVeto>, refusal: PendingVeto) {
     if !matches!(refusal.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
         why.get_or_insert(refusal);

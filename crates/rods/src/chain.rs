@@ -117,6 +117,7 @@ pub struct Rod {
 
 impl Rod {
     /// Returns a rod of fixed length.
+    #[inline]
     pub fn fixed(length_m: f64, radius_m: f64) -> Self {
         Self { min_m: length_m, max_m: length_m, radius_m }
     }

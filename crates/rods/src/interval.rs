@@ -21,6 +21,7 @@ pub(super) struct AngleInterval {
 }
 
 impl AngleInterval {
+    #[inline]
     fn from_center(center_rad: f64, low_rad: f64, high_rad: f64) -> Self {
         Self { from_rad: center_rad + low_rad, width_rad: (high_rad - low_rad).min(TAU) }
     }
@@ -98,6 +99,7 @@ struct AngularView {
 }
 
 impl AngularView {
+    #[inline]
     fn angle_to(&self, p: Point<2>) -> f64 {
         math::atan2(cross_2d(self.middle, p), dot(self.middle, p))
     }
@@ -130,6 +132,7 @@ impl AngularView {
 /// Returns half the angle under which a disc (or a sphere) blocks a rod: up to the tangent, or, if
 /// that is out of reach, up to where the rod's tip touches. `None` if the disc is out of reach; the
 /// master must not be inside.
+#[inline]
 pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
     if apart_m - radius_m >= length_m {
         return None;
@@ -261,6 +264,7 @@ impl BorderAngles {
 }
 
 /// Returns the directions that bend a connector beyond its limit, when it is reached along `into`.
+#[inline]
 pub(super) fn bend_forbidden_arc(into: Point<2>, max_bend_rad: f64) -> AngleInterval {
     let into_rad = math::atan2(into[1], into[0]);
     AngleInterval {
@@ -271,6 +275,7 @@ pub(super) fn bend_forbidden_arc(into: Point<2>, max_bend_rad: f64) -> AngleInte
 
 /// Returns the same direction in [0, 2 pi]: `rem_euclid` without a division, for angles that are at
 /// most a few turns away.
+#[inline]
 fn wrapped_rad(mut angle_rad: f64) -> f64 {
     while angle_rad < 0.0 {
         angle_rad += TAU;
@@ -329,6 +334,7 @@ pub(super) fn min_turn_rad(
 const ARC_TOLERANCE_RAD: f64 = 1e-13;
 
 /// Returns the direction of a turn from a unit vector.
+#[inline]
 pub(super) fn turn(u: Point<2>, turn_rad: f64, side: TurnDirection) -> Point<2> {
     let signed_rad = if side == TurnDirection::Left { turn_rad } else { -turn_rad };
     let (c, s) = (math::cos(signed_rad), math::sin(signed_rad));
@@ -336,6 +342,7 @@ pub(super) fn turn(u: Point<2>, turn_rad: f64, side: TurnDirection) -> Point<2> 
 }
 
 /// Returns the direction of a vector, in (-pi, pi].
+#[inline]
 pub(super) fn direction_rad(u: Point<2>) -> f64 {
     math::atan2(u[1], u[0])
 }

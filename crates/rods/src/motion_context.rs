@@ -73,6 +73,7 @@ pub(super) enum BlockOwner {
 }
 
 impl BlockOwner {
+    #[inline]
     pub(super) fn obstacle(self) -> Option<u32> {
         match self {
             Self::Obstacle(id) => Some(id),
@@ -91,10 +92,12 @@ pub struct PendingVeto {
 }
 
 impl PendingVeto {
+    #[inline]
     pub(super) fn new(reason: VetoReason) -> Self {
         Self { reason, obstacle: None }
     }
 
+    #[inline]
     pub(super) fn from_owner(reason: VetoReason, name: BlockOwner) -> Self {
         let reason = if name.obstacle().is_none() { VetoReason::SelfCollision } else { reason };
         Self { reason, obstacle: name.obstacle() }
@@ -132,6 +135,7 @@ impl<const D: usize> SlaveStep<D> {
 }
 
 /// Returns the distance at which a body and an obstacle only touch, meters.
+#[inline]
 pub fn contact_distance_m(radius_m: f64) -> f64 {
     (radius_m - TOLERANCE_M).max(TOUCH_M)
 }
@@ -288,6 +292,7 @@ fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &SlaveStep<D>, block:
 }
 
 /// Returns whether a rod's length is within its limits, up to the tolerance.
+#[inline]
 pub fn is_length_allowed(rod: Rod, length_m: f64) -> bool {
     (rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M).contains(&length_m)
 }

@@ -26,6 +26,7 @@ impl MotionTally {
     }
 
     /// Adds the results of a separate motion.
+    #[inline]
     pub(super) fn add(&mut self, motion: &Self) {
         self.record_run(motion.from..motion.to);
         self.changed += motion.changed;

@@ -155,6 +155,7 @@ fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
 
 /// Returns the cosine of half the angle under which a ball blocks a rod or its end; `None` if there
 /// is no such direction.
+#[inline]
 pub(super) fn cosine_of_half_angle(
     apart_m: f64,
     radius_m: f64,

@@ -3,7 +3,7 @@
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
 //! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
 //! In space a rod may go around anything, so only its distance counts: it is never nearer to the core
-//! than half of the distance that it must keep at rest. [`super::passage`] describes the guarantees of
+//! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the guarantees of
 //! that and their limits.
 
 use super::geometry::{Core, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
@@ -106,6 +106,7 @@ impl<const D: usize> Sweep<D> {
 const TOUCH_M: f64 = 1e-12;
 
 /// Returns the real roots of `a x^2 + b x + c`; none if it is zero everywhere.
+#[inline]
 fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if a == 0.0 {
         return [(b != 0.0).then(|| -c / b), None];

@@ -119,6 +119,7 @@ impl VetoReason {
     ];
 
     /// Returns its number among all, from 0.
+    #[inline]
     pub fn number(self) -> usize {
         self as usize
     }

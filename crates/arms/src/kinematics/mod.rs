@@ -2,14 +2,14 @@
 //! from connectors.
 //!
 //! ```text
-//! pose        vectors, rotations and frames
-//! serial      model -> joints from base to tip, their values and limits; forward kinematics
-//! skeleton    joint axes -> connectors and rods
-//! bend        joint limits -> bend limits, where one joint alone bends a connector
-//! recover     connectors -> joint values
-//! body/       collision shapes of links
-//! chosen      the files of a robot, and which part of it is the arm
-//! inverse/    a target -> joint values, inside limits
+//! transform       vectors, rotations and frames
+//! serial          model -> joints from base to tip, their values and limits; forward kinematics
+//! skeleton        joint axes -> connectors and rods
+//! bend            joint limits -> bend limits, where one joint alone bends a connector
+//! recover         connectors -> joint values
+//! body/           collision shapes of links
+//! arm_selection   the files of a robot, and which part of it is the arm
+//! inverse/        a target -> joint values, inside limits
 //! ```
 //!
 //! A **connector** of an arm is a point that is fixed in two or more links at once: where axes

@@ -21,12 +21,14 @@ const MAX_PAUSE: u32 = 256;
 
 impl ProofSchedule {
     /// Returns whether a proof is to be tried now.
+    #[inline]
     fn is_due(&mut self) -> bool {
         let is_due = self.until_next == 0;
         self.until_next = self.until_next.saturating_sub(1);
         is_due
     }
 
+    #[inline]
     fn record(&mut self, holds: bool) {
         self.pause = if holds { 0 } else { (2 * self.pause).clamp(1, MAX_PAUSE) };
         self.until_next = self.pause;

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
-//! agents/: the program aboard a connector                deploy/: agents on a network in memory; elsewhere.rs
+//! agents/: the program aboard a connector                deploy/: agents on a network in memory; remote_agents.rs
 //! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)

@@ -7,16 +7,16 @@
 //!
 //! ```text
 //! goal       a goal: a pose, the part of it that counts, tolerances
-//! answer     its answer, and the reason for a failure
-//! quick      forward kinematics without allocation, and the effect of each joint
+//! result     its answer, and the reason for a failure
+//! fast_fk    forward kinematics without allocation, and the effect of each joint
 //! contacts   parts that are in another body
-//! rows       errors of a posture and their Jacobian: the tip, its orientation, contacts
+//! criteria   errors of a posture and their Jacobian: the tip, its orientation, contacts
 //! step       a damped step inside limits
 //! descent    steps from one posture, until the goal is met or nothing is gained
 //! search     descents from many postures, and the reason if none leads there
-//! many       several postures, and those nearest to the start
+//! solutions  several postures, and those nearest to the start
 //! guide      the connectors' solution as a posture to start from
-//! follow     joint values for the places of all connectors, within one cycle
+//! tracking   joint values for the places of all connectors, within one cycle
 //! ```
 //!
 //! Every answer's error is that of forward kinematics at its values.

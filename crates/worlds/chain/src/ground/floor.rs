@@ -5,7 +5,7 @@
 //! such an edge. It is also compact: a straight wall is one segment, where a box would have four
 //! sides, and the inside of solid areas needs nothing. No chain gets there, because walls that meet
 //! share their corners bit for bit, and no motion passes through a wall, however thin (see
-//! [`sweep`](sidestep_rods::sweep)). The walls do not detect a chain that starts inside a solid area;
+//! [`Sweep`](sidestep_rods::Sweep)). The walls do not detect a chain that starts inside a solid area;
 //! [`Floor::is_free`] does.
 
 use sidestep_import::PixelMap;
