@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Folders of crates beside this one with sources that determine results.
-const CRATES: [&str; 6] = ["kernel", "scenario", "map", "import", "collectives", "statistics"];
+const CRATES: [&str; 7] =
+    ["kernel", "scenario", "map", "import", "collectives", "statistics", "error-models"];
 /// The sources of this crate that determine results.
 const OWN: &str = "src/experiment/sweep";
 

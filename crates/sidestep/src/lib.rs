@@ -72,6 +72,7 @@ pub mod worlds;
 pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
+pub use sidestep_error_models as error_models;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
 pub use sidestep_map as map;

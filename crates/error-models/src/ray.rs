@@ -8,23 +8,23 @@ use sidestep_kernel::math;
 
 /// One box that a beam crosses after it has left the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Crossing {
+pub struct Crossing {
     /// Columns east of the body's anchor (its lower-left box).
-    pub(crate) dx: i32,
+    pub dx: i32,
     /// Rows north of the anchor.
-    pub(crate) dy: i32,
+    pub dy: i32,
     /// Distance in boxes along the beam, from the body's boundary to this box's boundary.
-    pub(crate) distance: f64,
+    pub distance: f64,
 }
 
 /// Differences below this are rounding errors, of the direction's sine and cosine, or of a length
 /// divided by the side of a box; in boxes.
-pub(crate) const EPSILON: f64 = 1e-9;
+pub const EPSILON: f64 = 1e-9;
 
 /// Returns whether a distance reaches a limit, both in boxes. This is the one rule for all edges of
 /// distance classes and ranges: a thing at an edge is beyond it, also where the edge in meters is a
 /// multiple of the side of a box that floating-point numbers cannot hold, like 0.9 m of 0.3 m.
-pub(crate) fn reaches(distance: f64, limit: f64) -> bool {
+pub fn reaches(distance: f64, limit: f64) -> bool {
     distance >= limit - EPSILON
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn reaches(distance: f64, limit: f64) -> bool {
 /// A beam through a corner of boxes goes on to the box across it. A beam that runs along a
 /// line between boxes (even sizes, multiples of 90 degrees) counts as running on the left
 /// side of it, seen along the beam.
-pub(crate) fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
+pub fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     // The first octant-exact direction: quarter turns are done on integers.
     let quarter = (bearing_deg / 90.0).floor();
     let rest_deg = bearing_deg - 90.0 * quarter;
@@ -44,7 +44,7 @@ pub(crate) fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing
 }
 
 /// Returns the same crossing for a body turned `turns` quarters to the left.
-pub(crate) fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
+pub fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
     let last = size as i32 - 1;
     let (dx, dy) = match turns % 4 {
         0 => (c.dx, c.dy),
