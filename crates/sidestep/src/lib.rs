@@ -75,9 +75,9 @@ pub use sidestep_document as document;
 pub use sidestep_error_models as error_models;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
+pub use sidestep_learn as learn;
 pub use sidestep_map as map;
 pub use sidestep_map::{Cell, GridMap, office, planning};
-pub use sidestep_robots::learn;
 pub use sidestep_scenario as scenario;
 pub use sidestep_statistics as statistics;
 

@@ -26,7 +26,6 @@ pub mod exact;
 mod external;
 mod inspect;
 mod join;
-pub mod learn;
 mod metric_info;
 pub mod metrics;
 mod odometry;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::learn::track::{Pose2, pose_at};
+use crate::track::{Pose2, pose_at};
 use sidestep_import::mrclam::{Dataset, Measurement};
 use sidestep_kernel::math::wrap_angle;
 
@@ -174,7 +174,7 @@ pub(super) mod tests {
     /// Robot 1 stands at the origin and looks along x from t = 0 to 10 s; robot 2 stands at
     /// (3, 0) until t = 5 s; landmarks 6 and 7 at (2, 0.5) and (2, -0.5). Barcodes are ten
     /// times the subject.
-    pub(in crate::learn::sensor) fn scene(measurements: Vec<Measurement>) -> Dataset {
+    pub(in crate::sensor) fn scene(measurements: Vec<Measurement>) -> Dataset {
         let still = |x: f64, until: u32| {
             let at = |i| StampedPose2 {
                 t_secs: f64::from(i) * 0.25,
@@ -192,7 +192,7 @@ pub(super) mod tests {
         }
     }
 
-    pub(in crate::learn::sensor) fn reading(
+    pub(in crate::sensor) fn reading(
         t_secs: f64,
         barcode: u32,
         range_m: f64,

@@ -1,12 +1,5 @@
-//! Learns a real robot's sensor and effector errors from its logs.
-//!
-//! Reads logs through [`sidestep_import`], counts ([`CountTable`]), and writes the result as a profile
-//! that a scenario loads by name ([`profile`]). [`sensor`] learns confusion, distance and
-//! detection; [`effector`] learns the real motion after a commanded move or turn.
-//!
-//! Every probability is reported with its count and a 95 % interval
-//! ([`statistics::wilson`](sidestep_statistics::wilson)); a part of the events is held out to test
-//! how well the rest predicts it ([`holdout`]). Learning draws no random numbers.
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
 
 pub mod effector;
 pub mod sensor;
@@ -17,8 +10,6 @@ pub mod holdout;
 pub mod profile;
 mod track;
 
-#[cfg(test)]
-mod closed_loop;
 #[cfg(test)]
 mod oracle;
 

@@ -1,16 +1,15 @@
 //! Promise: when a run with known tables is simulated and recorded, learning from the recording
 //! gives back the tables within the stated error.
 
+use sidestep::import::table::CsvTable;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
+use sidestep::learn::sensor::{self, SensorOptions};
+use sidestep::learn::{Estimate, EstimateOptions, effector};
+use sidestep::scenario::Source;
+use sidestep::statistics::chi_square_p_value;
+use sidestep::worlds::robots::robots_run;
 use std::collections::BTreeMap;
-
-use crate::learn::sensor::{self, SensorOptions};
-use crate::learn::{Estimate, EstimateOptions, effector};
-use crate::robots_run;
-use sidestep_import::table::CsvTable;
-use sidestep_kernel::Simulation;
-use sidestep_kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
-use sidestep_scenario::Source;
-use sidestep_statistics::chi_square_p_value;
 
 const CYCLES: u64 = 4000;
 

@@ -1,8 +1,9 @@
 //! The transitions from which a simulation draws a move.
 
 use super::grid_displacement::{FORWARD_CLASSES, GridDisplacement};
-use crate::learn::CountTable;
-use crate::learn::counts::{rounded, smooth};
+use crate::CountTable;
+use crate::counts::{rounded, smooth};
+use sidestep_error_models::effector::{EffectorModel, Side, Transition};
 
 /// An effector in the form of a profile; the probabilities of each action sum to 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +24,26 @@ impl EffectorProfile {
         let found = self.actions.iter().find(|(action, _)| action == name);
         found.map(|(_, transitions)| transitions.as_slice())
     }
+
+    /// Returns the effector `name` as a model. Standard actions that the profile leaves out never err, as in a
+    /// scenario that loads it.
+    ///
+    /// # Panics
+    /// When a path has a letter other than `F`, `B`, `L` and `R`.
+    pub fn model(&self, name: &str) -> EffectorModel {
+        let mut model = EffectorModel { name: name.into(), ..EffectorModel::perfect() };
+        for (action, learned) in &self.actions {
+            let transitions = learned.iter().map(ProfileTransition::transition).collect();
+            match model.actions.iter().position(|known| known == action) {
+                Some(id) => model.transitions[id] = transitions,
+                None => {
+                    model.actions.push(action.clone());
+                    model.transitions.push(transitions);
+                }
+            }
+        }
+        model
+    }
 }
 
 /// One possible result of an action.
@@ -34,6 +55,17 @@ pub struct ProfileTransition {
     pub path: String,
     /// Turn in degrees, a multiple of 90, + to the left.
     pub turn_deg: i32,
+}
+
+impl ProfileTransition {
+    fn transition(&self) -> Transition {
+        let side = |letter| Side::from_letter(letter).expect("a path of F, B, L and R");
+        Transition {
+            p: self.p,
+            path: self.path.chars().map(side).collect(),
+            turn: (self.turn_deg / 90).rem_euclid(4) as u8,
+        }
+    }
 }
 
 /// Returns the path to an outcome: ahead first, then sideways.

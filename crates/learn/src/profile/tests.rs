@@ -1,12 +1,9 @@
-//! Promise: a profile holds the learned numbers in the form that a scenario loads, and adding to
-//! one leaves the rest of its text as it is.
+//! Promise: the rows of a profile are distributions, and adding to one leaves the rest of its text as it is.
 
 use super::*;
-use crate::learn::EstimateOptions;
-use crate::learn::effector::from_csv as effector_from;
-use crate::learn::sensor::{SensorOptions, from_csv as sensor_from};
-use crate::scenario::{Behaviours, Compiled, StorageOrder};
-use sidestep_scenario::Source;
+use crate::EstimateOptions;
+use crate::effector::from_csv as effector_from;
+use crate::sensor::{SensorOptions, from_csv as sensor_from};
 
 const READINGS: &str = "true,reported,true_distance_m,reported_distance_m\n\
     robot,robot,1.0,1.2\nrobot,nothing,2.0,\nrobot,robot,3.4,1.6\nnothing,robot,,1.0\n\
@@ -33,49 +30,6 @@ fn effector_model() -> LearnedEffector {
 fn both() -> String {
     let text = with_sensor("p.toml", &empty("small"), "eye", &sensor_model()).unwrap();
     with_effector("p.toml", &text, "wheels", &effector_model()).unwrap()
-}
-
-/// Loads a scenario with one robot that has the named sensor and effector.
-fn loads(profile: &str, sensor: &str, effector: &str) -> Result<Compiled, InputError> {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("p.toml"), profile).unwrap();
-    let text = format!(
-        "format = 1\nworld = \"robots\"\nprofiles = [\"p.toml\"]\n\
-         [map]\nascii = \"\"\"\n.....\n.....\n.....\n\"\"\"\nbox_size_m = 0.25\n\
-         [robots]\ncount = 1\nsensors = [\"{sensor}\"]\neffector = \"{effector}\"\n"
-    );
-    let source = Source::new("scenario.toml", text, folder.path());
-    Compiled::new(&source, &Behaviours::new(), StorageOrder::ById)
-}
-
-#[test]
-fn a_scenario_loads_what_was_learned() {
-    let compiled = loads(&both(), "eye", "wheels").unwrap();
-    let sensor = compiled.world.sensors().next().unwrap().clone();
-    let profile = sensor_model().profile;
-    assert_eq!(sensor.observations, ["nothing", "robot", "wall"]);
-    for (index, row) in profile.confusion.iter().enumerate() {
-        let beyond = &sensor.confusion[profile.distance_classes.len()][index];
-        let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
-        assert!(beyond.iter().zip(&row.probabilities).all(close), "{row:?}");
-    }
-}
-
-#[test]
-fn a_camera_from_mrclam_loads_with_its_wheels() {
-    let Some(folder) = sidestep_testing::shared_data("logs/mrclam7") else { return };
-    let folder = folder.as_path();
-    let camera = crate::learn::sensor::from_mrclam(folder, &SensorOptions::default()).unwrap();
-    let options = EstimateOptions::default();
-    let wheels = crate::learn::effector::from_mrclam(folder, 0.25, &options).unwrap();
-    let text = with_sensor("p.toml", &empty("mrclam7"), "camera", &camera).unwrap();
-    let text = with_effector("p.toml", &text, "create", &wheels).unwrap();
-    loads(&text, "camera", "create").unwrap();
-    let parsed: toml::Table = text.parse().unwrap();
-    let forward = parsed["effectors"]["create"]["forward"].as_array().unwrap();
-    assert_eq!(forward[0]["path"].as_str(), Some("F"));
-    assert!((forward[0]["p"].as_float().unwrap() - 0.877).abs() < 0.003);
-    assert!(text.contains("interval = "));
 }
 
 #[test]

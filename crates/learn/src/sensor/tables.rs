@@ -2,7 +2,7 @@
 
 use super::options::{BEYOND, DistanceClasses};
 use super::sighting::{Candidate, Sighting};
-use crate::learn::CountTable;
+use crate::CountTable;
 use sidestep_import::mrclam::Dataset;
 
 /// Row of a table of kinds, and column: a robot.

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{assert_close, assert_moments, expected, shared};
-use crate::learn::sensor::{LearnedSensor, SensorOptions, from_mrclam};
+use crate::sensor::{LearnedSensor, SensorOptions, from_mrclam};
 
 fn learned() -> Option<(LearnedSensor, Value, Value)> {
     let model = from_mrclam(&shared("logs/mrclam7")?, &SensorOptions::default()).unwrap();

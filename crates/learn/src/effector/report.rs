@@ -6,9 +6,9 @@ use std::fmt;
 use serde::Serialize;
 
 use super::grid_displacement::FORWARD_CLASSES;
-use crate::learn::display::{self, TableHeading};
-use crate::learn::holdout::HoldoutTest;
-use crate::learn::{Estimate, EstimateOptions, LowCountRow};
+use crate::display::{self, TableHeading};
+use crate::holdout::HoldoutTest;
+use crate::{Estimate, EstimateOptions, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned effector. Displayed as readable tables, serialized for programs.

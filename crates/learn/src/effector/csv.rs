@@ -12,13 +12,12 @@ use super::transitions::{
     EffectorProfile, ProfileTransition, certain_transition, from_outcomes, intended_displacement,
     label,
 };
-use crate::learn::holdout::{holdout_test, split};
-use crate::learn::{CountTable, EstimateOptions};
+use crate::holdout::{holdout_test, split};
+use crate::{CountTable, EstimateOptions};
+use sidestep_error_models::effector::STANDARD_ACTIONS;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
 
-/// The commands of a robot.
-const ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
 /// A longer displacement is not a single action; two such make the longest path of a profile.
 const MAX_BOXES: f64 = 8.0;
 /// A wider turn is not a single action either.
@@ -31,7 +30,7 @@ const RULE: &str = "counts of measured displacements, phase-averaged where they 
 /// One row of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MeasuredDisplacement {
-    /// Index in [`ACTIONS`].
+    /// Index in [`STANDARD_ACTIONS`].
     action: usize,
     ahead_boxes: f64,
     left_boxes: f64,
@@ -58,7 +57,8 @@ impl MeasuredDisplacement {
     }
 
     fn as_turn(&self) -> TurnEvent {
-        let commanded_deg = f64::from(90 * intended_displacement(ACTIONS[self.action]).quarters);
+        let commanded_deg =
+            f64::from(90 * intended_displacement(STANDARD_ACTIONS[self.action]).quarters);
         TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
     }
 }
@@ -68,8 +68,9 @@ pub(super) fn learn(
     options: &EstimateOptions,
 ) -> Result<LearnedEffector, InputError> {
     let (free, n_cut) = parse(table)?;
-    let by_action: Vec<ActionLog> =
-        (0..ACTIONS.len()).map(|action| ActionLog::from_displacements(&free, action)).collect();
+    let by_action: Vec<ActionLog> = (0..STANDARD_ACTIONS.len())
+        .map(|action| ActionLog::from_displacements(&free, action))
+        .collect();
     let mut report = report(table.place(), &by_action, options);
     if n_cut > 0 {
         report.rejected.insert("contact".to_string(), n_cut);
@@ -98,11 +99,11 @@ impl ActionLog {
             *weights.entry(outcome).or_insert(0.0) += weight;
         }
         // Infinite, so that the intended outcome comes first whether or not it was seen.
-        weights.insert(intended_displacement(ACTIONS[action]), f64::INFINITY);
+        weights.insert(intended_displacement(STANDARD_ACTIONS[action]), f64::INFINITY);
         let mut ranked: Vec<(GridDisplacement, f64)> = weights.into_iter().collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         let outcomes = ranked.into_iter().map(|(outcome, _)| outcome).collect();
-        Self { action: ACTIONS[action], events, outcomes }
+        Self { action: STANDARD_ACTIONS[action], events, outcomes }
     }
 
     fn counts<'e>(&self, events: impl IntoIterator<Item = &'e MeasuredDisplacement>) -> CountTable {
@@ -236,11 +237,11 @@ impl DisplacementColumns {
 
 /// Returns an action by its name, or by the number that a recording gives it.
 fn action(place: &str, word: Token<'_>) -> Result<usize, InputError> {
-    let by_name = ACTIONS.iter().position(|name| *name == word.text);
-    let by_number = || word.text.parse().ok().filter(|number| *number < ACTIONS.len());
+    let by_name = STANDARD_ACTIONS.iter().position(|name| *name == word.text);
+    let by_number = || word.text.parse().ok().filter(|number| *number < STANDARD_ACTIONS.len());
     by_name.or_else(by_number).ok_or_else(|| {
         let cause = format!("`{}` is not an action", word.text);
-        word.error(&place, cause, &format!("use one of {}", ACTIONS.join(", ")))
+        word.error(&place, cause, &format!("use one of {}", STANDARD_ACTIONS.join(", ")))
     })
 }
 

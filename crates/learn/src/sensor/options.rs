@@ -1,6 +1,6 @@
 //! Options of learning a sensor.
 
-use crate::learn::EstimateOptions;
+use crate::EstimateOptions;
 use sidestep_kernel::InputError;
 
 /// Largest number of distance classes; more are taken for a mistake.

@@ -7,8 +7,8 @@ use super::camera::{NOTHING, NamedRow, SensorProfile, certain_row, distance_rows
 use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
 use super::readings::{LabeledReading, read};
 use super::report::{ErrorMoments, SensorReport};
-use crate::learn::holdout::{HoldoutTest, holdout_test, split};
-use crate::learn::{CountMatrix, CountTable};
+use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::{CountMatrix, CountTable};
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 use sidestep_statistics::Moments;
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn readings_in_meters_become_rows_by_class() {
         let options = SensorOptions {
-            estimate: crate::learn::EstimateOptions { alpha: 0.0, ..Default::default() },
+            estimate: crate::EstimateOptions { alpha: 0.0, ..Default::default() },
             distance_edges_m: vec![1.5],
             ..Default::default()
         };
@@ -306,7 +306,7 @@ mod tests {
             rows in "((nothing|wall|robot),(nothing|wall|robot),[0-9]{0,2},(beyond|[0-9]{0,2}|x)\n){0,9}",
             alpha in 0.0..2.0_f64,
         ) {
-            let estimate = crate::learn::EstimateOptions { alpha, ..Default::default() };
+            let estimate = crate::EstimateOptions { alpha, ..Default::default() };
             let options = SensorOptions { estimate, ..Default::default() };
             let head = "true,reported,true_distance_m,reported_distance_m\n";
             if let Ok(model) = learned(&format!("{head}{rows}"), &options) {

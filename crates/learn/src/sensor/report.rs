@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::detection::Detection;
 use super::sighting::is_consistent;
-use crate::learn::display::{self, TableHeading};
-use crate::learn::holdout::HoldoutTest;
-use crate::learn::{CountMatrix, CountTable, Estimate, EstimateOptions, LowCountRow};
+use crate::display::{self, TableHeading};
+use crate::holdout::HoldoutTest;
+use crate::{CountMatrix, CountTable, Estimate, EstimateOptions, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned sensor. Displayed as readable tables, serialized for programs.

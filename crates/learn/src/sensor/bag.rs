@@ -8,7 +8,7 @@ use super::csv::ReadingLog;
 use super::options::{DistanceClasses, SensorOptions};
 use super::readings::{Distance, LabeledReading};
 use super::report::MapComparison;
-use crate::learn::track::{Gaps, Pose2, pose_at};
+use crate::track::{Gaps, Pose2, pose_at};
 use sidestep_import::bag::BagLog;
 use sidestep_import::bag::messages::LaserScan;
 use sidestep_import::{PixelMap, RayHit};

@@ -3,8 +3,9 @@
 use super::detection::Detection;
 use super::options::{BEYOND, DistanceClasses, SensorOptions};
 use super::tables::{LANDMARK, NO_SUBJECT, ROBOT};
-use crate::learn::CountTable;
-use crate::learn::counts::{rounded, smooth};
+use crate::CountTable;
+use crate::counts::{rounded, smooth};
+use sidestep_error_models::sensor::SensorModel;
 
 /// The report when nothing is seen.
 pub(super) const NOTHING: &str = "nothing";
@@ -35,6 +36,57 @@ pub struct SensorProfile {
     pub assumed: Vec<String>,
     /// The rule by which counts became rows.
     pub rule: String,
+}
+
+impl SensorProfile {
+    /// Returns the sensor `name` as a model for bodies of these kinds, the first of which is the empty box. A kind
+    /// that the sensor has no observation for reads as nothing.
+    ///
+    /// # Panics
+    /// When the profile's rows do not fit its observations and distance classes.
+    pub fn model(&self, name: &str, kinds: &[String]) -> SensorModel {
+        let rows_of = |rows: &[NamedRow], names: &[String]| -> Vec<Vec<f64>> {
+            names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
+        };
+        let classes = [&self.distance_classes[..], &[BEYOND.to_string()]].concat();
+        let everywhere = rows_of(&self.confusion, &self.observations);
+        let mut confusion = vec![everywhere; classes.len()];
+        for (class, rows) in &self.confusion_by_class {
+            let index = classes.iter().position(|known| known == class);
+            let matrix = &mut confusion[index.expect("one of the classes")];
+            for (row, observation) in matrix.iter_mut().zip(&self.observations) {
+                if let Some(own) = row_of(rows, observation) {
+                    *row = own;
+                }
+            }
+        }
+        SensorModel {
+            name: name.into(),
+            bearings_deg: self.bearings_deg.clone(),
+            range_m: self.range_m,
+            observations: self.observations.clone(),
+            confusion,
+            distance_edges_m: self.distance_edges_m.clone(),
+            distance_classes: self.distance_classes.clone(),
+            distance_confusion: rows_of(&self.distance_confusion, &classes),
+            designates: kinds.iter().map(|kind| self.designated_observation(kind)).collect(),
+        }
+    }
+
+    /// Returns the index of the observation that a kind designates.
+    fn designated_observation(&self, kind: &str) -> u8 {
+        let own = self.designates.iter().find(|(name, _)| name == kind);
+        let designated = own.map_or(kind, |(_, observation)| observation);
+        let index = self.observations.iter().position(|known| known == designated);
+        index.unwrap_or_default() as u8
+    }
+}
+
+/// Returns the row of a name, brought to sum to 1: printed digits may leave it short.
+fn row_of(rows: &[NamedRow], name: &str) -> Option<Vec<f64>> {
+    let row = rows.iter().find(|row| row.name == name)?;
+    let sum: f64 = row.probabilities.iter().sum();
+    Some(row.probabilities.iter().map(|p| p / sum).collect())
 }
 
 /// One row of a table of probabilities.

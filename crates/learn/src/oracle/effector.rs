@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use super::{assert_close, assert_moments, expected, shared};
-use crate::learn::EstimateOptions;
-use crate::learn::effector::{LearnedEffector, from_carmen, from_mrclam};
+use crate::EstimateOptions;
+use crate::effector::{LearnedEffector, from_carmen, from_mrclam};
 
 const MOMENTS: [&str; 4] = ["ahead_boxes", "left_boxes", "dtheta_minus_cmd_rad", "duration_s"];
 

@@ -5,8 +5,8 @@
 use super::LearnedEffector;
 use super::events::{Events, MoveEvent, TurnEvent};
 use super::report::EffectorReport;
-use crate::learn::EstimateOptions;
-use crate::learn::track::{Displacement2, Pose2};
+use crate::EstimateOptions;
+use crate::track::{Displacement2, Pose2};
 use sidestep_import::carmen::{CorrectedLog, Scan};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{hypot, tan, wrap_angle};

@@ -2,8 +2,8 @@
 
 use super::carmen::{EventRule, learn_with_rule};
 use super::{LearnedEffector, check_box};
-use crate::learn::EstimateOptions;
-use crate::learn::track::{Gaps, Pose2, pose_at};
+use crate::EstimateOptions;
+use crate::track::{Gaps, Pose2, pose_at};
 use sidestep_import::bag::BagLog;
 use sidestep_import::carmen::{CorrectedLog, Scan};
 use sidestep_import::mrclam::StampedPose2;

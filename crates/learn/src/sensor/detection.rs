@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::options::DistanceClasses;
 use super::sighting::{other_subjects, position_of};
-use crate::learn::CountTable;
-use crate::learn::track::pose_at;
+use crate::CountTable;
+use crate::track::pose_at;
 use sidestep_import::mrclam::{Dataset, RobotLog};
 
 /// Half of the angle within which a subject is surely in view.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::events::{Events, MoveEvent, TurnEvent};
 use super::{LearnedEffector, check_box};
-use crate::learn::EstimateOptions;
-use crate::learn::track::{Displacement2, pose_at};
+use crate::EstimateOptions;
+use crate::track::{Displacement2, pose_at};
 use sidestep_import::mrclam::{Dataset, RobotLog, VelocityCommand};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::wrap_angle;

@@ -10,8 +10,8 @@ use super::report::{EffectorReport, ForwardShares, TurnReport};
 use super::transitions::{
     self, EffectorProfile, ProfileTransition, TURN_CLASSES, intended_displacement, turn_class,
 };
-use crate::learn::holdout::{HoldoutTest, holdout_test, split};
-use crate::learn::{CountTable, EstimateOptions};
+use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::{CountTable, EstimateOptions};
 use sidestep_statistics::Moments;
 
 /// One commanded box ahead, and the motion that followed.

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, Value, value};
 
 use super::{implicit, words};
-use crate::learn::effector::LearnedEffector;
-use crate::learn::holdout::HoldoutTest;
-use crate::learn::sensor::LearnedSensor;
-use crate::learn::{Estimate, EstimateOptions, LowCountRow};
+use crate::effector::LearnedEffector;
+use crate::holdout::HoldoutTest;
+use crate::sensor::LearnedSensor;
+use crate::{Estimate, EstimateOptions, LowCountRow};
 
 pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     let report = &model.report;
