@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Folders of crates beside this one with sources that determine results.
-const CRATES: [&str; 8] =
-    ["kernel", "scenario", "map", "import", "collectives", "statistics", "rods", "arms"];
+const CRATES: [&str; 9] = [
+    "kernel", "scenario", "map", "import", "collectives", "statistics", "error-models", "rods", "arms",
+];
 /// The sources of this crate that determine results.
 const OWN: &str = "src/experiment/sweep";
 

@@ -39,7 +39,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 12] = [
+const WITHOUT_WORLDS: [&str; 15] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -52,6 +52,9 @@ const WITHOUT_WORLDS: [&str; 12] = [
     "crates/rods",
     "crates/arms",
     "crates/map",
+    "crates/error-models",
+    "crates/learn",
+    "crates/exact",
 ];
 
 /// Crates that drive runs of any world: the list of worlds is handed to them, and their code names none.
