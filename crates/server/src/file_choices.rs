@@ -1,7 +1,7 @@
 //! Files that a scenario can name.
 
 use crate::files::AllowedFiles;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 use std::collections::{BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Component, Path, PathBuf};

@@ -3,7 +3,7 @@
 //! They are spaced by computing time, not by cycles: the stretch between two of them takes about as long
 //! everywhere. Beyond the bound of memory every second one goes, and the next ones are twice as far apart.
 
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

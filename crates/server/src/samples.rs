@@ -2,8 +2,8 @@
 
 use crate::protocol::{MetricName, ReplyBody};
 use serde_json::Value;
-use sidestep::kernel::Cycle;
-use sidestep::scenario::{MetricInfo, MetricLabel, metric_label};
+use sidestep_kernel::Cycle;
+use sidestep_scenario::{MetricInfo, MetricLabel, metric_label};
 use std::time::Duration;
 
 /// The largest number of samples; beyond it they are thinned by half.

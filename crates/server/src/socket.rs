@@ -9,7 +9,7 @@ use crate::session::{
 };
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
-use sidestep::scenario::{Source, Worlds};
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -166,7 +166,7 @@ impl SocketSessions {
             Method::Files { folder } => {
                 let means = self.house.means.clone();
                 self.answer_in_thread(id, move || {
-                    let entries = means.files.list(folder.as_deref(), means.worlds)?;
+                    let entries = means.files.list(folder.as_deref(), &means.worlds)?;
                     Ok(ReplyBody::Files { entries })
                 });
                 None
@@ -194,8 +194,8 @@ impl SocketSessions {
                 self.on_text(id, session, move |means, source| model(means, source, text))
             }
             Method::Schema { world } => {
-                let worlds = self.house.means.worlds;
-                self.answer_in_thread(id, move || schema(worlds, &world));
+                let worlds = self.house.means.worlds.clone();
+                self.answer_in_thread(id, move || schema(&worlds, &world));
                 None
             }
             call => {
@@ -258,7 +258,7 @@ impl SocketSessions {
 ///
 /// # Errors
 /// When there is no such world.
-fn schema(worlds: Worlds, world: &str) -> Result<ReplyBody, Problem> {
+fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let schema = worlds.schema(Some(world)).ok_or_else(|| {
         let names = worlds.names().join(", ");
         Problem::new(world, "no such world is known", format!("name one of {names}"))

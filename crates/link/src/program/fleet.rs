@@ -22,6 +22,7 @@ use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
+use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     CommonSettings, FleetJob, FleetScene, FleetStatus, LinkMessage, NodeJob, NodeStatus,
 };
@@ -45,7 +46,8 @@ pub(super) fn fly(job: &FleetJob, lifeline: &ParentMonitor) -> Result<(), Error>
     let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
     let told = metrics::MetricsExporter::open(job.common.metrics.as_deref())?;
     let keep = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
-    let journey = ManagedRun::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
+    let journey =
+        ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, keep)?;
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&fleet_scene(journey.simulation()));
     let shown = ViewPublisher::new(ViewServer::open(&wire, scene).map_err(endpoint_error)?);
@@ -54,7 +56,7 @@ pub(super) fn fly(job: &FleetJob, lifeline: &ParentMonitor) -> Result<(), Error>
         Welcome { clock: job.clock, topology: job.topology, overrides, logs_packets: job.packets };
     let terms = ServerConfig {
         scenario: fingerprint,
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
         welcome,
         lease: Duration::from_secs_f64(job.common.lease_s),
         has_faults: scenario.world.has_faults(),
@@ -78,7 +80,7 @@ pub(super) fn fly(job: &FleetJob, lifeline: &ParentMonitor) -> Result<(), Error>
 /// Returns the unchanging part of a run that is watched.
 fn fleet_scene(run: &dyn Simulation) -> FleetScene {
     FleetScene {
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
         world: run.world().into(),
         agent: run.agent().into(),
         seed: run.config().seed,

@@ -24,6 +24,7 @@ mod watch;
 
 use output::print_message;
 use parent_monitor::ParentMonitor;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
 use std::io::BufRead;
@@ -56,7 +57,7 @@ pub fn main() -> ExitCode {
 }
 
 fn version() -> String {
-    format!("sidestep-link {}", sidestep_session::build_id())
+    format!("sidestep-link {}", WORLDS.build())
 }
 
 fn run_job(job: Job) -> Result<(), Error> {
@@ -91,7 +92,7 @@ fn check_and_start_log<'a>(
 
 /// Refuses the job of another build: all that decide must be of the same build.
 fn check_build(build: &str) -> Result<(), Error> {
-    let own = sidestep_session::build_id();
+    let own = WORLDS.build();
     if build == own {
         return Ok(());
     }

@@ -9,6 +9,7 @@ use crate::wire::Peer;
 use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::NodeJob;
 use std::time::Duration;
@@ -33,7 +34,7 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let wire = ZenohWire::node(Peer::Node(agent), &job.connect, tls, patience);
     let wire = wire.map_err(endpoint_error)?.with_listeners(ports);
     let mut mail = Messenger::new(Peer::Node(agent), Box::new(wire));
-    let build = sidestep_session::build_id();
+    let build = WORLDS.build();
     let question = Join {
         agent,
         scenario: scenario.fingerprint()?,

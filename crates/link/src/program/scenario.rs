@@ -23,7 +23,7 @@ impl Scenario {
     /// When it is wrong, or its agents cannot be flown by nodes.
     pub(super) fn read(flown: &JobScenario) -> Result<Self, InputError> {
         let (source, compiled) =
-            sidestep_session::read_scenario(WORLDS, &flown.file, &flown.overrides)?;
+            sidestep_session::read_scenario(&WORLDS, &flown.file, &flown.overrides)?;
         Self::from_compiled(source, compiled)
     }
 

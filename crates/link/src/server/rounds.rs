@@ -138,7 +138,7 @@ mod tests {
         let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
         let keep = OutputPaths::default();
         let journey =
-            ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+            ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, keep).expect("started");
         HostedRun::new(journey, world, &NoWatcher)
     }
 

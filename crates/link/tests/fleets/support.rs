@@ -94,7 +94,7 @@ fn run_result(journey: ManagedRun) -> RunResult {
 pub(crate) fn run_in_one_process(text: &str) -> RunResult {
     let (source, compiled) = compiled(text);
     let mut journey =
-        ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+        ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
             .expect("started");
     let cycles = journey.simulation().config().cycles;
     journey.advance_to(cycles, &NoWatcher).expect("flown");
@@ -190,7 +190,7 @@ pub(crate) fn run_in_threads(
         lease: way.lease,
         has_faults: world.has_faults(),
     };
-    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let journey = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
     let mut stage = HostedRun::new(journey, world.clone(), &NoWatcher);
     let mail = Messenger::new(Peer::Server, (way.wire)(Peer::Server));

@@ -134,7 +134,7 @@ impl FieldResults {
             .with_size(plan.field_seeds, Some(plan.field_cycles));
         let results =
             study.run_with(plan.workers, "open field", progress, settings, |source, cell| {
-                Ok(start_cell(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
+                Ok(start_cell(&WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }

@@ -9,8 +9,8 @@ use axum::extract::State;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::kernel::{Cycle, Interrupt};
-use sidestep::scenario::Worlds;
+use sidestep_kernel::{Cycle, Interrupt};
+use sidestep_scenario::Worlds;
 use sidestep_session::export::{AnimationOptions, ExportRequest, Format, export};
 use sidestep_session::{Error, RecordedRun, Watcher};
 use std::path::{Path, PathBuf};
@@ -36,10 +36,11 @@ pub(crate) async fn answer(
 async fn export_response(house: &AppState, fields: &QueryFields) -> Result<Response, ResultError> {
     let path = house.means.files.resolve(fields.require("path")?)?;
     let wanted = ExportSpec::from_fields(fields)?;
-    let (worlds, workers) = (house.means.worlds, house.means.workers);
+    let worlds = house.means.worlds.clone();
+    let workers = house.means.workers;
     let name = wanted.file_name(&path);
     let media = wanted.media;
-    let work = move |client: &CancelToken| write_export(worlds, &path, &wanted, workers, client);
+    let work = move |client: &CancelToken| write_export(&worlds, &path, &wanted, workers, client);
     let bytes = house.workshop.run(work).await?;
     let disposition = format!("attachment; filename=\"{name}\"");
     let about = [
@@ -107,7 +108,7 @@ pub(super) fn plain_file_name(name: &str) -> String {
 
 /// Exports to a temporary folder; returns the content of the file.
 fn write_export(
-    worlds: Worlds,
+    worlds: &Worlds,
     path: &Path,
     wanted: &ExportSpec,
     workers: usize,

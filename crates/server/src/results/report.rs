@@ -13,8 +13,8 @@ use axum::http::header::{
 };
 use axum::http::{HeaderMap, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::scenario::Worlds;
 use sidestep_report::{RenderedReport, SvgFile, render};
+use sidestep_scenario::Worlds;
 use sidestep_session::report::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -50,12 +50,12 @@ async fn report_response(
 ) -> Result<Response, ResultError> {
     let path = house.means.files.resolve(fields.require("path")?)?;
     let part = fields.get("as").map(String::from);
-    let worlds = house.means.worlds;
+    let worlds = house.means.worlds.clone();
     let kept = house.workshop.cached_report(&path).filter(|_| part.is_some());
     let folder = path.clone();
     let work = move |client: &CancelToken| match kept {
         Some(kept) => Ok(kept),
-        None => render_cached(worlds, &folder, client).map(Arc::new),
+        None => render_cached(&worlds, &folder, client).map(Arc::new),
     };
     let rendered = house.workshop.run(work).await?;
     house.workshop.cache_report(path.clone(), rendered.clone());
@@ -66,7 +66,7 @@ async fn report_response(
 }
 
 fn render_cached(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Path,
     client: &CancelToken,
 ) -> Result<RenderedReport, ResultError> {

@@ -9,8 +9,8 @@ use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
 use crate::protocol::{OpenTarget, Problem, ReplyBody};
-use sidestep::kernel::{Cycle, Simulation};
-use sidestep::scenario::{MetricInfo, Source, Worlds};
+use sidestep_kernel::{Cycle, Simulation};
+use sidestep_scenario::{MetricInfo, Source, Worlds};
 use sidestep_session::{Error, RecordedRun, read_scenario};
 use std::path::Path;
 use std::sync::Arc;
@@ -78,7 +78,7 @@ impl OpenRun {
         match what {
             OpenTarget::Scenario { path } => {
                 let path = means.files.resolve(path)?;
-                let read = read_scenario(means.worlds, &path, &[]).map_err(|e| problem(&e))?;
+                let read = read_scenario(&means.worlds, &path, &[]).map_err(|e| problem(&e))?;
                 let own = SessionFile::open(&path, &read.0);
                 Self::from_scenario(means, read.0, seed, own)
             }
@@ -127,7 +127,7 @@ impl OpenRun {
             return Err(recording_is_read_only(path));
         }
         let path = means.files.resolve(path)?;
-        let recorded = RecordedRun::open(means.worlds, &path).map_err(|e| problem_of(&e))?;
+        let recorded = RecordedRun::open(&means.worlds, &path).map_err(|e| problem_of(&e))?;
         let resolved = recorded.resolved_scenario().map_err(|e| problem(&e))?;
         let run = recorded.start_for_viewing(means.workers).map_err(|e| problem(&e))?;
         let until = recorded.cycles_done;
@@ -295,7 +295,7 @@ pub(crate) fn text_problems(
     };
     Ok(match means.worlds.compile(&source) {
         Err(_) => {
-            let errors = sidestep::problems(means.worlds, &source);
+            let errors = sidestep_experiment::problems(&means.worlds, &source);
             errors.iter().map(|error| problem(&source.error_at_reference(error))).collect()
         }
         Ok(compiled) => {

@@ -38,7 +38,7 @@ fn means(folder: &std::path::Path, workers: usize) -> SessionDeps {
     let files = AllowedFiles::from_roots(&[folder.to_path_buf()]).expect("a folder");
     let (budget, screens) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
     SessionDeps {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         files,
         workers,
         read_only: false,

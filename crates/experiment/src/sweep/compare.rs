@@ -2,9 +2,9 @@
 
 use super::groups::RunGroups;
 use super::table::RunColumn;
-use crate::statistics::{Bootstrap, Interval, Pairs, holm};
 use serde::Serialize;
 use sidestep_kernel::ports::Values;
+use sidestep_statistics::{Bootstrap, Interval, Pairs, holm};
 
 /// Difference between a variant and the baseline in one metric, over pairs of equal replicates.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,8 +4,8 @@ use super::cell::Outcome;
 use super::file::Precision;
 use super::plan::{Cell, Plan};
 use super::table::RunTable;
-use crate::statistics::{StopDecision, StopReason, StoppingRule};
 use serde::Serialize;
+use sidestep_statistics::{StopDecision, StopReason, StoppingRule};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of runs of each variant before the first check.
@@ -154,9 +154,9 @@ fn is_present(value: &Option<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{BaseScenario, Factor, Sweep};
-    use crate::scenario::Source;
+    use crate::sweep::{BaseScenario, Factor, Sweep};
     use serde_json::json;
+    use sidestep_scenario::Source;
 
     fn plan(max_runs: u32) -> Plan {
         let mut sweep = Sweep::from_scenario("s.toml");

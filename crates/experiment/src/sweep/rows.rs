@@ -270,10 +270,10 @@ fn widen(values: &mut Values, value: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{BaseScenario, Factor, Sweep};
-    use crate::scenario::Source;
+    use crate::sweep::{BaseScenario, Factor, Sweep};
     use proptest::prelude::*;
     use serde_json::json;
+    use sidestep_scenario::Source;
 
     fn plan() -> Plan {
         let mut sweep = Sweep::from_scenario("s.toml");

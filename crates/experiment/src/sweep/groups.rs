@@ -4,12 +4,12 @@ use super::Label;
 use super::options::SummaryOptions;
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::DEFAULT_LABEL;
-use crate::scenario::{MetricInfo, metric_label};
-use crate::statistics::{Sample, wilson};
 use serde::Serialize;
 use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
+use sidestep_scenario::{MetricInfo, metric_label};
+use sidestep_statistics::{Sample, wilson};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most characters of a value in the name of a level that stands for several parameters.
@@ -169,7 +169,7 @@ impl<'a> RunGroups<'a> {
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
         let mean = |r: usize| {
             let of_all: Option<Vec<f64>> = columns.iter().map(|c| finite(c[r])).collect();
-            crate::statistics::mean(&of_all?)
+            sidestep_statistics::mean(&of_all?)
         };
         // Where all are seedless, every replicate gives the same number.
         let all = if group.iter().all(|v| self.seedless[*v]) { 1 } else { usize::MAX };

@@ -11,10 +11,10 @@ use super::Label;
 use super::groups::RunGroups;
 use super::label::capitalized;
 use super::table::RunColumn;
-use crate::statistics::{Sample, wilson};
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_kernel::ports::Values;
+use sidestep_statistics::{Sample, wilson};
 use std::collections::BTreeMap;
 
 /// Largest number of series in a figure: more cannot be distinguished.

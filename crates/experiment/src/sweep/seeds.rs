@@ -7,8 +7,7 @@
 use super::cell::Outcome;
 use super::plan::{Cell, Plan};
 use super::table::{Role, RunTable};
-use crate::scenario::SeedEffect;
-use crate::worlds::WORLDS;
+use sidestep_scenario::{SeedEffect, WorldType};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of runs of a variant before the others, where its world cannot tell.
@@ -87,7 +86,11 @@ pub(super) fn seedless_variants(plan: &Plan, runs: &RunTable) -> Vec<bool> {
 }
 
 /// Returns the notes that a reader must know about the seeds of these runs.
-pub(super) fn seed_notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
+pub(super) fn seed_notes(
+    plan: &Plan,
+    runs: &RunTable,
+    world: Option<&dyn WorldType>,
+) -> Vec<String> {
     let trials = PilotRuns::from_table(plan, runs);
     let all = plan.variants.len() as u32;
     let count = |holds: &dyn Fn(u32) -> bool| (0..all).filter(|v| holds(*v)).count();
@@ -123,17 +126,17 @@ pub(super) fn seed_notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
             of_all(unchanged)
         ));
     }
-    notes.extend(seed_remedy(&plan.world).filter(|_| !notes.is_empty()));
+    if !notes.is_empty() {
+        notes.extend(world.and_then(seed_remedy));
+    }
     notes
 }
 
-/// Returns the features to ask for in a scenario of a world so that its seeds change something.
-pub fn seed_remedy(world: &str) -> Option<String> {
-    let draws = WORLDS
-        .find(world)
-        .map(|world| world.random_quantities())
-        .filter(|draws| !draws.is_empty())?;
-    Some(format!("Seeds change what is drawn: {draws}."))
+/// Returns the features to ask for in a scenario of a world so that its seeds change something; `None` where the
+/// world lists none.
+pub fn seed_remedy(world: &dyn WorldType) -> Option<String> {
+    let draws = world.random_quantities();
+    (!draws.is_empty()).then(|| format!("Seeds change what is drawn: {draws}."))
 }
 
 /// Returns the number of variants of which all runs ended alike, although seeds might decide.
@@ -161,8 +164,9 @@ fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{BaseScenario, Factor, RunTableBuilder, Sweep};
-    use crate::scenario::Source;
+    use crate::sweep::{BaseScenario, Factor, RunTableBuilder, Sweep};
+    use crate::testing::worlds;
+    use sidestep_scenario::Source;
 
     /// A plan of two variants with four runs each.
     fn plan(seeds: [SeedEffect; 2]) -> Plan {
@@ -183,7 +187,7 @@ mod tests {
     #[test]
     fn what_draws_nothing_is_planned_once() {
         let plan = plan([SeedEffect::Nothing, SeedEffect::Decide]);
-        let cells: Vec<Cell> = plan.shard_cells(crate::experiment::sweep::Shard::ALL).collect();
+        let cells: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
         assert_eq!((plan.runs(), cells.len()), (5, 5));
         assert_eq!(cells.iter().filter(|c| c.variant == 0).count(), 1);
     }
@@ -193,7 +197,7 @@ mod tests {
         for (digests, settled) in [(["a", "a"], true), (["a", "b"], false), (["", ""], false)] {
             let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
             let mut trials = PilotRuns::new(&plan);
-            let open: Vec<Cell> = plan.shard_cells(crate::experiment::sweep::Shard::ALL).collect();
+            let open: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
             let first = trials.next_cells(open.clone());
             assert!(
                 first.len() == 4 && first.iter().all(|c| c.replicate < PILOT_RUNS),
@@ -211,13 +215,13 @@ mod tests {
     fn the_table_has_no_runs_beyond_trials_that_settle_and_readers_are_told() {
         let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
         let mut rows = RunTableBuilder::default();
-        for cell in plan.shard_cells(crate::experiment::sweep::Shard::ALL) {
+        for cell in plan.shard_cells(crate::sweep::Shard::ALL) {
             rows.push(&outcome(cell, "the same"));
         }
         let table = rows.build(&plan).expect("no twins");
         assert_eq!(table.runs(), 2 + 4);
         assert_eq!(seedless_variants(&plan, &table), [true, false]);
-        let told = seed_notes(&plan, &table);
+        let told = seed_notes(&plan, &table, worlds().find("chain"));
         assert!(
             told[0].contains("in 1 of 2 variants: the runs with the seeds 7 and 8"),
             "{told:?}"
@@ -233,14 +237,11 @@ mod tests {
     fn where_seeds_decide_nothing_is_said_of_what_they_could_change() {
         let plan = plan([SeedEffect::Decide, SeedEffect::Decide]);
         let mut rows = RunTableBuilder::default();
-        for (k, cell) in plan.shard_cells(crate::experiment::sweep::Shard::ALL).enumerate() {
+        for (k, cell) in plan.shard_cells(crate::sweep::Shard::ALL).enumerate() {
             rows.push(&outcome(cell, &format!("end {k}")));
         }
         let table = rows.build(&plan).expect("no twins");
-        assert!(seed_notes(&plan, &table).is_empty());
-        assert!(
-            WORLDS.0.iter().all(|world| seed_remedy(world.name()).is_some()),
-            "every world tells"
-        );
+        assert!(seed_notes(&plan, &table, worlds().find("chain")).is_empty());
+        assert!(worlds().iter().all(|world| seed_remedy(world).is_some()));
     }
 }

@@ -1,7 +1,7 @@
 //! A text that is repaired step by step, and the way back to the text as it was given.
 
-use crate::scenario::Source;
 use sidestep_kernel::InputError;
+use sidestep_scenario::Source;
 use std::ops::Range;
 use toml::de::DeTable;
 

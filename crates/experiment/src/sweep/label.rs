@@ -1,8 +1,8 @@
 //! Names with units in them, split into words and unit.
 
-use crate::scenario::{MetricInfo, metric_label};
 use serde::Serialize;
 use sidestep_kernel::ports::table::split_unit;
+use sidestep_scenario::{MetricInfo, metric_label};
 use std::fmt;
 
 /// The label of a column on an axis. Displayed as `mean delay (%)`.

@@ -2,13 +2,13 @@
 
 use super::summary::MetricValues;
 use super::*;
-use crate::statistics::Bootstrap;
 use proptest::prelude::*;
 use sidestep_document::FigureKind;
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_statistics::Bootstrap;
 
 fn column(name: &str, role: Role, values: Values) -> RunColumn {
     RunColumn { name: name.into(), role, values }
@@ -136,7 +136,7 @@ fn a_column_of_yes_and_no_is_a_share_with_wilsons_interval() {
     let arrived = of(&summary, "arrived");
     assert!(arrived.is_share);
     let MetricValues::Share(share) = &arrived.variants[0].values else { panic!("a share") };
-    assert_eq!(share.interval, Some(crate::statistics::wilson(share.yes as f64, 20.0)));
+    assert_eq!(share.interval, Some(sidestep_statistics::wilson(share.yes as f64, 20.0)));
     let comparison = &arrived.comparisons[0];
     assert_eq!(comparison.p, comparison.p_sign, "McNemar's test");
 }

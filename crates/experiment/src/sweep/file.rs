@@ -3,10 +3,10 @@
 use super::baseline::BaselineSpec;
 use super::design::{self, Design, Factor, LatinHypercube};
 use super::variant::{Setting, Variant};
-use crate::scenario::{FORMAT, Source, Spanned, schema};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use sidestep_scenario::{FORMAT, Source, Spanned, schema};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

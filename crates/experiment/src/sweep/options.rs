@@ -1,7 +1,7 @@
 //! Options of a summary.
 
-use crate::scenario::MetricInfo;
-use crate::statistics::Bootstrap;
+use sidestep_scenario::MetricInfo;
+use sidestep_statistics::Bootstrap;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Options of a summary.

@@ -7,9 +7,9 @@ use super::summary::{
     MetricSection, MetricSummary, MetricValues, NOT_REQUESTED, NumericSummary, OmittedMetric,
     Proportion, Quantile, Summary, VariantMetric,
 };
-use crate::statistics::Interval;
 use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::math;
+use sidestep_statistics::Interval;
 
 impl Summary {
     /// Returns the summary as tables.

@@ -6,9 +6,9 @@
 //! a single variant for another reason, is that variant, for all others.
 
 use super::variant::{BaseScenario, DEFAULT_LABEL, Setting, Variant};
-use crate::scenario::suggestion;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use sidestep_scenario::suggestion;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::Value;
 
@@ -220,8 +220,8 @@ fn canonical(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::{Plan, Sweep};
-    use crate::scenario::Source;
+    use crate::sweep::{Plan, Sweep};
+    use sidestep_scenario::Source;
 
     const SCENARIO: &str = "format = 1\nregime = \"both\"\n[robots]\ncount = 3\n";
 

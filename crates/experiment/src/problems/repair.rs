@@ -2,9 +2,9 @@
 
 use super::draft::Draft;
 use super::tree::{find, key_path};
-use crate::scenario::schema;
 use serde_json::Value;
 use sidestep_kernel::InputError;
+use sidestep_scenario::schema;
 
 /// Most examples that are tried for a key.
 const MAX_EXAMPLES: usize = 3;
@@ -205,8 +205,8 @@ fn mentions(error: &InputError, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Source;
     use serde_json::json;
+    use sidestep_scenario::Source;
 
     const TEXT: &str = "[[robots]]\ncuont = 3\nkind = \"cat\"\nat = [1, 2]\n";
 

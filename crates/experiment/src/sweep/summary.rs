@@ -3,9 +3,9 @@
 use super::Label;
 use super::compare::Comparison;
 use super::groups::{Level, Parameter};
-use crate::statistics::{Correlation, Interval, QuantileInterval};
 use serde::Serialize;
 use sidestep_document::{Estimate, Figure, Table};
+use sidestep_statistics::{Correlation, Interval, QuantileInterval};
 
 /// The quantiles that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -32,7 +32,7 @@ pub struct Quantile {
     /// Its estimate.
     pub value: f64,
     /// Its confidence interval; absent with fewer runs than
-    /// [`runs_for_quantile`](crate::statistics::runs_for_quantile).
+    /// [`runs_for_quantile`](sidestep_statistics::runs_for_quantile).
     pub interval: Option<QuantileInterval>,
 }
 

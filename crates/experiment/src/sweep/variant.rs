@@ -1,8 +1,8 @@
 //! A scenario and its variants: settings, and perhaps a name.
 
-use crate::scenario::{SeedEffect, Source};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
+use sidestep_scenario::{SeedEffect, Source};
 use std::fmt;
 use toml::Value;
 
@@ -46,7 +46,7 @@ impl Setting {
     }
 
     /// Returns the setting as an override of a scenario, see
-    /// [`Source::with`](crate::scenario::Source::with).
+    /// [`Source::with`](sidestep_scenario::Source::with).
     pub fn to_override(&self) -> String {
         format!("{}={}", self.key, self.value)
     }

@@ -15,11 +15,11 @@ mod draft;
 mod repair;
 mod tree;
 
-use crate::scenario::{Source, Worlds};
 use draft::Draft;
 use repair::{Guess, Repair, repairs};
 use serde_json::Value;
 use sidestep_kernel::InputError;
+use sidestep_scenario::{Source, Worlds};
 
 /// Most errors that are reported.
 pub const MAX_PROBLEMS: usize = 20;
@@ -29,7 +29,7 @@ const MAX_DRAFTS: usize = 150;
 /// Returns the errors of a scenario, in the order of its text and at most [`MAX_PROBLEMS`]; none if it
 /// compiles. Errors of syntax are reported alone, because nothing else is known before they are
 /// repaired.
-pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
+pub fn problems(worlds: &Worlds, source: &Source) -> Vec<InputError> {
     let Err(first) = worlds.compile(source) else { return Vec::new() };
     let mut told = source.syntax_errors();
     if told.is_empty() {
@@ -44,7 +44,7 @@ pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
 
 /// The search for further errors.
 struct ErrorRecovery<'a> {
-    worlds: Worlds,
+    worlds: &'a Worlds,
     source: &'a Source,
     reported: Vec<InputError>,
     /// Keys to which drafts give values, or none, that their author did not mean.
@@ -59,7 +59,7 @@ struct DraftStep {
 }
 
 impl<'a> ErrorRecovery<'a> {
-    fn new(worlds: Worlds, source: &'a Source) -> Self {
+    fn new(worlds: &'a Worlds, source: &'a Source) -> Self {
         Self { worlds, source, reported: Vec::new(), guessed: Vec::new(), drafts: 0 }
     }
 

@@ -18,14 +18,14 @@ use super::summary::{
     Proportion, QUANTILES, Quantile, Summary, Trend, VariantMetric, VariantSummary,
 };
 use super::table::{Role, RunColumn, RunTable};
-use crate::scenario::suggestion;
-use crate::statistics::{
-    Bootstrap, Sample, mean, mean_interval, percentile, quantile_interval, rank_correlation,
-    runs_for_half_width, sample_sd, wilson,
-};
 use sidestep_document::Figure;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
+use sidestep_scenario::suggestion;
+use sidestep_statistics::{
+    Bootstrap, Sample, mean, mean_interval, percentile, quantile_interval, rank_correlation,
+    runs_for_half_width, sample_sd, wilson,
+};
 use std::collections::BTreeMap;
 
 /// Number of runs of a variant above which no bootstrap is drawn: Student's interval is as good

@@ -97,7 +97,7 @@ fn is_same_or_below(key: &str, above: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Source;
+    use sidestep_scenario::Source;
 
     #[test]
     fn a_key_is_set_for_all_variants_unless_each_of_them_sets_it() {

@@ -1,10 +1,10 @@
 //! One cell -> one row.
 
 use super::plan::Cell;
-use crate::scenario::{Source, Worlds};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
+use sidestep_scenario::{Source, Worlds};
 
 /// Cycles between two checks whether to go on.
 const INTERRUPT_CHECK_CYCLES: Cycle = 256;
@@ -43,7 +43,7 @@ pub struct CellRun {
 /// # Errors
 /// When the scenario is wrong with this seed.
 pub fn start_cell(
-    worlds: Worlds,
+    worlds: &Worlds,
     cell: Cell,
     source: &Source,
     workers: usize,
@@ -144,7 +144,7 @@ fn add_flattened(found: &mut Map<String, Value>, name: &str, value: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::worlds::WORLDS;
+    use crate::testing::worlds;
     use serde_json::json;
 
     const ROBOTS: &str = "format = 1\nworld = \"robots\"\ncycles = 300\n[map]\n\
@@ -159,7 +159,7 @@ mod tests {
 
     fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
         let source = Source::new("s.toml", text, "");
-        let started = start_cell(WORLDS, cell(seed), &source, workers).expect("valid");
+        let started = start_cell(&worlds(), cell(seed), &source, workers).expect("valid");
         started.run(&|| true).expect("not stopped")
     }
 
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn a_run_that_is_to_stop_is_no_row() {
         let source = Source::new("s.toml", ROBOTS, "");
-        assert_eq!(start_cell(WORLDS, cell(1), &source, 1).expect("valid").run(&|| false), None);
+        assert_eq!(start_cell(&worlds(), cell(1), &source, 1).expect("valid").run(&|| false), None);
     }
 
     #[test]

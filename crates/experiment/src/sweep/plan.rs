@@ -3,10 +3,10 @@
 use super::baseline::{Baseline, BaselineMatcher};
 use super::file::{Precision, Sweep};
 use super::variant::{BaseScenario, Setting, Variant};
-use crate::scenario::SeedEffect;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sidestep_kernel::InputError;
+use sidestep_scenario::SeedEffect;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -293,9 +293,9 @@ impl fmt::Display for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::sweep::Factor;
-    use crate::scenario::Source;
+    use crate::sweep::Factor;
     use proptest::prelude::*;
+    use sidestep_scenario::Source;
     use std::collections::BTreeSet;
 
     fn plan(variants: usize, replicates: u32) -> Plan {
