@@ -146,7 +146,7 @@ fn text(n: u32, cycles: u64) -> String {
 }
 
 fn job(folder: &Path, clock: ClockMode) -> FleetJob {
-    let build = sidestep_session::build_id().into();
+    let build = WORLDS.build().into();
     let flown = JobScenario { file: folder.join("s.toml"), overrides: Vec::new(), build };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
@@ -195,7 +195,7 @@ fn conflict(n: u32) {
     for _ in 0..3 {
         let began = Instant::now();
         let journey =
-            ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+            ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
                 .expect("started");
         let alone = journey.run_to_end(&NoWatcher).expect("flown");
         let alone_s = began.elapsed().as_secs_f64();

@@ -5,10 +5,10 @@
 
 use cpu_time::ProcessTime;
 use serde_json::{Value, json};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
+use sidestep_scenario::Source;
 use sidestep_server::protocol::FrameText;
 use sidestep_server::{Encoder, Options, Studio};
 use std::net::TcpStream;
@@ -135,7 +135,7 @@ impl Page {
 fn studio(folder: &Path, text: &str) -> (Studio, Page) {
     std::fs::write(folder.join("s.toml"), text).expect("written");
     let options = Options {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         program: "bench".into(),
         named: vec![folder.to_path_buf()],
         host: "127.0.0.1".into(),

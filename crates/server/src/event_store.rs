@@ -2,8 +2,8 @@
 
 use crate::encode::event;
 use crate::protocol::{Event, ReplyBody};
-use sidestep::kernel::Cycle;
-use sidestep::kernel::view::{Frame, LogEvent};
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
 
 /// Maximum number of events kept; further ones are counted.
@@ -120,7 +120,7 @@ impl EventStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::{BodyId, BodyKind, LogEvent, LogEventKind, Severity};
+    use sidestep_kernel::view::{BodyId, BodyKind, LogEvent, LogEventKind, Severity};
 
     fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
         let entry = |&cycle: &Cycle| {

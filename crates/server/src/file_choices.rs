@@ -1,7 +1,7 @@
 //! Files to which a scenario can refer, for lists to choose from.
 
 use crate::files::AllowedFiles;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 use std::collections::{BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Component, Path, PathBuf};

@@ -5,8 +5,8 @@ use crate::protocol::{FileEntry, FileKind, Problem};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
-use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_kernel::InputError;
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -139,7 +139,7 @@ impl AllowedFiles {
     pub(crate) fn list(
         &self,
         folder: Option<&str>,
-        worlds: Worlds,
+        worlds: &Worlds,
     ) -> Result<Vec<FileEntry>, Problem> {
         let Some(folder) = folder else {
             let roots = self.roots.iter();
@@ -193,7 +193,7 @@ fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
 
 /// Returns the entry of a file or folder; `None` if it cannot be opened. `foreign` counts the files of other programs
 /// that were read.
-fn entry(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<FileEntry> {
+fn entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
     let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
     if name.starts_with('.') && name.len() > 1 && name != ".." {
         return None;
@@ -216,7 +216,7 @@ fn kind_of_folder(path: &Path) -> FileKind {
     }
 }
 
-fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
+fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
     let bytes = fs::metadata(path).ok().filter(fs::Metadata::is_file)?.len();
     let ends_in =
         |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
@@ -288,7 +288,7 @@ mod tests {
     fn a_folder_lists_what_can_be_opened() {
         let (folder, files) = places();
         let inside = folder.path().join("in");
-        let listed = files.list(inside.to_str(), WORLDS).expect("listed");
+        let listed = files.list(inside.to_str(), &WORLDS).expect("listed");
         let told: Vec<_> =
             listed.iter().map(|e| (e.name.as_str(), e.kind, e.about.as_str())).collect();
         assert_eq!(
@@ -304,7 +304,7 @@ mod tests {
                 ("t.scn", FileKind::Foreign, ""),
             ]
         );
-        let roots = files.list(None, WORLDS).expect("listed");
+        let roots = files.list(None, &WORLDS).expect("listed");
         assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
         assert!(files.resolve(&listed[1].path).is_ok());
     }
@@ -331,10 +331,10 @@ mod tests {
             problems.iter().all(|p| p.cause == problems[0].cause),
             "nothing is told of what is there"
         );
-        assert!(files.list(Some(&path("out")), WORLDS).is_err());
-        assert!(files.list(Some(&path("in/..")), WORLDS).is_err());
+        assert!(files.list(Some(&path("out")), &WORLDS).is_err());
+        assert!(files.list(Some(&path("in/..")), &WORLDS).is_err());
         assert!(files.resolve("/etc/passwd").is_err() && files.resolve("").is_err());
-        let listed = files.list(Some(&path("in")), WORLDS).expect("listed");
+        let listed = files.list(Some(&path("in")), &WORLDS).expect("listed");
         assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
         assert!(files.resolve(&path("in/deep/../a.toml")).is_ok());
     }

@@ -1,6 +1,6 @@
 //! The port: found and bound; and the address by which others reach it.
 
-use sidestep::kernel::InputError;
+use sidestep_kernel::InputError;
 use sidestep_session::next_free_port;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};

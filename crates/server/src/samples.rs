@@ -2,8 +2,8 @@
 
 use crate::protocol::{MetricName, ReplyBody};
 use serde_json::Value;
-use sidestep::kernel::Cycle;
-use sidestep::scenario::{MetricInfo, MetricLabel, metric_label};
+use sidestep_kernel::Cycle;
+use sidestep_scenario::{MetricInfo, MetricLabel, metric_label};
 use std::time::Duration;
 
 /// Maximum number of samples; beyond it every second one is dropped. A chart is at most about 2000 pixels wide.

@@ -9,7 +9,7 @@ use crate::session::{
 };
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
-use sidestep::scenario::{Source, Worlds};
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -175,7 +175,7 @@ impl SocketSessions {
             Method::Files { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || {
-                    let entries = deps.files.list(folder.as_deref(), deps.worlds)?;
+                    let entries = deps.files.list(folder.as_deref(), &deps.worlds)?;
                     Ok(ReplyBody::Files { entries })
                 });
                 None
@@ -203,8 +203,8 @@ impl SocketSessions {
                 self.on_text(id, session, move |deps, source| model(deps, source, text))
             }
             Method::Schema { world } => {
-                let worlds = self.state.deps.worlds;
-                self.answer_in_thread(id, move || schema(worlds, &world));
+                let worlds = self.state.deps.worlds.clone();
+                self.answer_in_thread(id, move || schema(&worlds, &world));
                 None
             }
             call => {
@@ -267,7 +267,7 @@ impl SocketSessions {
 ///
 /// # Errors
 /// When there is no such world.
-fn schema(worlds: Worlds, world: &str) -> Result<ReplyBody, Problem> {
+fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let schema = worlds.schema(Some(world)).ok_or_else(|| {
         let names = worlds.names().join(", ");
         Problem::new(world, "no such world is known", format!("name one of {names}"))

@@ -3,7 +3,7 @@
 use crate::files::AllowedFiles;
 use crate::protocol::Problem;
 use serde_json::Value;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};

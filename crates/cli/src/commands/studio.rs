@@ -80,8 +80,8 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     let watch = |endpoint: &String| fleet_watch::start_watching(endpoint, args.tls.files());
     let fleets = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
     let studio = Studio::start(Options {
-        worlds: worlds(),
-        program: format!("sidestep {}", sidestep_session::build_id()),
+        worlds: worlds().clone(),
+        program: format!("sidestep {}", worlds().build()),
         named,
         host: args.addr.clone(),
         port: args.port,

@@ -22,6 +22,7 @@ use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
+use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     CommonSettings, FleetJob, FleetScene, FleetStatus, LinkMessage, NodeJob, NodeStatus,
 };
@@ -49,14 +50,14 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
     let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
     let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
-    let run = ManagedRun::start(scenario.compiled.as_ref(), &scenario.source, 1, paths, None)?;
+    let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&fleet_scene(run.simulation()));
     let views = ViewPublisher::new(ViewServer::open(&wire, scene).map_err(endpoint_error)?);
     let messenger = Messenger::new(Peer::Server, Box::new(wire));
     let config = ServerConfig {
         scenario: fingerprint,
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
         welcome: Welcome {
             clock: job.clock,
             topology: job.topology,
@@ -85,7 +86,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
 /// Returns the unchanging part of a run, for viewers.
 fn fleet_scene(run: &dyn Simulation) -> FleetScene {
     FleetScene {
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
         world: run.world().into(),
         agent: run.agent().into(),
         seed: run.config().seed,

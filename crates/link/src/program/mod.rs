@@ -27,6 +27,7 @@ mod watch;
 
 use output::print_message;
 use parent_monitor::ParentMonitor;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
 use std::io::BufRead;
@@ -59,7 +60,7 @@ pub fn main() -> ExitCode {
 }
 
 fn version() -> String {
-    format!("sidestep-link {}", sidestep_session::build_id())
+    format!("sidestep-link {}", WORLDS.build())
 }
 
 fn run_job(job: Job) -> Result<(), Error> {
@@ -94,7 +95,7 @@ fn check_and_start_log<'a>(
 
 /// Refuses the job of another build: results are the same only if server, nodes and command are of one build.
 fn check_build(build: &str) -> Result<(), Error> {
-    let own = sidestep_session::build_id();
+    let own = WORLDS.build();
     if build == own {
         return Ok(());
     }

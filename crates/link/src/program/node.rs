@@ -9,6 +9,7 @@ use crate::wire::Peer;
 use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::NodeJob;
 use std::time::Duration;
@@ -28,7 +29,7 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
         .map_err(endpoint_error)?;
     let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
     let timeout = Duration::from_secs_f64(job.patience_s);
-    let build = sidestep_session::build_id();
+    let build = WORLDS.build();
     let request = Join {
         agent,
         scenario: scenario.fingerprint()?,

@@ -23,7 +23,7 @@ impl Scenario {
     /// When it is wrong, or its agents cannot be nodes.
     pub(super) fn read(job: &JobScenario) -> Result<Self, InputError> {
         let (source, compiled) =
-            sidestep_session::read_scenario(WORLDS, &job.file, &job.overrides)?;
+            sidestep_session::read_scenario(&WORLDS, &job.file, &job.overrides)?;
         Self::from_compiled(source, compiled)
     }
 

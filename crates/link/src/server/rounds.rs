@@ -141,7 +141,8 @@ mod tests {
         let compiled = WORLDS.compile(&source).expect("a scenario");
         let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
         let paths = OutputPaths::default();
-        let run = ManagedRun::start(compiled.as_ref(), &source, 1, paths, None).expect("started");
+        let run =
+            ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, paths).expect("started");
         HostedRun::new(run, world, &NoWatcher)
     }
 

@@ -44,7 +44,7 @@ fn chains_that_may_meet_decide_one_after_the_other_in_rounds_of_one_cycle() {
     let source = Source::new("s.toml", text, "");
     let compiled = WORLDS.compile(&source).expect("a scenario");
     let world = distributed_world(compiled.as_ref(), &source).expect("connectors");
-    let run = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
     let mut run = HostedRun::new(run, world, &NoWatcher);
     let (first, second): (Vec<EntityId>, Vec<EntityId>) = ((0..5).collect(), (5..10).collect());
@@ -86,7 +86,7 @@ fn processes_come_out_as_one_process_does_and_leave_a_folder_that_is_replayed() 
         let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
         assert_eq!(summary["metrics"]["messages"], packets, "nodes count what the run does");
         assert!(fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
-        let recorded = RecordedRun::open(WORLDS, &out).expect("an ordinary folder");
+        let recorded = RecordedRun::open(&WORLDS, &out).expect("an ordinary folder");
         replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
     }
 }
@@ -116,10 +116,10 @@ fn events(out: &Path, kind: &str) -> Vec<(u64, u64)> {
 fn resumed(mut program: LinkProcess, out: &Path) {
     drop(program.stdin.take());
     assert_eq!(program.end().0, Some(130));
-    let run = ManagedRun::resume(WORLDS, out, 1, None).expect("it can be resumed");
+    let run = ManagedRun::resume(&WORLDS, out, 1, None).expect("it can be resumed");
     let summary = run.run_to_end(&NoWatcher).expect("flown to the end");
     assert_eq!(summary.status, RunStatus::Complete);
-    let recorded = RecordedRun::open(WORLDS, out).expect("an ordinary folder");
+    let recorded = RecordedRun::open(&WORLDS, out).expect("an ordinary folder");
     replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
 }
 

@@ -22,7 +22,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
     let flown = JobScenario {
         file: folder.join("s.toml"),
         overrides: Vec::new(),
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
     };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
@@ -250,7 +250,7 @@ fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
     let fleet = program.fleet("some cycles", |now| now.cycle > 10);
     program.child.kill().expect("killed");
     wait_until_gone(&fleet, Duration::from_secs(10));
-    let journey = ManagedRun::resume(WORLDS, &out, 1, None).expect("it can be resumed");
+    let journey = ManagedRun::resume(&WORLDS, &out, 1, None).expect("it can be resumed");
     assert!(journey.cycle() >= 5);
     let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
     assert_eq!(summary.status, RunStatus::Complete);

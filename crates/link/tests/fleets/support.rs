@@ -93,7 +93,7 @@ fn run_result(run: ManagedRun) -> RunResult {
 /// Returns the outcome of a scenario in one process.
 pub(crate) fn run_in_one_process(text: &str) -> RunResult {
     let (source, compiled) = compiled(text);
-    let mut run = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let mut run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
     let cycles = run.simulation().config().cycles;
     run.advance_to(cycles, &NoWatcher).expect("flown");
@@ -189,7 +189,7 @@ pub(crate) fn run_in_threads(
         lease: setup.lease,
         has_faults: world.has_faults(),
     };
-    let run = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
     let mut run = HostedRun::new(run, world.clone(), &NoWatcher);
     let messenger = Messenger::new(Peer::Server, (setup.wire)(Peer::Server));

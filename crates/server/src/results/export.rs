@@ -9,8 +9,8 @@ use axum::extract::State;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::kernel::{Cycle, Interrupt};
-use sidestep::scenario::Worlds;
+use sidestep_kernel::{Cycle, Interrupt};
+use sidestep_scenario::Worlds;
 use sidestep_session::export::{AnimationOptions, ExportRequest, Format, export};
 use sidestep_session::{Error, RecordedRun, Watcher};
 use std::path::{Path, PathBuf};
@@ -36,11 +36,11 @@ pub(crate) async fn answer(
 async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Response, ResultError> {
     let path = state.deps.files.resolve(fields.require("path")?)?;
     let spec = ExportSpec::from_fields(fields)?;
-    let worlds = state.deps.worlds;
+    let worlds = state.deps.worlds.clone();
     let workers = state.deps.workers;
     let name = spec.file_name(&path);
     let media = spec.media;
-    let job = move |cancel: &CancelToken| write_export(worlds, &path, &spec, workers, cancel);
+    let job = move |cancel: &CancelToken| write_export(&worlds, &path, &spec, workers, cancel);
     let bytes = state.jobs.run(job).await?;
     let disposition = format!("attachment; filename=\"{name}\"");
     let about = [
@@ -109,7 +109,7 @@ pub(super) fn plain_file_name(name: &str) -> String {
 
 /// Exports to a temporary folder; returns the content of the file.
 fn write_export(
-    worlds: Worlds,
+    worlds: &Worlds,
     path: &Path,
     spec: &ExportSpec,
     workers: usize,

@@ -3,7 +3,7 @@
 use super::ResultError;
 use crate::protocol::Problem;
 use axum::http::StatusCode;
-use sidestep::kernel::Interrupt;
+use sidestep_kernel::Interrupt;
 use sidestep_report::RenderedReport;
 use sidestep_session::{Error, Watcher};
 use std::panic::{AssertUnwindSafe, catch_unwind};

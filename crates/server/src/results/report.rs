@@ -13,8 +13,8 @@ use axum::http::header::{
 };
 use axum::http::{HeaderMap, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::scenario::Worlds;
 use sidestep_report::{RenderedReport, SvgFile, render};
+use sidestep_scenario::Worlds;
 use sidestep_session::report::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,13 +46,13 @@ async fn report_response(
 ) -> Result<Response, ResultError> {
     let path = state.deps.files.resolve(fields.require("path")?)?;
     let part = fields.get("as").map(String::from);
-    let worlds = state.deps.worlds;
+    let worlds = state.deps.worlds.clone();
     // The report itself is rendered anew each time: its run or sweep may have grown.
     let cached = state.jobs.cached_report(&path).filter(|_| part.is_some());
     let folder = path.clone();
     let job = move |cancel: &CancelToken| match cached {
         Some(report) => Ok(report),
-        None => render_report(worlds, &folder, cancel).map(Arc::new),
+        None => render_report(&worlds, &folder, cancel).map(Arc::new),
     };
     let report = state.jobs.run(job).await?;
     state.jobs.cache_report(path.clone(), report.clone());
@@ -63,7 +63,7 @@ async fn report_response(
 }
 
 fn render_report(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Path,
     cancel: &CancelToken,
 ) -> Result<RenderedReport, ResultError> {

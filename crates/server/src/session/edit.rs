@@ -4,7 +4,7 @@ use super::open_run::{SessionDeps, source_with_text};
 use crate::encode::problem;
 use crate::protocol::{Edit, Problem, ReplyBody};
 use serde_json::Value;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 
 /// The key under which the TOML parser puts a date, which JSON does not have.
 const DATE_KEY: &str = "$__toml_private_datetime";

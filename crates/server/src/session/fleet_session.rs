@@ -10,8 +10,8 @@ use crate::protocol::{
     Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
     SessionStatus, Speed,
 };
-use sidestep::kernel::Cycle;
-use sidestep::kernel::view::Frame;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::Frame;
 use sidestep_session::fleet::{FleetFrame, FleetScene};
 use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;

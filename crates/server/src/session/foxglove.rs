@@ -2,8 +2,8 @@
 
 use crate::event_store::EventStore;
 use crate::protocol::SessionId;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::Scenery;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::Scenery;
 use sidestep_session::{
     Error, Playback, PlaybackPhase, PlaybackRequest, ViewerAddress, ViewerServer,
 };

@@ -3,8 +3,8 @@
 use crate::event_store::EventStore;
 use crate::keyframes::{Keyframes, MemoryBudget};
 use crate::samples::Samples;
-use sidestep::kernel::Simulation;
-use sidestep::scenario::MetricInfo;
+use sidestep_kernel::Simulation;
+use sidestep_scenario::MetricInfo;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -25,8 +25,8 @@ use fleet_session::FleetSession;
 use open_run::OpenRun;
 use player::Player;
 use save::SharedSource;
-use sidestep::kernel::Interrupt;
-use sidestep::scenario::Source;
+use sidestep_kernel::Interrupt;
+use sidestep_scenario::Source;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -135,18 +135,37 @@ enum SessionExit {
 }
 
 impl SessionWorker {
-    /// Opens the target and plays it, until the socket drops the session or a bug ends it.
+    /// Opens the target and serves it, until the socket drops the session or it ends by itself.
     fn run(self, deps: SessionDeps, request: OpenRequest, source: SharedSource) {
         let OpenRequest { session, id, target, seed } = request;
-        if let OpenTarget::Fleet { path } = &target {
-            match deps.fleet_feed(path) {
-                Ok(feed) => FleetSession::new(session, self.outbox.clone(), feed).run(&self, id),
-                Err(problem) => return self.refuse(id, problem),
+        match target {
+            OpenTarget::Scenario { path } => {
+                self.run_player(session, id, source, || OpenRun::from_file(deps, &path, seed));
             }
-            return self.refuse_queued();
+            OpenTarget::New { world } => {
+                self.run_player(session, id, source, || OpenRun::from_default(deps, &world, seed));
+            }
+            OpenTarget::Recording { path } => {
+                self.run_player(session, id, source, || OpenRun::from_recording(deps, &path, seed));
+            }
+            OpenTarget::Fleet { path } => match deps.fleet_feed(&path) {
+                Ok(feed) => FleetSession::new(session, self.outbox.clone(), feed).run(&self, id),
+                Err(problem) => self.refuse(id, problem),
+            },
         }
+        self.refuse_queued();
+    }
+
+    /// Opens a run and plays it; `id` is the number of the request that opens it.
+    fn run_player(
+        &self,
+        session: SessionId,
+        id: u32,
+        source: SharedSource,
+        open: impl FnOnce() -> Result<OpenRun, Problem>,
+    ) {
         let opened = self.catch_panic(|| {
-            let open_run = OpenRun::open(deps, &target, seed)?.with_shared_source(source);
+            let open_run = open()?.with_shared_source(source);
             Player::new(session, self.outbox.clone(), self.interrupt.clone(), open_run)
         });
         let mut player = match opened {
@@ -161,7 +180,6 @@ impl SessionWorker {
             Ok(()) | Err(SessionExit::Interrupted) => player.cancel_seek("the session was closed"),
             Err(SessionExit::Bug(message)) => player.fail(internal_error(&message)),
         }
-        self.refuse_queued();
     }
 
     /// Refuses the requests in the queue of a session that has ended: each request gets a reply.

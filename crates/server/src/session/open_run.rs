@@ -8,9 +8,9 @@ use crate::encode::problem;
 use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
-use crate::protocol::{OpenTarget, Problem, ReplyBody};
-use sidestep::kernel::{Cycle, Simulation};
-use sidestep::scenario::{MetricInfo, Source, Worlds};
+use crate::protocol::{Problem, ReplyBody};
+use sidestep_kernel::{Cycle, Simulation};
+use sidestep_scenario::{MetricInfo, Source, Worlds};
 use sidestep_session::{Error, RecordedRun, read_scenario};
 use std::path::Path;
 use std::sync::Arc;
@@ -68,42 +68,37 @@ pub(crate) struct OpenRun {
 }
 
 impl OpenRun {
-    /// Opens a scenario or a recording.
+    /// Opens a scenario file, or a file of another program that stands for a scenario.
     ///
     /// # Errors
     /// When it cannot be opened; with place, cause and remedy.
-    pub(crate) fn open(
+    pub(crate) fn from_file(
         deps: SessionDeps,
-        target: &OpenTarget,
+        path: &str,
         seed: Option<u64>,
     ) -> Result<Self, Problem> {
-        match target {
-            OpenTarget::Scenario { path } => {
-                let path = deps.files.resolve(path)?;
-                let (source, _) =
-                    read_scenario(deps.worlds, &path, &[]).map_err(|e| problem(&e))?;
-                let file = SessionFile::open(&path, &source);
-                Self::from_scenario(deps, source, seed, file)
-            }
-            OpenTarget::New { world } => {
-                let world_type = deps.worlds.find(world).ok_or_else(|| {
-                    let names = deps.worlds.names().join(", ");
-                    Problem::new(
-                        world.as_str(),
-                        "no such world is known",
-                        format!("name one of {names}"),
-                    )
-                })?;
-                let folder = deps.files.first_root_folder();
-                let source =
-                    Source::new(format!("{world}.toml"), world_type.default_scenario(), folder);
-                Self::from_scenario(deps, source, seed, None)
-            }
-            OpenTarget::Recording { path } => Self::from_recording(deps, path, seed),
-            OpenTarget::Fleet { path } => {
-                Err(Problem::new(path.as_str(), "a fleet has no run here", "report this as a bug"))
-            }
-        }
+        let path = deps.files.resolve(path)?;
+        let (source, _) = read_scenario(&deps.worlds, &path, &[]).map_err(|e| problem(&e))?;
+        let file = SessionFile::open(&path, &source);
+        Self::from_scenario(deps, source, seed, file)
+    }
+
+    /// Opens the default scenario of a world.
+    ///
+    /// # Errors
+    /// When there is no such world.
+    pub(crate) fn from_default(
+        deps: SessionDeps,
+        world: &str,
+        seed: Option<u64>,
+    ) -> Result<Self, Problem> {
+        let world_type = deps.worlds.find(world).ok_or_else(|| {
+            let names = deps.worlds.names().join(", ");
+            Problem::new(world, "no such world is known", format!("name one of {names}"))
+        })?;
+        let folder = deps.files.first_root_folder();
+        let source = Source::new(format!("{world}.toml"), world_type.default_scenario(), folder);
+        Self::from_scenario(deps, source, seed, None)
     }
 
     /// Shares the scenario with other threads.
@@ -133,12 +128,20 @@ impl OpenRun {
         })
     }
 
-    fn from_recording(deps: SessionDeps, path: &str, seed: Option<u64>) -> Result<Self, Problem> {
+    /// Opens a recording, to be computed again.
+    ///
+    /// # Errors
+    /// When it cannot be opened, or another seed is requested.
+    pub(crate) fn from_recording(
+        deps: SessionDeps,
+        path: &str,
+        seed: Option<u64>,
+    ) -> Result<Self, Problem> {
         if seed.is_some() {
             return Err(recording_is_read_only(path));
         }
         let path = deps.files.resolve(path)?;
-        let recorded = RecordedRun::open(deps.worlds, &path).map_err(|e| problem_of(&e))?;
+        let recorded = RecordedRun::open(&deps.worlds, &path).map_err(|e| problem_of(&e))?;
         let resolved = recorded.resolved_scenario().map_err(|e| problem(&e))?;
         let run = recorded.start_for_viewing(deps.workers).map_err(|e| problem(&e))?;
         let place = path.join("scenario.toml").display().to_string();
@@ -318,7 +321,7 @@ pub(crate) fn text_problems(
     };
     Ok(match deps.worlds.compile(&source) {
         Err(_) => {
-            let errors = sidestep::problems(deps.worlds, &source);
+            let errors = sidestep_experiment::problems(&deps.worlds, &source);
             errors.iter().map(|error| problem(&source.error_at_reference(error))).collect()
         }
         Ok(compiled) => {

@@ -5,8 +5,8 @@ use crate::encode::{Encoder, body, scan};
 use crate::event_store::EventStore;
 use crate::outbox::Outbox;
 use crate::protocol::{BodyId, FrameText, Notification, SessionId, SessionStatus};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -19,8 +19,8 @@ use crate::protocol::{
     SessionStatus, Speed,
 };
 use seek::Seek;
-use sidestep::kernel::view::Scenery;
-use sidestep::kernel::{Cycle, Interrupt};
+use sidestep_kernel::view::Scenery;
+use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_session::Pacer;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -4,8 +4,8 @@
 
 use super::history::RunHistory;
 use super::pace::SliceSize;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::kernel::{Cycle, Interrupt, Simulation};
+use sidestep_kernel::view::FrameOptions;
+use sidestep_kernel::{Cycle, Interrupt, Simulation};
 use std::time::{Duration, Instant};
 
 /// Time between two transfers of events: a simulation keeps only the last some thousands.

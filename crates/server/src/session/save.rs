@@ -4,7 +4,7 @@ use crate::files::AllowedFiles;
 use crate::protocol::{Problem, ReplyBody};
 use crate::write::{WriteTarget, replace_file};
 use serde_json::Value;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -37,7 +37,15 @@ struct Page {
 fn deps(folder: &std::path::Path, workers: usize) -> SessionDeps {
     let files = AllowedFiles::from_roots(&[folder.to_path_buf()]).expect("a folder");
     let (budget, fleets) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
-    SessionDeps { worlds: WORLDS, files, workers, read_only: false, budget, foxglove: None, fleets }
+    SessionDeps {
+        worlds: WORLDS.clone(),
+        files,
+        workers,
+        read_only: false,
+        budget,
+        foxglove: None,
+        fleets,
+    }
 }
 
 impl Page {

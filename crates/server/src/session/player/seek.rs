@@ -2,7 +2,7 @@
 
 use super::Player;
 use crate::protocol::{Problem, ReplyBody, SessionState, Speed};
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use std::time::Instant;
 
 /// A seek under way.

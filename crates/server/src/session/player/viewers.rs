@@ -4,7 +4,7 @@ use super::Player;
 use crate::SPEED_RANGE;
 use crate::protocol::{Problem, SessionState, Speed};
 use crate::session::problem_of;
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use sidestep_session::{Playback, PlaybackPhase, PlaybackRequest};
 use std::time::Instant;
 

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::fleet_feed::FleetFeed;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
 use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus, NodeStatus};
 
 const AT: &str = "tcp/127.0.0.1:7600";
@@ -13,7 +13,7 @@ struct RemoteFlight {
     run: Box<dyn Simulation>,
     screen: Arc<FleetFeed>,
     number: u64,
-    events: Vec<sidestep::kernel::view::LogEvent>,
+    events: Vec<sidestep_kernel::view::LogEvent>,
 }
 
 impl RemoteFlight {
