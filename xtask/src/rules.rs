@@ -39,7 +39,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 13] = [
+const WITHOUT_WORLDS: [&str; 18] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -49,7 +49,12 @@ const WITHOUT_WORLDS: [&str; 13] = [
     "crates/import",
     "crates/statistics",
     "crates/collectives",
+    "crates/rods",
+    "crates/arms",
     "crates/map",
+    "crates/error-models",
+    "crates/learn",
+    "crates/exact",
     "crates/experiment",
     "crates/session",
     "crates/server",

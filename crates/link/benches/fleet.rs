@@ -53,7 +53,7 @@ fn rounds(team: u32, rounds: usize) {
         .zip(&held)
         .map(|(agent, held)| Member {
             agent,
-            life: Incarnation(0),
+            incarnation: Incarnation(0),
             listens: vec![held.endpoint.clone()],
         })
         .collect();
@@ -237,11 +237,11 @@ fn start_watched(job: FleetJob) -> (Child, Receiver<FleetNews>) {
     let (tells, news) = channel();
     let out = BufReader::new(child.stdout.take().expect("a pipe"));
     let logs = BufReader::new(child.stderr.take().expect("a pipe"));
-    let told = tells.clone();
+    let message = tells.clone();
     std::thread::spawn(move || {
         for line in out.lines().map_while(Result::ok) {
             if let Ok(LinkMessage::Fleet(now)) = serde_json::from_str(&line) {
-                let _ = told.send(FleetNews::Fleet(now));
+                let _ = message.send(FleetNews::Fleet(now));
             }
         }
     });

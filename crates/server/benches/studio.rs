@@ -143,7 +143,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         read_only: false,
         workers: 1,
         foxglove: None,
-        screens: Vec::new(),
+        fleets: Vec::new(),
     };
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);

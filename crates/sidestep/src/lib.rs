@@ -138,14 +138,17 @@ pub mod worlds;
 
 pub use builder::{Problems, Scenario, load, parse};
 pub use run::{Run, Table};
+pub use sidestep_arms as arms;
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
+pub use sidestep_error_models as error_models;
 pub use sidestep_experiment as experiment;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
+pub use sidestep_learn as learn;
 pub use sidestep_map as map;
 pub use sidestep_map::{Cell, GridMap, office, planning};
-pub use sidestep_robots::learn;
+pub use sidestep_rods as rods;
 pub use sidestep_scenario as scenario;
 pub use sidestep_session as session;
 pub use sidestep_session::{Error, VERSION};

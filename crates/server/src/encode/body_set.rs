@@ -34,17 +34,17 @@ impl BodySet {
     pub(super) fn from_bodies(bodies: &[Body], dimensions: u8) -> Self {
         let is_flat = dimensions == 2;
         let members = Vec::with_capacity(bodies.len());
-        let mut troupe = Self { members, shapes: Vec::new(), forms: Vec::new(), is_flat };
+        let mut body_set = Self { members, shapes: Vec::new(), forms: Vec::new(), is_flat };
         let mut known = BTreeMap::new();
         for body in bodies {
             let form = shape_key(&body.shape, is_flat);
             let shape = *known.entry(form).or_insert_with(|| {
-                troupe.shapes.push(without_points(&body.shape));
-                troupe.forms.push(form);
-                troupe.forms.len() as u32 - 1
+                body_set.shapes.push(without_points(&body.shape));
+                body_set.forms.push(form);
+                body_set.forms.len() as u32 - 1
             });
             let &Body { kind, number, part, .. } = body;
-            troupe.members.push(BodyIdentity {
+            body_set.members.push(BodyIdentity {
                 kind,
                 number,
                 part,
@@ -52,7 +52,7 @@ impl BodySet {
                 shape,
             });
         }
-        troupe
+        body_set
     }
 
     /// Returns whether the given bodies are its own, in their order, with the same shapes.

@@ -20,7 +20,7 @@ pub struct Encoder {
     session: SessionId,
     dimensions: u8,
     names: BTreeMap<(BodyKind, u32), String>,
-    troupe: Option<BodySet>,
+    body_set: Option<BodySet>,
     casts: u32,
 }
 
@@ -28,7 +28,7 @@ impl Encoder {
     /// Creates an encoder for a run with this scenery.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();
-        let mut encoder = Self { session, dimensions: 2, names, troupe: None, casts: 0 };
+        let mut encoder = Self { session, dimensions: 2, names, body_set: None, casts: 0 };
         encoder.restart(scenery);
         encoder
     }
@@ -39,7 +39,7 @@ impl Encoder {
             |(kind, number, name): &(BodyKind, u32, String)| ((*kind, *number), name.clone());
         self.names = scenery.names.iter().map(named).collect();
         self.dimensions = scenery.dimensions;
-        self.troupe = None;
+        self.body_set = None;
     }
 
     /// Returns a frame as bytes, and the cast that it begins, if it begins one.
@@ -49,15 +49,15 @@ impl Encoder {
         text: &FrameText,
         left_out: u32,
     ) -> (Option<BodyTable>, Vec<u8>) {
-        let is_new = !self.troupe.as_ref().is_some_and(|troupe| troupe.matches(&frame.bodies));
+        let is_new =
+            !self.body_set.as_ref().is_some_and(|body_set| body_set.matches(&frame.bodies));
         if is_new {
             self.casts += 1;
-            self.troupe = Some(BodySet::from_bodies(&frame.bodies, self.dimensions));
+            self.body_set = Some(BodySet::from_bodies(&frame.bodies, self.dimensions));
         }
-        let cast =
-            self.troupe.as_ref().filter(|_| is_new).map(|troupe| {
-                troupe.to_table(self.session, self.casts, &frame.bodies, &self.names)
-            });
+        let cast = self.body_set.as_ref().filter(|_| is_new).map(|body_set| {
+            body_set.to_table(self.session, self.casts, &frame.bodies, &self.names)
+        });
         // Text made of numbers and strings only: serializing cannot fail.
         let text = serde_json::to_vec(text).unwrap_or_default();
         (cast, self.bytes(frame, &text, left_out))

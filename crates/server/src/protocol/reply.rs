@@ -261,7 +261,7 @@ pub enum Notification {
     },
 }
 
-/// A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
+/// A thing that the command line named: a kind as in [`OpenTarget`](super::OpenTarget), with its path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct TargetRef {

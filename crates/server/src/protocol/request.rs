@@ -65,7 +65,7 @@ pub enum Method {
         cycle: u64,
     },
     /// Starts anew, with another seed and another text where given. Answered by
-    /// [`Opened`](super::Answer::Opened), with the session's own number; the run before stays if the text is wrong.
+    /// [`Opened`](super::ReplyBody::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
         /// The session.
         session: SessionId,

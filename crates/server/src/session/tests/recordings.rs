@@ -32,7 +32,7 @@ fn made_by_another(folder: &tempfile::TempDir) {
 
 fn opened(folder: tempfile::TempDir) -> (Page, Value) {
     let what = OpenTarget::Recording { path: path(&folder).display().to_string() };
-    Page::open_target(means(folder.path(), 2), what, folder)
+    Page::open_target(deps(folder.path(), 2), what, folder)
 }
 
 fn banner(status: &Value) -> String {
