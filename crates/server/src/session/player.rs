@@ -15,7 +15,7 @@ use crate::SPEED_RANGE;
 use crate::encode::scene;
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
+    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
 use seek::Seek;
@@ -181,31 +181,31 @@ impl Player {
     fn answer_query(&mut self, call: Method) -> Result<ReplyBody, Problem> {
         let run = self.stage.run.as_mut();
         match call {
-            Method::Look { scans_of, .. } if scans_of.len() > MAX_SCANNED_BODIES => {
+            Method::SelectScans { bodies, .. } if bodies.len() > MAX_SCANNED_BODIES => {
                 let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
-                Err(Problem::new("look", cause, "name fewer"))
+                Err(Problem::new("select-scans", cause, "select fewer"))
             }
-            Method::Look { scans_of, .. } => {
-                self.viewer.set_scanned_bodies(scans_of);
+            Method::SelectScans { bodies, .. } => {
+                self.viewer.set_scanned_bodies(bodies);
                 Ok(ReplyBody::Done)
             }
             Method::Credit { frames, .. } => {
                 self.viewer.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
-            Method::Inspect { who, .. } => inspection(run, &who).map(ReplyBody::Inspection),
+            Method::Inspect { body, .. } => inspection(run, &body).map(ReplyBody::Inspection),
             Method::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
-            Method::Events { from, until, skip, most, .. } => {
+            Method::Events { from, until, skip, limit, .. } => {
                 self.viewer.drain(run, &mut self.memory.log, Instant::now());
-                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), most.min(MAX_EVENTS)))
+                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
             }
             Method::Source { .. } => {
                 let source = &self.stage.source;
                 let (place, text) = (source.place.clone(), source.text.clone());
                 Ok(ReplyBody::Source { place, text, read_only: self.stage.is_read_only() })
             }
-            Method::Save { text, to, base, over, .. } => {
-                self.stage.save(text, to, SaveOptions { base, over })
+            Method::Save { text, to, base, overwrite, .. } => {
+                self.stage.save(text, to, SaveOptions { base, overwrite })
             }
             Method::Tables { .. } => self.stage.tables().map(|names| ReplyBody::Tables { names }),
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
@@ -371,9 +371,10 @@ impl Player {
         if let Some(told) = self.viewer.last_reported() {
             self.outbox.send_status(
                 self.session,
-                &Notification::Status(SessionStatus { state: SessionState::Failed, ..told }),
+                &ServerNotification::Status(SessionStatus { state: SessionState::Failed, ..told }),
             );
         }
-        self.outbox.send_notification(&Notification::Ended { session: self.session, problem });
+        self.outbox
+            .send_notification(&ServerNotification::Ended { session: self.session, problem });
     }
 }
