@@ -18,6 +18,7 @@ use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
+use sidestep::worlds::WORLDS;
 use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
 use std::path::PathBuf;
@@ -77,7 +78,7 @@ impl Simulation {
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
             let journey =
-                ManagedRun::start(scenario.compiled.as_ref(), &source, workers, keep, None);
+                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, keep);
             journey.map_err(|e| error::session_error(&e))
         })?;
         let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();

@@ -5,10 +5,10 @@
 
 use cpu_time::ProcessTime;
 use serde_json::{Value, json};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
+use sidestep_scenario::Source;
 use sidestep_server::protocol::FrameText;
 use sidestep_server::{Encoder, Options, Studio};
 use std::net::TcpStream;
@@ -135,7 +135,7 @@ impl Page {
 fn studio(folder: &Path, text: &str) -> (Studio, Page) {
     std::fs::write(folder.join("s.toml"), text).expect("written");
     let options = Options {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         program: "bench".into(),
         named: vec![folder.to_path_buf()],
         host: "127.0.0.1".into(),
@@ -143,7 +143,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         read_only: false,
         workers: 1,
         foxglove: None,
-        screens: Vec::new(),
+        fleets: Vec::new(),
     };
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);

@@ -2,7 +2,7 @@
 
 use super::{CONDITIONS, convert};
 use crate::protocol::{Appearance, BodyTable, SessionId};
-use sidestep::kernel::view::{BODY_COLORS, Body, BodyKind, Shape};
+use sidestep_kernel::view::{BODY_COLORS, Body, BodyKind, Shape};
 use std::collections::BTreeMap;
 
 /// The part of a body that stays the same as long as the body table does.

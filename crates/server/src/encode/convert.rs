@@ -3,8 +3,8 @@
 use crate::protocol::{
     Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, Shape, StaticBody,
 };
-use sidestep::kernel::InputError;
-use sidestep::kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
+use sidestep_kernel::InputError;
+use sidestep_kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {

@@ -7,7 +7,7 @@ pub(crate) use convert::{body, body_id, event, problem, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
-use sidestep::kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
+use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
 use std::collections::BTreeMap;
 
 /// First bytes of a frame.

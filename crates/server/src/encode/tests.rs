@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::protocol::Scan;
-use sidestep::kernel::view::{BODY_COLORS, Pose};
+use sidestep_kernel::view::{BODY_COLORS, Pose};
 
 fn scenery(dimensions: u8) -> Scenery {
     Scenery {
@@ -141,8 +141,8 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
 
 #[test]
 fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
-    let seen = sidestep::kernel::view::Scan {
-        of: sidestep::kernel::view::BodyId::new(BodyKind::Robot, 1, None),
+    let seen = sidestep_kernel::view::Scan {
+        of: sidestep_kernel::view::BodyId::new(BodyKind::Robot, 1, None),
         sensor: "eye".into(),
         pose: Pose::from_position([0.0; 3]),
         bearings_rad: vec![0.0, 1.0],

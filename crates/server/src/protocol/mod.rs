@@ -22,7 +22,7 @@
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
 //! A page grants credit for frames ([`Method::Credit`]), and gets none without it. At most
-//! [`FRAMES_PER_S`](crate::FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
+//! [`MAX_FRAMES_PER_S`](crate::MAX_FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 
 mod edit;

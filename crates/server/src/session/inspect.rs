@@ -4,8 +4,8 @@ use crate::encode::{body, body_id};
 use crate::protocol::{
     BodyId, Fact, Inspection, Mark, MarkShape, Problem, Role, Section, Table, Value,
 };
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view;
 
 /// Returns the percepts, decisions and deeds of a body.
 ///

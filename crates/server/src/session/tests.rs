@@ -34,17 +34,17 @@ struct Page {
     _folder: tempfile::TempDir,
 }
 
-fn means(folder: &std::path::Path, workers: usize) -> SessionDeps {
+fn deps(folder: &std::path::Path, workers: usize) -> SessionDeps {
     let files = AllowedFiles::from_roots(&[folder.to_path_buf()]).expect("a folder");
-    let (budget, screens) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
+    let (budget, fleets) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
     SessionDeps {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         files,
         workers,
         read_only: false,
         budget,
-        showcase: None,
-        screens,
+        foxglove: None,
+        fleets,
     }
 }
 
@@ -55,17 +55,17 @@ impl Page {
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).expect("written");
         let what = OpenTarget::Scenario { path: path.display().to_string() };
-        Self::open_target(means(folder.path(), workers), what, folder)
+        Self::open_target(deps(folder.path(), workers), what, folder)
     }
 
     fn open_target(
-        means: SessionDeps,
-        what: OpenTarget,
+        deps: SessionDeps,
+        target: OpenTarget,
         folder: tempfile::TempDir,
     ) -> (Self, Value) {
         let outbox = Arc::new(Outbox::default());
-        let opening = OpenRequest { session: 1, id: 1, what, seed: None };
-        let session = Session::start(means, opening, outbox.clone(), ()).expect("a thread");
+        let request = OpenRequest { session: 1, id: 1, target, seed: None };
+        let session = Session::start(deps, request, outbox.clone(), ()).expect("a thread");
         let (frames, notices, replies) = Default::default();
         let mut page = Self { outbox, session, id: 1, frames, notices, replies, _folder: folder };
         let opened = page.wait(1);
@@ -328,19 +328,19 @@ fn what_cannot_be_opened_or_done_is_a_problem_and_the_session_goes_on() {
 fn a_text_is_checked_with_its_place_and_refused_where_the_studio_only_reads() {
     let folder = tempfile::tempdir().expect("a folder");
     let source = Source::new("s.toml", ROBOTS, folder.path());
-    let means = means(folder.path(), 1);
+    let deps = deps(folder.path(), 1);
     let problems =
-        text_problems(&means, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
+        text_problems(&deps, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
     assert_eq!((problems.len(), problems[0].line), (1, Some(16)));
     assert!(problems[0].remedy.contains("count") && !problems[0].is_warning);
     assert_eq!(problems[0].key.as_deref(), Some("robots.cuont"));
     let twice = ROBOTS.replace("count = 6", "cuont = 6").replace("seed = ", "seed = -");
-    let keys = text_problems(&means, &source, twice).expect("checked");
+    let keys = text_problems(&deps, &source, twice).expect("checked");
     let keys: Vec<_> = keys.iter().filter_map(|one| one.key.as_deref()).collect();
     assert_eq!(keys, ["seed", "robots.cuont"]);
-    assert_eq!(text_problems(&means, &source, ROBOTS.into()), Ok(vec![]));
-    assert_eq!(text_problems(&means, &source, "a = = 1".into()).expect("checked").len(), 1);
-    let reads = SessionDeps { read_only: true, ..means };
+    assert_eq!(text_problems(&deps, &source, ROBOTS.into()), Ok(vec![]));
+    assert_eq!(text_problems(&deps, &source, "a = = 1".into()).expect("checked").len(), 1);
+    let reads = SessionDeps { read_only: true, ..deps };
     assert!(text_problems(&reads, &source, ROBOTS.into()).is_err());
 }
 
@@ -368,15 +368,15 @@ fn a_bug_in_a_run_ends_its_session_with_a_notice() {
         .send_request(99, Method::SelectScans { session: 1, bodies: vec![who] })
         .expect("taken");
     page.wait(99);
-    let desk = |work: fn()| {
-        let (_, orders) = sync_channel(1);
+    let worker = |work: fn()| {
+        let (_, requests) = sync_channel(1);
         let (outbox, interrupt) = (page.outbox.clone(), Interrupt::default());
-        SessionWorker { outbox, interrupt, orders }.catch_panic(work)
+        SessionWorker { outbox, interrupt, requests }.catch_panic(work)
     };
     assert!(
-        matches!(desk(|| panic!("a rule is broken")), Err(SessionExit::Bug(words)) if words == "a rule is broken")
+        matches!(worker(|| panic!("a rule is broken")), Err(SessionExit::Bug(words)) if words == "a rule is broken")
     );
-    assert!(matches!(desk(|| ()), Ok(())));
+    assert!(matches!(worker(|| ()), Ok(())));
 }
 
 #[test]
@@ -412,6 +412,6 @@ fn a_pipe_is_not_opened_for_nobody_may_ever_write_into_it() {
     let made = std::process::Command::new("mkfifo").arg(&path).status().expect("mkfifo runs");
     assert!(made.success());
     let what = OpenTarget::Scenario { path: path.display().to_string() };
-    let (_, reply) = Page::open_target(means(folder.path(), 1), what, folder);
+    let (_, reply) = Page::open_target(deps(folder.path(), 1), what, folder);
     assert!(reply.get("problem").is_some(), "{reply}");
 }

@@ -4,8 +4,8 @@ use super::folder::{Folder, check_variants, to_run_table, to_share};
 use super::journal::{StoredOutcome, now_unix_s};
 use serde::Serialize;
 use serde_json::Value;
-use sidestep::experiment::sweep::{Outcome, Plan, Shard};
-use sidestep::kernel::InputError;
+use sidestep_experiment::sweep::{Outcome, Plan, Shard};
+use sidestep_kernel::InputError;
 use sidestep_record::sweep::Share;
 use std::collections::BTreeSet;
 

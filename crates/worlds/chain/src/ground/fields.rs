@@ -2,10 +2,10 @@
 
 use super::courses::{Course, Mover};
 use super::purposes;
-use crate::rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
-use crate::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
+use sidestep_rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
+use sidestep_rods::{Obstacle, Obstacles};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
@@ -204,7 +204,7 @@ fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::norm;
+    use sidestep_rods::geometry::norm;
 
     fn field<const D: usize>(part: f64, length_m: f64) -> Field<D> {
         let mut tail = [0.0; D];

@@ -2,9 +2,6 @@
 
 use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
-use super::super::rods::chain::Chain;
-use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
-use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::{ChainSpec, push_parts};
 use super::{Compiler, MAX_VALUE, Measure, PointValue};
 use schemars::JsonSchema;
@@ -12,6 +9,8 @@ use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
+use sidestep_rods::geometry::{Bounds, Core, Cuboid, Point};
+use sidestep_rods::{Chain, Obstacle, Obstacles, outline};
 use sidestep_scenario::{NumberRange, Spanned};
 use std::ops::{Range, RangeInclusive};
 
