@@ -1,7 +1,7 @@
 /** One socket to the server: requests with replies, notifications, frames, and reconnection. */
 
 import { delayBefore_ms } from "./backoff";
-import type { ReplyBody, Method, ServerNotification, Problem, Reply } from "./protocol";
+import type { ReplyBody, ServerMethod, SessionMethod, ServerNotification, Problem, Reply } from "./protocol";
 
 /** The part of a WebSocket that a connection needs. */
 export interface Socket {
@@ -103,12 +103,21 @@ export class Connection {
     this.#timer = this.#environment.after(HELLO_TIMEOUT_MS, () => this.#onClose(socket));
   }
 
-  /** Sends a call; the promise fails with `Refused`. */
-  request(call: Method): Promise<ReplyBody> {
+  /** Sends a request to the server itself; the promise fails with a `RequestError`. */
+  request(call: ServerMethod): Promise<ReplyBody> {
+    return this.#send({ call });
+  }
+
+  /** Sends a request to a session. */
+  requestSession(session: number, call: SessionMethod): Promise<ReplyBody> {
+    return this.#send({ session, call });
+  }
+
+  #send(request: { session?: number; call: ServerMethod | SessionMethod }): Promise<ReplyBody> {
     if (!this.#socket || !this.#isReady) return Promise.reject(new RequestError(CONNECTION_LOST));
     const id = this.#nextId++;
     const answer = new Promise<ReplyBody>((resolve, reject) => this.#pending.set(id, { resolve, reject }));
-    this.#socket.send(JSON.stringify({ id, call }));
+    this.#socket.send(JSON.stringify({ id, ...request }));
     return answer;
   }
 

@@ -95,9 +95,12 @@ impl Page {
         Self { socket, id: 0, frames: 0, status: Value::Null }
     }
 
+    /// Sends a request; the call is written with the session that it is for, if there is one.
     fn send(&mut self, call: &Value) -> u32 {
         self.id += 1;
-        let text = json!({ "id": self.id, "call": call }).to_string();
+        let mut call = call.clone();
+        let session = call.as_object_mut().and_then(|call| call.remove("session"));
+        let text = json!({ "id": self.id, "session": session, "call": call }).to_string();
         self.socket.send(Message::text(text)).expect("sent");
         self.id
     }

@@ -1,7 +1,8 @@
 //! Reading of requests: every message of a page gets an answer.
 
-use crate::protocol::{ClientRequest, Method, Problem, SessionId};
+use crate::protocol::{ClientRequest, Problem, SessionId};
 use serde::Deserialize;
+use serde_json::Value;
 
 /// Longest text of a request, in bytes: room for the longest scenario that can be read (16 MiB), and for the one that
 /// it replaces, both as JSON.
@@ -23,10 +24,28 @@ pub fn decode(text: &str) -> Result<ClientRequest, Box<(u32, Problem)>> {
         let remedy = "make the text shorter, or change the file with another program";
         return Err(Box::new((request_number(text), Problem::new("request", cause, remedy))));
     }
-    serde_json::from_str(text).map_err(|error| {
+    read(text).map_err(|error| {
         let id = request_number(text);
         let cause = format!("it cannot be read: {error}");
         Box::new((id, Problem::new("request", cause, "send JSON as the protocol has it")))
+    })
+}
+
+/// Reads a request. Whether there is a session decides which methods there are, so the method is read last.
+fn read(text: &str) -> serde_json::Result<ClientRequest> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Envelope {
+        id: u32,
+        session: Option<SessionId>,
+        call: Value,
+    }
+    let Envelope { id, session, call } = serde_json::from_str(text)?;
+    Ok(match session {
+        None => ClientRequest::Server { id, call: serde_json::from_value(call)? },
+        Some(session) => {
+            ClientRequest::Session { id, session, call: serde_json::from_value(call)? }
+        }
     })
 }
 
@@ -35,59 +54,40 @@ fn request_number(text: &str) -> u32 {
     serde_json::from_str(text).map_or(0, |RequestNumber { id }| id)
 }
 
-impl Method {
-    /// Returns the session asked, if it is a question to one.
-    pub(crate) fn session(&self) -> Option<SessionId> {
-        match *self {
-            Self::Files { .. } | Self::Open { .. } | Self::Runs { .. } | Self::Schema { .. } => {
-                None
-            }
-            Self::Close { session }
-            | Self::Play { session, .. }
-            | Self::Pause { session }
-            | Self::Step { session, .. }
-            | Self::Seek { session, .. }
-            | Self::Restart { session, .. }
-            | Self::SelectScans { session, .. }
-            | Self::Credit { session, .. }
-            | Self::Inspect { session, .. }
-            | Self::Metrics { session, .. }
-            | Self::Events { session, .. }
-            | Self::Source { session }
-            | Self::Tables { session }
-            | Self::Check { session, .. }
-            | Self::Edit { session, .. }
-            | Self::Model { session, .. }
-            | Self::Save { session, .. } => Some(session),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::{OpenTarget, Speed};
+    use crate::protocol::{OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed};
     use proptest::prelude::*;
 
     #[test]
     fn requests_are_read_as_the_protocol_has_them() {
         for (text, call) in [
-            (r#"{"do":"files"}"#, Method::Files { folder: None }),
+            (r#"{"do":"files"}"#, ServerMethod::Files { folder: None }),
             (
                 r#"{"do":"open","target":{"kind":"new","world":"robots"},"seed":null}"#,
-                Method::Open { target: OpenTarget::New { world: "robots".into() }, seed: None },
-            ),
-            (
-                r#"{"do":"play","session":3,"speed":{"times":2.5}}"#,
-                Method::Play { session: 3, speed: Speed::Times(2.5) },
-            ),
-            (
-                r#"{"do":"play","session":3,"speed":"fastest"}"#,
-                Method::Play { session: 3, speed: Speed::Fastest },
+                ServerMethod::Open {
+                    target: OpenTarget::New { world: "robots".into() },
+                    seed: None,
+                },
             ),
         ] {
             let request = decode(&format!(r#"{{"id":7,"call":{text}}}"#)).expect(text);
-            assert_eq!(request, ClientRequest { id: 7, call });
+            assert_eq!(request, ClientRequest::Server { id: 7, call });
+        }
+        for (text, call) in [
+            (r#"{"do":"close"}"#, SessionMethod::Close {}),
+            (
+                r#"{"do":"play","speed":{"times":2.5}}"#,
+                SessionMethod::Run(RunMethod::Play { speed: Speed::Times(2.5) }),
+            ),
+            (
+                r#"{"do":"play","speed":"fastest"}"#,
+                SessionMethod::Run(RunMethod::Play { speed: Speed::Fastest }),
+            ),
+        ] {
+            let request = decode(&format!(r#"{{"id":7,"session":3,"call":{text}}}"#)).expect(text);
+            assert_eq!(request, ClientRequest::Session { id: 7, session: 3, call });
         }
     }
 
@@ -99,8 +99,10 @@ mod tests {
             ("null", 0),
             (r#"{"id":-1,"call":{}}"#, 0),
             (r#"{"id":5,"call":{"do":"explode"}}"#, 5),
-            (r#"{"id":6,"call":{"do":"pause","session":1,"more":1}}"#, 6),
-            (r#"{"id":7,"call":{"do":"seek","session":1,"cycle":-3}}"#, 7),
+            (r#"{"id":6,"session":1,"call":{"do":"pause","more":1}}"#, 6),
+            (r#"{"id":4,"session":1,"call":{"do":"files"}}"#, 4),
+            (r#"{"id":3,"call":{"do":"pause"}}"#, 3),
+            (r#"{"id":7,"session":1,"call":{"do":"seek","cycle":-3}}"#, 7),
         ] {
             assert_eq!(decode(text).map_err(|unread| unread.0), Err(id), "{text}");
         }
@@ -112,9 +114,9 @@ mod tests {
     #[test]
     fn the_longest_scenario_that_can_be_read_is_saved_over_another_one() {
         let text = "seed = 1\n\"a\" = 2\n".repeat((16 << 20) / 19);
-        let call = serde_json::json!({ "do": "save", "session": 1, "text": text, "to": null, "base": text, "overwrite": true });
-        let request = serde_json::json!({ "id": 7, "call": call }).to_string();
-        assert_eq!(decode(&request).map(|request| request.id), Ok(7));
+        let call = serde_json::json!({ "do": "save", "text": text, "to": null, "base": text, "overwrite": true });
+        let request = serde_json::json!({ "id": 7, "session": 1, "call": call }).to_string();
+        assert!(decode(&request).is_ok());
     }
 
     proptest! {

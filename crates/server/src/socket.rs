@@ -1,7 +1,10 @@
 //! The socket of one page: requests go to sessions, and their messages to the page.
 
 use crate::outbox::{Outbox, OutboxItem};
-use crate::protocol::{Method, OpenTarget, Problem, Reply, ReplyBody, ReplyResult, SessionId};
+use crate::protocol::{
+    ClientRequest, OpenTarget, Problem, Reply, ReplyBody, ReplyResult, ServerMethod, SessionId,
+    SessionMethod,
+};
 use crate::request::decode;
 use crate::results::runs;
 use crate::session::{
@@ -153,12 +156,18 @@ impl SocketSessions {
                 refuse(&self.outbox, id, problem);
             }
             Ok(request) => {
-                let id = request.id;
+                let (ClientRequest::Server { id, .. } | ClientRequest::Session { id, .. }) =
+                    request;
                 if text.len() > LONG_REQUEST_BYTES {
                     self.outbox.record_long_request(id, text.len());
                 }
                 let outbox = self.outbox.clone();
-                catch_panic(&outbox, id, || self.dispatch(id, request.call));
+                catch_panic(&outbox, id, || match request {
+                    ClientRequest::Server { call, .. } => self.call_server(id, call),
+                    ClientRequest::Session { session, call, .. } => {
+                        self.call_session(id, session, call)
+                    }
+                });
             }
         }
     }
@@ -169,10 +178,10 @@ impl SocketSessions {
         refuse(&self.outbox, 0, problem);
     }
 
-    /// Passes a request on; returns the answer to one that is not answered elsewhere.
-    fn dispatch(&mut self, id: u32, call: Method) -> Option<Result<ReplyBody, Problem>> {
+    /// Answers a request to the server itself; `None` if it is answered by another thread.
+    fn call_server(&mut self, id: u32, call: ServerMethod) -> Option<Result<ReplyBody, Problem>> {
         match call {
-            Method::Files { folder } => {
+            ServerMethod::Files { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || {
                     let entries = deps.files.list(folder.as_deref(), &deps.worlds)?;
@@ -180,36 +189,48 @@ impl SocketSessions {
                 });
                 None
             }
-            Method::Runs { folder } => {
+            ServerMethod::Runs { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || runs(&deps.files.resolve(&folder)?));
                 None
             }
-            Method::Open { target, seed } => self.open(id, target, seed).err().map(Err),
-            Method::Close { session } => {
-                let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
-                self.outbox.clear(session);
-                Some(closed.map(|_| ReplyBody::Done))
-            }
-            Method::Check { session, text } => self.on_text(id, session, move |deps, source| {
-                Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
-            }),
-            Method::Edit { session, text, edits } => {
-                self.on_text(id, session, move |deps, source| {
-                    apply_edits(deps, source, text, edits)
-                })
-            }
-            Method::Model { session, text } => {
-                self.on_text(id, session, move |deps, source| model(deps, source, text))
-            }
-            Method::Schema { world } => {
+            ServerMethod::Open { target, seed } => self.open(id, target, seed).err().map(Err),
+            ServerMethod::Schema { world } => {
                 let worlds = self.state.deps.worlds.clone();
                 self.answer_in_thread(id, move || schema(&worlds, &world));
                 None
             }
-            call => {
-                let session = call.session().and_then(|session| self.sessions.get(&session));
-                let Some(session) = session else { return Some(Err(no_such_session())) };
+        }
+    }
+
+    /// Answers a request to a session; `None` if it is answered by another thread.
+    fn call_session(
+        &mut self,
+        id: u32,
+        session: SessionId,
+        call: SessionMethod,
+    ) -> Option<Result<ReplyBody, Problem>> {
+        match call {
+            SessionMethod::Close {} => {
+                let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
+                self.outbox.clear(session);
+                Some(closed.map(|_| ReplyBody::Done))
+            }
+            SessionMethod::Check { text } => self.on_text(id, session, move |deps, source| {
+                Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
+            }),
+            SessionMethod::Edit { text, edits } => {
+                self.on_text(id, session, move |deps, source| {
+                    apply_edits(deps, source, text, edits)
+                })
+            }
+            SessionMethod::Model { text } => {
+                self.on_text(id, session, move |deps, source| model(deps, source, text))
+            }
+            SessionMethod::Run(call) => {
+                let Some(session) = self.sessions.get(&session) else {
+                    return Some(Err(no_such_session()));
+                };
                 session.send_request(id, call).err().map(Err)
             }
         }

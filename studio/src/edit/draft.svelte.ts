@@ -95,7 +95,7 @@ export class Draft {
 
   async #loadSchema(): Promise<void> {
     try {
-      const answer = await this.session.request({ do: "schema", world: this.session.scene.world });
+      const answer = await this.session.schema();
       if (answer.is === "schema" && isTable(answer.schema)) this.world = new WorldSchema(answer.schema);
     } catch (error) {
       // Without a schema the text can still be edited.
@@ -137,12 +137,7 @@ export class Draft {
     if (list.length === 0 || this.isLocked) return false;
     const before = this.text;
     try {
-      const answer = await this.session.request({
-        do: "edit",
-        session: this.session.id,
-        text: before,
-        edits: [...list],
-      });
+      const answer = await this.session.request({ do: "edit", text: before, edits: [...list] });
       if (answer.is !== "edited") return false;
       // Text typed meanwhile is kept: the edit is then repeated on it.
       if (this.text !== before) return await this.#edit(edits);
@@ -208,7 +203,7 @@ export class Draft {
     const { session } = this;
     this.phase = "checking";
     try {
-      const model = session.request({ do: "model", session: session.id, text }).catch((error: unknown) => {
+      const model = session.request({ do: "model", text }).catch((error: unknown) => {
         if (!(error instanceof RequestError)) throw error;
         return null;
       });

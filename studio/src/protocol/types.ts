@@ -5,22 +5,35 @@
 export const VERSION = 2;
 
 /**
- * A request; its reply has the same number.
+ * A request; its reply has the same number, chosen by the page from 1 on: a request that cannot be read is answered with
+ * number 0.
  */
 export type ClientRequest = {
 /**
- * Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
+ * The number of the request.
  */
 id: number,
 /**
  * What is asked.
  */
-call: Method, };
+call: ServerMethod, } | {
+/**
+ * The number of the request.
+ */
+id: number,
+/**
+ * The session.
+ */
+session: number,
+/**
+ * What is asked.
+ */
+call: SessionMethod, };
 
 /**
- * A query or a command of a page.
+ * A query or a command for the server itself.
  */
-export type Method = { "do": "files",
+export type ServerMethod = { "do": "files",
 /**
  * Its path, as a listing gave it.
  */
@@ -32,43 +45,53 @@ target: OpenTarget,
 /**
  * Another seed than the scenario's.
  */
-seed: number | null, } | { "do": "close",
+seed: number | null, } | { "do": "runs",
 /**
- * The session.
+ * Its folder, as a listing gave it.
  */
-session: number, } | { "do": "play",
+folder: string, } | { "do": "schema",
 /**
- * The session.
+ * The world's name.
  */
-session: number,
+world: string, };
+
+/**
+ * A query or a command for a session.
+ */
+export type SessionMethod = { "do": "close", } | { "do": "check",
+/**
+ * The text.
+ */
+text: string, } | { "do": "edit",
+/**
+ * The text.
+ */
+text: string,
+/**
+ * The changes.
+ */
+edits: Array<Edit>, } | { "do": "model",
+/**
+ * The text.
+ */
+text: string, } | RunMethod;
+
+/**
+ * A query or a command for the run of a session.
+ */
+export type RunMethod = { "do": "play",
 /**
  * The speed.
  */
-speed: Speed, } | { "do": "pause",
-/**
- * The session.
- */
-session: number, } | { "do": "step",
-/**
- * The session.
- */
-session: number,
+speed: Speed, } | { "do": "pause", } | { "do": "step",
 /**
  * Number of cycles.
  */
 cycles: number, } | { "do": "seek",
 /**
- * The session.
- */
-session: number,
-/**
  * The cycle; a run that is over before it stays at its end.
  */
 cycle: number, } | { "do": "restart",
-/**
- * The session.
- */
-session: number,
 /**
  * Another seed.
  */
@@ -78,41 +101,21 @@ seed: number | null,
  */
 text: string | null, } | { "do": "select-scans",
 /**
- * The session.
- */
-session: number,
-/**
  * The bodies.
  */
 bodies: Array<BodyId>, } | { "do": "credit",
-/**
- * The session.
- */
-session: number,
 /**
  * Number of frames.
  */
 frames: number, } | { "do": "inspect",
 /**
- * The session.
- */
-session: number,
-/**
  * The body.
  */
 body: BodyId, } | { "do": "metrics",
 /**
- * The session.
- */
-session: number,
-/**
  * The number of the first sample wanted.
  */
 from: number, } | { "do": "events",
-/**
- * The session.
- */
-session: number,
 /**
  * The first cycle.
  */
@@ -128,51 +131,7 @@ skip: number | null,
 /**
  * The largest number of events.
  */
-limit: number, } | { "do": "source",
-/**
- * The session.
- */
-session: number, } | { "do": "tables",
-/**
- * The session.
- */
-session: number, } | { "do": "runs",
-/**
- * Its folder, as a listing gave it.
- */
-folder: string, } | { "do": "check",
-/**
- * The session.
- */
-session: number,
-/**
- * The text.
- */
-text: string, } | { "do": "edit",
-/**
- * The session.
- */
-session: number,
-/**
- * The text.
- */
-text: string,
-/**
- * The changes.
- */
-edits: Array<Edit>, } | { "do": "model",
-/**
- * The session.
- */
-session: number,
-/**
- * The text.
- */
-text: string, } | { "do": "save",
-/**
- * The session.
- */
-session: number,
+limit: number, } | { "do": "source", } | { "do": "tables", } | { "do": "save",
 /**
  * The text.
  */
@@ -189,11 +148,7 @@ base: string | null,
 /**
  * Whether a file is replaced even if it holds something else.
  */
-overwrite: boolean, } | { "do": "schema",
-/**
- * The world's name.
- */
-world: string, };
+overwrite: boolean, };
 
 /**
  * A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands

@@ -7,7 +7,8 @@ import { CONNECTION_LOST, RequestError, makeProblem } from "../connection";
 import { initialSpeed, SPEEDS, bodyKey } from "../format";
 import type {
   ReplyBody,
-  Method,
+  ServerMethod,
+  SessionMethod,
   BodyTable,
   RunEvent,
   Inspection,
@@ -26,13 +27,10 @@ import { cyclesBack_per_s, Rewind } from "./rewind.svelte";
 import { Seeker } from "./seeker";
 import { Waiters } from "./waiters";
 
-type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
-/** A method of a session, which adds its own number. */
-type SessionCall = DistributiveOmit<Extract<Method, { session: number }>, "session">;
-
 /** What a session needs from the page: requests and a sink of problems. */
 export interface SessionHost {
-  request(call: Method): Promise<ReplyBody>;
+  request(call: ServerMethod): Promise<ReplyBody>;
+  requestSession(session: number, call: SessionMethod): Promise<ReplyBody>;
   onProblem(problem: Problem): void;
 }
 
@@ -304,10 +302,9 @@ export class Session {
     const cycle = 1 + (this.scene.is_recording ? this.lastCycle : Math.max(this.status.cycle, this.displayed.cycle));
     const ignore = (): void => undefined;
     this.events
-      .fetch(cycle, (from, until, skip, limit) => this.#request({ do: "events", from, until, skip, limit }))
+      .fetch(cycle, (from, until, skip, limit) => this.request({ do: "events", from, until, skip, limit }))
       .catch(ignore);
-    if (withMetrics && !this.isFleet)
-      this.metrics.fetch((from) => this.#request({ do: "metrics", from })).catch(ignore);
+    if (withMetrics && !this.isFleet) this.metrics.fetch((from) => this.request({ do: "metrics", from })).catch(ignore);
   }
 
   // Commands of the page.
@@ -342,7 +339,7 @@ export class Session {
     const orders = this.#commands;
     const step = (this.#pendingStep = { target });
     try {
-      await this.#request({ do: "step", cycles });
+      await this.request({ do: "step", cycles });
     } catch (error) {
       if (orders === this.#commands) this.#report(error);
     } finally {
@@ -390,7 +387,7 @@ export class Session {
   async #seekNow(cycle: number): Promise<boolean> {
     const orders = this.#commands;
     try {
-      await this.#request({ do: "seek", cycle });
+      await this.request({ do: "seek", cycle });
       return true;
     } catch (error) {
       if (orders === this.#commands) this.#report(error);
@@ -440,7 +437,7 @@ export class Session {
   }
 
   source(): Promise<ReplyBody> {
-    return this.#request({ do: "source" });
+    return this.request({ do: "source" });
   }
 
   /** The folder of the recording, if it is one: only folders have reports. */
@@ -456,12 +453,19 @@ export class Session {
   }
 
   check(text: string): Promise<ReplyBody> {
-    return this.#request({ do: "check", text });
+    return this.request({ do: "check", text });
   }
 
-  /** Sends a request of the editor. */
-  request(call: Method): Promise<ReplyBody> {
-    return this.id === 0 ? Promise.reject(new RequestError(SESSION_NOT_OPEN)) : this.#host.request(call);
+  /** The JSON Schema of scenarios of the session's world. */
+  schema(): Promise<ReplyBody> {
+    return this.#host.request({ do: "schema", world: this.scene.world });
+  }
+
+  /** Sends a request to the session. */
+  request(call: SessionMethod): Promise<ReplyBody> {
+    // Between two connections the session has no id on the server.
+    if (this.id === 0) return Promise.reject(new RequestError(SESSION_NOT_OPEN));
+    return this.#host.requestSession(this.id, call);
   }
 
   reportProblem(problem: Problem): void {
@@ -469,9 +473,9 @@ export class Session {
   }
 
   /** Sends a request and reports its problem, if there is one. */
-  async send(call: SessionCall): Promise<ReplyBody | null> {
+  async send(call: SessionMethod): Promise<ReplyBody | null> {
     try {
-      return await this.#request(call);
+      return await this.request(call);
     } catch (error) {
       this.#report(error);
       return null;
@@ -485,14 +489,8 @@ export class Session {
   }
 
   /** Sends a request whose failure is ignored. */
-  sendQuietly(call: SessionCall): void {
-    this.#request(call).catch(() => undefined);
-  }
-
-  #request(call: SessionCall): Promise<ReplyBody> {
-    // Between two connections the session has no id on the server.
-    if (this.id === 0) return Promise.reject(new RequestError(SESSION_NOT_OPEN));
-    return this.#host.request({ ...call, session: this.id } as Method);
+  sendQuietly(call: SessionMethod): void {
+    this.request(call).catch(() => undefined);
   }
 
   #selectScans(): void {
@@ -515,7 +513,7 @@ export class Session {
     this.#isInspecting = true;
     this.#inspectedAt_ms = performance.now();
     try {
-      const answer = await this.#request({ do: "inspect", body });
+      const answer = await this.request({ do: "inspect", body });
       if (this.selected === body && answer.is === "inspection") {
         this.inspection = answer;
         this.inspectProblem = null;

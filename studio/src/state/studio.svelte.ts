@@ -104,6 +104,8 @@ export class Studio {
   }
 
   readonly request: Connection["request"] = (call) => this.#connection.request(call);
+  readonly #requestSession: Connection["requestSession"] = (session, call) =>
+    this.#connection.requestSession(session, call);
 
   onProblem(problem: Problem): void {
     const same = this.problems.some(({ problem: p }) => p.place === problem.place && p.cause === problem.cause);
@@ -123,7 +125,11 @@ export class Studio {
       );
       return false;
     }
-    const session = new Session(target, { request: this.request, onProblem: (problem) => this.onProblem(problem) });
+    const session = new Session(target, {
+      request: this.request,
+      requestSession: this.#requestSession,
+      onProblem: (problem) => this.onProblem(problem),
+    });
     if (!(await this.#openAt(session, seed))) return false;
     // A fleet is known only as long as it is on the studio's command line.
     if (!session.isFleet) remember(target, session.scene.name);

@@ -7,7 +7,8 @@ import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
 import type {
   ReplyBody,
-  Method,
+  ServerMethod,
+  SessionMethod,
   Fleet,
   ServerNotification,
   Problem,
@@ -197,7 +198,7 @@ class Run {
 }
 
 export class FakeServer {
-  readonly calls: Method[] = [];
+  readonly calls: (ServerMethod | SessionMethod)[] = [];
   port = 0;
   /** Subjects that the command line would have asked to open. */
   open: OpenTarget[] = [];
@@ -287,10 +288,14 @@ export class FakeServer {
     });
     const mine = new Set<number>();
     socket.on("message", (data) => {
-      const { id, call } = JSON.parse(String(data)) as ClientRequest;
-      this.calls.push(call);
+      const request = JSON.parse(String(data)) as ClientRequest;
+      const { id } = request;
+      this.calls.push(request.call);
       try {
-        const answer = this.#answer(call, socket, say);
+        const answer =
+          "session" in request
+            ? this.#answerSession(request.session, request.call, say)
+            : this.#answer(request.call, socket);
         if (answer.is === "opened") mine.add(answer.session);
         say({ id, answer });
         if (answer.is === "opened") say(this.#runs.get(answer.session)!.bodyTable());
@@ -320,7 +325,7 @@ export class FakeServer {
     for (const socket of this.#sockets?.clients ?? []) socket.send(text);
   }
 
-  #answer(call: Method, socket: WebSocket, say: (words: unknown) => void): ReplyBody {
+  #answer(call: ServerMethod, socket: WebSocket): ReplyBody {
     if (call.do === "files") return files(call.folder);
     if (call.do === "runs") return runs();
     if (call.do === "open") {
@@ -342,8 +347,11 @@ export class FakeServer {
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
     }
-    if (call.do === "schema") return { is: "schema", schema: SCHEMA };
-    const run = this.#runs.get(call.session);
+    return { is: "schema", schema: SCHEMA };
+  }
+
+  #answerSession(session: number, call: SessionMethod, say: (words: unknown) => void): ReplyBody {
+    const run = this.#runs.get(session);
     if (!run) throw problemOf("no such session", "open it again");
     if (run.isFleet && !["close", "credit", "select-scans", "events", "tables"].includes(call.do)) {
       throw problemOf("a fleet is only watched here", "steer it where it was started");
@@ -431,7 +439,7 @@ function runs(): ReplyBody {
   };
 }
 
-function act(call: Exclude<Method, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): ReplyBody {
+function act(call: Exclude<SessionMethod, { do: "save" }>, run: Run): ReplyBody {
   switch (call.do) {
     case "play":
       run.playing = true;

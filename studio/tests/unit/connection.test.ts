@@ -81,9 +81,9 @@ test("a socket that stays silent is given up", () => {
 test("replies find their calls, also out of order", async () => {
   const socket = sockets[0]!;
   socket.onopen!();
-  const first = connection.request({ do: "pause", session: 1 });
-  const second = connection.request({ do: "source", session: 1 });
-  expect(JSON.parse(socket.sent[1]!)).toEqual({ id: 2, call: { do: "source", session: 1 } });
+  const first = connection.requestSession(1, { do: "pause" });
+  const second = connection.requestSession(1, { do: "source" });
+  expect(JSON.parse(socket.sent[1]!)).toEqual({ id: 2, session: 1, call: { do: "source" } });
   socket.onmessage!({
     data: JSON.stringify({ id: 2, answer: { is: "source", place: "p", text: "t", read_only: false } }),
   });
@@ -94,7 +94,7 @@ test("replies find their calls, also out of order", async () => {
 
 test("a refusal carries place, cause and remedy", async () => {
   sockets[0]!.onopen!();
-  const call = connection.request({ do: "pause", session: 9 });
+  const call = connection.requestSession(9, { do: "pause" });
   const problem = {
     place: "session 9",
     line: null,
@@ -112,10 +112,10 @@ test("a refusal carries place, cause and remedy", async () => {
 
 test("calls that are open when the socket dies are refused, as are those without one", async () => {
   sockets[0]!.onopen!();
-  const call = connection.request({ do: "pause", session: 1 });
+  const call = connection.requestSession(1, { do: "pause" });
   sockets[0]!.onclose!();
   await expect(call).rejects.toBeInstanceOf(RequestError);
-  await expect(connection.request({ do: "pause", session: 1 })).rejects.toBeInstanceOf(RequestError);
+  await expect(connection.requestSession(1, { do: "pause" })).rejects.toBeInstanceOf(RequestError);
 });
 
 test("connecting now gives up the old socket, whose end is then nobody's loss", () => {

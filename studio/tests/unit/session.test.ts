@@ -1,15 +1,24 @@
 /** A session goes on after frames that cannot be read. */
 
 import { expect, test, vi } from "vitest";
-import type { Method, BodyTable } from "../../src/protocol";
+import type { SessionMethod, BodyTable } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
-import { Session } from "../../src/state/session.svelte";
+import { Session, type SessionHost } from "../../src/state/session.svelte";
+
+/** A page that keeps the requests to sessions, and answers none. */
+function host(calls: SessionMethod[]): SessionHost {
+  const never = new Promise<never>(() => undefined);
+  return {
+    request: () => never,
+    requestSession: (_, call) => (calls.push(call), never),
+    onProblem: () => undefined,
+  };
+}
 
 test("frames that cannot be read are granted again, at most once a second", () => {
   vi.useFakeTimers();
-  const calls: Method[] = [];
-  const ask = (call: Method): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
-  const session = new Session({ kind: "new", world: "robots" }, { request: ask, onProblem: () => undefined });
+  const calls: SessionMethod[] = [];
+  const session = new Session({ kind: "new", world: "robots" }, host(calls));
   session.id = 1;
   session.credit.refill();
   for (let i = 0; i < 2; i++) session.onFrame(new ArrayBuffer(60));
@@ -17,16 +26,15 @@ test("frames that cannot be read are granted again, at most once a second", () =
   expect(calls.length).toBe(1);
   vi.advanceTimersByTime(5000);
   expect(calls).toEqual([
-    { do: "credit", frames: 2, session: 1 },
-    { do: "credit", frames: 2, session: 1 },
+    { do: "credit", frames: 2 },
+    { do: "credit", frames: 2 },
   ]);
   vi.useRealTimers();
 });
 
 test("a session that nobody sees is granted frames slowly, and tells none of them as lost", () => {
-  const calls: Method[] = [];
-  const ask = (call: Method): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
-  const session = new Session({ kind: "new", world: "robots" }, { request: ask, onProblem: () => undefined });
+  const calls: SessionMethod[] = [];
+  const session = new Session({ kind: "new", world: "robots" }, host(calls));
   session.id = 1;
   const frame = (cycle: number, leftOut: number): void =>
     session.onFrame(

@@ -109,11 +109,12 @@ impl Page {
         self.socket.send(Message::text(text.into())).expect("sent");
     }
 
-    /// Asks and waits for the reply.
-    pub(crate) fn reply(&mut self, call: Value) -> Value {
+    /// Asks and waits for the reply. The call is written with the session that it is for, if there is one.
+    pub(crate) fn reply(&mut self, mut call: Value) -> Value {
         self.id += 1;
         let id = self.id;
-        self.send(json!({ "id": id, "call": call }).to_string());
+        let session = call.as_object_mut().and_then(|call| call.remove("session"));
+        self.send(json!({ "id": id, "session": session, "call": call }).to_string());
         self.wait_reply(id)
     }
 
@@ -186,7 +187,7 @@ fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
     let studio = Studio::start(&place, &["s.toml", "--workers", "2"]);
     let mut page = studio.page();
     let hello = page.read();
-    assert_eq!((&hello["notice"], &hello["version"]), (&"hello".into(), &1.into()));
+    assert_eq!((&hello["notice"], &hello["version"]), (&"hello".into(), &2.into()));
     assert_eq!(hello["open"], json!([{ "kind": "scenario", "path": "s.toml" }]));
     let listed = page.ask(json!({ "do": "files", "folder": "." }));
     assert_eq!(listed["entries"][0]["about"], "robots: small");
@@ -450,8 +451,8 @@ fn pages_that_ask_for_much_keep_no_other_page_waiting() {
         let mut page = studio.page();
         page.open("s.toml");
         for id in 1000..1060 {
-            let call = json!({ "do": "check", "session": session, "text": HEAVY });
-            page.send(json!({ "id": id, "call": call }).to_string());
+            let call = json!({ "do": "check", "text": HEAVY });
+            page.send(json!({ "id": id, "session": session, "call": call }).to_string());
         }
         page
     });

@@ -1,7 +1,7 @@
 //! The words between page and server: requests, replies and notifications as JSON text, frames as binary.
 //!
 //! ```text
-//! page -> server   ClientRequest { id, call }            text
+//! page -> server   ClientRequest { id, session, call }   text; without `session` it is for the server itself
 //! server -> page   Reply   { id, answer | problem }      text, one for each request
 //!                  ServerNotification                    text, unasked
 //!                  frame                                 binary, see below
@@ -21,7 +21,7 @@
 //!    u8[n]       condition: 0 plain 1 leading 2 open 3 touching 4 failed; padded to 4
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
-//! A page grants credit for frames ([`Method::Credit`]), and gets none without it. At most
+//! A page grants credit for frames ([`RunMethod::Credit`]), and gets none without it. At most
 //! [`MAX_FRAMES_PER_S`](crate::MAX_FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 
@@ -41,7 +41,9 @@ pub use reply::{
     FileEntry, FileKind, MetricName, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
     SessionState, SessionStatus, SweepRun, TargetRef,
 };
-pub use request::{BodyId, ClientRequest, Method, OpenTarget, Speed};
+pub use request::{
+    BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,
+};
 pub use scene::{
     Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, Shape, StaticBody,
 };

@@ -3,22 +3,35 @@
 use super::{Edit, SessionId};
 use serde::{Deserialize, Serialize};
 
-/// A request; its reply has the same number.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// A request; its reply has the same number, chosen by the page from 1 on: a request that cannot be read is answered with
+/// number 0.
+#[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(deny_unknown_fields)]
-pub struct ClientRequest {
-    /// Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
-    pub id: u32,
-    /// What is asked.
-    pub call: Method,
+#[cfg_attr(test, ts(untagged))]
+pub enum ClientRequest {
+    /// A request to the server itself.
+    Server {
+        /// The number of the request.
+        id: u32,
+        /// What is asked.
+        call: ServerMethod,
+    },
+    /// A request to a session of the page.
+    Session {
+        /// The number of the request.
+        id: u32,
+        /// The session.
+        session: SessionId,
+        /// What is asked.
+        call: SessionMethod,
+    },
 }
 
-/// A query or a command of a page.
+/// A query or a command for the server itself.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Method {
+pub enum ServerMethod {
     /// Lists a folder below those named at start (all of those if none is given).
     Files {
         /// Its path, as a listing gave it.
@@ -31,44 +44,76 @@ pub enum Method {
         /// Another seed than the scenario's.
         seed: Option<u64>,
     },
-    /// Ends a session.
-    Close {
-        /// The session.
-        session: SessionId,
+    /// Asks for the runs of a sweep.
+    Runs {
+        /// Its folder, as a listing gave it.
+        folder: String,
     },
+    /// Asks for the JSON Schema of a world's scenarios.
+    Schema {
+        /// The world's name.
+        world: String,
+    },
+}
+
+/// A query or a command for a session.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SessionMethod {
+    /// Ends a session.
+    Close {},
+    /// Asks for the problems of a text that stands for the session's scenario.
+    Check {
+        /// The text.
+        text: String,
+    },
+    /// Changes a text that stands for the session's scenario: all edits, one after the other, or none. The server
+    /// keeps nothing of it.
+    Edit {
+        /// The text.
+        text: String,
+        /// The changes.
+        edits: Vec<Edit>,
+    },
+    /// Asks for the values in a text that stands for the session's scenario.
+    Model {
+        /// The text.
+        text: String,
+    },
+    /// Passed on to the session's thread. The methods above are answered elsewhere, so that none waits for a cycle that the
+    /// run is computing.
+    #[serde(untagged)]
+    Run(RunMethod),
+}
+
+/// A query or a command for the run of a session.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RunMethod {
     /// Plays a session.
     Play {
-        /// The session.
-        session: SessionId,
         /// The speed.
         speed: Speed,
     },
     /// Pauses a session.
-    Pause {
-        /// The session.
-        session: SessionId,
-    },
+    Pause {},
     /// Advances by some cycles and stays paused; answered there. While a seek or a step is under way, counted from its
     /// end; the request for that one is then answered at once.
     Step {
-        /// The session.
-        session: SessionId,
         /// Number of cycles.
         cycles: u32,
     },
     /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem means that another request has
     /// changed the destination meanwhile.
     Seek {
-        /// The session.
-        session: SessionId,
         /// The cycle; a run that is over before it stays at its end.
         cycle: u64,
     },
     /// Starts anew, with another seed and another text where given. Answered by
     /// [`Opened`](super::ReplyBody::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
-        /// The session.
-        session: SessionId,
         /// Another seed.
         seed: Option<u64>,
         /// Another text for the scenario, which is not saved.
@@ -76,37 +121,27 @@ pub enum Method {
     },
     /// Selects the bodies whose scans the frames contain.
     SelectScans {
-        /// The session.
-        session: SessionId,
         /// The bodies.
         bodies: Vec<BodyId>,
     },
     /// Grants the server further frames; it sends none without credit.
     Credit {
-        /// The session.
-        session: SessionId,
         /// Number of frames.
         frames: u32,
     },
     /// Asks for the percepts, decisions and actions of a body.
     Inspect {
-        /// The session.
-        session: SessionId,
         /// The body.
         body: BodyId,
     },
     /// Asks for samples of all metrics, from the sample with this number on.
     Metrics {
-        /// The session.
-        session: SessionId,
         /// The number of the first sample wanted.
         from: u32,
     },
     /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `limit`, after the
     /// first `skip` ones.
     Events {
-        /// The session.
-        session: SessionId,
         /// The first cycle.
         from: u64,
         /// The cycle after the last one.
@@ -117,48 +152,11 @@ pub enum Method {
         limit: u32,
     },
     /// Asks for the scenario's text.
-    Source {
-        /// The session.
-        session: SessionId,
-    },
+    Source {},
     /// Asks for the names of the tables of a recording, which can be exported.
-    Tables {
-        /// The session.
-        session: SessionId,
-    },
-    /// Asks for the runs of a sweep.
-    Runs {
-        /// Its folder, as a listing gave it.
-        folder: String,
-    },
-    /// Asks for the problems of a text that stands for the session's scenario.
-    Check {
-        /// The session.
-        session: SessionId,
-        /// The text.
-        text: String,
-    },
-    /// Changes a text that stands for the session's scenario: all edits, one after the other, or none. The server
-    /// keeps nothing of it.
-    Edit {
-        /// The session.
-        session: SessionId,
-        /// The text.
-        text: String,
-        /// The changes.
-        edits: Vec<Edit>,
-    },
-    /// Asks for the values in a text that stands for the session's scenario.
-    Model {
-        /// The session.
-        session: SessionId,
-        /// The text.
-        text: String,
-    },
+    Tables {},
     /// Writes a text into a file, which is the session's place from then on.
     Save {
-        /// The session.
-        session: SessionId,
         /// The text.
         text: String,
         /// The path of the file; the session's own without it.
@@ -168,11 +166,6 @@ pub enum Method {
         base: Option<String>,
         /// Whether a file is replaced even if it holds something else.
         overwrite: bool,
-    },
-    /// Asks for the JSON Schema of a world's scenarios.
-    Schema {
-        /// The world's name.
-        world: String,
     },
 }
 

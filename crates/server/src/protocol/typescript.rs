@@ -27,7 +27,9 @@ fn types() -> String {
     }
     let types = all![
         ClientRequest,
-        Method,
+        ServerMethod,
+        SessionMethod,
+        RunMethod,
         Edit,
         OpenTarget,
         Speed,

@@ -7,7 +7,7 @@ use crate::event_store::EventStore;
 use crate::fleet_feed::{FeedSnapshot, FleetFeed, to_protocol};
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
+    Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
 use sidestep_kernel::Cycle;
@@ -135,23 +135,32 @@ impl FleetSession {
         }
     }
 
-    fn answer(&mut self, call: Method) -> Result<ReplyBody, Problem> {
+    fn answer(&mut self, call: RunMethod) -> Result<ReplyBody, Problem> {
         match call {
-            Method::Credit { frames, .. } => self.page_view.add_credit(frames),
-            // A fleet has no scans.
-            Method::SelectScans { .. } => {}
-            Method::Events { from, until, skip, limit, .. } => {
-                let skip = skip.unwrap_or(0);
-                return Ok(self.log.answer(from..until, skip, limit.min(MAX_EVENTS)));
+            RunMethod::Credit { frames } => {
+                self.page_view.add_credit(frames);
+                Ok(ReplyBody::Done)
             }
-            Method::Tables { .. } => return Ok(ReplyBody::Tables { names: Vec::new() }),
-            _ => {
+            // A fleet has no scans, and the page selects bodies all the same.
+            RunMethod::SelectScans { bodies: _ } => Ok(ReplyBody::Done),
+            RunMethod::Events { from, until, skip, limit } => {
+                Ok(self.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
+            }
+            RunMethod::Tables {} => Ok(ReplyBody::Tables { names: Vec::new() }),
+            RunMethod::Play { .. }
+            | RunMethod::Pause {}
+            | RunMethod::Step { .. }
+            | RunMethod::Seek { .. }
+            | RunMethod::Restart { .. }
+            | RunMethod::Inspect { .. }
+            | RunMethod::Metrics { .. }
+            | RunMethod::Source {}
+            | RunMethod::Save { .. } => {
                 let remedy = "steer it where it was started; what it records can be replayed";
                 let place = self.feed.endpoint.as_str();
-                return Err(Problem::new(place, "a fleet is only watched here", remedy));
+                Err(Problem::new(place, "a fleet is only watched here", remedy))
             }
         }
-        Ok(ReplyBody::Done)
     }
 
     fn status(&self, snapshot: &FeedSnapshot) -> SessionStatus {

@@ -20,7 +20,7 @@ pub(crate) use foxglove::FoxgloveHost;
 pub(crate) use open_run::{SessionDeps, problem_of, text_problems};
 
 use crate::outbox::Outbox;
-use crate::protocol::{Method, OpenTarget, Problem, Reply, ReplyResult, SessionId};
+use crate::protocol::{OpenTarget, Problem, Reply, ReplyResult, RunMethod, SessionId};
 use fleet_session::FleetSession;
 use open_run::OpenRun;
 use player::Player;
@@ -53,7 +53,7 @@ pub(crate) struct OpenRequest {
 
 /// A session, as its socket holds it. It ends when this is dropped.
 pub(crate) struct Session {
-    requests: SyncSender<(u32, Method)>,
+    requests: SyncSender<(u32, RunMethod)>,
     interrupt: Interrupt,
     thread: JoinHandle<()>,
     source: SharedSource,
@@ -87,7 +87,7 @@ impl Session {
     ///
     /// # Errors
     /// When too many wait, or the session has ended.
-    pub(crate) fn send_request(&self, id: u32, call: Method) -> Result<(), Problem> {
+    pub(crate) fn send_request(&self, id: u32, call: RunMethod) -> Result<(), Problem> {
         self.requests.try_send((id, call)).map_err(|error| match error {
             TrySendError::Full(_) => {
                 Problem::new("session", "too many requests wait for it", "ask less often")
@@ -123,7 +123,7 @@ pub(crate) fn no_such_session() -> Problem {
 struct SessionWorker {
     outbox: Arc<Outbox>,
     interrupt: Interrupt,
-    requests: Receiver<(u32, Method)>,
+    requests: Receiver<(u32, RunMethod)>,
 }
 
 /// The reason why a session's work unwound.

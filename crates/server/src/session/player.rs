@@ -15,8 +15,8 @@ use crate::SPEED_RANGE;
 use crate::encode::scene;
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
-    SessionStatus, Speed,
+    BodyId, Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId,
+    SessionState, SessionStatus, Speed,
 };
 use seek::Seek;
 use sidestep_kernel::view::Scenery;
@@ -144,7 +144,7 @@ impl Player {
     }
 
     /// Answers a request, now or on arrival.
-    pub(super) fn on_request(&mut self, id: u32, call: Method) {
+    pub(super) fn on_request(&mut self, id: u32, call: RunMethod) {
         self.request_in_progress = Some(id);
         if let Some(result) = self.answer(id, call) {
             self.reply(id, result);
@@ -158,23 +158,23 @@ impl Player {
     }
 
     /// Returns the answer to a request; `None` if it is given later.
-    fn answer(&mut self, id: u32, call: Method) -> Option<Result<ReplyBody, Problem>> {
+    fn answer(&mut self, id: u32, call: RunMethod) -> Option<Result<ReplyBody, Problem>> {
         Some(match call {
-            Method::Play { speed, .. } => self.play(speed),
-            Method::Pause { .. } => {
+            RunMethod::Play { speed } => self.play(speed),
+            RunMethod::Pause {} => {
                 self.cancel_seek("the run was paused");
                 self.pause();
                 Ok(ReplyBody::Done)
             }
-            Method::Step { cycles, .. } => {
+            RunMethod::Step { cycles } => {
                 self.step(id, cycles);
                 return None;
             }
-            Method::Seek { cycle, .. } => {
+            RunMethod::Seek { cycle } => {
                 self.start_seek(Some(id), cycle, None);
                 return None;
             }
-            Method::Restart { seed, text, .. } => {
+            RunMethod::Restart { seed, text } => {
                 self.cancel_seek("the run was started anew");
                 let result = self.restart(seed, text);
                 if result.is_err() && self.state == SessionState::Seeking {
@@ -182,33 +182,22 @@ impl Player {
                 }
                 result
             }
-            other => self.answer_query(other),
-        })
-    }
-
-    /// Answers a request that does not move the run.
-    fn answer_query(&mut self, call: Method) -> Result<ReplyBody, Problem> {
-        let run = self.open_run.run.as_mut();
-        match call {
-            Method::SelectScans { bodies, .. } if bodies.len() > MAX_SCANNED_BODIES => {
-                let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
-                Err(Problem::new("select-scans", cause, "select fewer"))
-            }
-            Method::SelectScans { bodies, .. } => {
-                self.page_view.set_scanned_bodies(bodies);
-                Ok(ReplyBody::Done)
-            }
-            Method::Credit { frames, .. } => {
+            RunMethod::SelectScans { bodies } => self.select_scans(bodies),
+            RunMethod::Credit { frames } => {
                 self.page_view.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
-            Method::Inspect { body, .. } => inspection(run, &body).map(ReplyBody::Inspection),
-            Method::Metrics { from, .. } => Ok(self.history.samples.answer(from)),
-            Method::Events { from, until, skip, limit, .. } => {
-                self.page_view.drain(run, &mut self.history.log, Instant::now());
-                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
+            RunMethod::Inspect { body } => {
+                inspection(self.open_run.run.as_ref(), &body).map(ReplyBody::Inspection)
             }
-            Method::Source { .. } => {
+            RunMethod::Metrics { from } => Ok(self.history.samples.answer(from)),
+            RunMethod::Events { from, until, skip, limit } => {
+                let run = self.open_run.run.as_mut();
+                self.page_view.drain(run, &mut self.history.log, Instant::now());
+                let limit = limit.min(MAX_EVENTS);
+                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit))
+            }
+            RunMethod::Source {} => {
                 let source = &self.open_run.source;
                 Ok(ReplyBody::Source {
                     place: source.place.clone(),
@@ -216,14 +205,20 @@ impl Player {
                     read_only: self.open_run.is_read_only(),
                 })
             }
-            Method::Save { text, to, base, overwrite, .. } => {
+            RunMethod::Tables {} => self.open_run.tables().map(|names| ReplyBody::Tables { names }),
+            RunMethod::Save { text, to, base, overwrite } => {
                 self.open_run.save(text, to, SaveOptions { base, overwrite })
             }
-            Method::Tables { .. } => {
-                self.open_run.tables().map(|names| ReplyBody::Tables { names })
-            }
-            _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
+        })
+    }
+
+    fn select_scans(&mut self, bodies: Vec<BodyId>) -> Result<ReplyBody, Problem> {
+        if bodies.len() > MAX_SCANNED_BODIES {
+            let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
+            return Err(Problem::new("select-scans", cause, "select fewer"));
         }
+        self.page_view.set_scanned_bodies(bodies);
+        Ok(ReplyBody::Done)
     }
 
     fn play(&mut self, speed: Speed) -> Result<ReplyBody, Problem> {

@@ -4,7 +4,7 @@ use super::*;
 use crate::files::AllowedFiles;
 use crate::keyframes::MemoryBudget;
 use crate::outbox::OutboxItem;
-use crate::protocol::{BodyId, Speed};
+use crate::protocol::{BodyId, RunMethod, Speed};
 use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
@@ -131,7 +131,7 @@ impl Page {
 
     /// Seeks to a cycle; returns the digest there.
     fn digest_at(&mut self, cycle: u64) -> String {
-        self.ask(json!({ "do": "seek", "session": 1, "cycle": cycle }));
+        self.ask(json!({ "do": "seek", "cycle": cycle }));
         let status = self.until("the cycle", |page| {
             let last = page.notices.iter().rfind(|notice| notice["notice"] == "status")?;
             (last["cycle"] == cycle as f64 && !last["digest"].is_null()).then(|| last.clone())
@@ -154,8 +154,8 @@ fn the_digest_is_that_of_a_plain_run_played_stepped_and_sought_to_and_fro() {
         let at = [end / 3, end / 2, end].map(|cycle| (cycle, plain(text, cycle)));
         for workers in 1..=3 {
             let (mut page, _) = Page::open(text, workers);
-            page.send(json!({ "do": "credit", "session": 1, "frames": 100 }));
-            page.ask(json!({ "do": "play", "session": 1, "speed": "fastest" }));
+            page.send(json!({ "do": "credit", "frames": 100 }));
+            page.ask(json!({ "do": "play", "speed": "fastest" }));
             let over = page.state("over");
             assert_eq!(over["digest"], at[2].1.as_str(), "{workers} workers");
             for k in [0, 2, 1, 0, 1, 2] {
@@ -163,7 +163,7 @@ fn the_digest_is_that_of_a_plain_run_played_stepped_and_sought_to_and_fro() {
                 assert_eq!(&page.digest_at(*cycle), digest, "cycle {cycle}, {workers} workers");
             }
             page.digest_at(end / 3);
-            page.ask(json!({ "do": "step", "session": 1, "cycles": end / 2 - end / 3 }));
+            page.ask(json!({ "do": "step", "cycles": end / 2 - end / 3 }));
             assert_eq!(page.digest_at(end / 2), at[1].1);
         }
     }
@@ -173,14 +173,14 @@ fn the_digest_is_that_of_a_plain_run_played_stepped_and_sought_to_and_fro() {
 fn a_run_that_is_paused_now_and_then_and_looked_at_is_the_same() {
     let (mut page, _) = Page::open(ROBOTS, 2);
     let who = json!({ "kind": "robot", "number": 2, "part": null });
-    page.ask(json!({ "do": "select-scans", "session": 1, "bodies": [who] }));
+    page.ask(json!({ "do": "select-scans", "bodies": [who] }));
     for _ in 0..5 {
-        page.send(json!({ "do": "credit", "session": 1, "frames": 10 }));
-        page.ask(json!({ "do": "play", "session": 1, "speed": { "times": 100.0 } }));
+        page.send(json!({ "do": "credit", "frames": 10 }));
+        page.ask(json!({ "do": "play", "speed": { "times": 100.0 } }));
         std::thread::sleep(Duration::from_millis(40));
-        page.ask(json!({ "do": "pause", "session": 1 }));
-        page.ask(json!({ "do": "metrics", "session": 1, "from": 0 }));
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 9999, "limit": 9 }));
+        page.ask(json!({ "do": "pause" }));
+        page.ask(json!({ "do": "metrics", "from": 0 }));
+        page.ask(json!({ "do": "events", "from": 0, "until": 9999, "limit": 9 }));
     }
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
     assert!(page.frames.len() > 3);
@@ -203,7 +203,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         let by_library = inspect::inspection(run.as_ref(), &who);
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(20);
-        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
+        let id = page.send(json!({ "do": "inspect", "body": who }));
         let told = page.wait(id);
         match by_library {
             Ok(inspection) => {
@@ -217,7 +217,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         }
         assert_eq!((page.digest_at(20), page.digest_at(40)), (digest, plain(text, 40)));
         let who = json!({ "kind": "no such kind", "number": 1, "part": null });
-        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
+        let id = page.send(json!({ "do": "inspect", "body": who }));
         assert!(page.wait(id).get("problem").is_some());
     }
 }
@@ -225,8 +225,8 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
 #[test]
 fn a_page_that_grants_no_credit_loses_frames_and_is_told_and_the_run_goes_on() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000"), 1);
-    page.ask(json!({ "do": "credit", "session": 1, "frames": 3 }));
-    page.ask(json!({ "do": "play", "session": 1, "speed": "fastest" }));
+    page.ask(json!({ "do": "credit", "frames": 3 }));
+    page.ask(json!({ "do": "play", "speed": "fastest" }));
     page.until("the frames", |page| (page.frames.len() == 3).then_some(()));
     std::thread::sleep(Duration::from_millis(300));
     page.read();
@@ -234,7 +234,7 @@ fn a_page_that_grants_no_credit_loses_frames_and_is_told_and_the_run_goes_on() {
     let cycle = |frame: &[u8]| f64::from_le_bytes(*frame[16..].first_chunk().expect("a cycle"));
     let left_out = |frame: &[u8]| u32::from_le_bytes(*frame[48..].first_chunk().expect("a number"));
     let last = cycle(&page.frames[2]);
-    page.ask(json!({ "do": "credit", "session": 1, "frames": 1 }));
+    page.ask(json!({ "do": "credit", "frames": 1 }));
     page.until("another", |page| (page.frames.len() == 4).then_some(()));
     let frame = &page.frames[3];
     assert!(cycle(frame) > last + 1.0);
@@ -244,8 +244,8 @@ fn a_page_that_grants_no_credit_loses_frames_and_is_told_and_the_run_goes_on() {
 #[test]
 fn a_socket_that_takes_nothing_keeps_the_newest_frame_alone() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000"), 1);
-    page.send(json!({ "do": "credit", "session": 1, "frames": 50 }));
-    page.send(json!({ "do": "play", "session": 1, "speed": "fastest" }));
+    page.send(json!({ "do": "credit", "frames": 50 }));
+    page.send(json!({ "do": "play", "speed": "fastest" }));
     std::thread::sleep(Duration::from_millis(500));
     page.read();
     let left_out = u32::from_le_bytes(*page.frames[0][48..].first_chunk().expect("a number"));
@@ -257,7 +257,7 @@ fn a_socket_that_takes_nothing_keeps_the_newest_frame_alone() {
 fn events_and_samples_are_told_once_however_often_a_cycle_is_computed() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let events = |page: &mut Page| {
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 100_000 }))
+        page.ask(json!({ "do": "events", "from": 0, "until": 600, "limit": 100_000 }))
     };
     page.digest_at(600);
     let first = events(&mut page);
@@ -267,7 +267,7 @@ fn events_and_samples_are_told_once_however_often_a_cycle_is_computed() {
     page.digest_at(10);
     page.digest_at(600);
     assert_eq!(events(&mut page), first);
-    let metrics = page.ask(json!({ "do": "metrics", "session": 1, "from": 0 }));
+    let metrics = page.ask(json!({ "do": "metrics", "from": 0 }));
     let cycles: Vec<f64> = serde_json::from_value(metrics["cycles"].clone()).expect("numbers");
     assert!(cycles.is_sorted_by(|a, b| a < b) && cycles.len() >= 2, "{cycles:?}");
     assert_eq!(cycles.last(), Some(&600.0));
@@ -278,27 +278,27 @@ fn another_seed_and_another_text_start_anew_and_a_wrong_one_changes_nothing() {
     let (mut page, opened) = Page::open(ROBOTS, 1);
     assert_eq!(opened["answer"]["status"]["seed"], "5");
     let wrong = ROBOTS.replace("count = 6", "count = \"six\"");
-    let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": wrong }));
+    let id = page.send(json!({ "do": "restart", "seed": null, "text": wrong }));
     assert_eq!(page.wait(id)["problem"]["line"], 16);
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
-    let again = page.ask(json!({ "do": "restart", "session": 1, "seed": 77, "text": null }));
+    let again = page.ask(json!({ "do": "restart", "seed": 77, "text": null }));
     assert_eq!(
         (&again["is"], &again["status"]["seed"], &again["status"]["cycle"]),
         (&"opened".into(), &"77".into(), &0.0.into())
     );
     assert_eq!(page.digest_at(100), plain(&ROBOTS.replace("seed = 5", "seed = 77"), 100));
     let other = ROBOTS.replace("count = 6", "count = 3");
-    page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": other }));
+    page.ask(json!({ "do": "restart", "seed": null, "text": other }));
     assert_eq!(page.digest_at(100), plain(&other, 100));
-    assert_eq!(page.ask(json!({ "do": "source", "session": 1 }))["text"], other);
+    assert_eq!(page.ask(json!({ "do": "source" }))["text"], other);
 }
 
 #[test]
 fn a_way_that_is_given_up_is_answered_with_a_problem() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000000"), 1);
-    let far = page.send(json!({ "do": "seek", "session": 1, "cycle": 900_000_000 }));
+    let far = page.send(json!({ "do": "seek", "cycle": 900_000_000 }));
     page.state("seeking");
-    page.ask(json!({ "do": "pause", "session": 1 }));
+    page.ask(json!({ "do": "pause" }));
     let reply = page.wait(far);
     assert!(reply["problem"]["cause"].as_str().is_some_and(|c| c.contains("paused")), "{reply}");
     page.state("paused");
@@ -311,17 +311,16 @@ fn what_cannot_be_opened_or_done_is_a_problem_and_the_session_goes_on() {
     assert!(reply["problem"]["remedy"].as_str().is_some_and(|r| r.contains("robots")), "{reply}");
     let (mut page, _) = Page::open(ROBOTS, 1);
     for call in [
-        json!({ "do": "play", "session": 1, "speed": { "times": 0.0 } }),
-        json!({ "do": "play", "session": 1, "speed": { "times": 1e9 } }),
-        json!({ "do": "select-scans", "session": 1, "bodies": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
-        json!({ "do": "restart", "session": 1, "seed": u64::MAX, "text": null }),
-        json!({ "do": "restart", "session": 1, "seed": 1, "text": "map = { file = \"/etc/passwd\" }" }),
-        json!({ "do": "files" }),
+        json!({ "do": "play", "speed": { "times": 0.0 } }),
+        json!({ "do": "play", "speed": { "times": 1e9 } }),
+        json!({ "do": "select-scans", "bodies": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
+        json!({ "do": "restart", "seed": u64::MAX, "text": null }),
+        json!({ "do": "restart", "seed": 1, "text": "map = { file = \"/etc/passwd\" }" }),
     ] {
         let id = page.send(call.clone());
         assert!(page.wait(id).get("problem").is_some(), "{call}");
     }
-    page.ask(json!({ "do": "step", "session": 1, "cycles": 1 }));
+    page.ask(json!({ "do": "step", "cycles": 1 }));
 }
 
 #[test]
@@ -348,7 +347,7 @@ fn a_text_is_checked_with_its_place_and_refused_where_the_studio_only_reads() {
 fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000000"), 2);
     page.outbox.expect_reply();
-    page.send(json!({ "do": "seek", "session": 1, "cycle": 900_000_000 }));
+    page.send(json!({ "do": "seek", "cycle": 900_000_000 }));
     page.state("seeking");
     let Page { outbox, session, .. } = page;
     drop(session);
@@ -364,9 +363,7 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
 fn a_bug_in_a_run_ends_its_session_with_a_notice() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let who = BodyId { kind: "no such kind".into(), number: 0, part: None };
-    page.session
-        .send_request(99, Method::SelectScans { session: 1, bodies: vec![who] })
-        .expect("taken");
+    page.session.send_request(99, RunMethod::SelectScans { bodies: vec![who] }).expect("taken");
     page.wait(99);
     let worker = |work: fn()| {
         let (_, requests) = sync_channel(1);
@@ -382,12 +379,12 @@ fn a_bug_in_a_run_ends_its_session_with_a_notice() {
 #[test]
 fn a_run_that_is_played_at_a_speed_goes_on_until_it_is_paused() {
     let (mut page, _) = Page::open(ROBOTS, 1);
-    page.ask(json!({ "do": "play", "session": 1, "speed": Speed::Times(20.0) }));
+    page.ask(json!({ "do": "play", "speed": Speed::Times(20.0) }));
     page.until("some cycles", |page| {
         let last = page.notices.iter().rfind(|notice| notice["notice"] == "status")?;
         (last["cycle"].as_f64()? >= 5.0).then_some(())
     });
-    page.ask(json!({ "do": "pause", "session": 1 }));
+    page.ask(json!({ "do": "pause" }));
     let cycle = page.state("paused")["cycle"].as_f64().expect("a number");
     assert!((5.0..600.0).contains(&cycle), "{cycle}: it is paused on its way");
 }
@@ -395,13 +392,13 @@ fn a_run_that_is_played_at_a_speed_goes_on_until_it_is_paused() {
 #[test]
 fn a_restart_that_is_refused_on_the_way_to_a_cycle_leaves_the_run_standing() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000000"), 1);
-    let far = page.send(json!({ "do": "seek", "session": 1, "cycle": 900_000_000 }));
+    let far = page.send(json!({ "do": "seek", "cycle": 900_000_000 }));
     page.state("seeking");
-    let wrong = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": "x = =" }));
+    let wrong = page.send(json!({ "do": "restart", "seed": null, "text": "x = =" }));
     assert!(page.wait(far).get("problem").is_some());
     assert!(page.wait(wrong).get("problem").is_some());
     assert!(!page.state("paused")["digest"].is_null());
-    page.ask(json!({ "do": "step", "session": 1, "cycles": 1 }));
+    page.ask(json!({ "do": "step", "cycles": 1 }));
 }
 
 #[cfg(unix)]

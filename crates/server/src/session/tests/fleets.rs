@@ -95,7 +95,7 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
     let mut elsewhere = RemoteFlight::start();
     elsewhere.publish(0, false);
     let mut page = elsewhere.page();
-    page.ask(json!({ "do": "credit", "session": 1, "frames": 100 }));
+    page.ask(json!({ "do": "credit", "frames": 100 }));
     page.until("a frame", |page| (!page.frames.is_empty()).then_some(()));
     for _ in 0..4 {
         elsewhere.publish(9, false);
@@ -107,8 +107,7 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
         assert_eq!(now["fleet"]["nodes"][5]["body"], who);
     }
     assert!(elsewhere.events.len() > 3, "there is something to tell");
-    let told =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "limit": 5000 }));
+    let told = page.ask(json!({ "do": "events", "from": 0, "until": 99, "limit": 5000 }));
     assert_eq!(told["entries"].as_array().map(Vec::len), Some(elsewhere.events.len()));
     elsewhere.publish(4, true);
     status(&mut page, |status| status["state"] == "over");
@@ -120,9 +119,9 @@ fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
     elsewhere.publish(1, false);
     let mut page = elsewhere.page();
     for call in [
-        json!({ "do": "play", "session": 1, "speed": "fastest" }),
-        json!({ "do": "step", "session": 1, "cycles": 1 }),
-        json!({ "do": "source", "session": 1 }),
+        json!({ "do": "play", "speed": "fastest" }),
+        json!({ "do": "step", "cycles": 1 }),
+        json!({ "do": "source" }),
     ] {
         let id = page.send(call.clone());
         let cause = page.wait(id)["problem"]["cause"].clone();

@@ -169,14 +169,14 @@ fn a_recording_of_another_build_says_so_and_has_its_events_but_no_inspection_and
     let (mut page, told) = opened(folder);
     let words = banner(&told["answer"]["status"]);
     assert!(words.contains("0.0.9+abc") && words.contains("its own tables"), "{words}");
-    page.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
+    page.ask(json!({ "do": "seek", "cycle": 600 }));
     let status = page.state("over");
     assert!(status["digest"].is_null() && banner(&status) == words, "{status}");
     let who = json!({ "kind": "robot", "number": 0, "part": null });
-    let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
+    let id = page.send(json!({ "do": "inspect", "body": who }));
     assert!(page.wait(id).get("problem").is_some());
-    one.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
-    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 5000 });
+    one.ask(json!({ "do": "seek", "cycle": 600 }));
+    let ask = json!({ "do": "events", "from": 0, "until": 600, "limit": 5000 });
     let happened = |page: &mut Page| -> Vec<Value> {
         let told = page.ask(ask.clone())["entries"].clone();
         let entries = told.as_array().expect("events").iter();
@@ -200,20 +200,18 @@ fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
             .any(|n| n["notice"] == "status" && banner(n).contains("the recorded one"));
         told.then_some(())
     });
-    let events =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 }));
+    let events = page.ask(json!({ "do": "events", "from": 0, "until": 601, "limit": 9999 }));
     assert_eq!(events["known_until"], 600.0);
     let (mut plain_page, _) = Page::open(ROBOTS, 1);
     plain_page.digest_at(600);
     assert_eq!(
-        plain_page
-            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 })),
+        plain_page.ask(json!({ "do": "events", "from": 0, "until": 601, "limit": 9999 })),
         events
     );
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
     assert!(banner(&page.state("over")).contains("the recorded one"));
-    let id = page.send(json!({ "do": "restart", "session": 1, "seed": 3, "text": null }));
+    let id = page.send(json!({ "do": "restart", "seed": 3, "text": null }));
     assert!(page.wait(id).get("problem").is_some());
-    page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
+    page.ask(json!({ "do": "restart", "seed": null, "text": null }));
     assert_eq!(page.digest_at(100), plain(ROBOTS, 100));
 }

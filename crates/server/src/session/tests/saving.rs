@@ -42,7 +42,7 @@ impl Page {
     fn save(&mut self, text: &str, to: Option<&Path>, base: Option<&str>, over: bool) -> Value {
         let to = to.map(|path| path.display().to_string());
         let call = json!({
-            "do": "save", "session": 1, "text": text, "to": to, "base": base, "overwrite": over
+            "do": "save", "text": text, "to": to, "base": base, "overwrite": over
         });
         let id = self.send(call);
         self.wait(id)
@@ -88,7 +88,7 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
     assert_eq!(opened["answer"]["is"], "opened");
     let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), None, false);
     assert_eq!(saved["answer"]["is"], "saved");
-    let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
+    let id = page.send(json!({ "do": "restart", "seed": null, "text": null }));
     assert_eq!(page.wait(id)["problem"]["place"], "../m.map");
 }
 
@@ -125,7 +125,7 @@ fn no_text_that_is_saved_is_read_as_a_map_or_a_floor_that_names_files_elsewhere(
         let saved = page.save(text, Some(&inside.join("m.toml")), None, true);
         assert_eq!(saved["answer"]["is"], "saved", "{saved}");
         let text = format!("{CHAINS}[ground]\n{key} = \"m.toml\"\n");
-        let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": text }));
+        let id = page.send(json!({ "do": "restart", "seed": null, "text": text }));
         let reply = page.wait(id);
         let cause = reply["problem"]["cause"].as_str().unwrap_or_default();
         assert!(cause.contains("the file name does not say"), "{text}: {reply}");
