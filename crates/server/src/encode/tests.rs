@@ -62,7 +62,7 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
     let (table, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
     let mut read = Reader(&bytes);
     assert_eq!(read.take(), *b"SSTF");
-    assert_eq!(read.take(), [1, 0, 2, 0], "version, dimensions");
+    assert_eq!(read.take(), [2, 0, 2, 0], "version, dimensions");
     assert_eq!(read.u32s(), [9, 1], "session, table");
     assert_eq!((read.f64(), read.f64()), (7.0, 3.5));
     let text = br#"{"scans":[],"events":[],"events_left_out":0}"#;
