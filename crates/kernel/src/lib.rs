@@ -58,3 +58,8 @@ pub use run_config::{GroupSizes, RunConfig, RunStats};
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
 pub use world::{PhaseContext, Phases, World};
+
+/// The example of the README, which is tested.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -119,7 +119,10 @@ mod tests {
             assert_eq!(key_of(part).as_deref(), Some(key), "{part}");
         }
         let last = TEXT.rfind("[[many]]").expect("the second");
-        assert_eq!(locate(TEXT, &(last..last + 8)).map(|path| dotted_path(&path)), Some("many.1".into()));
+        assert_eq!(
+            locate(TEXT, &(last..last + 8)).map(|path| dotted_path(&path)),
+            Some("many.1".into())
+        );
     }
 
     #[test]
