@@ -271,7 +271,7 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
     let source = Source::new("s.toml", TEXT, "");
     let infinite = serde_json::Number::from_f64(f64::NAN).map_or(Value::Null, Value::Number);
     for (edit, cause, remedy) in [
-        (set("robots.count", json!(1)), "is not in a table", "by its number"),
+        (set("robots.count", json!(1)), "is not in a table", "the number of an element"),
         (set("robots.7.count", json!(1)), "no element 7, as there are 2", "count from 0"),
         (set("seed.x", json!(1)), "is not in a table", "number"),
         (set("at.2", json!(1)), "no element 2", "count from 0"),
