@@ -1,8 +1,8 @@
 //! `cargo xtask test`: every test of the workspace, in two builds that share all third-party crates.
 //!
-//! Tests beside the code run with overflow checks and debug assertions on, in a build that is quick to make.
-//! Tests from outside (`tests/`: promises, the program itself) run against the shipped build, so that the
-//! program and its tests share all that cargo compiles.
+//! Tests beside the code of the hot crates (kernel, worlds and their libraries) run with overflow checks and debug
+//! assertions on, in a build that is quick to make. All others run against the shipped build, so that the program and
+//! its tests share all that cargo compiles.
 
 use crate::root;
 use std::fs;
@@ -16,9 +16,23 @@ const CHECKS: [(&str, &str); 3] = [
     ("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1"),
 ];
 
-/// Tests beside the code. Of the programs, only those with tests: each other one would be compiled for nothing,
-/// together with its library. `.ci/soak` runs all others with checks as well.
-const BESIDE: [&str; 6] = ["--workspace", "--lib", "--bin", "sidestep-fuzz", "--bin", "xtask"];
+/// Crates that are hot: they are shipped without checks, so their tests beside the code are built once more with checks.
+/// All other crates of ours have overflow checks in the shipped build, too (`Cargo.toml`), and are tested in it.
+const HOT: [&str; 9] = [
+    "sidestep-airspace",
+    "sidestep-arms",
+    "sidestep-chain",
+    "sidestep-collectives",
+    "sidestep-error-models",
+    "sidestep-kernel",
+    "sidestep-map",
+    "sidestep-robots",
+    "sidestep-rods",
+];
+
+/// Programs with tests beside their code: each other program would be compiled for nothing, with its library.
+/// `.ci/soak` runs all of them with checks.
+const TESTED_PROGRAMS: [&str; 4] = ["--bin", "sidestep-fuzz", "--bin", "xtask"];
 
 /// Tests from outside, some of which run examples: the promises of the library, too, so that its golden digests
 /// are those of the shipped build.
@@ -40,16 +54,40 @@ pub(crate) fn run(chosen: &[String]) -> ExitCode {
     } else {
         // Examples as programs: among the targets of tests, cargo would compile each as a program of tests.
         let has_examples = cargo(&["build", "--release", "--workspace", "--examples"], &[]);
-        // Both parts are run, even if the first fails: a developer wants to see every failure.
-        let has_passed_beside = tests(&BESIDE, &CHECKS, chosen);
+        // All parts are run, even if the first fails: a developer wants to see every failure.
+        let has_passed_with_checks = tests(&with_checks(), &CHECKS, chosen);
+        let has_passed_beside = tests(&beside(), &[], chosen);
         let has_passed_outside = tests(&OUTSIDE, &[], chosen);
         has_examples
+            && has_passed_with_checks
             && has_passed_beside
             && has_passed_outside
             && (!chosen.is_empty() || cargo(&["test", "--release", "--workspace", "--doc"], &[]))
     };
     print_skipped();
     if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Returns the choice of tests beside the code of hot crates.
+fn with_checks() -> Vec<&'static str> {
+    // This program depends on the crate that unifies features (`.config/hakari.toml`): without one that does, packages
+    // of others would be compiled again with fewer features.
+    let mut words = vec!["-p", "xtask", "--lib"];
+    for name in HOT {
+        words.extend(["-p", name]);
+    }
+    words
+}
+
+/// Returns the choice of tests beside the code of all other crates.
+fn beside() -> Vec<&'static str> {
+    let mut words = vec!["--workspace", "--lib"];
+    words.extend(TESTED_PROGRAMS);
+    // The Python package is tested from Python, and the crate of features has nothing to test.
+    for name in HOT.into_iter().chain(["sidestep-python", "sidestep-workspace-hack"]) {
+        words.extend(["--exclude", name]);
+    }
+    words
 }
 
 /// Runs tests by nextest where it is installed, else by `cargo test`.
