@@ -53,12 +53,12 @@ pub(super) struct CandidateScratch<const D: usize> {
 pub(super) fn guide<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
-    least_move_m: f64,
+    min_move_m: f64,
 ) -> Point<D> {
     let g = sub(so, mn);
     let d = norm(g);
     let t = clamped(d, rod.min_m, rod.max_m);
-    if (t - d).abs() <= least_move_m {
+    if (t - d).abs() <= min_move_m {
         so
     } else if d > 0.0 {
         add_scaled(mn, g, t / d)

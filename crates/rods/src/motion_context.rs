@@ -11,6 +11,7 @@ use super::rules::Rules;
 use super::sweep::Sweep;
 use super::veto::VetoReason;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Clearance that a turn aims at, meters. It is at least ten times the tolerance, because otherwise
 /// the next step would start "inside".
@@ -35,6 +36,11 @@ impl<const D: usize> TentativePositions<D> {
     pub(super) fn start(&mut self, n: usize, first: usize) {
         self.points.resize(n, [0.0; D]);
         (self.from, self.to) = (first, first);
+    }
+
+    /// Returns the connectors that have a new position.
+    pub(super) fn run(&self) -> Range<usize> {
+        self.from..self.to
     }
 
     /// Sets the position of a connector of the run, or of one beside it.
@@ -126,7 +132,7 @@ impl<const D: usize> SlaveStep<D> {
         Sweep { from: [self.mo, self.so], to: [self.mn, s] }
     }
 
-    pub(super) fn exceeds_bend_at(&self, s: Point<D>) -> bool {
+    pub(super) fn is_bend_allowed_at(&self, s: Point<D>) -> bool {
         let Some(prev) = self.prev else { return true };
         self.max_bend_rad >= PI
             || angle_rad(sub(self.mn, prev), sub(s, self.mn))
@@ -145,14 +151,14 @@ pub(super) struct MotionContext<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
     pub(super) rules: &'a Rules,
-    pub(super) overlay: &'a TentativePositions<D>,
-    pub(super) own: &'a RodBvh<D>,
+    pub(super) tentative: &'a TentativePositions<D>,
+    pub(super) own_rods: &'a RodBvh<D>,
 }
 
 impl<'a, const D: usize> MotionContext<'a, D> {
     /// Returns the current place of a connector: its new place if it has one.
     pub(super) fn position(&self, i: usize) -> Point<D> {
-        self.overlay.get(i).unwrap_or(self.chain.points()[i])
+        self.tentative.get(i).unwrap_or(self.chain.points()[i])
     }
 
     /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
@@ -162,10 +168,10 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         near: &Bounds<D>,
         rod: Option<usize>,
         tip: usize,
-        mut look: impl FnMut(&Block<D>),
+        mut visit_one: impl FnMut(&Block<D>),
     ) {
         self.obstacles.visit(near, |o| {
-            look(&Block {
+            visit_one(&Block {
                 core: o.core,
                 radius_m: o.radius_m,
                 name: BlockOwner::Obstacle(o.id),
@@ -174,9 +180,9 @@ impl<'a, const D: usize> MotionContext<'a, D> {
             });
         });
         if self.rules.self_collision {
-            self.own.visit(near, |other| {
+            self.own_rods.visit(near, |other| {
                 for block in self.own_blocks(other, rod, tip).into_iter().flatten() {
-                    look(&block);
+                    visit_one(&block);
                 }
             });
         }
@@ -210,7 +216,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
 
     /// Checks whether the slave may be at `s`; returns the first objection otherwise.
     pub(super) fn check_slave(&self, step: &SlaveStep<D>, s: Point<D>) -> Result<(), PendingVeto> {
-        if !step.exceeds_bend_at(s) {
+        if !step.is_bend_allowed_at(s) {
             return Err(PendingVeto::new(VetoReason::BendLimit));
         }
         let longest_m = self.rules.slave_step_max_m;

@@ -182,13 +182,13 @@ impl<const D: usize> Obstacles<D> {
     /// Visits every obstacle whose box meets `near`, each once: the static ones first, in an order
     /// that depends only on the obstacles and the box.
     #[inline]
-    pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
-        self.still.grid.visit(near, |k| look(&self.still.all[k]));
+    pub fn visit<'a>(&'a self, near: &Bounds<D>, mut visit_one: impl FnMut(&'a Obstacle<D>)) {
+        self.still.grid.visit(near, |k| visit_one(&self.still.all[k]));
         if self.moving.len() > MAX_LINEAR_SCAN {
-            return self.moving_grid.visit(near, |k| look(&self.moving[k]));
+            return self.moving_grid.visit(near, |k| visit_one(&self.moving[k]));
         }
         for obstacle in self.moving.iter().filter(|o| o.bounds().meets(near)) {
-            look(obstacle);
+            visit_one(obstacle);
         }
     }
 

@@ -153,13 +153,13 @@ fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m
 
 /// Passes from one stub to the connector before the other.
 fn run_pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
-    let least_move_m = chain.min_move_m();
+    let min_move_m = chain.min_move_m();
     let mut master = from;
     let mut mo = chain.points()[from];
     while let Some(slave) = direction.next(master, chain.points().len()).filter(|&s| s != to) {
         let (mn, so) = (chain.points()[master], chain.points()[slave]);
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = guide([mo, mn, so], rod, least_move_m);
+        chain.points_mut()[slave] = guide([mo, mn, so], rod, min_move_m);
         (master, mo) = (slave, so);
     }
 }

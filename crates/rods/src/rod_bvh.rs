@@ -92,7 +92,7 @@ impl<const D: usize> RodBvh<D> {
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
         // The depth of the tree is at most the number of bits of a usize.
         let mut waiting = [0usize; 66];
         let mut n = usize::from(!self.rods.is_empty());
@@ -111,7 +111,7 @@ impl<const D: usize> RodBvh<D> {
             let from = (node - self.leaves) * RODS_PER_LEAF;
             for rod in from..(from + RODS_PER_LEAF).min(self.rods.len()) {
                 if self.rods[rod].meets(near) {
-                    look(rod);
+                    visit_one(rod);
                 }
             }
         }

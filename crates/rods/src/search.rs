@@ -64,7 +64,7 @@ impl<const D: usize> DirectionSearch<'_, D> {
         let e1 = perpendicular(wanted);
         let e2 = other_perpendicular(wanted, e1);
         let is_free =
-            |u: Point<D>| self.exceeds_bend(u) && self.worst_block(u).is_none() && is_good(u);
+            |u: Point<D>| self.is_bend_allowed(u) && self.worst_block(u).is_none() && is_good(u);
         let (mut inner_rad, mut ring_rad) = (0.0, 0.02);
         while ring_rad <= MAX_RING_RAD {
             for k in 0..AZIMUTHS {
@@ -82,8 +82,8 @@ impl<const D: usize> DirectionSearch<'_, D> {
         None
     }
 
-    fn exceeds_bend(&self, u: Point<D>) -> bool {
-        self.step.exceeds_bend_at(add_scaled(self.step.mn, u, self.length_m))
+    fn is_bend_allowed(&self, u: Point<D>) -> bool {
+        self.step.is_bend_allowed_at(add_scaled(self.step.mn, u, self.length_m))
     }
 
     /// Returns the direction itself, or the nearest on the cone of the bend limit.

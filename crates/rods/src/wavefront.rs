@@ -137,7 +137,7 @@ struct LaneMotions<const D: usize, const MEASURES: bool> {
     /// Number of connectors.
     connectors: usize,
     limits: LaneLimits,
-    least_move_m: f64,
+    min_move_m: f64,
     /// Length of a move above which a slave surely moves; -1 in lanes without a motion, where it is never read.
     surely_m: [f64; LANES],
     /// Whether a lane's last slave stayed, and whether its motion has ended.
@@ -158,7 +158,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             n,
             connectors: chain.points().len(),
             limits: LaneLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
-            least_move_m: chain.min_move_m(),
+            min_move_m: chain.min_move_m(),
             surely_m: std::array::from_fn(|w| if w < n { surely_m } else { -1.0 }),
             rests: [false; LANES],
             ended: [false; LANES],
@@ -249,7 +249,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = guide([mo, mn, so], rod, self.least_move_m);
+            let new = guide([mo, mn, so], rod, self.min_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
