@@ -152,7 +152,7 @@ impl<'a> ColumnIndices<'a> {
     fn icao24<'t>(&self, row: CsvRow<'t>) -> Result<&'t str, InputError> {
         let word = row.field(self.icao24);
         if word.text.is_empty() {
-            let cause = "the row names no aircraft".to_string();
+            let cause = "the row has no aircraft".to_string();
             return Err(word.error(&self.place, cause, "write its icao24 address"));
         }
         Ok(word.text)

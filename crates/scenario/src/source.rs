@@ -196,7 +196,7 @@ impl Source {
     fn sweep_error(&self) -> Option<InputError> {
         let table = self.text.parse::<toml::Table>().ok()?;
         let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
-        let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
+        let remedy = "run it with `sidestep sweep`, or give the scenario that it refers to";
         is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 

@@ -58,7 +58,7 @@ impl PoseTopic {
             _ => {
                 let remedy =
                     "give a topic such as /odom, or a topic and two frames: /tf:map:base_link";
-                Err(InputError::new(text, "this names no topic", remedy))
+                Err(InputError::new(text, "this is no topic", remedy))
             }
         }
     }

@@ -152,8 +152,8 @@ impl Semantics {
             next += 1;
         }
         path_ends(&joints, model).ok_or_else(|| {
-            let cause = format!("the joints of group `{name}` do not lie on one way");
-            InputError::new(place, cause, "name base and tip with --base and --tip")
+            let cause = format!("the joints of group `{name}` do not lie on one path");
+            InputError::new(place, cause, "give base and tip with --base and --tip")
         })
     }
 }

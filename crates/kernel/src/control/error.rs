@@ -17,9 +17,7 @@ pub enum OrderError {
         last: Option<EntityId>,
     },
     /// The agent decides for itself.
-    #[error(
-        "{who} decides for itself; let the scenario say that it is decided from outside (`external`)"
-    )]
+    #[error("{who} decides for itself; make it `external` in the scenario")]
     NotExternal {
         /// The agent.
         who: String,
@@ -57,7 +55,7 @@ pub enum OrderError {
         expected: String,
     },
     /// Controls were handed over to a run with agents that decide within it.
-    #[error("in this run nobody decides outside: {cause}")]
+    #[error("this run has no external agents: {cause}")]
     NoExternalAgents {
         /// The reason, and the remedy.
         cause: String,
