@@ -12,7 +12,7 @@
 //! The crate `sidestep-session` drives the runs.
 //!
 //! A program with worlds or parts of its own has the whole command line by [`main_with`]: it checks, runs,
-//! sweeps, films and replays scenarios that name them.
+//! sweeps, animates and replays scenarios that name them.
 
 mod args;
 mod commands;

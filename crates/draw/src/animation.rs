@@ -34,12 +34,12 @@ impl AnimationRenderer {
     pub fn new(scenery: Scenery, frames: &[Frame], width_px: u32) -> Result<Self, DrawError> {
         if width_px > MAX_FRAME_PX {
             return Err(DrawError::TooLarge {
-                what: "film width in px",
+                what: "animation width in px",
                 found: u64::from(width_px),
                 limit: u64::from(MAX_FRAME_PX),
             });
         }
-        DrawError::positive("film width in px", f64::from(width_px))?;
+        DrawError::positive("animation width in px", f64::from(width_px))?;
         check_content(&scenery, &Frame::default(), &[])?;
         let (canvas, window) = view(&scenery, animation_bounds(&scenery, frames)?, width_px);
         let width = window.width as u32;

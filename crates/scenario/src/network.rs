@@ -289,7 +289,7 @@ pub fn check_unique(mut ids: Vec<EntityId>, agent: &str) -> Result<(), SectionEr
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
         Some(pair) => {
-            let cause = format!("{agent} {} is named twice", pair[0]);
+            let cause = format!("{agent} {} is listed twice", pair[0]);
             Err(SectionError::new(cause, format!("name each {agent} once")))
         }
     }

@@ -169,7 +169,7 @@ impl AllowedFiles {
 
 /// Returns the problem of a path that may not be read.
 fn outside_roots(path: &str) -> Problem {
-    let cause = "is not below the folders that were named at start";
+    let cause = "is not below the folders that were given at start";
     Problem::new(path, cause, "start the studio with its folder: sidestep studio FOLDER")
 }
 

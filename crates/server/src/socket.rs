@@ -270,7 +270,7 @@ impl SocketSessions {
 fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let schema = worlds.schema(Some(world)).ok_or_else(|| {
         let names = worlds.names().join(", ");
-        Problem::new(world, "no such world is known", format!("name one of {names}"))
+        Problem::new(world, "no such world", format!("give one of {names}"))
     })?;
     Ok(ReplyBody::Schema { schema })
 }

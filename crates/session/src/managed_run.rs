@@ -346,7 +346,7 @@ fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), Inpu
     if !has_orders(folder)? {
         return Ok(());
     }
-    let cause = format!("its agents were decided from outside up to cycle {}", run.cycle());
+    let cause = format!("its agents were controlled externally up to cycle {}", run.cycle());
     let remedy = "continue it with the program that decided for them, or look at it with \
                   `sidestep replay DIR --cycle N`";
     Err(InputError::new(folder.display(), cause, remedy))

@@ -49,7 +49,7 @@ pub enum RecoverError {
         expected: usize,
     },
     /// Points leave these joints open, or couple them to connectors farther out.
-    #[error("connector {connector} depends on {} at once; its position does not tell them apart", .joints.join(", "))]
+    #[error("connector {connector} depends on {} at once; its position does not distinguish them", .joints.join(", "))]
     Coupled {
         /// Index of the connector.
         connector: usize,

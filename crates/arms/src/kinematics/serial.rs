@@ -166,7 +166,7 @@ impl SerialChain {
             return Ok(());
         }
         let motion = JointMotion::from_kind(joint.kind).ok_or_else(|| {
-            let cause = format!("joint `{}` moves in more than one way", joint.name);
+            let cause = format!("joint `{}` has more than one degree of freedom", joint.name);
             InputError::new(place, cause, "choose base and tip on one side of it")
         })?;
         let (driver, multiplier, offset) = mimic_source(model, index);

@@ -181,7 +181,7 @@ fn comparison_text(c: &Comparison) -> String {
         Some(true) => "agrees".to_string(),
         Some(false) => "DISAGREES".to_string(),
         None => {
-            format!("too few runs to tell, --runs {} or more would do", c.runs_to_tell)
+            format!("too few runs for a verdict; --runs {} or more would suffice", c.runs_to_tell)
         }
     };
     format!(

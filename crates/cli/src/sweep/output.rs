@@ -82,7 +82,7 @@ fn print_interrupted(told: SweepOutput<'_>, finished: usize) -> Result<ExitCode,
             let all = plan.runs();
             let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
             console.note(format!(
-                "{finished}{of} runs are finished; `sidestep resume {path}` goes on."
+                "{finished}{of} runs are finished; `sidestep resume {path}` continues."
             ));
         }
     }

@@ -78,7 +78,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<RoleColumn<R>>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
-            let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
+            let remedy =
+                "give another folder, or continue the sweep in this one: sidestep resume DIR";
             let cause = "the folder holds a sweep already";
             return Err(InputError::new(path.display(), cause, remedy).into());
         }

@@ -232,7 +232,7 @@ fn check_header(path: &Path, json: &[u8], of: SweepIdentity<'_>) -> Result<(), I
         header.program_version, of.program_version
     );
     let remedy =
-        format!("go on with sidestep {}, or sweep into a new folder", header.program_version);
+        format!("continue with sidestep {}, or sweep into a new folder", header.program_version);
     Err(InputError::new(path.display(), cause, remedy))
 }
 

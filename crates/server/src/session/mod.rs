@@ -225,7 +225,7 @@ fn panic_message(payload: &(dyn Any + Send)) -> String {
 }
 
 fn internal_error(message: &str) -> Problem {
-    let remedy = "please report it with the scenario; the other sessions go on";
+    let remedy = "please report it with the scenario; the other sessions continue";
     Problem::new("session", format!("this is a bug in sidestep: {message}"), remedy)
 }
 

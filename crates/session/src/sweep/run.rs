@@ -143,7 +143,7 @@ fn open_same(
     }
     let there = out.display();
     let remedy =
-        format!("name another folder, or go on with what is there: sidestep resume {there}");
+        format!("give another folder, or continue the sweep in this one: sidestep resume {there}");
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
@@ -347,7 +347,8 @@ fn with_cell_runner(
 fn with_resume_hint(error: Error, folder: &Path) -> Error {
     match error {
         Error::Record(error) => {
-            let remedy = "make room; the finished runs are saved, go on with: sidestep resume";
+            let remedy =
+                "free some space; the finished runs are saved, continue with: sidestep resume";
             Error::other(error.to_string(), format!("{remedy} {}", folder.display()))
         }
         other => other,

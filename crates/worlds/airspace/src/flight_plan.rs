@@ -116,7 +116,7 @@ impl AirplaneSection {
         if own || self.altitude_m.is_some() || self.appears_s.is_some() || !self.orders.is_empty() {
             let remedy =
                 "leave out at_m, heading_deg, way_points_m, altitude_m, appears_s and orders";
-            return Err(source.error(rows.span(), "a track beside what it tells itself", remedy));
+            return Err(source.error(rows.span(), "a track beside keys that it replaces", remedy));
         }
         let point =
             |&[t_s, x, y, altitude_m]: &[f64; 4]| TrackPoint { t_s, at: [x, y], altitude_m };

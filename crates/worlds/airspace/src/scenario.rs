@@ -119,7 +119,7 @@ impl Rule for ReplayEnd {
     }
 
     fn description() -> String {
-        "seconds after the start, 0 to fly all anew, or inf to replay all".into()
+        "seconds after the start, 0 to fly all of them by the method, or inf to replay all".into()
     }
 
     fn limits() -> Value {

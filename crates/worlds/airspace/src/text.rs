@@ -230,7 +230,7 @@ fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
 }
 
 fn flights(m: &Metrics) -> KeyValues {
-    let nearest = m.min_separation_m.map_or("nobody came near".into(), |d| format!("{d:.1} m"));
+    let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),
         n => format!("{}, {:.1} s in all", group_thousands(n), m.lost_s),

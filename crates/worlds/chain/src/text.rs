@@ -186,8 +186,8 @@ fn after_vetoes(m: &Metrics) -> KeyValues {
         (rungs.waited, "waited"),
         (rungs.pulled_back, "pulled by the other end"),
         (rungs.stuck, "stuck"),
-        (rungs.planned, "ways planned"),
-        (rungs.not_planned, "plans without a way"),
+        (rungs.planned, "paths planned"),
+        (rungs.not_planned, "plans without a path"),
     ]);
     let escaped = some(&[
         (escapes.moves, "parts moved away"),
@@ -238,7 +238,7 @@ fn abandoned_part(told: &ChainAbandonedPart) -> (String, String) {
     let what = &told.what;
     let why = match (&what.by, &what.reason) {
         (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
-        _ => "nobody objected".into(),
+        _ => "no connector objected".into(),
     };
     let nearest = match what.nearest_m.is_finite() {
         true => format!(", came within {:.4} m", what.nearest_m),

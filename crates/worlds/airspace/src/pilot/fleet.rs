@@ -161,7 +161,9 @@ impl AirspaceWorld {
         let (own, steps) = (&sight.own, self.timing.points_per_dt());
         if omegas_rad_s.len() != steps {
             let found = omegas_rad_s.len();
-            return Err(format!("its way has {found} turn rates; give {steps}, one for each step"));
+            return Err(format!(
+                "its path has {found} turn rates; give {steps}, one for each step"
+            ));
         }
         let most_rad_s = self.segment(own.id, own.orders).model.omega_max_rad_s;
         // Comparisons with NaN are false.
@@ -179,7 +181,7 @@ impl AirspaceWorld {
         };
         match ways.iter().any(|way| way.omegas_rad_s == *omegas_rad_s) {
             true if (*wish as usize) < ways.len() => Ok(()),
-            _ => Err("its way is none of those that its actions lead; give one of them".into()),
+            _ => Err("its path is that of none of its actions; give one of those".into()),
         }
     }
 

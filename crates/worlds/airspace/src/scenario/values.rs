@@ -34,11 +34,11 @@ macro_rules! bounds {
 bounds! {
     Speed, 1e-3, MAX_SPEED_M_S, "0.001 to 1e6 m/s", "slower steps are lost in rounding, and nothing is faster";
     TurnRate, 1e-3, 360.0, "0.001 to 360 degrees per second", "slower turns make orbits without end";
-    Decision, 0.01, 3600.0, "0.01 to 3600 s", "nobody avoids others by one decision an hour";
+    Decision, 0.01, 3600.0, "0.01 to 3600 s", "one decision per hour is too slow for collision avoidance";
     Step, 0.001, 3600.0, "0.001 to 3600 s", "a step is part of dt_s, and a run has many";
-    LookAhead, 0.001, 86_400.0, "0.001 to 86400 s", "nobody predicts more than a day";
+    LookAhead, 0.001, 86_400.0, "0.001 to 86400 s", "predictions are limited to one day";
     Held, 0.001, 86_400.0, "0.001 to 86400 s", "no turn or leg takes more than a day";
-    Tolerance, 0.001, 1e6, "0.001 to 1e6 m", "way-points are met to the millimeter at best";
+    Tolerance, 0.001, 1e6, "0.001 to 1e6 m", "way-points are reached to the millimeter at best";
     Weight, 1e-12, 1e6, "1e-12 to 1e6", "beyond that rounding hides one part of the objective";
     Fading, 1e-3, 1.0, "0.001 to 1", "the future counts less than the present, but it counts";
     Inflation, 0.1, 10.0, "0.1 to 10", "it is a margin on the separation";

@@ -117,10 +117,10 @@ fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str
         return Some(("has fewer than two way points", "give at least two"));
     }
     if !way_points.iter().all(is_finite) {
-        return Some(("has a way point that is no finite number", "give finite numbers"));
+        return Some(("has a way point that is not finite", "give finite numbers"));
     }
     let stays = way_points.windows(2).any(|w| w[0] == w[1]);
-    stays.then_some(("has two equal way points behind each other", "leave one of them out"))
+    stays.then_some(("has two equal consecutive way points", "leave one of them out"))
 }
 
 /// Returns a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least

@@ -125,7 +125,7 @@ impl PlacementFailure {
             (cause, "make the robots smaller or the clearance less")
         } else if self.laid == 0 {
             let cause = format!(
-                "no free way for a chain of {:.1} m from {} places; the longest is {:.1} m",
+                "no free path for a chain of {:.1} m from {} places; the longest is {:.1} m",
                 wanted.length_m(),
                 self.free_places,
                 self.longest_m
@@ -345,7 +345,7 @@ mod tests {
             cause(SpaceRequirement { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m")
         );
         let too_long = cause(SpaceRequirement { connectors: 40, ..WANTED });
-        assert!(too_long.contains("no free way for a chain of 27.3"), "{too_long}");
+        assert!(too_long.contains("no free path for a chain of 27.3"), "{too_long}");
         let no_room = cause(SpaceRequirement { connectors: 3, ahead_m: 50.0, ..WANTED });
         assert!(no_room.contains("nowhere 50 m free"), "{no_room}");
         for wrong in [

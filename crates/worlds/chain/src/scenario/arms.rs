@@ -109,7 +109,7 @@ impl<const D: usize> Compiler<'_, D> {
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
                 let at = self.source.key_span(at.clone(), &["posture", "srdf", "joints"]);
-                Err(self.source.error(at, "a posture given in two ways, or half", remedy))
+                Err(self.source.error(at, "a posture given twice, or by half", remedy))
             }
         }
     }

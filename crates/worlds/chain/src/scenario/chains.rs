@@ -162,7 +162,7 @@ impl<const D: usize> Compiler<'_, D> {
         let apart_m: Point<D> = match &s.apart_m {
             Some(given) => given.get(),
             None if s.count > 1 => {
-                let remedy = "add apart_m = [...], the way from one to the next";
+                let remedy = "add apart_m = [...], the offset from one to the next";
                 return Err(self.source.error(
                     self.source.key_span(section.span(), &["count"]),
                     format!("{} chains at one place", s.count),
@@ -258,7 +258,7 @@ impl<const D: usize> Compiler<'_, D> {
         let breaks =
             changes.iter().filter(|change| matches!(change.what, ChangeKind::Scatter { .. }));
         if breaks.count() > 1 {
-            let remedy = "let it break once";
+            let remedy = "break it once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
         self.check_breaks(s, dt_s)?;
@@ -460,7 +460,7 @@ impl<const D: usize> Compiler<'_, D> {
         match s.changes.0.iter().find(|change| change.get_ref().takes_apart()) {
             None => Ok(()),
             Some(change) => {
-                let remedy = "let a connector fail, or give a chain of rods in place of the arm";
+                let remedy = "make a connector fail, or give a chain of rods in place of the arm";
                 let cause =
                     "an arm is as its joints put it: it is never scattered, nor off its base";
                 Err(self.source.error(change.span(), cause, remedy))
@@ -501,7 +501,7 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "leave out at_m, points_m, along, heading_deg and folded_m";
             let keys = ["at_m", "points_m", "along", "heading_deg", "folded_m"];
             let at = self.source.key_span(at, &keys);
-            return Err(self.source.error(at, "a chain placed in two ways", remedy));
+            return Err(self.source.error(at, "a chain placed twice", remedy));
         }
         let obstacles =
             Obstacles::new(self.placement_obstacles(Some(site), placed)?, rod.max_m.max(1e-3))
@@ -531,7 +531,7 @@ impl<const D: usize> Compiler<'_, D> {
             if s.connectors.is_some() || s.at_m.is_some() || s.folded_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
                 let at = self.source.key_span(at, &["points_m"]);
-                return Err(self.source.error(at, "a chain placed in two ways", remedy));
+                return Err(self.source.error(at, "a chain placed twice", remedy));
             }
             let keys = [
                 ("along", s.along.is_some(), false),
@@ -577,8 +577,7 @@ impl<const D: usize> Compiler<'_, D> {
                 self.source.error(given.span(), "along has no length", remedy)
             }),
             (Some(given), Some(_)) => {
-                let remedy =
-                    "give along, the way from the first connector to the last, or heading_deg";
+                let remedy = "give along, the direction from the first connector to the last, or heading_deg";
                 Err(self.source.error(given.span(), "two directions", remedy))
             }
         }

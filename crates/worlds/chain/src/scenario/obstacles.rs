@@ -367,7 +367,7 @@ impl<const D: usize> Compiler<'_, D> {
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
                 let at = self.source.key_span(at, &["patrol_m", "bounces_m"]);
-                return Err(self.source.error(at, "an obstacle that moves in two ways", remedy));
+                return Err(self.source.error(at, "an obstacle with two motions", remedy));
             }
         };
         Ok(Some(course))

@@ -69,7 +69,7 @@ impl Kinds {
             return Ok(k);
         }
         if self.all.len() == 127 {
-            return error("more than 122 kinds of your own", "let kinds share a name");
+            return error("more than 122 kinds of your own", "give several kinds one name");
         }
         let (name, observation) = (name.get_ref().clone(), name.get_ref().clone());
         self.all.push(Kind { name, observation, ..Kind::default() });
