@@ -76,7 +76,7 @@ pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
         return Err(InputError::new(
             place,
             format!("the log has {} FLASER messages; learning compares pairs", log.scans.len()),
-            "name a corrected CARMEN log with ODOM and FLASER messages",
+            "give a corrected CARMEN log with ODOM and FLASER messages",
         ));
     }
     Ok(log)

@@ -39,7 +39,7 @@ pub(super) fn trajectory(
         Err(InputError::new(format!("{bag}: {}", source.topic), cause, remedy))
     };
     if pairs.is_empty() {
-        return refuse("its messages hold no transforms".into(), "name another topic".into());
+        return refuse("its messages hold no transforms".into(), "give another topic".into());
     }
     let chain = match &source.frames {
         Some((parent, child)) => chain(&edges, parent, child),

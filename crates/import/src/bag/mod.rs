@@ -179,7 +179,7 @@ impl BagContent {
     ) -> Result<(), InputError> {
         let damaged = |cause: String| {
             let place = format!("{bag}: {}, message {}", raw.topic, raw.number);
-            InputError::new(place, cause, "record the bag again, or name another topic")
+            InputError::new(place, cause, "record the bag again, or give another topic")
         };
         if wanted.scans.as_deref() == Some(raw.topic) {
             check_type(bag, raw, &[LaserScan::NAME])?;
@@ -221,7 +221,7 @@ fn check_type(bag: &str, raw: &RawMessage<'_>, known: &[&str]) -> Result<(), Inp
         return Ok(());
     }
     let cause = format!("its messages are of type `{}`", raw.schema);
-    let remedy = format!("name a topic of type {}", known.join(", "));
+    let remedy = format!("give a topic of type {}", known.join(", "));
     Err(InputError::new(format!("{bag}: {}", raw.topic), cause, remedy))
 }
 

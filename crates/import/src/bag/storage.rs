@@ -145,7 +145,7 @@ fn bag_files(path: &Path) -> Result<Vec<PathBuf>, InputError> {
         false => find_mcap_files(path)?,
     };
     if names.is_empty() {
-        let remedy = "name a folder that `ros2 bag record -s mcap` wrote, or an .mcap file";
+        let remedy = "give a folder that `ros2 bag record -s mcap` wrote, or an .mcap file";
         return Err(InputError::new(path.display(), "the folder holds no .mcap file", remedy));
     }
     Ok(names.into_iter().map(|name| path.join(name)).collect())
@@ -168,7 +168,7 @@ fn read_file_list(path: &Path) -> Result<Vec<String>, InputError> {
     let text = read_text(path, MAX_METADATA_BYTES)?;
     let mut below = text.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
     if below.next().is_none() {
-        let remedy = "restore it: `ros2 bag reindex -s mcap FOLDER`, or name an .mcap file";
+        let remedy = "restore it: `ros2 bag reindex -s mcap FOLDER`, or give an .mcap file";
         return Err(InputError::new(path.display(), "it lists no `relative_file_paths`", remedy));
     }
     let names = below.map_while(|line| line.strip_prefix("- "));
@@ -194,7 +194,7 @@ fn check_magic(path: &Path, file: &mut File) -> Result<(), InputError> {
     }
     let other = FOREIGN_FORMATS.iter().find(|(magic, ..)| begin.starts_with(magic));
     let (cause, remedy) = other.map_or(
-        ("is no MCAP file", "name a bag recorded with `ros2 bag record -s mcap`"),
+        ("is no MCAP file", "give a bag recorded with `ros2 bag record -s mcap`"),
         |(_, cause, remedy)| (cause, remedy),
     );
     Err(InputError::new(path.display(), cause, remedy))

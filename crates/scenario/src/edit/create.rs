@@ -30,7 +30,7 @@ pub(super) fn create(
         Item::Table(table) => add_to_table(layout, path, table, names, new),
         _ => Err(edit_error(
             format!("`{}` does not stand in a table", dotted(names)),
-            "name a table",
+            "give a table",
         )),
     }
 }

@@ -20,14 +20,14 @@ pub(super) fn insert(
 ) -> Result<Vec<Splice>, EditError> {
     let KeyLookup { path, item, rest } = layout.look_up(key)?;
     if rest.is_empty() && matches!(path.last(), Some(Step::Index(_))) && item.is_table_like() {
-        return Err(edit_error("it is an element of an array itself", "name the array"));
+        return Err(edit_error("it is an element of an array itself", "give the array"));
     }
     let is_there = rest.is_empty() && !path.is_empty();
     let count = match item {
         _ if !is_there => 0,
         item if item.is_table_like() => 1,
         item => count(item).ok_or_else(|| {
-            edit_error("it is neither an array nor a list of sections", "set it, or name an array")
+            edit_error("it is neither an array nor a list of sections", "set it, or give an array")
         })?,
     };
     let at = at.unwrap_or(count);
@@ -37,7 +37,7 @@ pub(super) fn insert(
     }
     match item {
         _ if path.is_empty() && rest.is_empty() => {
-            Err(edit_error("this is no array", "name a key"))
+            Err(edit_error("this is no array", "give a key"))
         }
         _ if !is_there => {
             let list = Json::Array(vec![value.clone()]);
@@ -105,7 +105,7 @@ pub(super) fn relocate(
 ) -> Result<Vec<Splice>, EditError> {
     let path = layout.find(key)?.path;
     let Some((Step::Index(from), list)) = path.split_last() else {
-        let remedy = "name an element by its number, e.g. robots.1";
+        let remedy = "give an element by its number, e.g. robots.1";
         return Err(edit_error("it is no element of an array", remedy));
     };
     let item = layout.item(list);

@@ -171,7 +171,7 @@ pub(super) fn count(item: &Item) -> Option<usize> {
 fn not_a_table(name: &str) -> EditError {
     edit_error(
         format!("`{name}` does not stand in a table"),
-        "name the element of an array by its number, e.g. robots.0.count",
+        "give the element of an array by its number, e.g. robots.0.count",
     )
 }
 

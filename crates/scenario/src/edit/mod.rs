@@ -1,4 +1,4 @@
-//! Changes of a scenario's text by keys. All text that an edit does not name stays the same, byte for byte.
+//! Changes of a scenario's text by keys. All text that an edit does not address stays the same, byte for byte.
 //!
 //! ```text
 //! path.rs     `robots.1.at` -> parts          layout.rs   text -> places of all keys
@@ -6,7 +6,7 @@
 //! set.rs      values in place of others       create.rs   new keys and sections
 //! section.rs  text of new sections            insert.rs   new and moved elements
 //! blocks.rs   lines and sections of a text    lists.rs    elements of arrays in brackets
-//! members.rs  keys of tables in braces        names.rs    renamed keys
+//! members.rs  keys of tables in braces        rename.rs   renamed keys
 //! paint.rs    characters of drawings
 //! ```
 //! An edit reads the text, and gives a list of pieces to replace: the text is never rebuilt from its parsed form,

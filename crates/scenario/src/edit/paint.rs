@@ -16,7 +16,7 @@ pub(super) fn paint(
 ) -> Result<Vec<Splice>, EditError> {
     let item = layout.find(key)?.item;
     let (Some(value), Some(span)) = (item.as_str(), item.span()) else {
-        return Err(edit_error("it is no drawing", "name a string of characters, e.g. map.ascii"));
+        return Err(edit_error("it is no drawing", "give a string of characters, e.g. map.ascii"));
     };
     let text = &layout.text[span.clone()];
     let inside = quoted(text);

@@ -16,7 +16,7 @@ pub(super) fn rename(
 ) -> Result<Vec<Splice>, EditError> {
     let path = layout.find(key)?.path;
     let Some((Step::Name(from), parent)) = path.split_last() else {
-        return Err(edit_error("an element of an array has no name", "name a key"));
+        return Err(edit_error("an element of an array has no name", "give a key"));
     };
     if to.is_empty() {
         return Err(edit_error("the new name is empty", "give a name"));

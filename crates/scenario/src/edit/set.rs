@@ -65,7 +65,7 @@ pub(super) fn add_header(
 pub(super) fn remove(layout: &Layout<'_>, key: &[KeyPart]) -> Result<Vec<Splice>, EditError> {
     let path = layout.find(key)?.path;
     match path.is_empty() {
-        true => Err(edit_error("this is the whole text", "name a key of it")),
+        true => Err(edit_error("this is the whole text", "give a key of it")),
         false => Ok(removal_splices(layout, &path)),
     }
 }
