@@ -103,7 +103,7 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
 /// The error of a run folder that cannot be made.
 pub(crate) fn cannot_create(path: &Path, cause: impl std::fmt::Display) -> InputError {
     let cause = format!("cannot make the run folder: {cause}");
-    InputError::new(path.display(), cause, "name a folder in a place where you may write")
+    InputError::new(path.display(), cause, "give a folder in a place where you may write")
 }
 
 #[cfg(test)]

@@ -251,7 +251,7 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
         Ok(_) => "this is no folder".to_string(),
         Err(e) => e.to_string(),
     };
-    Err(InputError::new(path.display(), cause, "name the folder that a run was recorded to"))
+    Err(InputError::new(path.display(), cause, "give the folder that a run was recorded to"))
 }
 
 /// Refuses a path at which a new run must not be created.
@@ -266,7 +266,7 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
         (false, _, _) | (true, true, IfExists::Replace) => Ok(()),
         (true, true, IfExists::Refuse) => refuse(
             "the folder holds a run already",
-            "resume that run, name another folder, or replace the old run (--replace)",
+            "resume that run, give another folder, or replace the old run (--replace)",
         ),
         (true, false, _) => {
             let cause = if path.join(manifest::SWEEP_MANIFEST).is_file() {
@@ -274,7 +274,7 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
             } else {
                 "the folder holds something else than a run"
             };
-            refuse(cause, "name a new or empty folder")
+            refuse(cause, "give a new or empty folder")
         }
     }
 }
@@ -286,7 +286,7 @@ fn lock(folder: &Path) -> Result<File, InputError> {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let cause = "another process is writing this run";
-            let remedy = "wait until it ends, stop it, or name another folder";
+            let remedy = "wait until it ends, stop it, or give another folder";
             Err(InputError::new(folder.display(), cause, remedy))
         }
         Err(TryLockError::Error(e)) => {

@@ -155,7 +155,7 @@ fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputEr
     let partial = disk::partial_path(&table);
     let complete = table.is_dir();
     if !complete && !partial.is_dir() {
-        let remedy = "name a run folder and one of the tables in it";
+        let remedy = "give a run folder and one of the tables in it";
         return Err(InputError::new(table.display(), "there is no such table", remedy));
     }
     let found = parts(if complete { &table } else { &partial })
@@ -314,7 +314,7 @@ pub(crate) fn required_value(
     key: &str,
 ) -> Result<String, InputError> {
     schema::key_value(metadata, key).map(str::to_string).ok_or_else(|| {
-        let remedy = "name a file that a recording wrote";
+        let remedy = "give a file that a recording wrote";
         InputError::new(path.display(), format!("the file has no key `{key}`"), remedy)
     })
 }

@@ -362,7 +362,7 @@ pub(crate) fn read_key_values<const N: usize>(
 }
 
 fn cannot_open(path: &Path, e: &io::Error) -> InputError {
-    InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
+    InputError::new(path.display(), e.to_string(), "give a table that a sweep wrote")
 }
 
 /// Returns columns without rows, of the file's types.

@@ -105,7 +105,7 @@ pub fn reach<const D: usize>(
         return Err(InputError::new(
             "base",
             format!("is connector {}, of {}", request.base, chain.points().len()),
-            "name another connector than the one that moves, counted from 0",
+            "give another connector than the one that moves, counted from 0",
         ));
     }
     let before = chain.points().to_vec();

@@ -282,7 +282,7 @@ fn catch_panic(
     work: impl FnOnce() -> Option<Result<ReplyBody, Problem>>,
 ) {
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        let cause = "this is a bug in sidestep";
+        let cause = "internal error (a bug in Sidestep)";
         Some(Err(Problem::new("request", cause, "please report it with the request")))
     });
     match done {

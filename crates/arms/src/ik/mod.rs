@@ -174,12 +174,12 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> Result<(), 
     }
     if goal.base >= n || goal.base == goal.k {
         let cause = format!("is connector {}, of {n}", goal.base);
-        let remedy = "name another connector than the tip, counted from 0";
+        let remedy = "give another connector than the tip, counted from 0";
         return Err(InputError::new("base", cause, remedy));
     }
     if chain.connectors()[goal.k].is_still() {
         let cause = format!("is connector {}, which never moves", goal.k);
-        return Err(InputError::new("tip", cause, "name a connector that is free"));
+        return Err(InputError::new("tip", cause, "give a connector that is free"));
     }
     if !is_finite(&goal.target) || goal.target.iter().any(|x| x.abs() > 1e7) {
         let cause = format!("is {:?}", goal.target);

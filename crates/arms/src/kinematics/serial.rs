@@ -135,7 +135,7 @@ impl SerialChain {
     pub fn new(model: &Model, base: usize, tip: usize, place: &str) -> Result<Self, InputError> {
         let way = model.joint_path(base, tip).ok_or_else(|| {
             let cause = format!("`{}` does not hang on `{}`", model.links[tip], model.links[base]);
-            InputError::new(place, cause, "name a link that is further from the root")
+            InputError::new(place, cause, "give a link that is further from the root")
         })?;
         let mut chain = Self {
             base: model.links[base].clone(),

@@ -2,7 +2,7 @@
 //! target, where no local rule finds one.
 //!
 //! ```text
-//! space.rs:  postures of rods, the straight way between two, and whether it is free
+//! space.rs:  postures of rods, the straight path between two, and whether it is free
 //! joints.rs: the same for the joints of an arm
 //! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```

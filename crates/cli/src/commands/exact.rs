@@ -21,10 +21,10 @@ Examples:
   sidestep exact one-robot.toml --runs 2000 --cycles 50  compare the simulator
   sidestep exact one-robot.toml --pomdp model.pomdp --goal 5,3 --beam sonar-8:0
 
-The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the \
+The scenario has one robot; doors stay closed, and nothing else moves. The policy replaces the \
 robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes \
 ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit \
-code 1, and so do runs that are too few to tell.";
+code 1, and so do too few runs for a verdict.";
 
 /// Compute the exact Markov chain of a scenario with one robot.
 #[derive(Debug, Args)]

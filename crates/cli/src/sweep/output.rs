@@ -18,7 +18,7 @@ const MAX_LISTED_FAILURES: usize = 5;
 
 fn timing_text(effort: &SweepTiming) -> String {
     format!(
-        "{} for {}, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
+        "{} for {}, {} at once; {:.1} ms of simulation and {:.1} ms of overhead per run",
         format_duration(effort.wall_s),
         format_count(effort.runs as usize, "run"),
         effort.at_once,

@@ -126,7 +126,7 @@ fn a_sweep_runs_until_it_is_precise_and_shares_of_it_are_refused() {
     place.json(&planned);
     let refused = place.run(&["sweep", "run", "p", "--shard", "0/2"]);
     assert_eq!(refused.code(), 2);
-    assert!(refused.err().contains("stops by its precision"), "{}", refused.err());
+    assert!(refused.err().contains("target precision cannot be sharded"), "{}", refused.err());
     assert_eq!(place.json(&["resume", "p"])["summary"], done["summary"]);
 }
 

@@ -8,7 +8,7 @@
 //! ```text
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
 //! pushing.rs, movers.rs, snake.rs       chains among static and moving obstacles
-//! scaling.rs, broken.rs, postures.rs, initiators.rs    experiments without a world
+//! scaling.rs, broken_chain.rs, postures.rs, initiators.rs    experiments without a world
 //! arm.rs           an arm of joints
 //! scenes.rs        pictures of bodies
 //! claims/          the verdicts

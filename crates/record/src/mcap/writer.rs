@@ -77,11 +77,11 @@ impl McapRecorder {
     pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
         let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
         match fs::metadata(path) {
-            Ok(found) if !found.is_file() => refuse("this is no file", "name a new file"),
+            Ok(found) if !found.is_file() => refuse("this is no file", "give a new file"),
             Ok(_) if existing == IfExists::Refuse => {
-                refuse("the file exists already", "name another file, or replace it (--replace)")
+                refuse("the file exists already", "give another file, or replace it (--replace)")
             }
-            _ if path.file_name().is_none() => refuse("this is no file name", "name a new file"),
+            _ if path.file_name().is_none() => refuse("this is no file name", "give a new file"),
             _ => Ok(()),
         }
     }

@@ -136,7 +136,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     pub fn open(path: &Path) -> Result<Self, InputError> {
         if !Self::is_at(path) {
             let cause = format!("this is no sweep: it holds no `{MANIFEST}`");
-            let remedy = "name the folder that a sweep was written to";
+            let remedy = "give the folder that a sweep was written to";
             return Err(InputError::new(path.display(), cause, remedy));
         }
         let manifest = manifest::read_json(&path.join(MANIFEST))?;

@@ -203,7 +203,7 @@ impl TaskProgress {
         let motions = script.motions(self.start);
         let motions: Vec<ScriptMotion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
         if motions.len() > MAX_MOTIONS {
-            let cause = format!("comes to more than {MAX_MOTIONS} motions");
+            let cause = format!("makes more than {MAX_MOTIONS} motions");
             return Err(InputError::new("script", cause, "repeat less often"));
         }
         Ok(motions)

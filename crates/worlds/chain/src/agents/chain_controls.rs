@@ -45,7 +45,7 @@ impl<const D: usize> ChainControls<D> {
             }
             if !is_valid(control, n) {
                 let cause = format!("that of connector {k} refers to connectors that do not exist");
-                return Err((cause, "hand over what agents of this chain have decided"));
+                return Err((cause, "submit what agents of this chain have decided"));
             }
         }
         Ok(())

@@ -61,7 +61,7 @@ impl<const D: usize> Mover<D> {
     }
 
     fn fault(&self) -> Option<(&'static str, &'static str)> {
-        let still = ("does not move", "give it a speed, or make it an obstacle that stands still");
+        let still = ("does not move", "give it a speed, or make it a static obstacle");
         let moves = |v: &Point<D>| is_finite(v) && norm(*v) > 0.0;
         match &self.course {
             Course::Straight { velocity_m_s } => (!moves(velocity_m_s)).then_some(still),

@@ -53,7 +53,7 @@ impl<const D: usize> Compiler<'_, D> {
         if serial.variables.is_empty() {
             let at = self.source.key_span(at, &["tip", "base", "urdf", "urdf_text"]);
             let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);
-            return Err(self.source.error(at, cause, "name another base or another tip"));
+            return Err(self.source.error(at, cause, "give another base or another tip"));
         }
         let values = self.values(s, &model, &serial, at.clone())?;
         let at = || self.source.key_span(at, &["joints", "posture"]);

@@ -492,7 +492,7 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
-            let remedy = "name a ground.map or a ground.stage, and give connectors";
+            let remedy = "give a ground.map or a ground.stage, and give connectors";
             let at = self.source.key_span(at, &["anywhere"]);
             return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };

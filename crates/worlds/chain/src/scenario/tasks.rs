@@ -185,7 +185,7 @@ impl<const D: usize> Compiler<'_, D> {
             if is_far || n >= MAX_MOTIONS {
                 let cause = match is_far {
                     true => "the script leads further than 1e6 m".into(),
-                    false => format!("the script comes to more than {MAX_MOTIONS} motions"),
+                    false => format!("the script makes more than {MAX_MOTIONS} motions"),
                 };
                 let at = self.source.key_span(at, &["script", "script_file"]);
                 return Err(self.source.error(at, cause, "go less far, or repeat less often"));

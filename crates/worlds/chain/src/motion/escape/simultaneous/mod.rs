@@ -1,17 +1,18 @@
 //! Escape by a simultaneous solve of all constraints of a tick.
 //!
 //! ```text
-//! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold in any case
-//! way_out.rs     help for parts that are caught: roll-outs of ways through an obstacle
-//! leading.rs     the leader's choice before any part is caught: roll-outs of going on and of resting
-//! stage.rs       where roll-outs are made
-//! posture.rs     positions under trial
+//! solve_input.rs    the desired motions and the margins of a solve
+//! solve.rs          where all parts go: contacts.rs, lengths.rs, and the constraints.rs that always hold
+//! escape_plan.rs    help for parts that are caught: roll-outs of paths through an obstacle
+//! leader_choice.rs  the leader's choice before any part is caught: roll-outs of continuing and of resting
+//! rollout.rs        where roll-outs are made
+//! posture.rs        positions under trial
 //! ```
 //!
 //! One part that flees alone is held by its neighbors, which are not asked to move. Here all of them
 //! move, own parts push each other, and approaching obstacles are avoided by a margin as wide as their
-//! way in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
-//! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
+//! motion in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
+//! chain is taut, it leaves through one of them, by the path that roll-outs find shortest.
 
 mod constraints;
 mod contacts;
