@@ -93,11 +93,11 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         ends: &[Point<D>],
         i: usize,
         margin_m: f64,
-        look: impl FnMut(&'a Obstacle<D>),
+        visit: impl FnMut(&'a Obstacle<D>),
     ) {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
-        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), look);
+        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), visit);
     }
 
     /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
