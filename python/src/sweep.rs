@@ -288,14 +288,14 @@ pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
-    cells: Vec<CellTuple>,
+    trials: Vec<CellTuple>,
 ) -> PyResult<Vec<String>> {
     let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
-    let cell = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
+    let trial = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
     let task = Task {
         build,
         scenarios: scenarios.into_iter().map(resolved).collect(),
-        cells: cells.into_iter().map(cell).collect(),
+        cells: trials.into_iter().map(trial).collect(),
     };
     let outcomes = run_polling(py, |watcher| task.run(&WORLDS, watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;

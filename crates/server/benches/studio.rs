@@ -148,7 +148,9 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);
     let path = folder.join("s.toml").display().to_string();
-    page.ask(&json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }));
+    page.ask(
+        &json!({ "do": "open", "target": { "kind": "scenario", "path": path }, "seed": null }),
+    );
     (studio, page)
 }
 
@@ -232,7 +234,7 @@ fn inspecting() {
         let asked = (0..200_u32).map(|k| {
             let who = json!({ "kind": kind, "number": k % count, "part": part });
             let start = Instant::now();
-            page.ask(&json!({ "do": "inspect", "session": 1, "who": who }));
+            page.ask(&json!({ "do": "inspect", "session": 1, "body": who }));
             start.elapsed().as_secs_f64() * 1e3
         });
         let times = sorted(asked.collect());

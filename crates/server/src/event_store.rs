@@ -1,7 +1,7 @@
 //! The events of a session, each kept once, however often its cycle is computed.
 
 use crate::encode::event;
-use crate::protocol::{Event, ReplyBody};
+use crate::protocol::{ReplyBody, RunEvent};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
@@ -86,7 +86,7 @@ impl EventStore {
     }
 
     /// Takes the last events since the last call, and the number of those that are not among them.
-    pub(crate) fn take_unsent(&mut self) -> (Vec<Event>, u64) {
+    pub(crate) fn take_unsent(&mut self) -> (Vec<RunEvent>, u64) {
         let UnsentEvents { entries, left_out } = std::mem::take(&mut self.unsent);
         (entries.iter().map(event).collect(), left_out)
     }
@@ -104,12 +104,12 @@ impl EventStore {
     }
 
     /// Returns at most the given number of events of some cycles, after the first `skip` ones.
-    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, most: u32) -> ReplyBody {
+    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, limit: u32) -> ReplyBody {
         let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
         let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);
         let start = start.saturating_add(skip as usize).min(end);
-        let entries: Vec<Event> =
-            self.kept[start..end].iter().take(most as usize).map(event).collect();
+        let entries: Vec<RunEvent> =
+            self.kept[start..end].iter().take(limit as usize).map(event).collect();
         let lost = self.lost.iter().filter(|(cycle, _)| cycles.contains(cycle));
         let lost: u64 = lost.map(|(_, count)| count).sum();
         let left_out = (end - start - entries.len()) as u64 + lost;

@@ -2,7 +2,7 @@
 //!
 //! The thread that receives the views of a fleet puts the newest one here and never waits; sessions take it when they can.
 
-use crate::protocol::{BodyId, Fleet, Node, Problem};
+use crate::protocol::{BodyId, Fleet, FleetNode, Problem};
 use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus, NodeStatus};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -81,10 +81,10 @@ pub(crate) fn to_protocol(now: &FleetStatus, silent_s: f64) -> Fleet {
     }
 }
 
-fn to_protocol_node(noun: &str, now: &NodeStatus) -> Node {
-    Node {
+fn to_protocol_node(noun: &str, now: &NodeStatus) -> FleetNode {
+    FleetNode {
         agent: now.agent,
-        who: BodyId { kind: noun.into(), number: now.number, part: now.part },
+        body: BodyId { kind: noun.into(), number: now.number, part: now.part },
         state: now.state.clone(),
         epoch: now.epoch,
         heard: now.heard_of.clone(),

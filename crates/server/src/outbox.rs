@@ -3,7 +3,7 @@
 //!
 //! Sessions put them here from their threads and never wait; the socket takes them when it can.
 
-use crate::protocol::{Notification, Reply, SessionId};
+use crate::protocol::{Reply, ServerNotification, SessionId};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
@@ -40,7 +40,7 @@ struct PendingMessages {
 #[derive(Debug, Default)]
 struct LatestUpdate {
     status: Option<String>,
-    cast: Option<String>,
+    bodies: Option<String>,
     frame: Option<Vec<u8>>,
 }
 
@@ -90,32 +90,32 @@ impl Outbox {
     }
 
     /// Sends a notice; all of them go out, in their order.
-    pub(crate) fn send_notification(&self, notice: &Notification) {
+    pub(crate) fn send_notification(&self, notice: &ServerNotification) {
         let text = to_json(notice);
         self.lock().texts.push_back(text);
         self.ready.notify_one();
     }
 
     /// Sends the state of a session, unless a newer one comes before it has been sent.
-    pub(crate) fn send_status(&self, session: SessionId, status: &Notification) {
+    pub(crate) fn send_status(&self, session: SessionId, status: &ServerNotification) {
         let text = to_json(status);
         self.lock().newest.entry(session).or_default().status = Some(text);
         self.ready.notify_one();
     }
 
-    /// Sends a frame, and the cast that it begins, unless a newer one comes before it has been sent. Returns whether
+    /// Sends a frame, and the body table that it begins, unless a newer one comes before it has been sent. Returns whether
     /// it replaces one that was not sent.
     pub(crate) fn send_frame(
         &self,
         session: SessionId,
-        cast: Option<&Notification>,
+        bodies: Option<&ServerNotification>,
         frame: Vec<u8>,
     ) -> bool {
-        let cast = cast.map(to_json);
+        let bodies = bodies.map(to_json);
         let mut pending = self.lock();
         let newest = pending.newest.entry(session).or_default();
-        if cast.is_some() {
-            newest.cast = cast;
+        if bodies.is_some() {
+            newest.bodies = bodies;
         }
         let replaces = newest.frame.replace(frame).is_some();
         drop(pending);
@@ -140,9 +140,9 @@ impl Outbox {
         let all = pending.newest.range(last + 1..).chain(pending.newest.range(..=last));
         let session = all.map(|(&session, _)| session).next()?;
         let newest = pending.newest.get_mut(&session)?;
-        let text = newest.status.take().or_else(|| newest.cast.take()).map(OutboxItem::Text);
+        let text = newest.status.take().or_else(|| newest.bodies.take()).map(OutboxItem::Text);
         let item = text.or_else(|| newest.frame.take().map(OutboxItem::Frame));
-        if newest.status.is_none() && newest.cast.is_none() && newest.frame.is_none() {
+        if newest.status.is_none() && newest.bodies.is_none() && newest.frame.is_none() {
             pending.newest.remove(&session);
             pending.last = session;
         }
@@ -164,9 +164,9 @@ mod tests {
         Reply { id, result: ReplyResult::Answer(ReplyBody::Done) }
     }
 
-    fn notice(text: &str) -> Notification {
+    fn notice(text: &str) -> ServerNotification {
         let (program, worlds, open) = (text.to_string(), Vec::new(), Vec::new());
-        Notification::Hello { version: 1, program, worlds, read_only: false, open }
+        ServerNotification::Hello { version: 1, program, worlds, read_only: false, open }
     }
 
     fn all(outbox: &Outbox) -> Vec<String> {
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn replies_go_first_and_of_frames_and_states_the_newest_alone() {
         let outbox = Outbox::default();
-        assert!(!outbox.send_frame(1, Some(&notice("cast 1")), vec![1]));
+        assert!(!outbox.send_frame(1, Some(&notice("table 1")), vec![1]));
         assert!(outbox.send_frame(1, None, vec![2]));
         outbox.send_status(1, &notice("old"));
         outbox.send_status(1, &notice("new"));
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(outbox.backlog(), 1);
         outbox.send_reply(&reply(1));
         assert_eq!(outbox.backlog(), 1);
-        assert_eq!(all(&outbox), ["reply", "new", "cast 1", "frame 2"]);
+        assert_eq!(all(&outbox), ["reply", "new", "table 1", "frame 2"]);
         assert_eq!(outbox.backlog(), 0);
     }
 

@@ -79,7 +79,7 @@ impl Samples {
             return known;
         }
         let MetricLabel { words, unit, .. } = metric_label(self.infos, &key);
-        self.names.push(MetricName { key, words, unit: unit.unwrap_or_default().into() });
+        self.names.push(MetricName { key, label: words, unit: unit.unwrap_or_default().into() });
         self.values.push(vec![None; self.cycles.len()]);
         Some(self.names.len() - 1)
     }

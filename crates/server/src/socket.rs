@@ -185,7 +185,7 @@ impl SocketSessions {
                 self.answer_in_thread(id, move || runs(&deps.files.resolve(&folder)?));
                 None
             }
-            Method::Open { what: target, seed } => self.open(id, target, seed).err().map(Err),
+            Method::Open { target, seed } => self.open(id, target, seed).err().map(Err),
             Method::Close { session } => {
                 let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
                 self.outbox.clear(session);

@@ -1,7 +1,7 @@
 //! The state that all sockets of a server share.
 
 use crate::access::AccessPolicy;
-use crate::protocol::{Notification, Problem, SessionId, TargetRef, VERSION};
+use crate::protocol::{Problem, ServerNotification, SessionId, TargetRef, VERSION};
 use crate::results::JobQueue;
 use crate::serve::wait_for_shutdown;
 use crate::session::SessionDeps;
@@ -57,8 +57,8 @@ impl AppState {
     }
 
     /// Returns the first notice for a page.
-    pub(crate) fn hello(&self) -> Notification {
-        Notification::Hello {
+    pub(crate) fn hello(&self) -> ServerNotification {
+        ServerNotification::Hello {
             version: VERSION,
             program: self.program.clone(),
             worlds: self.deps.worlds.names().into_iter().map(String::from).collect(),

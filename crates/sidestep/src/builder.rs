@@ -25,9 +25,9 @@ pub fn parse(text: impl Into<String>) -> Scenario {
 /// A scenario of any world, with changes, that is about to be started. It can be started many times.
 ///
 /// ```
-/// let scenario = sidestep::parse("format = 1\nworld = \"chain\"\n[[chains]]\nrods_m = [1.0, 1.0]\n");
-/// let error = scenario.set("chains.0.rods_m.0", -1.0)?.start().err().unwrap();
-/// assert!(error.to_string().contains("rods_m"));
+/// let text = "format = 1\nworld = \"chain\"\n[[chains]]\nconnectors = 3\nat_m = [0.0, 0.0]\n";
+/// let error = sidestep::parse(text).set("chains.0.rod_m", -1.0)?.start().err().unwrap();
+/// assert!(error.to_string().contains("rod_m"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone)]

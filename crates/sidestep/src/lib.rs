@@ -41,11 +41,12 @@
 //! let chain = sidestep::parse(r#"
 //!     format = 1
 //!     world = "chain"
-//!     record = { frames_every = 10 }
+//!     record = { events = true }
 //!
 //!     [[chains]]
-//!     at_m = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
-//!     tasks = [{ kind = "go", targets_m = [[-1.0, 1.0]] }]
+//!     connectors = 3
+//!     at_m = [0.0, 0.0]
+//!     tasks = [{ kind = "targets", targets_m = [[-1.0, 1.0]] }]
 //! "#);
 //! let mut run = chain.keep_tables().start()?;
 //! run.advance(100)?;
@@ -62,7 +63,7 @@
 //!     airspace = { method = "pc", generator = { kind = "superconflict", n = 4 } }
 //! "#);
 //! let collective = flight.clone().start()?.finish()?;
-//! let velocity_obstacles = flight.set("airspace.method", "vo")?.start()?.finish()?;
+//! let velocity_obstacles = flight.set("airspace.method", "orca")?.start()?.finish()?;
 //! assert_eq!(collective.metrics["arrived"], 4);
 //! assert_ne!(collective.digest, velocity_obstacles.digest);
 //! # Ok::<(), sidestep::Error>(())
@@ -118,7 +119,10 @@
 //! worlds       the list of worlds, and each of them
 //! experiment   many runs and sweeps, and their results with confidence intervals
 //! session      runs that are recorded, resumed, replayed, filmed, exported and reported
+//! arms         arms: URDF -> joints, inverse kinematics, plans
+//! rods         chains of constraints: one motion through all parts
 //! learn        logs of a real robot -> error tables that a scenario loads
+//! error_models sensors and effectors that err, as plain types
 //! scenario     TOML text + overrides -> typed sections, and errors with positions
 //! import       ROS, MovingAI, CARMEN, MRCLAM and BlueSky files; URDF
 //! map          floors of boxes, generated offices, paths on them

@@ -7,7 +7,7 @@ use crate::event_store::EventStore;
 use crate::fleet_feed::{FeedSnapshot, FleetFeed, to_protocol};
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
+    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
 use sidestep_kernel::Cycle;
@@ -139,10 +139,10 @@ impl FleetSession {
         match call {
             Method::Credit { frames, .. } => self.page_view.add_credit(frames),
             // A fleet has no scans.
-            Method::Look { .. } => {}
-            Method::Events { from, until, skip, most, .. } => {
+            Method::SelectScans { .. } => {}
+            Method::Events { from, until, skip, limit, .. } => {
                 let skip = skip.unwrap_or(0);
-                return Ok(self.log.answer(from..until, skip, most.min(MAX_EVENTS)));
+                return Ok(self.log.answer(from..until, skip, limit.min(MAX_EVENTS)));
             }
             Method::Tables { .. } => return Ok(ReplyBody::Tables { names: Vec::new() }),
             _ => {
@@ -185,8 +185,9 @@ impl FleetSession {
     fn fail(&mut self, problem: Problem) {
         if let Some(last) = self.page_view.last_reported() {
             let status = SessionStatus { state: SessionState::Failed, ..last };
-            self.outbox.send_status(self.session, &Notification::Status(status));
+            self.outbox.send_status(self.session, &ServerNotification::Status(status));
         }
-        self.outbox.send_notification(&Notification::Ended { session: self.session, problem });
+        self.outbox
+            .send_notification(&ServerNotification::Ended { session: self.session, problem });
     }
 }

@@ -4,7 +4,7 @@ use crate::MAX_FRAMES_PER_S;
 use crate::encode::{Encoder, body, scan};
 use crate::event_store::EventStore;
 use crate::outbox::Outbox;
-use crate::protocol::{BodyId, FrameText, Notification, SessionId, SessionStatus};
+use crate::protocol::{BodyId, FrameText, ServerNotification, SessionId, SessionStatus};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
 use std::sync::Arc;
@@ -149,9 +149,9 @@ impl PageView {
         let (events, events_left_out) = log.take_unsent();
         let scans = frame.scans.iter().map(scan).collect();
         let text = FrameText { scans, events, events_left_out };
-        let (cast, bytes) = self.encoder.encode(frame, &text, self.left_out);
-        let cast = cast.map(Notification::Cast);
-        match self.outbox.send_frame(self.session, cast.as_ref(), bytes) {
+        let (bodies, bytes) = self.encoder.encode(frame, &text, self.left_out);
+        let bodies = bodies.map(ServerNotification::Bodies);
+        match self.outbox.send_frame(self.session, bodies.as_ref(), bytes) {
             // It replaces one that has cost its credit.
             true => self.left_out = self.left_out.saturating_add(1),
             false => self.credit -= 1,
@@ -175,7 +175,7 @@ impl PageView {
         if is_same || (now < self.status_due && !is_urgent) {
             return;
         }
-        self.outbox.send_status(self.session, &Notification::Status(status.clone()));
+        self.outbox.send_status(self.session, &ServerNotification::Status(status.clone()));
         self.last_status = Some(status);
         self.status_due = now + STATUS_INTERVAL;
     }

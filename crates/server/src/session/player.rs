@@ -15,7 +15,7 @@ use crate::SPEED_RANGE;
 use crate::encode::scene;
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
+    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
 use seek::Seek;
@@ -190,23 +190,23 @@ impl Player {
     fn answer_query(&mut self, call: Method) -> Result<ReplyBody, Problem> {
         let run = self.open_run.run.as_mut();
         match call {
-            Method::Look { scans_of, .. } if scans_of.len() > MAX_SCANNED_BODIES => {
+            Method::SelectScans { bodies, .. } if bodies.len() > MAX_SCANNED_BODIES => {
                 let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
-                Err(Problem::new("look", cause, "name fewer"))
+                Err(Problem::new("select-scans", cause, "select fewer"))
             }
-            Method::Look { scans_of, .. } => {
-                self.page_view.set_scanned_bodies(scans_of);
+            Method::SelectScans { bodies, .. } => {
+                self.page_view.set_scanned_bodies(bodies);
                 Ok(ReplyBody::Done)
             }
             Method::Credit { frames, .. } => {
                 self.page_view.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
-            Method::Inspect { who, .. } => inspection(run, &who).map(ReplyBody::Inspection),
+            Method::Inspect { body, .. } => inspection(run, &body).map(ReplyBody::Inspection),
             Method::Metrics { from, .. } => Ok(self.history.samples.answer(from)),
-            Method::Events { from, until, skip, most, .. } => {
+            Method::Events { from, until, skip, limit, .. } => {
                 self.page_view.drain(run, &mut self.history.log, Instant::now());
-                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), most.min(MAX_EVENTS)))
+                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
             }
             Method::Source { .. } => {
                 let source = &self.open_run.source;
@@ -216,8 +216,8 @@ impl Player {
                     read_only: self.open_run.is_read_only(),
                 })
             }
-            Method::Save { text, to, base, over, .. } => {
-                self.open_run.save(text, to, SaveOptions { base, over })
+            Method::Save { text, to, base, overwrite, .. } => {
+                self.open_run.save(text, to, SaveOptions { base, overwrite })
             }
             Method::Tables { .. } => {
                 self.open_run.tables().map(|names| ReplyBody::Tables { names })
@@ -393,9 +393,10 @@ impl Player {
         if let Some(last) = self.page_view.last_reported() {
             self.outbox.send_status(
                 self.session,
-                &Notification::Status(SessionStatus { state: SessionState::Failed, ..last }),
+                &ServerNotification::Status(SessionStatus { state: SessionState::Failed, ..last }),
             );
         }
-        self.outbox.send_notification(&Notification::Ended { session: self.session, problem });
+        self.outbox
+            .send_notification(&ServerNotification::Ended { session: self.session, problem });
     }
 }

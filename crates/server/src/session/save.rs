@@ -54,7 +54,7 @@ pub(super) struct SaveOptions {
     /// The text that the page believes the file holds; without it, the text that the session has read or written.
     pub(super) base: Option<String>,
     /// Whether the file is replaced regardless of its content.
-    pub(super) over: bool,
+    pub(super) overwrite: bool,
 }
 
 /// Refuses a text that would let a page read forbidden files, and one that is no scenario. A text that is no TOML may
@@ -95,7 +95,7 @@ pub(super) fn write_scenario(
     let known = options.base.as_deref().or(own);
     let may_replace = |found: Option<&str>| match found {
         None => true,
-        Some(found) => options.over || known == Some(found) || found == text,
+        Some(found) => options.overwrite || known == Some(found) || found == text,
     };
     match replace_file(target, text, own.is_some(), may_replace)? {
         None => Ok(ReplyBody::Saved { place: target.path.display().to_string() }),

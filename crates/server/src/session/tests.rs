@@ -173,14 +173,14 @@ fn the_digest_is_that_of_a_plain_run_played_stepped_and_sought_to_and_fro() {
 fn a_run_that_is_paused_now_and_then_and_looked_at_is_the_same() {
     let (mut page, _) = Page::open(ROBOTS, 2);
     let who = json!({ "kind": "robot", "number": 2, "part": null });
-    page.ask(json!({ "do": "look", "session": 1, "scans_of": [who] }));
+    page.ask(json!({ "do": "select-scans", "session": 1, "bodies": [who] }));
     for _ in 0..5 {
         page.send(json!({ "do": "credit", "session": 1, "frames": 10 }));
         page.ask(json!({ "do": "play", "session": 1, "speed": { "times": 100.0 } }));
         std::thread::sleep(Duration::from_millis(40));
         page.ask(json!({ "do": "pause", "session": 1 }));
         page.ask(json!({ "do": "metrics", "session": 1, "from": 0 }));
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 9999, "most": 9 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 9999, "limit": 9 }));
     }
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
     assert!(page.frames.len() > 3);
@@ -203,7 +203,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         let by_library = inspect::inspection(run.as_ref(), &who);
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(20);
-        let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
         let told = page.wait(id);
         match by_library {
             Ok(inspection) => {
@@ -217,7 +217,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         }
         assert_eq!((page.digest_at(20), page.digest_at(40)), (digest, plain(text, 40)));
         let who = json!({ "kind": "no such kind", "number": 1, "part": null });
-        let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
         assert!(page.wait(id).get("problem").is_some());
     }
 }
@@ -257,12 +257,12 @@ fn a_socket_that_takes_nothing_keeps_the_newest_frame_alone() {
 fn events_and_samples_are_told_once_however_often_a_cycle_is_computed() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let events = |page: &mut Page| {
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 600, "most": 100_000 }))
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 100_000 }))
     };
     page.digest_at(600);
     let first = events(&mut page);
     assert!(!first["entries"].as_array().expect("events").is_empty() && first["left_out"] == 0);
-    assert_eq!(first["entries"][0]["who"]["kind"], "robot");
+    assert_eq!(first["entries"][0]["body"]["kind"], "robot");
     assert_eq!(first["entries"][0]["kind"], "contact");
     page.digest_at(10);
     page.digest_at(600);
@@ -313,7 +313,7 @@ fn what_cannot_be_opened_or_done_is_a_problem_and_the_session_goes_on() {
     for call in [
         json!({ "do": "play", "session": 1, "speed": { "times": 0.0 } }),
         json!({ "do": "play", "session": 1, "speed": { "times": 1e9 } }),
-        json!({ "do": "look", "session": 1, "scans_of": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
+        json!({ "do": "select-scans", "session": 1, "bodies": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
         json!({ "do": "restart", "session": 1, "seed": u64::MAX, "text": null }),
         json!({ "do": "restart", "session": 1, "seed": 1, "text": "map = { file = \"/etc/passwd\" }" }),
         json!({ "do": "files" }),
@@ -364,7 +364,9 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
 fn a_bug_in_a_run_ends_its_session_with_a_notice() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let who = BodyId { kind: "no such kind".into(), number: 0, part: None };
-    page.session.send_request(99, Method::Look { session: 1, scans_of: vec![who] }).expect("taken");
+    page.session
+        .send_request(99, Method::SelectScans { session: 1, bodies: vec![who] })
+        .expect("taken");
     page.wait(99);
     let worker = |work: fn()| {
         let (_, requests) = sync_channel(1);

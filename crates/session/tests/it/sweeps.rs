@@ -69,15 +69,15 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
         writing.append(&outcome(cell)).expect("written");
     }
     let found = read_status(&folder).expect("read");
-    assert!(found.is_worked_on && found.left_s.is_none(), "before the second run, too");
+    assert!(found.is_active && found.eta_s.is_none(), "before the second run, too");
     drop(writing);
     let found = read_status(&folder).expect("read");
-    assert_eq!((found.runs, found.of, found.failed, found.is_complete), (4, 6, 1, false));
-    assert!(!found.is_worked_on, "nobody has the lock of its journal");
+    assert_eq!((found.runs, found.total, found.failed, found.is_complete), (4, 6, 1, false));
+    assert!(!found.is_active, "no process has the lock of its journal");
     assert_eq!(found.failures[0].why, "no frogs");
     assert_eq!(found.failures[0].cell, other.expect("a cell"));
     // Lines of early journals have no times.
-    assert_eq!((found.runs_per_s, found.idle_s, found.left_s), (None, None, None));
+    assert_eq!((found.runs_per_s, found.idle_s, found.eta_s), (None, None, None));
     let shares: Vec<_> =
         found.shares.iter().map(|s| (s.share.as_str(), s.runs, s.is_done)).collect();
     assert_eq!(shares, [("0/1", 2, false), ("1/2", 3, true)]);

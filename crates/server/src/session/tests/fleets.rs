@@ -104,11 +104,11 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
         assert_eq!((&now["state"], &now["cycles_planned"]), (&"watched".into(), &40.0.into()));
         assert_eq!(now["fleet"]["nodes"].as_array().map(Vec::len), Some(6));
         let who = json!({ "kind": "connector", "number": 4, "part": 5 });
-        assert_eq!(now["fleet"]["nodes"][5]["who"], who);
+        assert_eq!(now["fleet"]["nodes"][5]["body"], who);
     }
     assert!(elsewhere.events.len() > 3, "there is something to tell");
     let told =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "most": 5000 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "limit": 5000 }));
     assert_eq!(told["entries"].as_array().map(Vec::len), Some(elsewhere.events.len()));
     elsewhere.publish(4, true);
     status(&mut page, |status| status["state"] == "over");

@@ -173,14 +173,14 @@ fn a_recording_of_another_build_says_so_and_has_its_events_but_no_inspection_and
     let status = page.state("over");
     assert!(status["digest"].is_null() && banner(&status) == words, "{status}");
     let who = json!({ "kind": "robot", "number": 0, "part": null });
-    let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+    let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
     assert!(page.wait(id).get("problem").is_some());
     one.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
-    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "most": 5000 });
+    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 5000 });
     let happened = |page: &mut Page| -> Vec<Value> {
         let told = page.ask(ask.clone())["entries"].clone();
         let entries = told.as_array().expect("events").iter();
-        entries.map(|e| json!([e["cycle"], e["kind"], e["who"]])).collect()
+        entries.map(|e| json!([e["cycle"], e["kind"], e["body"]])).collect()
     };
     let (now, then) = (happened(&mut one), happened(&mut page));
     assert!(!now.is_empty());
@@ -201,13 +201,13 @@ fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
         told.then_some(())
     });
     let events =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 }));
     assert_eq!(events["known_until"], 600.0);
     let (mut plain_page, _) = Page::open(ROBOTS, 1);
     plain_page.digest_at(600);
     assert_eq!(
         plain_page
-            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 })),
+            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 })),
         events
     );
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));

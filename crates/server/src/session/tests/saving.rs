@@ -42,7 +42,7 @@ impl Page {
     fn save(&mut self, text: &str, to: Option<&Path>, base: Option<&str>, over: bool) -> Value {
         let to = to.map(|path| path.display().to_string());
         let call = json!({
-            "do": "save", "session": 1, "text": text, "to": to, "base": base, "over": over
+            "do": "save", "session": 1, "text": text, "to": to, "base": base, "overwrite": over
         });
         let id = self.send(call);
         self.wait(id)

@@ -73,7 +73,7 @@ impl<const D: usize> Field<D> {
                 "{n} obstacles of radius {} m and length {} m for {} of its room",
                 self.radius_m, self.length_m, self.part
             ),
-            "give a room, a part from 0 on and a positive radius that make at most 1e7 obstacles",
+            "give a room, a fill_fraction from 0 on and a positive radius that make at most 1e7 obstacles",
         ))
     }
 

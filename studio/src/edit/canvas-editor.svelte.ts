@@ -1,36 +1,45 @@
-/** The tool in hand over the canvas of a draft, and its edits of the text. */
+/** The active tool on the canvas of a draft, and its edits of the text. */
 
-import type { Edit, Place } from "../protocol";
+import type { Edit, Point3 } from "../protocol";
 import { boxesOf } from "../scene/floor";
 import type { Session } from "../state/session.svelte";
-import { artOf, Board, cellOf, groundOf, MOST_BOXES, placeOf, type Ground, type Mark } from "./board";
-import { brushed, floodCells, lineCells, rectangleCells, rectOf, type Cell } from "./cells";
+import {
+  asciiOf,
+  AsciiMap,
+  cellOf,
+  placementOf,
+  MAX_BOXES,
+  cornerPosition,
+  type GridPlacement,
+  type MapChar,
+} from "./ascii-map";
+import { brushCells, floodCells, lineCells, rectangleCells, rectOf, type Cell } from "./cells";
 import type { Draft } from "./draft.svelte";
 import { valueAt, type Path } from "./keypath";
 import { airplaneItems, putAirplane, putWayPoint } from "./tools/airspace";
 import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "./tools/chain";
 import { insert, remove, set, type Item } from "./tools/item";
-import { around, putBody, putDoor, putGoal, robotItems, robotSide } from "./tools/robots";
-import { obstacleTo, toolsOf, type Tool, type ToolId } from "./tools/tools";
+import { lowerLeftAround, putBody, putDoor, putGoal, robotItems, robotSide } from "./tools/robots";
+import { restrictionOn, toolsOf, type Tool, type ToolId } from "./tools/tools";
 
-/** A press that has not been released: where it began, where it is, and the boxes between. */
+/** A press in progress: its start, its current position, and the boxes between. */
 export interface Stroke {
-  from: Place;
-  to: Place;
-  /** Boxes that a brush has touched. */
+  from: Point3;
+  to: Point3;
+  /** Boxes touched by a brush. */
   trail: Cell[];
-  /** Whether Shift is held. */
-  isWhole: boolean;
+  /** Whether Shift is held: rectangles are filled. */
+  isFilled: boolean;
 }
 
-export class Bench {
+export class CanvasEditor {
   readonly draft: Draft;
   readonly session: Session;
   tool = $state<ToolId>("select");
-  mark = $state<Mark>("#");
+  char = $state<MapChar>("#");
   /** Side of the brush in boxes. */
   side = $state(1);
-  /** Meters of a pixel: how finely places are written. */
+  /** Meters per pixel: the precision of written positions. */
   m_per_px = $state(0.01);
 
   constructor(draft: Draft) {
@@ -38,31 +47,33 @@ export class Bench {
     this.session = draft.session;
   }
 
-  readonly board = $derived.by(() => (this.session.scene.world === "robots" ? Board.of(this.draft.model) : null));
-  readonly ground = $derived.by((): Ground | null => groundOf(this.board, this.session.scene.floor));
-  readonly items = $derived.by((): Item[] => this.#items());
-  readonly chosen = $derived.by(() => this.items.find(({ path }) => isSame(path, this.draft.chosen)) ?? null);
-  readonly tools = $derived.by((): Tool[] =>
-    toolsOf(this.session.scene).filter((tool) => this.board !== null || !tool.paints),
+  readonly map = $derived.by(() =>
+    this.session.scene.world === "robots" ? AsciiMap.fromModel(this.draft.model) : null,
   );
-  readonly obstacle = $derived.by(() => {
+  readonly ground = $derived.by((): GridPlacement | null => placementOf(this.map, this.session.scene.floor));
+  readonly items = $derived.by((): Item[] => this.#items());
+  readonly selected = $derived.by(() => this.items.find(({ path }) => isSame(path, this.draft.selected)) ?? null);
+  readonly tools = $derived.by((): Tool[] =>
+    toolsOf(this.session.scene).filter((tool) => this.map !== null || !tool.paints),
+  );
+  readonly restriction = $derived.by(() => {
     const model = this.draft.model ?? {};
     const has = (path: Path): boolean => valueAt(model, path) !== undefined;
-    return obstacleTo(this.session.scene, this.board, {
+    return restrictionOn(this.session.scene, this.map, {
       file: has(["map", "file"]),
       office: has(["map", "office"]),
       airplanes: has(["airplanes"]),
     });
   });
-  /** Returns whether the map of the picture can become a drawn one. */
-  readonly canTakeMap = $derived.by(() => {
+  /** Returns whether the shown map can become a drawn one. */
+  readonly canInlineMap = $derived.by(() => {
     const { world, floor } = this.session.scene;
     return (
       world === "robots" &&
-      this.board === null &&
+      this.map === null &&
       this.draft.model !== null &&
       floor !== null &&
-      floor.width * floor.height <= MOST_BOXES
+      floor.width * floor.height <= MAX_BOXES
     );
   });
 
@@ -76,27 +87,27 @@ export class Bench {
     return world === "airspace" ? airplaneItems(model, this.m_per_px) : [];
   }
 
-  /** The boxes between two places. */
-  between(from: Place, to: Place): Cell[] {
+  /** The boxes between two positions. */
+  cellsBetween(from: Point3, to: Point3): Cell[] {
     const { ground } = this;
     return ground ? lineCells(cellOf(ground, from[0], from[1]), cellOf(ground, to[0], to[1])) : [];
   }
 
-  /** The boxes that a stroke would draw now. */
+  /** The boxes that the stroke would draw. */
   cells(stroke: Stroke): Cell[] {
-    const { board, ground } = this;
-    if (!board || !ground) return [];
+    const { map, ground } = this;
+    if (!map || !ground) return [];
     const [from, to] = [stroke.from, stroke.to].map(([x, y]) => cellOf(ground, x, y)) as [Cell, Cell];
     switch (this.tool) {
       case "brush":
       case "eraser":
-        return brushed([...stroke.trail, to], this.side);
+        return brushCells([...stroke.trail, to], this.side);
       case "line":
-        return brushed(lineCells(from, to), this.side);
+        return brushCells(lineCells(from, to), this.side);
       case "rectangle":
-        return rectangleCells(from, to, stroke.isWhole);
+        return rectangleCells(from, to, stroke.isFilled);
       case "fill":
-        return floodCells(to, board.width, board.height, (cell) => board.markAt(cell));
+        return floodCells(to, map.width, map.height, (cell) => map.charAt(cell));
       case "door":
         return rectangleCells(from, to, true);
       default:
@@ -104,15 +115,15 @@ export class Bench {
     }
   }
 
-  /** The box of a body that would be put there. */
-  bodyAt(to: Place): Cell[] {
+  /** The boxes of a body that would be placed there. */
+  bodyCells(to: Point3): Cell[] {
     const { ground } = this;
     const { model } = this.draft;
     if (!ground || !model || (this.tool !== "robot" && this.tool !== "person" && this.tool !== "goal")) return [];
     const cell = cellOf(ground, to[0], to[1]);
     if (this.tool === "goal") return [cell];
-    const side = robotSide(model, this.tool === "robot" ? "robots" : "people", this.draft.chosen);
-    const [column, row] = around(cell, side);
+    const side = robotSide(model, this.tool === "robot" ? "robots" : "people", this.draft.selected);
+    const [column, row] = lowerLeftAround(cell, side);
     return rectangleCells([column, row], [column + side - 1, row + side - 1], true);
   }
 
@@ -122,7 +133,7 @@ export class Bench {
   }
 
   #edits(stroke: Stroke): Edit[] {
-    const { model, chosen } = this.draft;
+    const { model, selected: chosen } = this.draft;
     const { from, to } = stroke;
     if (!model) return [];
     switch (this.tool) {
@@ -137,7 +148,7 @@ export class Bench {
       case "patrol":
         return putPatrol(model, to, chosen, this.m_per_px);
       case "airplane":
-        return putAirplane(from, this.#far(from, to), this.m_per_px);
+        return putAirplane(from, this.#routeEnd(from, to), this.m_per_px);
       case "way-point":
         return putWayPoint(model, to, chosen, this.m_per_px);
       default:
@@ -145,66 +156,66 @@ export class Bench {
     }
   }
 
-  #boxEdits(stroke: Stroke, ground: Ground): Edit[] {
+  #boxEdits(stroke: Stroke, ground: GridPlacement): Edit[] {
     const model = this.draft.model ?? {};
-    const { chosen } = this.draft;
+    const { selected: chosen } = this.draft;
     const cell = cellOf(ground, stroke.to[0], stroke.to[1]);
     if (this.tool === "robot" || this.tool === "person") {
       const key = this.tool === "robot" ? "robots" : "people";
-      return putBody(model, key, around(cell, robotSide(model, key, chosen)), chosen);
+      return putBody(model, key, lowerLeftAround(cell, robotSide(model, key, chosen)), chosen);
     }
     if (this.tool === "goal") return putGoal(model, cell, chosen);
     if (this.tool === "door")
-      return putDoor(model, this.board, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
-    const painted = this.board?.paint(this.cells(stroke), this.tool === "eraser" ? "." : this.mark);
+      return putDoor(model, this.map, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
+    const painted = this.map?.paint(this.cells(stroke), this.tool === "eraser" ? "." : this.char);
     return painted ? [painted] : [];
   }
 
-  /** A way that is too short to be meant goes east over a third of the picture. */
-  #far(from: Place, to: Place): Place {
+  /** The end of a route; after a click without a drag, 300 pixels to the east. */
+  #routeEnd(from: Point3, to: Point3): Point3 {
     const isShort = Math.hypot(to[0] - from[0], to[1] - from[1]) < 8 * this.m_per_px;
     return isShort ? [from[0] + 300 * this.m_per_px, from[1], 0] : to;
   }
 
   choose(item: Item | null): void {
-    this.draft.chosen = item?.path ?? null;
-    // The item chosen here is open in the forms.
+    this.draft.selected = item?.path ?? null;
+    // The item selected here is also open in the forms.
     if (item) this.draft.open = item.path;
   }
 
-  /** Returns the item as the changes before have left it. */
-  #now(item: Item): Item | undefined {
+  /** Returns the item as earlier edits have left it. */
+  #current(item: Item): Item | undefined {
     return this.items.find(({ path }) => isSame(path, item.path));
   }
 
-  moveTo(item: Item, to: Place): Promise<boolean> {
-    return this.draft.edit(() => this.#now(item)?.move(to) ?? []);
+  moveTo(item: Item, to: Point3): Promise<boolean> {
+    return this.draft.edit(() => this.#current(item)?.move(to) ?? []);
   }
 
   async removeChosen(): Promise<void> {
-    const item = this.chosen;
+    const item = this.selected;
     if (!item) return;
     this.choose(null);
-    await this.draft.edit(() => this.#now(item)?.remove() ?? []);
+    await this.draft.edit(() => this.#current(item)?.remove() ?? []);
   }
 
   async turnChosen(): Promise<void> {
-    const item = this.chosen;
-    if (item?.turn) await this.draft.edit(() => this.#now(item)?.turn?.() ?? []);
+    const item = this.selected;
+    if (item?.turn) await this.draft.edit(() => this.#current(item)?.turn?.() ?? []);
   }
 
-  /** Writes the map of the picture into the text, with the doors of a generated office, so that it can be drawn upon. */
-  takeMap(): Promise<boolean> {
+  /** Writes the shown map into the text, with the doors of a generated office, so that it can be edited. */
+  inlineMap(): Promise<boolean> {
     const { floor } = this.session.scene;
     const model = this.draft.model;
-    if (!floor || !model || !this.canTakeMap) return Promise.resolve(false);
-    const gone = ["office", "file", "resolution_m"].filter((key) => valueAt(model, ["map", key]) !== undefined);
-    const edits: Edit[] = gone.map((key) => remove(["map", key]));
-    edits.push(set(["map", "box_size_m"], floor.box_m), set(["map", "ascii"], artOf(floor, boxesOf(floor))));
+    if (!floor || !model || !this.canInlineMap) return Promise.resolve(false);
+    const removed = ["office", "file", "resolution_m"].filter((key) => valueAt(model, ["map", key]) !== undefined);
+    const edits: Edit[] = removed.map((key) => remove(["map", key]));
+    edits.push(set(["map", "box_size_m"], floor.box_m), set(["map", "ascii"], asciiOf(floor, boxesOf(floor))));
     return this.draft.edit([...edits, ...this.#officeDoors()]);
   }
 
-  /** The doors of an office, each with its place: sections for each size, with the schedule that they had. */
+  /** The doors of an office with explicit positions: a section for each size, with their schedule. */
   #officeDoors(): Edit[] {
     const doors = valueAt(this.draft.model ?? {}, ["doors"]);
     const sections = Array.isArray(doors)
@@ -215,12 +226,13 @@ export class Bench {
     if (!host || !table) return [];
     const { office: _, at: __, size: ___, ...schedule } = table;
     const bySize = this.#doorsBySize();
-    const keepsOwn = Array.isArray(table["at"]);
+    const hasPositions = Array.isArray(table["at"]);
     const [first, ...others] = [...bySize.values()];
     const edits: Edit[] = [remove([...host.path, "office"])];
-    if (!keepsOwn && first) edits.push(set([...host.path, "at"], first.at), set([...host.path, "size"], first.size));
-    if (!keepsOwn && !first) return [remove(host.path)];
-    for (const one of keepsOwn && first ? [first, ...others] : others)
+    if (!hasPositions && first)
+      edits.push(set([...host.path, "at"], first.at), set([...host.path, "size"], first.size));
+    if (!hasPositions && !first) return [remove(host.path)];
+    for (const one of hasPositions && first ? [first, ...others] : others)
       edits.push(insert(["doors"], { ...schedule, at: one.at, size: one.size }));
     return edits;
   }
@@ -231,13 +243,16 @@ export class Bench {
     const floor = scene.floor;
     if (!bodies || !frame || !floor) return bySize;
     for (let i = 0; i < bodies.count; i++) {
-      const shape = bodies.cast.shapes[bodies.cast.shape[i]!]!;
-      if (bodies.who(i).kind !== "door" || shape.type !== "cuboid") continue;
+      const shape = bodies.table.shapes[bodies.table.shape[i]!]!;
+      if (bodies.bodyId(i).kind !== "door" || shape.type !== "cuboid") continue;
       const size: [number, number] = [
         Math.round(shape.size_m[0] / floor.box_m),
         Math.round(shape.size_m[1] / floor.box_m),
       ];
-      const [x, y] = [frame.places_m[2 * i]! - shape.size_m[0] / 2, frame.places_m[2 * i + 1]! - shape.size_m[1] / 2];
+      const [x, y] = [
+        frame.positions_m[2 * i]! - shape.size_m[0] / 2,
+        frame.positions_m[2 * i + 1]! - shape.size_m[1] / 2,
+      ];
       const cell = cellOf(floor, x + floor.box_m / 2, y + floor.box_m / 2);
       const group = bySize.get(size.join()) ?? { at: [], size };
       group.at.push([...cell]);
@@ -246,24 +261,24 @@ export class Bench {
     return bySize;
   }
 
-  /** Describes a place in words. */
-  wordsAt(to: Place): string {
-    const { ground, board } = this;
+  /** Describes a position as text. */
+  describePosition(to: Point3): string {
+    const { ground, map } = this;
     const meters = (axis: string, value: number): string => `${axis} ${value.toPrecision(4)} m`;
     const height = this.session.scene.dimensions === 3 ? `, ${meters("z", to[2])}` : "";
     if (!ground) return `${meters("x", to[0])}, ${meters("y", to[1])}${height}`;
     const cell = cellOf(ground, to[0], to[1]);
-    const mark = board?.markAt(cell);
-    const what = mark === "#" ? ", wall" : mark === "?" ? ", unknown" : mark === "." ? ", free" : "";
-    return `column ${cell[0]}, row ${cell[1]}${what}`;
+    const char = map?.charAt(cell);
+    const state = char === "#" ? ", wall" : char === "?" ? ", unknown" : char === "." ? ", free" : "";
+    return `column ${cell[0]}, row ${cell[1]}${state}`;
   }
 
-  /** The middle of the box that holds a place; the place itself where there are no boxes. */
-  snapped(to: Place): Place {
+  /** The center of the box at a position; the position itself where there are no boxes. */
+  snap(to: Point3): Point3 {
     const { ground } = this;
     if (!ground) return to;
     const [column, row] = cellOf(ground, to[0], to[1]);
-    return placeOf(ground, column + 0.5, row + 0.5);
+    return cornerPosition(ground, column + 0.5, row + 0.5);
   }
 }
 
@@ -271,15 +286,15 @@ function isSame(a: Path, b: Path | null): boolean {
   return b !== null && a.length === b.length && a.every((part, i) => String(part) === String(b[i]));
 }
 
-const benches = new WeakMap<Draft, Bench>();
+const editors = new WeakMap<Draft, CanvasEditor>();
 
-/** The bench of a draft. */
-export function benchOf(draft: Draft): Bench {
-  const known = benches.get(draft);
+/** The canvas editor of a draft. */
+export function canvasEditorOf(draft: Draft): CanvasEditor {
+  const known = editors.get(draft);
   if (known) return known;
-  let made!: Bench;
-  // Its derived values must outlive the component that asks first.
-  $effect.root(() => void (made = new Bench(draft)));
-  benches.set(draft, made);
-  return made;
+  let created!: CanvasEditor;
+  // Its derived values must outlive the component that creates it.
+  $effect.root(() => void (created = new CanvasEditor(draft)));
+  editors.set(draft, created);
+  return created;
 }
