@@ -126,7 +126,8 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         i: usize,
         j: usize,
     ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let (rods, connectors) = (self.chain.rods(), self.chain.connectors());
+        let rods = self.chain.rods();
+        let connectors = self.chain.connectors();
         let rod = |r: usize| ([r, r + 1], [points[r], points[r + 1]], rods[r].radius_m);
         let ball = |c: usize| ([c, c], [points[c]; 2], connectors[c].radius_m);
         let pair = |(a, at_a, ra): ([usize; 2], [Point<D>; 2], f64),

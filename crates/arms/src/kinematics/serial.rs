@@ -326,6 +326,7 @@ fn to_dof(model: &Model, joint: usize) -> Dof {
         JointKind::Prismatic => JointMotion::Slide,
         _ => JointMotion::Turn,
     };
-    let (limits, max_speed) = (joint.limits, joint.max_speed);
+    let limits = joint.limits;
+    let max_speed = joint.max_speed;
     Dof { name: joint.name.clone(), motion, limits, max_speed }
 }

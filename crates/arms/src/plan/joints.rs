@@ -119,7 +119,8 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
                 JointMotion::Turn => PI,
                 JointMotion::Slide => self.arm.skeleton.reach_m.max(1.0),
             };
-            let (lower, upper) = (lower.max(-max), upper.min(max));
+            let lower = lower.max(-max);
+            let upper = upper.min(max);
             lower + draws.uniform() * (upper - lower)
         };
         let variables = self.arm.serial.variables.iter();

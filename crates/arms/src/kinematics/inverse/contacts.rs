@@ -179,7 +179,8 @@ impl<'a> ContactFinder<'a> {
 
 /// Returns the links that hold the rod between two anchors, or on either side of its slide.
 fn holders(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
-    let (first, last) = (outer.first.max(inner.first), inner.last.min(outer.last));
+    let first = outer.first.max(inner.first);
+    let last = inner.last.min(outer.last);
     first.min(last)..=first.max(last)
 }
 

@@ -178,7 +178,9 @@ impl<'a> IkSearch<'a> {
         if let Some(hit) = self.without_contacts(&few, best) {
             return IkFailure::Blocked(hit);
         }
-        let (starts, error_m, error_rad) = (best.starts, evaluation.tip_m, evaluation.turn_rad);
+        let starts = best.starts;
+        let error_m = evaluation.tip_m;
+        let error_rad = evaluation.turn_rad;
         let unturned = PoseMask { turn: OrientationMask::Free, ..goal.asked };
         let is_turn = goal.asked.turn != OrientationMask::Free
             && unturned.along != [false; 3]

@@ -261,7 +261,8 @@ fn speeds(chain: &SerialChain) -> Vec<f64> {
     let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(usual(v.motion)));
     let mut speeds: Vec<f64> = own.collect();
     for joint in &chain.joints {
-        let (drive, usual) = (joint.drive, usual(joint.motion));
+        let drive = joint.drive;
+        let usual = usual(joint.motion);
         if drive.multiplier != 0.0 {
             let max_speed = joint.max_speed.unwrap_or(usual) / drive.multiplier.abs();
             speeds[drive.variable] = speeds[drive.variable].min(max_speed);
