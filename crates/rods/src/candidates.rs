@@ -210,7 +210,8 @@ impl<const D: usize> MotionContext<'_, D> {
             .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m, b.name))
             .filter(|(nearest, radius_m, _)| nearest.distance_m < *radius_m)
             .min_by(|(a, _, a_name), (b, _, b_name)| {
-                let (a_m, b_m) = (distance(a.on_body, step.mn), distance(b.on_body, step.mn));
+                let a_m = distance(a.on_body, step.mn);
+                let b_m = distance(b.on_body, step.mn);
                 a_m.total_cmp(&b_m).then(a_name.cmp(b_name))
             });
         let length_m = distance(step.mn, guided);
@@ -498,8 +499,10 @@ fn segment_points_at<const D: usize>(
     t: f64,
     [a, b]: [Point<D>; 2],
 ) -> [Option<Point<D>>; 2] {
-    let (d, r) = (sub(b, a), sub(a, m));
-    let (dd, dr) = (dot(d, d), dot(d, r));
+    let d = sub(b, a);
+    let r = sub(a, m);
+    let dd = dot(d, d);
+    let dr = dot(d, r);
     let discriminant = dr * dr - dd * (dot(r, r) - t * t);
     if discriminant < 0.0 || dd <= 0.0 {
         return [None; 2];

@@ -1,4 +1,4 @@
-//! A uniform grid that finds the boxes nearby.
+//! A uniform grid that finds the boxes nearby: the broad phase of collision detection.
 
 use super::geometry::{Bounds, Point};
 
@@ -13,8 +13,10 @@ pub struct Grid<const D: usize> {
     first: Vec<CellIndex<D>>,
 }
 
-/// Largest mean number of entries per box; beyond it the grid gets coarser.
+/// Largest mean number of entries per box; beyond it the grid gets coarser, so that a few large boxes among
+/// many small ones do not fill the memory.
 const MAX_ENTRIES_PER_BOX: usize = 64;
+/// Largest number of cells per box, so that a few boxes far apart do not either.
 const MAX_CELLS_PER_BOX: usize = 64;
 
 impl<const D: usize> Grid<D> {
@@ -62,7 +64,8 @@ impl<const D: usize> Grid<D> {
         }
         let range = self.cells.range(near);
         self.cells.for_each(range, |cell, index| {
-            let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
+            let from = self.starts[index] as usize;
+            let to = self.starts[index + 1] as usize;
             for &k in &self.entries[from..to] {
                 let k = k as usize;
                 // A box in several cells is reported only in the first cell that it shares with the

@@ -73,7 +73,8 @@ impl<const D: usize> DirectionSearch<'_, D> {
         while ring_rad <= MAX_RING_RAD {
             for k in 0..AZIMUTHS {
                 let azimuth_rad = TAU * k as f64 / AZIMUTHS as f64;
-                let (c, s) = (math::cos(azimuth_rad), math::sin(azimuth_rad));
+                let c = math::cos(azimuth_rad);
+                let s = math::sin(azimuth_rad);
                 let side = add(scaled(e1, c), scaled(e2, s));
                 let at =
                     |rad: f64| add(scaled(wanted, math::cos(rad)), scaled(side, math::sin(rad)));
@@ -100,7 +101,8 @@ impl<const D: usize> DirectionSearch<'_, D> {
             return u;
         }
         let side = side_of(into, u);
-        let (c, s) = (math::cos(self.step.max_bend_rad), math::sin(self.step.max_bend_rad));
+        let c = math::cos(self.step.max_bend_rad);
+        let s = math::sin(self.step.max_bend_rad);
         add(scaled(into, c), scaled(side, s))
     }
 
@@ -195,7 +197,8 @@ fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
         return scaled(e1, -1.0);
     }
     std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let j = (i + 1) % 3;
+        let k = (i + 2) % 3;
         u[j] * e1[k] - u[k] * e1[j]
     })
 }

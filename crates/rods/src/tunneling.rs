@@ -40,7 +40,8 @@ pub fn find_tunneling<const D: usize>(
     let furthest_m = dt_s * speeds_m_s.fold(0.0, f64::max);
     (0..chain.rods().len().min(before.len().saturating_sub(1))).find_map(|rod| {
         let ends = |points: &[Point<D>]| [points[rod], points[rod + 1]];
-        let (from, to) = (ends(before), ends(chain.points()));
+        let from = ends(before);
+        let to = ends(chain.points());
         let radius_m = chain.rods()[rod].radius_m;
         let near =
             Bounds::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);

@@ -93,11 +93,11 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         ends: &[Point<D>],
         i: usize,
         margin_m: f64,
-        look: impl FnMut(&'a Obstacle<D>),
+        visit: impl FnMut(&'a Obstacle<D>),
     ) {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
-        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), look);
+        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), visit);
     }
 
     /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
@@ -126,7 +126,8 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         i: usize,
         j: usize,
     ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let (rods, connectors) = (self.chain.rods(), self.chain.connectors());
+        let rods = self.chain.rods();
+        let connectors = self.chain.connectors();
         let rod = |r: usize| ([r, r + 1], [points[r], points[r + 1]], rods[r].radius_m);
         let ball = |c: usize| ([c, c], [points[c]; 2], connectors[c].radius_m);
         let pair = |(a, at_a, ra): ([usize; 2], [Point<D>; 2], f64),

@@ -119,7 +119,8 @@ fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
     let e = scaled(perpendicular(u), sign);
     let other = (D == 3).then(|| -> Point<D> {
         std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % D, (i + 2) % D);
+            let j = (i + 1) % D;
+            let k = (i + 2) % D;
             u[j] * e[k] - u[k] * e[j]
         })
     });
