@@ -6,7 +6,7 @@
 //!                         barrier                barrier          barrier
 //! ```
 //!
-//! Agents that decide together ([`crate::world::Decides`]) do so in the last phase.
+//! Agents that decide together ([`crate::world::DecisionMode::Joint`]) do so in the last phase.
 //!
 //! The source paper merges tasks while they are inserted into pool two and so needs two barriers,
 //! but a lock or an atomic exchange per claimed box. Here claims are plain stores and joining is a

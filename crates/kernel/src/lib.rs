@@ -58,7 +58,10 @@ pub use run::{Run, RunStart};
 pub use run_config::{GroupSizes, RunConfig, RunStats};
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
-pub use world::{PhaseContext, Phases, World};
+pub use world::{
+    PhaseContext, Phases, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
+    WorldView,
+};
 
 /// The example of the README, which is tested.
 #[cfg(doctest)]

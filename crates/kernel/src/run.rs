@@ -14,7 +14,9 @@ use crate::simulation::Simulation;
 use crate::text::{Description, KeyValues};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
-use crate::world::{DecisionMode, World};
+use crate::world::{
+    DecisionMode, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+};
 use serde_json::Value;
 use std::fmt;
 use std::ops::ControlFlow;
@@ -58,7 +60,7 @@ pub struct Run<W: World> {
     control_rows: RowBuffer<ControlRow>,
 }
 
-impl<W: World> Run<W> {
+impl<W: WorldControl> Run<W> {
     /// Creates a run at its start, with `workers` workers; the world is shared, not copied.
     /// `scenario` is the resolved scenario's text.
     pub fn new(world: Arc<W>, start: RunStart<W>, scenario: &str, workers: usize) -> Self {
@@ -84,7 +86,9 @@ impl<W: World> Run<W> {
             control_rows: RowBuffer::default(),
         }
     }
+}
 
+impl<W: World> Run<W> {
     /// Uses all workers even where one would be faster; for tests and benchmarks.
     pub fn force_parallel(&mut self) {
         self.engine.force_parallel();
@@ -103,16 +107,6 @@ impl<W: World> Run<W> {
     /// The sums, rows and events that are kept beside the state.
     pub fn collector(&self) -> &W::Collector {
         &self.collector
-    }
-
-    /// Returns the content that a checkpoint of the present state would have.
-    pub fn snapshot(&self) -> W::Snapshot {
-        self.world.save(&self.state, &self.collector, self.cycle)
-    }
-
-    /// Returns the measurements of the run so far.
-    pub fn metrics(&self) -> W::Metrics {
-        self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
     }
 
     /// Bytes on the heap of the engine, which grow with the bodies.
@@ -176,6 +170,14 @@ impl<W: World> Run<W> {
         done
     }
 
+    /// Returns the first cycle after the present one before which orders or controls are replayed.
+    fn next_due(&self) -> Option<Cycle> {
+        let orders = self.order_log.next_after(self.cycle);
+        orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
+    }
+}
+
+impl<W: WorldControl> Run<W> {
     /// Gives an order, or refuses it as a whole.
     fn apply_orders(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.check_orders(orders)?;
@@ -214,6 +216,18 @@ impl<W: World> Run<W> {
         })
     }
 
+    /// Submits the controls of the present cycle, or refuses them as a whole.
+    fn apply_controls(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+        if self.records && !self.control_rows.is_enabled() {
+            let cause = "it is recorded without its controls, so it could not be reproduced; set \
+                         record.controls = true";
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
+        }
+        self.world.submit_controls(&mut self.state, self.cycle, controls)?;
+        self.control_rows.extend(control::control_rows(self.cycle, controls));
+        Ok(())
+    }
+
     /// Replays the orders and the controls of the present cycle.
     fn apply_due(&mut self) {
         if self.last_applied.replace(self.cycle) == Some(self.cycle) {
@@ -227,19 +241,29 @@ impl<W: World> Run<W> {
         let control_log = std::mem::take(&mut self.control_log);
         if let Some(controls) = control_log.get(self.cycle) {
             // Controls that can no longer be carried out are skipped. The run then differs, and its digest shows it.
-            if self.submit_controls(controls).is_err() {
-                let _ = self.submit_controls(&[]);
+            if self.apply_controls(controls).is_err() {
+                let _ = self.apply_controls(&[]);
             }
         }
         self.control_log = control_log;
     }
+}
 
-    /// Returns the first cycle after the present one before which orders or controls are replayed.
-    fn next_due(&self) -> Option<Cycle> {
-        let orders = self.order_log.next_after(self.cycle);
-        orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
+impl<W: WorldCheckpoint> Run<W> {
+    /// Returns the content that a checkpoint of the present state would have.
+    pub fn snapshot(&self) -> W::Snapshot {
+        self.world.save(&self.state, &self.collector, self.cycle)
     }
+}
 
+impl<W: WorldMetrics> Run<W> {
+    /// Returns the measurements of the run so far.
+    pub fn metrics(&self) -> W::Metrics {
+        self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
+    }
+}
+
+impl<W: WorldRecording> Run<W> {
     /// Sets up all workers for gathering the rows and events that are now enabled.
     fn prepare(&mut self) {
         let Self { world, collector, engine, .. } = self;
@@ -283,7 +307,10 @@ impl<W: World> Observer<W> for WorldObserver<'_, W> {
     }
 }
 
-impl<W: World> Simulation for Run<W> {
+impl<W> Simulation for Run<W>
+where
+    W: WorldCheckpoint + WorldControl + WorldMetrics + WorldRecording + WorldView,
+{
     fn world(&self) -> &'static str {
         W::NAME
     }
@@ -437,14 +464,7 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn submit_controls(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
-        if self.records && !self.control_rows.is_enabled() {
-            let cause = "it is recorded without its controls, so it could not be reproduced; set \
-                         record.controls = true";
-            return Err(OrderError::NoExternalAgents { cause: cause.into() });
-        }
-        self.world.submit_controls(&mut self.state, self.cycle, controls)?;
-        self.control_rows.extend(control::control_rows(self.cycle, controls));
-        Ok(())
+        self.apply_controls(controls)
     }
 
     fn replay_controls(&mut self, controls: ControlLog) {

@@ -262,7 +262,7 @@ mod tests {
     use super::contents;
     use crate::airspace_run;
     use crate::scenario::CompiledAirspace;
-    use sidestep_kernel::{Simulation, World};
+    use sidestep_kernel::{Simulation, WorldMetrics};
     use sidestep_scenario::Source;
 
     /// Many airplanes close together.

@@ -18,6 +18,7 @@ use sidestep_kernel::view::{
 };
 use sidestep_kernel::{
     Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -87,8 +88,6 @@ impl World for AirspaceWorld {
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
-    type Snapshot = (Snapshot, Counters);
-    type Metrics = Metrics;
 
     fn agents(&self) -> usize {
         self.airplanes.len()
@@ -137,7 +136,9 @@ impl World for AirspaceWorld {
             books.rows.push_optimization(optimization);
         }
     }
+}
 
+impl WorldRecording for AirspaceWorld {
     fn start_recording(&self, _: &mut AirspaceState, books: &mut Collector, _: Cycle) {
         books.rows.start(self);
     }
@@ -160,6 +161,14 @@ impl World for AirspaceWorld {
         books.rows.record(recorder)
     }
 
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        view::position_columns()
+    }
+}
+
+impl WorldCheckpoint for AirspaceWorld {
+    type Snapshot = (Snapshot, Counters);
+
     fn digest(&self, state: &AirspaceState, now: Cycle) -> Digest {
         state.snapshot(now).digest()
     }
@@ -180,7 +189,9 @@ impl World for AirspaceWorld {
         books.counters = ledger;
         Ok(AirspaceState::restore(self, &snapshot))
     }
+}
 
+impl WorldView for AirspaceWorld {
     fn scenery(&self, name: &str) -> Scenery {
         view::scenery(self, name)
     }
@@ -213,7 +224,9 @@ impl World for AirspaceWorld {
     ) -> Option<Inspection> {
         AirspaceWorld::inspect(self, state, now, who)
     }
+}
 
+impl WorldControl for AirspaceWorld {
     fn teams(&self) -> Arc<Teams> {
         self.teams.clone()
     }
@@ -242,10 +255,10 @@ impl World for AirspaceWorld {
     fn observe(&self, state: &AirspaceState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
         AirspaceWorld::observe(self, state, now, team, room);
     }
+}
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        view::position_columns()
-    }
+impl WorldMetrics for AirspaceWorld {
+    type Metrics = Metrics;
 
     fn metrics(
         &self,

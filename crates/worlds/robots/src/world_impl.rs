@@ -15,6 +15,7 @@ use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
 use sidestep_kernel::{
     Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -74,8 +75,6 @@ impl World for RobotsWorld {
     const AGENT: &'static str = "robot";
 
     type Collector = Collector;
-    type Snapshot = Snapshot;
-    type Metrics = Metrics;
 
     fn agents(&self) -> usize {
         self.robots.len()
@@ -92,7 +91,9 @@ impl World for RobotsWorld {
     fn commit(&self, books: &mut Collector) {
         books.commit(self);
     }
+}
 
+impl WorldRecording for RobotsWorld {
     fn start_recording(&self, state: &mut RobotsState, books: &mut Collector, now: Cycle) {
         books.start(self, state, now);
     }
@@ -123,6 +124,14 @@ impl World for RobotsWorld {
         books.record(self, state, now, recorder)
     }
 
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        RobotsWorld::position_columns(self)
+    }
+}
+
+impl WorldCheckpoint for RobotsWorld {
+    type Snapshot = Snapshot;
+
     fn digest(&self, state: &RobotsState, now: Cycle) -> Digest {
         state.snapshot(self, now).digest()
     }
@@ -145,7 +154,9 @@ impl World for RobotsWorld {
         books.resume(self, &mut state, saved.cycle);
         Ok(state)
     }
+}
 
+impl WorldView for RobotsWorld {
     fn scenery(&self, name: &str) -> Scenery {
         RobotsWorld::scenery(self, name)
     }
@@ -178,7 +189,9 @@ impl World for RobotsWorld {
     ) -> Option<Inspection> {
         RobotsWorld::inspect(self, state, now, who)
     }
+}
 
+impl WorldControl for RobotsWorld {
     fn teams(&self) -> Arc<Teams> {
         Arc::clone(&self.teams)
     }
@@ -190,10 +203,10 @@ impl World for RobotsWorld {
     fn observe(&self, state: &RobotsState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
         RobotsWorld::observe(self, state, now, team, room);
     }
+}
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        RobotsWorld::position_columns(self)
-    }
+impl WorldMetrics for RobotsWorld {
+    type Metrics = Metrics;
 
     fn metrics(
         &self,
