@@ -55,7 +55,9 @@
 //!    ▼
 //! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
 //!
+//! error_models    sensors and effectors that err, as plain types
 //! learn           logs of a real robot -> error tables that a scenario loads
+//! exact           the Markov chain of one robot, computed without random draws
 //! experiment      many runs and sweeps, and their results with confidence intervals
 //! statistics      intervals, tests, and when there are enough runs
 //! ```
@@ -73,6 +75,7 @@ pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_error_models as error_models;
+pub use sidestep_exact as exact;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
 pub use sidestep_learn as learn;
