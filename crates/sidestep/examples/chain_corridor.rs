@@ -6,14 +6,14 @@
 
 use sidestep::kernel::Seed;
 use sidestep::kernel::stream::Streams;
+use sidestep::rods::geometry::{Point, distance};
+use sidestep::rods::{Obstacle, Obstacles, Rod};
 use sidestep::worlds::chain::convoy::{Convoy, ConvoyConfig, ConvoyStats, ConvoySurroundings};
-use sidestep::worlds::chain::geometry::{Point, distance};
 use sidestep::worlds::chain::ground::corridor::{Corridor, WALL_PIECE_M};
 use sidestep::worlds::chain::swarm::drive::DifferentialDrive;
 use sidestep::worlds::chain::swarm::laser::LASER_NOISE;
 use sidestep::worlds::chain::swarm::leader::{LeaveRule, TurnMode};
 use sidestep::worlds::chain::swarm::{Follower, Pose2, WallLossRule};
-use sidestep::worlds::chain::{Obstacle, Obstacles, Rod};
 use std::error::Error;
 use std::f64::consts::PI;
 

@@ -14,8 +14,6 @@ use super::formation::Robots;
 use super::metrics::ChainTally;
 use super::motion::recovery::RecoveryLimits;
 use super::navigate::{NavigationGoal, Navigator};
-use super::rods::geometry::{Point, distance};
-use super::rods::{Chain, Connector, Obstacles, Rod, Rules};
 use super::scenario::{ChainScenario, RecordSection};
 use super::swarm::follower::speed_fraction;
 use super::swarm::leader::{Layer, LeaderState};
@@ -26,6 +24,8 @@ use crate::deploy::deployment::Deployment;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed, Simulation};
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Chain, Connector, Obstacles, Rod, Rules};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 

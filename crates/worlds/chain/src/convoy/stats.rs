@@ -1,8 +1,8 @@
 //! Measures of a convoy's run.
 
 use super::{Convoy, TickResult};
-use crate::rods::Obstacles;
-use crate::rods::geometry::{Point, distance};
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{Point, distance};
 
 /// Measures of a run so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
