@@ -119,6 +119,8 @@
 //! worlds       the list of worlds, and each of them
 //! experiment   many runs and sweeps, and their results with confidence intervals
 //! session      runs that are recorded, resumed, replayed, filmed, exported and reported
+//! arms         arms: URDF -> joints, inverse kinematics, plans
+//! rods         chains of constraints: one motion through all parts
 //! learn        logs of a real robot -> error tables that a scenario loads
 //! error_models sensors and effectors that err, as plain types
 //! exact        the Markov chain of one robot, computed without random draws

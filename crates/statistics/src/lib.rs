@@ -30,8 +30,8 @@ pub fn chi_square_p_value(statistic: f64, degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 1.0;
     }
-    let law = ChiSquared::new(degrees_of_freedom as f64).expect("positive freedom");
-    law.sf(statistic.max(0.0))
+    let distribution = ChiSquared::new(degrees_of_freedom as f64).expect("positive freedom");
+    distribution.sf(statistic.max(0.0))
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
-use super::*;
+use super::leader::{TurnMode, WallLossRule};
+use super::{DifferentialDrive, Laser, Pose2};
+use crate::fixtures::convoy::{Convoy, ConvoyConfig, ConvoyStats, ConvoySurroundings};
 use crate::fixtures::{TestRng, corridor_line, corridor_walls};
-use crate::swarm::Laser;
-use crate::swarm::leader::{TurnMode, WallLossRule};
-use sidestep_rods::Obstacle;
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Obstacle, Obstacles};
 use std::f64::consts::PI;
 
 struct Course {
@@ -28,7 +29,8 @@ fn corridor(width_m: f64) -> Course {
 
 /// Discs of 0.2 to 0.5 m in 20 m x 20 m, away from start and target in opposite corners.
 fn field(seed: u64, discs: usize) -> Course {
-    let (mut numbers, mut all) = (TestRng::new(seed), Vec::new());
+    let mut numbers = TestRng::new(seed);
+    let mut all = Vec::new();
     while all.len() < discs {
         let (at, radius_m) = (numbers.point(10.0), numbers.uniform(0.2, 0.5));
         if distance(at, [-8.5, -8.5]).min(distance(at, [8.5, 8.5])) > radius_m + 1.5 {
