@@ -4,11 +4,12 @@ use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
 use crate::scenario_args::{ScenarioArgs, downcast_scenario};
 use clap::Args;
+use sidestep::exact::{
+    Beam, Comparison, MarkovModel, POLICIES, PomdpOptions, PomdpSize, Summary, policy,
+};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::exact::{
-    Beam, Comparison, MarkovModel, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
-};
+use sidestep::worlds::robots::exact::{compare, markov_model};
 use sidestep::worlds::robots::scenario::Compiled;
 use sidestep_session::write_atomically;
 use std::io::Write;
@@ -108,7 +109,7 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
     let compiled: &Compiled = downcast_scenario(compiled.as_ref(), &source, "robots")?;
     // A scenario without a name is named by its file.
     let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
-    let model = MarkovModel::new(compiled).map_err(in_file)?;
+    let model = markov_model(compiled).map_err(in_file)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;
     if let Some(runs) = args.runs {

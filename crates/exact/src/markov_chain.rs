@@ -1,11 +1,11 @@
 //! A model under a fixed policy: a Markov chain with its distributions over time and in the long
 //! run.
 
-use super::obstacle::GridPose;
-use super::sparse::SparseMatrix;
-use super::{MarkovModel, ModelTransition};
-use crate::decide::RandomPolicy;
+use crate::model::{MarkovModel, ModelTransition};
+use crate::obstacle::GridPose;
+use crate::sparse::SparseMatrix;
 use serde::Serialize;
+use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
@@ -169,7 +169,7 @@ fn check_actions(model: &MarkovModel, policy: &RandomPolicy) -> Result<(), Input
         return Ok(());
     }
     let cause = format!("the policy chooses an action beyond the robot's {known}");
-    Err(InputError::new(&model.place, cause, "give weights to the robot's own actions only"))
+    Err(InputError::new(&model.robot.place, cause, "give weights to the robot's own actions only"))
 }
 
 /// Returns the states after one action chosen by the policy, unmerged.

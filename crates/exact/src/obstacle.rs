@@ -3,8 +3,8 @@
 //! Written from the model's description alone, not from the simulator: boxes are found by
 //! coordinates, where the simulator walks lists of prepared offsets. The tests compare the two.
 
-use crate::effector::{ObstacleRule, Side, Transition};
-use crate::sensor::FREE;
+use sidestep_error_models::effector::{ObstacleRule, Side, Transition};
+use sidestep_error_models::sensor::FREE;
 use std::collections::BTreeMap;
 
 /// Place and heading of a body.

@@ -1,9 +1,11 @@
 //! The command's report of a model.
 
-use super::markov_chain::{Convergence, StationaryDistribution};
-use super::{Comparison, MarkovChain, MarkovModel, PomdpSize};
-use crate::decide::RandomPolicy;
+use crate::compare::Comparison;
+use crate::markov_chain::{Convergence, MarkovChain, StationaryDistribution};
+use crate::model::MarkovModel;
+use crate::pomdp::PomdpSize;
 use serde::Serialize;
+use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 

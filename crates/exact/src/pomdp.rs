@@ -11,12 +11,13 @@
 
 mod text;
 
-use super::observe::{Beam, MountedBeam, forward_beam};
-use super::sparse::SparseMatrix;
-use super::{MarkovModel, ModelTransition, names};
-use crate::effector::{HEADING_NAMES, Side};
-use crate::sensor::Reading;
+use crate::model::{MarkovModel, ModelTransition};
+use crate::names;
+use crate::observe::{Beam, MountedBeam, forward_beam};
+use crate::sparse::SparseMatrix;
 use serde::Serialize;
+use sidestep_error_models::effector::{HEADING_NAMES, Side};
+use sidestep_error_models::sensor::Reading;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
@@ -91,7 +92,7 @@ impl Pomdp {
         check_lines(model, transitions.len())?;
         let (observations, readings) = observation_matrix(model, &beams, &order)?;
         Ok(Self {
-            place: model.place.clone(),
+            place: model.robot.place.clone(),
             discount: options.discount,
             states: names::valid_names(order.iter().map(|state| state_name(model, state))),
             actions: names::valid_names(model.actions().iter().cloned()),
@@ -129,7 +130,7 @@ fn check_lines(model: &MarkovModel, lines: usize) -> Result<(), InputError> {
         return Ok(());
     }
     let cause = format!("a file of more than {MAX_LINES} lines");
-    Err(InputError::new(&model.place, cause, "observe fewer beams, or use a smaller map"))
+    Err(InputError::new(&model.robot.place, cause, "observe fewer beams, or use a smaller map"))
 }
 
 fn beams<'a>(
@@ -220,7 +221,7 @@ fn joint_readings(
     let pose = model.poses[pose as usize];
     let mut joint = vec![(Vec::new(), 1.0)];
     for beam in beams {
-        let readings = beam.readings(&model.building, pose);
+        let readings = beam.readings(&model.robot, pose);
         let extended = |(before, p): &(Vec<(u8, u8)>, f64)| {
             let with = |&(r, q): &(Reading, f64)| {
                 ([&before[..], &[(r.observation, r.class)]].concat(), p * q)
@@ -262,7 +263,7 @@ fn state_name(model: &MarkovModel, state: &PomdpState) -> String {
 }
 
 fn contact_name(model: &MarkovModel, kind: u8, side: Side) -> String {
-    format!("{}-{}", side.name(), model.kinds[usize::from(kind)])
+    format!("{}-{}", side.name(), model.robot.kinds[usize::from(kind)])
 }
 
 fn observation_name(
@@ -275,7 +276,7 @@ fn observation_name(
     let felt = contact.map_or("free".into(), |(kind, side)| contact_name(model, kind, side));
     let readings = readings.iter().zip(beams).map(|(&(observation, class), beam)| {
         let reading = Reading { observation, class };
-        match beam.sensor.model.names_of(reading) {
+        match beam.sensor.names_of(reading) {
             (seen, _) if observation == 0 => seen.to_string(),
             (seen, class) => format!("{seen}-{class}"),
         }
