@@ -193,8 +193,8 @@ impl<const D: usize> ChainWorld<D> {
         row.push_integer(cause);
         row.push_integer(number);
         row.push_integer(i64::from(heeds));
-        row.push_integer(answer.came as i64);
-        row.push_reals(answer.wish_m[0][..D].iter().chain(&answer.wish_m[1][..D]).copied());
+        row.push_integer(answer.outcome as i64);
+        row.push_reals(answer.target_m[0][..D].iter().chain(&answer.target_m[1][..D]).copied());
         row.push_reals(answer.reached_m[..D].iter().copied());
         row.push_reals([answer.done_share]);
     }
