@@ -56,7 +56,7 @@ impl<const D: usize> Grid<D> {
 
     /// Visits every box that meets `near`, each once.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
         if self.bounds.is_empty() {
             return;
         }
@@ -69,7 +69,7 @@ impl<const D: usize> Grid<D> {
                 // query.
                 let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
                 if is_first && self.bounds[k].meets(near) {
-                    look(k);
+                    visit_one(k);
                 }
             }
         });
@@ -143,10 +143,14 @@ impl<const D: usize> CellLayout<D> {
 
     /// Visits the cells of a block, and their indices, in the order of the indices.
     #[inline]
-    fn for_each(&self, [lo, hi]: [CellIndex<D>; 2], mut look: impl FnMut(CellIndex<D>, usize)) {
+    fn for_each(
+        &self,
+        [lo, hi]: [CellIndex<D>; 2],
+        mut visit_one: impl FnMut(CellIndex<D>, usize),
+    ) {
         let mut cell = lo;
         loop {
-            look(cell, self.index(cell));
+            visit_one(cell, self.index(cell));
             let mut axis = 0;
             while cell[axis] == hi[axis] {
                 cell[axis] = lo[axis];

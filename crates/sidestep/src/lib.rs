@@ -119,7 +119,10 @@
 //! worlds       the list of worlds, and each of them
 //! experiment   many runs and sweeps, and their results with confidence intervals
 //! session      runs that are recorded, resumed, replayed, filmed, exported and reported
+//! arms         arms: URDF -> joints, inverse kinematics, plans
+//! rods         chains of constraints: one motion through all parts
 //! learn        logs of a real robot -> error tables that a scenario loads
+//! error_models sensors and effectors that err, as plain types
 //! scenario     TOML text + overrides -> typed sections, and errors with positions
 //! import       ROS, MovingAI, CARMEN, MRCLAM and BlueSky files; URDF
 //! map          floors of boxes, generated offices, paths on them

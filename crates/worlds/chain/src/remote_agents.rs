@@ -122,7 +122,7 @@ impl<const D: usize> ChainWorld<D> {
         let mut known = BTreeSet::new();
         for (id, bytes) in controls {
             let refused =
-                |cause: String| OrderError::Control { who: self.connector_name(*id), cause };
+                |cause: String| OrderError::Control { agent: self.connector_name(*id), cause };
             let control = self.read_control(now, *id, bytes).map_err(refused)?;
             if !known.insert(*id) {
                 return Err(refused("there are two of it; give one for each connector".into()));

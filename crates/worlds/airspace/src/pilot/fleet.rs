@@ -109,7 +109,7 @@ impl AirspaceWorld {
         for (id, bytes) in controls {
             let refused = |cause: String| {
                 let who = format!("airplane {}", self.display_name_or_id(*id));
-                OrderError::Control { who, cause }
+                OrderError::Control { agent: who, cause }
             };
             let control =
                 self.read_control(*id, bytes, sights.get(id).copied()).map_err(refused)?;
