@@ -1,5 +1,5 @@
-//! The wish of a chain's initiator, the objections and their reasons, the ladder's response, and the
-//! outcome for one connector: the cycle is tried on a copy of the state, for its group alone.
+//! The move that a chain's initiator wants, the vetoes and their reasons, the response of the recovery ladder, and the
+//! outcome for one connector: the cycle is tried on a copy of the state, for its conflict group alone.
 
 mod motion;
 #[cfg(test)]
@@ -117,7 +117,8 @@ fn add_navigation<const D: usize>(
     let Some(sight) = looking.percept(slot) else { return };
     let leader = &sight.navigator.leader;
     let decision = leader.decide(sight.leader.followed, &sight.percept);
-    let (walls, target) = (sight.percept.walls_m, sight.percept.target);
+    let walls = sight.percept.walls_m;
+    let target = sight.percept.target;
     told.add_section(
         FactSection::new("Perceives")
             .fact("wall on the left", FactValue::meters(walls.left))
@@ -217,7 +218,8 @@ impl<const D: usize> ConnectorInspection<'_, D> {
 
     /// Tells the wish of the initiator.
     fn add_intention(&self, told: &mut Inspection) {
-        let (Some(task), Some(intended)) = (self.task(), self.trace.intended) else { return };
+        let Some(task) = self.task() else { return };
+        let Some(intended) = self.trace.intended else { return };
         let at = self.before.chain.points()[intended.connector];
         let target = match &task.driver {
             TaskKind::Targets(targets) => targets.places.get(self.before.driving.next as usize),

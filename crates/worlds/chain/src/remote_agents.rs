@@ -27,7 +27,8 @@ impl<const D: usize> ChainWorld<D> {
     /// turn it is, because those before them have handed over their decisions. Nothing changes. Where no
     /// team is deployed there is no perception.
     pub fn percepts_at(&self, state: &ChainState<D>, now: Cycle) -> Vec<ChainPercepts<D>> {
-        let (state, clock) = (&state.trial_copy(), &ManualClock::default());
+        let state = &state.trial_copy();
+        let clock = &ManualClock::default();
         let mut scratch = Scratch::new(self);
         scratch.percept_log = Some(Vec::new());
         let turn = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };

@@ -118,13 +118,11 @@ struct BoxSection<const D: usize>(Bounds<D>);
 impl<'de, const D: usize> Deserialize<'de> for BoxSection<D> {
     fn deserialize<S: serde::Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let [lo, hi] = <[PointValue<D>; 2]>::deserialize(deserializer)?.map(PointValue::get);
-        match (0..D).all(|i| lo[i] < hi[i]) {
-            true => Ok(Self(Bounds { lo, hi })),
-            false => {
-                let remedy = "give the lower corner first, then the upper";
-                Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
-            }
+        if (0..D).all(|i| lo[i] < hi[i]) {
+            return Ok(Self(Bounds { lo, hi }));
         }
+        let remedy = "give the lower corner first, then the upper";
+        Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
     }
 }
 

@@ -12,7 +12,7 @@ use sidestep_rods::geometry::{Point, add, distance};
 use sidestep_rods::rebuild::{MovableEnd, ReformResult, reform};
 use std::ops::RangeInclusive;
 
-/// Attempts to find a free place where a part may fall.
+/// Attempts to find a free position where a part may fall; without one it stays.
 const MAX_PLACEMENT_TRIES: usize = 100;
 
 /// Applies the changes at the start of a cycle.
@@ -70,7 +70,8 @@ fn scatter<const D: usize>(
         if chain.connectors()[k].is_still() {
             continue;
         }
-        let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
+        let at = chain.points()[k];
+        let radius_m = chain.connectors()[k].radius_m;
         let mut throw = || normal(draws).clamp(-MAX_THROW_SIGMAS, MAX_THROW_SIGMAS);
         let mut place = || at.map(|x| x + by_m * throw());
         let is_free = |p: &Point<D>| context.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
@@ -94,11 +95,13 @@ fn start_reform<const D: usize>(
     speed_m_s: f64,
 ) {
     let Some(scattered) = &mut body.scattered else { return };
-    let (first, last) = (scattered.first as usize, scattered.last as usize);
-    let (whole, came) = reform_goals(&body.chain, first..=last, may_come);
-    let (kind, value) = match came {
+    let first = scattered.first as usize;
+    let last = scattered.last as usize;
+    let (whole, result) = reform_goals(&body.chain, first..=last, may_come);
+    let (kind, value) = match result {
         ReformResult::Whole { double_passes } => {
-            (scattered.goals_m, scattered.speed_m_s) = (flatten(&whole), speed_m_s);
+            scattered.goals_m = flatten(&whole);
+            scattered.speed_m_s = speed_m_s;
             scattered.waited = 0;
             (EventKind::Reforming, double_passes as f64)
         }
@@ -111,7 +114,7 @@ fn start_reform<const D: usize>(
     sink.record(&body.chain, kind, first, value);
 }
 
-/// Tells the length and the number of parts that are wanting.
+/// Reports the length and the number of parts that are missing.
 fn report_gap<const D: usize>(
     body: &mut Body<D>,
     sink: &mut EventSink<'_, D>,
@@ -134,17 +137,17 @@ fn reform_goals<const D: usize>(
     may_come: MovableEnd,
 ) -> (Vec<Point<D>>, ReformResult) {
     let mut whole = chain.clone();
-    // An end cannot come from outside the range of coordinates.
-    let came = reform(&mut whole, scattered, may_come)
+    // Beyond the range of coordinates nothing is joined.
+    let result = reform(&mut whole, scattered, may_come)
         .unwrap_or(ReformResult::NotReached { off_m: chain.max_rod_violation_m() });
     let stays = |k: &usize| chain.connectors()[*k].is_still();
     let would_move = |k: usize| whole.points()[k] != chain.points()[k];
-    let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
-        None => came,
+    let result = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
+        None => result,
         Some(k) => {
             let off_m = distance(whole.points()[k], chain.points()[k]);
             ReformResult::NotReached { off_m }
         }
     };
-    (whole.points().to_vec(), came)
+    (whole.points().to_vec(), result)
 }

@@ -1,5 +1,5 @@
-//! Arms of joints: the chain goes ahead as a guide, and the joints follow it inside their limits and at their speeds.
-//! The connectors are where the joints put them, so an arm is never where its joints cannot be.
+//! Arms: the chain moves first as a guide, and the joints follow it within their limits and speeds. Forward
+//! kinematics then places the connectors, so an arm is never where its joints cannot be.
 
 #[cfg(test)]
 mod tests;
@@ -20,13 +20,14 @@ use sidestep_rods::{
     Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
 };
 
-/// Parts of a motion that are tried, each half of the one before.
+/// Fractions of a motion that are tried, each half of the one before.
 const MAX_TRIES: usize = 6;
-/// Parts of a motion out of the way that are tried.
+/// Fractions of an escape that are tried; fewer, because escapes come in every cycle.
 const MAX_ESCAPE_TRIES: usize = 3;
-/// Part of its way that an initiator which only comes nearer must make good.
+/// Fraction of the distance to its target by which an initiator that only approaches must come nearer; less is not
+/// worth the joints' motion.
 const MIN_APPROACH_FRACTION: f64 = 0.25;
-/// Relative tolerance for ways at exactly the greatest speed.
+/// Relative tolerance for motions at exactly the maximum speed.
 const ROUNDING: f64 = 1e-9;
 
 /// A connector that leads, and where to.
@@ -114,7 +115,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         before: &'a PositionBuffer<D>,
         body: &'a mut Body<D>,
     ) -> Option<Self> {
-        let (arm, joints) = (context.spec.arm.as_deref()?, body.joints.as_mut()?);
+        let arm = context.spec.arm.as_deref()?;
+        let joints = body.joints.as_mut()?;
         Some(Self { context, before, arm, chain: &mut body.chain, joints })
     }
 
@@ -134,7 +136,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         match (followed, outcome) {
             (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(step.first)),
             (Ok(()), moved) => moved,
-            // Where the chain itself objects, it says more than its joints do.
+            // The veto of the chain itself says more than that of its joints.
             (Err(_), vetoed @ Outcome::Vetoed(_)) => vetoed,
             (Err(veto), Outcome::Moved(_)) => Outcome::Vetoed(veto),
         }
@@ -184,8 +186,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         comes
     }
 
-    /// Brings the joints along a motion of the chain out of the way: to where nothing objects or, where parts are
-    /// in something already, to where they are in it least.
+    /// Brings the joints along an escape of the chain: to where nothing vetoes or, where parts are inside an obstacle
+    /// already, to where they are least deep in it.
     pub(super) fn escape(&mut self) {
         let (from, guide) = self.reset_to_joints();
         if guide == from {
@@ -193,7 +195,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         }
         let wanted = ReferenceMotion { from: &from, guide: Some(&guide), led: &[] };
         let mut best: Option<ArmPosture<D>> = None;
-        let (mut least_m, mut part) = (self.clearance_m(&from), 1.0);
+        let mut least_m = self.clearance_m(&from);
+        let mut part = 1.0;
         for _ in 0..MAX_ESCAPE_TRIES {
             let posed = self.solve_posture(&wanted, part);
             let Some(veto) = self.find_veto(&from, &posed) else {
@@ -202,7 +205,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
             };
             let clearance_m = self.clearance_m(&posed.points);
             if veto.reason == VetoReason::BothSidesBlocked && clearance_m > least_m {
-                (least_m, best) = (clearance_m, Some(posed));
+                least_m = clearance_m;
+                best = Some(posed);
             }
             part *= 0.5;
         }
@@ -222,9 +226,9 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the posture in which the joints follow a part of a motion.
     fn solve_posture(&self, wanted: &ReferenceMotion<'_, D>, part: f64) -> ArmPosture<D> {
         let arm = self.arm;
-        let on_the_way = |k: usize, to: Point<D>| match part < 1.0 {
-            true => lerp(wanted.from[k], to, part),
-            false => to,
+        let on_the_way = |k: usize, to: Point<D>| {
+            // An interpolation to the end would differ from it by rounding.
+            if part < 1.0 { lerp(wanted.from[k], to, part) } else { to }
         };
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();
@@ -242,8 +246,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         ArmPosture { joints, points, led }
     }
 
-    /// Returns the objection to a posture: of the joints, that do not take a connector to where it is led; of speeds;
-    /// of the chain and all that is around it.
+    /// Returns the veto of a posture: by the joints, which do not take a connector to where it is led; by speeds; by
+    /// the chain and the obstacles around it.
     fn find_veto(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<Veto<D>> {
         let follower = &self.arm.follower;
         let k = posed.led.first().map_or(0, |led| led.k);
@@ -270,7 +274,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         objection.or_else(|| self.find_tunneling(from, posed).map(tunnels))
     }
 
-    /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
+    /// Returns whether a connector moves farther than it may: at the speed of led joints from where it was before this
     /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
         let world = self.context.world;

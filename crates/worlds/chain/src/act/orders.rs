@@ -1,4 +1,4 @@
-//! Orders from outside, for one cycle, and the answer to them.
+//! Orders of an external caller for one cycle, and their result.
 
 use super::joints::ArmFollower;
 use super::situation::out_of_range_veto;
@@ -11,19 +11,19 @@ use crate::state::Body;
 use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
 use sidestep_rods::{Chain, Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
 
-/// Number of times that the way is halved to find how far it goes: to 1/256 of it.
+/// Number of bisections to find how far a motion can go: to 1/256 of it.
 const BISECTIONS: usize = 8;
 
-/// Takes the orders for this cycle. They are gone after it, whether anybody heeds them or not.
+/// Takes the orders for this cycle. They end with it, whether the task follows them or not.
 pub(super) fn take_orders<const D: usize>(body: &mut Body<D>) -> Orders {
     let orders = std::mem::take(&mut body.external).orders;
     if orders.target.is_some() {
-        body.external.answer.came = OrderOutcome::Unheard;
+        body.external.answer.outcome = OrderOutcome::Unheard;
     }
     orders
 }
 
-/// Returns the errand on which orders send a chain in this cycle, if they have a target.
+/// Returns the motion that orders ask for in this cycle, if they have a target.
 pub(super) fn step_from_orders<const D: usize>(
     initiator: Initiator<'_, D>,
     chain: &Chain<D>,
@@ -34,7 +34,8 @@ pub(super) fn step_from_orders<const D: usize>(
     let motion = match target? {
         Target::Connector(to) => {
             let k = connector.map_or(agent, |k| k as usize);
-            let (to, at) = (with_dimensions(to), chain.points()[k]);
+            let to = with_dimensions(to);
+            let at = chain.points()[k];
             let connector = &chain.connectors()[k];
             let mobility = &connector.mobility;
             let is_there = !goes_far || connector.is_still() || mobility.allows(to, at);
@@ -49,16 +50,16 @@ pub(super) fn step_from_orders<const D: usize>(
     Some(StepMotion::new(chain, &motion, initiator.step_m()))
 }
 
-/// The manner of going on an errand.
+/// Options of an ordered motion.
 #[derive(Clone, Copy)]
 pub(super) struct StepOptions {
-    /// Whether the chain waits, because parts have to get out of the way.
+    /// Whether the chain waits, because parts of it have to escape.
     pub(super) gives_way: bool,
-    /// Whether it goes as far as it can where it cannot go all the way.
+    /// Whether it moves as far as it can where it cannot reach the target.
     pub(super) goes_far: bool,
 }
 
-/// Goes on an errand, unless parts have to get out of the way.
+/// Carries out an ordered motion, unless parts have to escape.
 pub(super) fn execute_step<const D: usize>(
     initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
@@ -67,9 +68,10 @@ pub(super) fn execute_step<const D: usize>(
 ) {
     let at = acting.body.chain.points()[step.first];
     acting.body.driving.way_m.wanted += norm(sub(step.to[0], at));
-    let climbed = match options.gives_way {
-        true => RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) },
-        false => request_or_bisect(initiator.context, acting, step, options.goes_far),
+    let climbed = if options.gives_way {
+        RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) }
+    } else {
+        request_or_bisect(initiator.context, acting, step, options.goes_far)
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
@@ -84,8 +86,8 @@ pub(super) fn execute_step<const D: usize>(
     body.tally.way_m += norm(displacement);
 }
 
-/// Requests all of the way and, where that is vetoed and as much as goes is wanted, halves of what is
-/// left; tells the objection to the rest.
+/// Requests the whole motion and, where that is vetoed and as much as possible is wanted, bisects; records the veto
+/// of the rest.
 fn request_or_bisect<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
@@ -102,8 +104,11 @@ fn request_or_bisect<const D: usize>(
         }
         Outcome::Vetoed(veto) => veto,
     };
-    let (mut done, mut half, mut last) = (0.0, 0.5, None);
-    for _ in 0..if goes_far { BISECTIONS } else { 0 } {
+    let mut done = 0.0;
+    let mut half = 0.5;
+    let mut last = None;
+    let bisections = if goes_far { BISECTIONS } else { 0 };
+    for _ in 0..bisections {
         match request_fraction(context, acting, step, done + half) {
             Outcome::Moved(moved) => {
                 done += half;
@@ -120,7 +125,7 @@ fn request_or_bisect<const D: usize>(
     }
 }
 
-/// Requests a part of an errand's way, counted from its start: all of that part, or nothing.
+/// Requests a fraction of a motion, counted from its start: all of that fraction, or nothing.
 fn request_fraction<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
@@ -143,20 +148,21 @@ fn request_fraction<const D: usize>(
     outcome
 }
 
-/// Counts a veto to an errand, and notes it in the answer.
+/// Counts a veto of an ordered motion, and records it in the result.
 fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
     acting.record_veto(veto);
     record_result_veto(acting.body, veto);
 }
 
-/// Notes in the answer who objects.
+/// Records a veto in the result.
 pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto<D>) {
     let answer = &mut body.external.answer;
-    (answer.veto, answer.obstacle) = (body.driving.objection, veto.obstacle);
+    answer.veto = body.driving.objection;
+    answer.obstacle = veto.obstacle;
     answer.reached_m = with_dimensions(veto.reached);
 }
 
-/// Completes the answer at the end of the chain's motions.
+/// Completes the result at the end of the chain's motions.
 pub(super) fn complete_result<const D: usize>(
     body: &mut Body<D>,
     step: &StepMotion<D>,
@@ -166,15 +172,15 @@ pub(super) fn complete_result<const D: usize>(
     let done_share = step.done_fraction(chain);
     let reached = chain.points()[step.first];
     let answer = &mut body.external.answer;
-    answer.wish_m = step.to.map(with_dimensions);
-    answer.came = match answer.veto {
+    answer.target_m = step.to.map(with_dimensions);
+    answer.outcome = match answer.veto {
         None if gives_way => OrderOutcome::Waited,
         None => OrderOutcome::Moved,
         Some(_) if done_share > 0.0 => OrderOutcome::CutShort,
         Some(_) => OrderOutcome::Vetoed,
     };
-    answer.done_share = if answer.came == OrderOutcome::Moved { 1.0 } else { done_share };
-    if answer.came != OrderOutcome::Vetoed {
+    answer.done_share = if answer.outcome == OrderOutcome::Moved { 1.0 } else { done_share };
+    if answer.outcome != OrderOutcome::Vetoed {
         answer.reached_m = with_dimensions(reached);
     }
 }

@@ -161,7 +161,8 @@ fn patrol<const D: usize>(
     } else {
         shuttle(speed_m_s * t_s, length_m)
     };
-    let (mut at, mut u) = (way_points[0], [0.0; D]);
+    let mut at = way_points[0];
+    let mut u = [0.0; D];
     for (a, b) in ends() {
         let leg_m = distance(*a, *b);
         let Some(along) = normalized(sub(*b, *a)) else { continue };

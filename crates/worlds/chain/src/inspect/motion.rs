@@ -52,9 +52,10 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 .map_or(String::new(), |id| format!(", because of {}", obstacle_body_id(id)));
             format!("by connector {}: {}{because}", veto.by, veto.reason)
         });
-        let touched = match moved.touched.is_empty() {
-            true => "none yet".into(),
-            false => format!("{} to {}", moved.touched.start, moved.touched.end - 1),
+        let touched = if moved.touched.is_empty() {
+            "none yet".into()
+        } else {
+            format!("{} to {}", moved.touched.start, moved.touched.end - 1)
         };
         section
             .fact("connectors that reacted", touched)

@@ -37,7 +37,8 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<ArmSection>,
         at_m: [f64; 3],
     ) -> Result<Arm, InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let model = self.model(s, at.clone())?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {

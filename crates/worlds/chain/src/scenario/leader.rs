@@ -71,7 +71,8 @@ impl<const D: usize> Compiler<'_, D> {
         start: &Chain<D>,
     ) -> Result<(), InputError> {
         let TaskKind::Targets(targets) = &task.driver else { return Ok(()) };
-        let (k, mobility) = (task.agent, start.connectors()[task.agent].mobility);
+        let k = task.agent;
+        let mobility = start.connectors()[k].mobility;
         let off_m = |p| distance(mobility.project(p, start.points()[k]), p);
         let is_off = |p: &_| mobility != Mobility::Free && off_m(*p) > targets.tolerance_m;
         let Some(i) = targets.places.iter().position(is_off) else { return Ok(()) };

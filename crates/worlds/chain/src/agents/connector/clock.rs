@@ -1,4 +1,4 @@
-//! The clock of an agent, its packets on their way out, and the end of its cycle.
+//! The timers of an agent, its outgoing packets, and the end of its cycle.
 
 use super::{ConnectorAgent, OutgoingPacket};
 use crate::agents::control::{ConnectorMove, Control};
@@ -8,7 +8,7 @@ use crate::agents::side::Side;
 use sidestep_kernel::network::{ConversationId, PacketHeader};
 
 impl<const D: usize> ConnectorAgent<D> {
-    /// Looks at the clock: sends unconfirmed messages again, and gives up a neighbor that never confirms.
+    /// Sends unconfirmed messages again, and treats a neighbor that never confirms as lost.
     pub fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
         for side in Side::ALL {
@@ -23,7 +23,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.process();
     }
 
-    /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
+    /// Ends the cycle at its deadline. A neighbor that has not been heard at all is lost.
     fn end_cycle(&mut self) {
         for side in Side::ALL {
             if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
@@ -36,7 +36,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.is_closed = true;
     }
 
-    /// Returns the next tick in which it has to look at the clock, if there is one.
+    /// Returns the tick of its next timer, if there is one.
     pub fn next_timer(&self) -> Option<u64> {
         if self.is_done() {
             return None;
@@ -52,7 +52,10 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Returns the packets that it sends now.
     pub fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
+        let Some(cycle) = self.cycle else { return Vec::new() };
+        if self.is_silent {
+            return Vec::new();
+        }
         let mut out = Vec::new();
         for side in Side::ALL {
             let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
@@ -63,10 +66,15 @@ impl<const D: usize> ConnectorAgent<D> {
                 continue;
             };
             let sequence = self.traffic.messages as u32;
-            let talk = ConversationId { cycle, topic: MotionProtocol, members: self.members };
-            let (fingerprint, sender) = (self.fingerprint, self.id());
-            let seal = PacketHeader { fingerprint, conversation: talk, sender, sequence };
-            let payload = Packet { missing, parcel }.encode().into_packet(&seal);
+            let conversation =
+                ConversationId { cycle, topic: MotionProtocol, members: self.members };
+            let header = PacketHeader {
+                fingerprint: self.fingerprint,
+                conversation,
+                sender: self.id(),
+                sequence,
+            };
+            let payload = Packet { missing, parcel }.encode().into_packet(&header);
             self.traffic.count(payload.len());
             if let Some(link) = &mut self.links[side] {
                 link.record_size(payload.len());
@@ -76,7 +84,7 @@ impl<const D: usize> ConnectorAgent<D> {
         out
     }
 
-    /// Returns whether its cycle is over. It goes on answering questions.
+    /// Returns whether its cycle is over. It still answers questions of its neighbors.
     pub fn is_done(&self) -> bool {
         let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
         self.is_closed || self.is_over && links.all(Link::is_quiet)
@@ -87,9 +95,9 @@ impl<const D: usize> ConnectorAgent<D> {
         let cycle = self.cycle.filter(|_| self.is_done())?;
         let doubt = self.following.as_ref().filter(|following| following.has_consented);
         let goes = match (self.goes_in, doubt) {
-            (Some(request), _) => ConnectorMove::To { request, to: self.place.settled },
+            (Some(request), _) => ConnectorMove::To { request, to: self.position.settled },
             (None, Some(following)) => {
-                ConnectorMove::WithItsMaster { request: following.request, to: self.place.now }
+                ConnectorMove::WithItsMaster { request: following.request, to: self.position.now }
             }
             (None, None) => ConnectorMove::Stays,
         };
