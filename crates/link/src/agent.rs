@@ -1,6 +1,7 @@
 //! Percepts, controls and packets of agents, and ports to their programs: as bytes, so that any world can be flown.
 
 use crate::protocol::CycleStart;
+pub use sidestep::kernel::network::OutgoingPacket;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// Controls of agents, serialized.
@@ -24,17 +25,6 @@ pub struct InvalidControl {
     pub agent: EntityId,
     /// The reason.
     pub reason: String,
-}
-
-/// A packet that an agent sends.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutgoingPacket {
-    /// The receivers, rising.
-    pub to: Vec<EntityId>,
-    /// Its number among the sender's in the talk.
-    pub sequence: u32,
-    /// The content.
-    pub payload: Vec<u8>,
 }
 
 /// The part of a cycle in which an agent is, for people.

@@ -5,18 +5,23 @@
 //! carrier.rs    a transport with the faults of a network
 //! ether.rs      the same for the packets of one agent, in a process of its own
 //! packet.rs     packets: the envelope of every message
+//! retry.rs      when an agent asks again for what it misses
+//! agent.rs      the programs of agents, and the loop that runs several of them
 //! ```
 //!
 //! Agents are known by their ids on the network; their meaning is up to the world.
 
+mod agent;
 mod fault_injector;
 mod faulty_transport;
 mod links;
 mod packet;
+mod retry;
 
 use crate::math;
 use crate::ports::Faults;
 use crate::units::EntityId;
+pub use agent::{AgentLoop, NetworkAgent, OutgoingPacket, ReplyTiming};
 pub use fault_injector::FaultInjector;
 pub use faulty_transport::{Distances, FaultyTransport};
 pub use links::{
@@ -26,6 +31,7 @@ pub use packet::{
     ConversationId, DropCounts, DropReason, HEADER_BYTES, PacketBuffer, PacketHeader, Protocol,
     digest, fingerprint, parse_packet,
 };
+pub use retry::RetryTimer;
 
 /// Chance of giving up an agent that is in touch.
 const FALSE_GIVE_UP_PROBABILITY: f64 = 1e-9;

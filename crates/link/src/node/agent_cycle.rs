@@ -250,7 +250,7 @@ impl AgentCycle {
             _ => (self.tick, packet.sequence),
         };
         self.sequence += 1;
-        for to in packet.to {
+        for &to in &*packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
             let one = Transmission { to, tick, sequence, bytes };

@@ -2,10 +2,11 @@
 //! of their controls are missing.
 
 use sidestep::kernel::EntityId;
+use sidestep::kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep::worlds::airspace::AirspaceRun;
-use sidestep::worlds::airspace::pilot::{Control, Fleet, Packet, Percept, Pilot};
+use sidestep::worlds::airspace::pilot::{Control, Percept, Pilot};
+use sidestep::worlds::airspace::{AirspaceRun, Fleet};
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, replay_all, replay_to};
 use std::any::Any;
 use std::path::Path;
@@ -29,7 +30,7 @@ fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<Control> {
     }
     loop {
         for pilot in &mut *pilots {
-            for Packet { to, payload, .. } in pilot.take_packets() {
+            for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
                 due.extend(to.iter().map(|&other| (other, pilot.id(), payload.clone())));
             }
         }

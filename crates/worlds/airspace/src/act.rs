@@ -1,11 +1,11 @@
 //! *Act*: the airplanes of a group decide together and fly for `dt`.
 //!
 //! ```text
-//! begin            airplanes come in, orders are carried out
-//! Sight            the perceptions of each                        pilot/sight.rs
+//! prepare          airplanes come in, orders are carried out      entry.rs, orders.rs
+//! Percept          what each perceives                            join.rs
 //!   -> Control     the decision for each: by one process for all (direct.rs), their pilots (deploy/),
-//!                  or pilots outside of the run (pilot/fleet.rs)
-//! obey             the controls are booked                        obey.rs, protect.rs
+//!                  or pilots outside of the run (fleet.rs)
+//! apply_controls   the controls are stored                        controls.rs, protect.rs
 //! step_all         all fly                                        step.rs
 //! ```
 
@@ -19,13 +19,14 @@ mod orders;
 mod protect;
 mod step;
 
-use super::PhaseContext;
 use super::decide::{ManeuverCandidates, straight_profile};
-use super::deploy::{self, Deployment};
+use super::deploy;
 use super::join::ControlledGroup;
 use super::non_cooperative::NonCooperative;
-use super::perceive::non_cooperative_aircraft;
+use super::perceive::{known_aircraft, non_cooperative_aircraft, ownship_state};
 use super::pilot::{Control, OwnshipState};
+use super::scratch::PhaseContext;
+use super::settings::Deployment;
 use super::shield::TurnProfile;
 use controls::apply_controls;
 use flight::{AircraftMotion, FlownPath};
@@ -60,7 +61,8 @@ fn fly(turn: &mut PhaseContext<'_>, group: &[Slot]) {
         let course = match &world.airplanes[slot as usize].track {
             Some(track) if world.is_replayed(slot, now) => FlownPath::Track(track),
             _ if world.is_non_cooperative(slot, now) => {
-                FlownPath::Profile(straight_profile(turn, slot), state.segment(world, slot))
+                let known = known_aircraft(world, state, now, slot);
+                FlownPath::Profile(straight_profile(world, known), state.segment(world, slot))
             }
             _ => FlownPath::Profile(ways.next().unwrap_or_default(), state.segment(world, slot)),
         };
@@ -92,8 +94,7 @@ fn turn_profiles(
     intruders: &[NonCooperative],
 ) -> Vec<TurnProfile> {
     let PhaseContext { world, state, now, .. } = *turn;
-    let own: Vec<OwnshipState> =
-        flown.ids.iter().map(|&slot| OwnshipState::from_state(turn, slot)).collect();
+    let own: Vec<OwnshipState> = flown.ids.iter().map(|&slot| ownship_state(turn, slot)).collect();
     let contacts = turn.scratch.trace.as_ref().map(|notes| state.traffic_picture(notes.slot));
     let (controls, considered): (Vec<Option<Control>>, Vec<ManeuverCandidates>) =
         if state.has_controls(now) {

@@ -1,27 +1,26 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
 mod external;
+mod group_memory;
 mod preferences;
 mod velocity;
 
-use super::PhaseContext;
 use super::agents::ActionChoice;
 use super::agents::network_traffic::NetworkTraffic;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
-use super::memory::max_group_bytes;
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, game};
-use super::perceive::known_aircraft;
-use super::pilot::Maneuver;
 use super::purpose;
-use super::shield::{ShieldDecision, TurnProfile};
-use super::world::{AirspaceWorld, Method};
+use super::settings::Method;
+use super::shield::TurnProfile;
+use super::world::AirspaceWorld;
+pub(super) use group_memory::max_group_bytes;
 use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId};
 
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,18 +82,6 @@ impl ManeuverCandidates {
 
     fn from_profiles(ways: Vec<TurnProfile>) -> Self {
         Self { ways, ..Self::default() }
-    }
-
-    /// Returns the course that follows from the shield's decision about those of its ways that were `allowed`.
-    pub(super) fn maneuver(&self, decision: ShieldDecision, allowed: &[usize]) -> Maneuver {
-        match decision.candidate.map(|k| allowed[k]) {
-            Some(wish) => Maneuver::Way {
-                wish: wish as u32,
-                way: self.ways[wish].clone(),
-                side: decision.fallback,
-            },
-            None => Maneuver::Orbit,
-        }
     }
 }
 
@@ -175,9 +162,7 @@ pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> 
 }
 
 /// Returns the straight way to the next way-point of an airplane that minds no other.
-pub(super) fn straight_profile(turn: &PhaseContext<'_>, slot: Slot) -> TurnProfile {
-    let PhaseContext { world, state, now, .. } = *turn;
-    let known = known_aircraft(world, state, now, slot);
+pub(super) fn straight_profile(world: &AirspaceWorld, known: KnownAircraft) -> TurnProfile {
     let wishes = rank_straight_first(world, known);
     preferences::turn_profiles(world, known, &wishes[..1]).swap_remove(0)
 }

@@ -2,7 +2,7 @@
 //! orders.
 
 use super::flight::{FlightOrder, FlightTask, MAX_ORDERS, Track, TrackPoint};
-use super::scenario::{SeparationM, Speed, TurnRate, Turns};
+use super::settings::{SeparationM, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};

@@ -9,10 +9,10 @@ use super::act;
 use super::flight::{KnownAircraft, Point};
 use super::join;
 use super::perceive::{self, observed_pose};
+use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
 use super::trace::InspectionTrace;
 use super::world::AirspaceWorld;
-use super::{PhaseContext, Scratch};
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
     self, BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,

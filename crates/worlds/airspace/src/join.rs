@@ -1,9 +1,11 @@
 //! Groups: airplanes that have to mind each other decide together.
 
-use super::PhaseContext;
 use super::flight::{FlightTask, Levels, distance_m};
-use super::perceive::claim;
-use super::world::Grouping;
+use super::non_cooperative::NonCooperative;
+use super::perceive::{claim, ownship_state, surveillance_report};
+use super::pilot::{Percept, SurveillanceReport};
+use super::scratch::PhaseContext;
+use super::settings::Grouping;
 use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::ConflictGroups;
 use std::ops::Range;
@@ -31,8 +33,28 @@ impl ControlledGroup {
         Self { ids, near }
     }
 
+    /// Returns the percept of each of them; `intruders` are those of the group that are not cooperative.
+    pub(super) fn percepts(
+        &self,
+        turn: &PhaseContext<'_>,
+        intruders: &[NonCooperative],
+    ) -> Vec<Percept> {
+        let group: Vec<SurveillanceReport> =
+            self.ids.iter().map(|&slot| surveillance_report(turn, slot)).collect();
+        let percept = |(k, &slot): (usize, &Slot)| {
+            let is_visible = |id: Slot| self.can_see(k, id);
+            Percept {
+                cycle: turn.now,
+                own: ownship_state(turn, slot),
+                group: group.iter().filter(|one| is_visible(one.id)).copied().collect(),
+                intruders: intruders.iter().filter(|one| is_visible(one.slot)).cloned().collect(),
+            }
+        };
+        self.ids.iter().enumerate().map(percept).collect()
+    }
+
     /// Returns whether the `k`-th of them sees another airplane of the group.
-    pub(super) fn can_see(&self, k: usize, other: Slot) -> bool {
+    fn can_see(&self, k: usize, other: Slot) -> bool {
         self.near.get(k).is_none_or(|near| near.binary_search(&other).is_ok())
     }
 }

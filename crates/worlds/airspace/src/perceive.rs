@@ -1,9 +1,10 @@
 //! *Perceive*: airplanes list themselves in the neighborhood, and are perceived there.
 
-use super::PhaseContext;
 use super::flight::{KnownAircraft, Levels, Pose2};
 use super::non_cooperative::NonCooperative;
+use super::pilot::{OwnshipState, SurveillanceReport};
 use super::purpose;
+use super::scratch::PhaseContext;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::distr::normal;
@@ -46,6 +47,40 @@ pub(super) fn known_aircraft(
     let pose = observed_pose(world, slot, now, cell.pose());
     let (orders, altitude_m) = (u32::from(cell.orders.get()), cell.altitude_m.get());
     KnownAircraft { slot, pose, next: cell.next.get() as usize, orders, altitude_m }
+}
+
+/// Returns an airplane as those aboard know it.
+pub(super) fn ownship_state(turn: &PhaseContext<'_>, slot: Slot) -> OwnshipState {
+    let PhaseContext { world, state, now, .. } = *turn;
+    let cell = &state.airplanes[slot as usize];
+    let pose = cell.pose();
+    let held = state.orbit_pose(slot);
+    OwnshipState {
+        id: slot,
+        pose,
+        held,
+        seen: observed_pose(world, slot, now, pose),
+        seen_held: observed_pose(world, slot, now, held),
+        altitude_m: cell.altitude_m.get(),
+        next: cell.next.get(),
+        orders: cell.orders.get().into(),
+        fallback: cell.fallback.get(),
+        refusals: cell.overrides.get(),
+        named: state.exempt_with(slot).to_vec(),
+        wish: state.external_action(slot),
+    }
+}
+
+/// Returns an airplane as others see it.
+pub(super) fn surveillance_report(turn: &PhaseContext<'_>, slot: Slot) -> SurveillanceReport {
+    let PhaseContext { world, state, now, .. } = *turn;
+    let cell = &state.airplanes[slot as usize];
+    SurveillanceReport {
+        id: slot,
+        pose: observed_pose(world, slot, now, cell.pose()),
+        altitude_m: cell.altitude_m.get(),
+        orbit: (cell.orbiting.get() > 0).then(|| cell.fallback.get()),
+    }
 }
 
 /// Returns the intruders of a group, by id.

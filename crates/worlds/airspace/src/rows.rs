@@ -3,7 +3,7 @@
 use super::decide::Optimization;
 use super::events::{Event, EventKind, Measure};
 use super::flight::Leg;
-use super::scenario::RecordSection;
+use super::settings::RecordSection;
 use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};

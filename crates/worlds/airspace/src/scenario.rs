@@ -3,22 +3,25 @@
 mod airplanes;
 mod compile;
 mod network;
-mod settings;
-mod values;
+mod optimizer;
+mod start_groups;
 
-use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
+use super::settings::{
+    Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise, Inflation, LevelGap,
+    LookAhead, Method, RecordSection, Rounds, Step, Tolerance, Weight,
+};
 use super::shield::Side;
 use super::state::{AirplaneRecord, PackedEnd, Snapshot};
-use super::world::{AirspaceWorld, Grouping, Method};
+use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
+use optimizer::{LegsSection, ReactiveSection, Switch, Times};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Update, UpdateOrder, Utility};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
@@ -27,11 +30,6 @@ use sidestep_scenario::{
     Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
 };
 use std::sync::Arc;
-use values::{
-    Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
-    Step, Tolerance, Weight,
-};
-pub(super) use values::{SeparationM, Speed, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -124,34 +122,6 @@ impl Rule for ReplayEnd {
 
     fn limits() -> Value {
         schema::with_infinity(json!({ "minimum": 0 }))
-    }
-}
-
-/// The tables that a run keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RecordSection {
-    /// A row per airplane and cycle.
-    pub trajectories: bool,
-    /// A row per event, see [`super::events`].
-    pub events: bool,
-    /// A row per optimization.
-    pub optimizations: bool,
-    /// The controls of airplanes with pilots outside of the run, so that it can be computed again.
-    pub controls: bool,
-    /// Number of cycles between two checkpoints; 0 for none.
-    pub checkpoint_every: u64,
-}
-
-impl Default for RecordSection {
-    fn default() -> Self {
-        Self {
-            trajectories: true,
-            events: true,
-            optimizations: true,
-            controls: false,
-            checkpoint_every: 1000,
-        }
     }
 }
 

@@ -4,65 +4,20 @@ mod solo_flight;
 #[cfg(test)]
 mod tests;
 
-use super::baseline::ReactiveSettings;
-use super::deploy::Deployment;
 use super::flight::{
     Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
     SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, Objective};
+use super::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
 use super::shield::{ErrorBounds, Side, common_rates};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
-
-/// The methods by which airplanes choose their actions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Probability collectives.
-    #[default]
-    Pc,
-    /// Optimal reciprocal collision avoidance.
-    Orca,
-    /// Modified voltage potential.
-    Mvp,
-    /// Straight to the way-point, without regard to others.
-    None,
-    /// Follows the orders of a caller of the library; without them, its flight plan.
-    External,
-}
-
-impl Method {
-    /// The methods by which airplanes decide themselves.
-    pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
-
-    /// Returns its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pc => "pc",
-            Self::Orca => "orca",
-            Self::Mvp => "mvp",
-            Self::None => "none",
-            Self::External => "external",
-        }
-    }
-}
-
-/// Random errors that the optimizer does not know of.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Disturbance {
-    /// Standard deviation of known positions, per coordinate, in meters.
-    pub position_m: f64,
-    /// Standard deviation of the unwanted change of heading per `dt`, in radians.
-    pub heading_rad: f64,
-}
 
 /// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
@@ -133,17 +88,6 @@ pub struct AirspaceWorld {
     pub(crate) teams: Arc<Teams>,
 }
 
-/// The way in which airplanes learn their groups.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Grouping {
-    /// Groups are announced, by an observer that sees all.
-    #[default]
-    Announced,
-    /// Airplanes find their groups from beacons of those near them.
-    Heard,
-}
-
 impl AirspaceWorld {
     /// Returns the call sign of an airplane, if it has one.
     pub(crate) fn callsign(&self, id: EntityId) -> Option<String> {
@@ -169,13 +113,11 @@ impl AirspaceWorld {
             self.actions = Arc::clone(&known.actions);
             self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
             self.top_m_s = Arc::clone(&known.top_m_s);
-            self.teams = Arc::clone(&known.teams);
         } else {
             let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
             self.actions = Arc::new(self.airplanes.iter().map(of).collect());
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.per_airplane(Self::max_speed_m_s));
-            self.teams = Arc::new(self.find_teams());
         }
         self.alone_s = Arc::new(self.per_airplane(Self::solo_s));
         self

@@ -1,9 +1,9 @@
 //! Closest approaches of pairs of airplanes, whether the method flies them or not.
 
 use super::flight::{AircraftMotion, SubStep};
-use crate::Scratch;
 use crate::events::{Event, EventKind};
 use crate::flight::{Approach, Leg, Zone, distance_m, is_separation_lost};
+use crate::scratch::Scratch;
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
 

@@ -1,12 +1,12 @@
 //! The controls of a group, booked and carried out.
 
 use super::protect::{exempt_non_cooperative, store_maneuver};
-use crate::PhaseContext;
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::Optimization;
 use crate::events::{Event, EventKind};
 use crate::non_cooperative::NonCooperative;
 use crate::pilot::{Control, Maneuver, OptimizerStats, OwnshipState};
+use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use sidestep_kernel::EntityId;
 

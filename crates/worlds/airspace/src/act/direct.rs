@@ -1,6 +1,5 @@
 //! One process that decides for all airplanes of a group.
 
-use crate::PhaseContext;
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{
     DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_choice,
@@ -10,6 +9,7 @@ use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperative;
 use crate::pilot::{Control, Maneuver, Memory, OptimizerStats, OwnshipState};
+use crate::scratch::PhaseContext;
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Slot;
@@ -117,5 +117,7 @@ fn shielded_maneuvers(
     let steps = world.timing.points_per_dt();
     let decisions = filter(&flyers, &candidates, steps, dtau_s, PlanCertainty::Sure);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
-    decided.map(|((decision, allowed), (_, one))| one.maneuver(decision, allowed)).collect()
+    decided
+        .map(|((decision, allowed), (_, one))| Maneuver::from_decision(decision, &allowed, one))
+        .collect()
 }

@@ -7,7 +7,7 @@
 //! one of them is gone; from then on the invariant holds for this pair as for any other.
 
 use super::protect::shielded_aircraft;
-use crate::PhaseContext;
+use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, entry_fallbacks};
 use sidestep_kernel::Slot;
 

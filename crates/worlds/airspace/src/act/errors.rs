@@ -3,10 +3,10 @@
 //! The shield keeps on treating them like all others, but its promise about their pairs holds again
 //! only once their plans have been made within the bounds.
 
-use crate::PhaseContext;
 use crate::events::{Event, EventKind};
 use crate::flight::{Pose2, distance_m};
 use crate::perceive::observed_pose;
+use crate::scratch::PhaseContext;
 use sidestep_kernel::Slot;
 use sidestep_kernel::math::wrap_angle;
 

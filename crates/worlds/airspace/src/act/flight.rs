@@ -1,7 +1,7 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::PhaseContext;
 use crate::flight::{FlightSegment, Leg, Levels, Point, Pose2, Track};
+use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use crate::state::End;
 use sidestep_kernel::{Cycle, Slot};

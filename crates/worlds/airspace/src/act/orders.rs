@@ -6,8 +6,8 @@
 //! one, the new one and all between.
 
 use super::protect::shielded_aircraft;
-use crate::PhaseContext;
 use crate::flight::{FlightOrder, FlightTask, Levels};
+use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, Side, safe_side};
 use sidestep_kernel::Slot;
 

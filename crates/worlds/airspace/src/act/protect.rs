@@ -1,18 +1,19 @@
 //! The course of an airplane, as the state keeps it: its stored fallback, and those that it is named with.
 
-use crate::PhaseContext;
 use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
 use crate::flight::{Pose2, distance_m};
 use crate::non_cooperative::NonCooperative;
+use crate::perceive::ownship_state;
 use crate::pilot::{Maneuver, OwnshipState};
+use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, TurnProfile};
 use sidestep_kernel::Slot;
 use sidestep_kernel::math::wrap_angle;
 
 /// Returns an airplane as the shield knows it: where all see it.
 pub(super) fn shielded_aircraft(turn: &PhaseContext<'_>, slot: Slot) -> ShieldedAircraft {
-    OwnshipState::from_state(turn, slot).shielded_aircraft(turn.world)
+    ownship_state(turn, slot).shielded_aircraft(turn.world)
 }
 
 /// Names an airplane with the intruders that could come too near on its way within `dt`, and ends

@@ -2,12 +2,12 @@
 
 use super::approaches;
 use super::flight::{AircraftMotion, FlownPath, SubStep};
-use crate::PhaseContext;
 use crate::events::{Event, EventKind};
 use crate::flight::{Leg, Pose2};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
+use crate::scratch::PhaseContext;
 use crate::state::End;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Cycle;

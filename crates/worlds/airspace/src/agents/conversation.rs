@@ -1,10 +1,10 @@
 //! One talk, as one airplane takes part in it: a party, and the packets around its messages.
 
 use super::network_traffic::NetworkTraffic;
-use super::packet::{ConversationId, Packet, PacketHeader};
+use super::packet::{ConversationId, PacketHeader};
 use super::participant::{ConversationEnd, OutgoingMessage, Participant, Progress, WithOutcome};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::DropReason;
+use sidestep_kernel::network::{DropReason, OutgoingPacket};
 use std::sync::Arc;
 
 /// The identity, participants and times of a talk.
@@ -65,7 +65,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Starts it.
-    pub fn start(&mut self, tick: u64, out: &mut Vec<Packet>) {
+    pub fn start(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
         self.participant.start(tick);
         self.send(out);
     }
@@ -79,7 +79,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
         from: EntityId,
         message: &[u8],
         tick: u64,
-        out: &mut Vec<Packet>,
+        out: &mut Vec<OutgoingPacket>,
     ) -> Result<(), DropReason> {
         if from == self.info.me || self.info.members.binary_search(&from).is_err() {
             return Err(DropReason::Sender);
@@ -93,7 +93,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Performs the actions that are due by a tick.
-    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<Packet>) {
+    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
         self.participant.on_timer(tick);
         self.send(out);
     }
@@ -109,7 +109,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Seals all that the party has to send, and counts it.
-    fn send(&mut self, out: &mut Vec<Packet>) {
+    fn send(&mut self, out: &mut Vec<OutgoingPacket>) {
         let ConversationInfo { id, me, fingerprint, is_silent, .. } = self.info;
         for OutgoingMessage { to, message } in self.participant.take_messages() {
             let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
@@ -120,7 +120,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
             let seal = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
             let payload = message.into_packet(&seal);
             self.traffic.count(to.len(), payload.len());
-            out.push(Packet { to, sequence, payload });
+            out.push(OutgoingPacket { to, sequence, payload });
             self.sent += 1;
         }
     }

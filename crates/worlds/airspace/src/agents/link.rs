@@ -15,8 +15,7 @@ use super::participant::{InvalidMessage, OutgoingMessage, Participant, Progress,
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::RetryPolicy;
-use sidestep_kernel::network::{HEADER_BYTES, PacketBuffer};
+use sidestep_kernel::network::{HEADER_BYTES, PacketBuffer, RetryPolicy, RetryTimer};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -127,10 +126,8 @@ pub struct Endpoint<A> {
     others: Vec<PeerState>,
     /// Messages that wait to be sent.
     out: Vec<OutgoingMessage>,
-    began: u64,
-    quiet_since: u64,
-    /// Size of the largest packet that it has sent or heard, in bytes.
-    largest: usize,
+    start_tick: u64,
+    retry: RetryTimer,
     late: bool,
 }
 
@@ -168,6 +165,7 @@ impl<A: Agent> Endpoint<A> {
     /// Returns an endpoint with an agent that has not sent anything yet.
     pub fn new(agent: A, radio: EndpointConfig) -> Self {
         let others = vec![PeerState::default(); radio.group.len()];
+        let retry = RetryTimer::new(radio.patience);
         Self {
             limits: agent.limits(),
             agent,
@@ -176,9 +174,8 @@ impl<A: Agent> Endpoint<A> {
             sent: Vec::new(),
             others,
             out: Vec::new(),
-            began: 0,
-            quiet_since: 0,
-            largest: 0,
+            start_tick: 0,
+            retry,
             late: false,
         }
     }
@@ -189,7 +186,7 @@ impl<A: Agent> Endpoint<A> {
     }
 
     fn send(&mut self, to: Option<EntityId>, message: PacketBuffer) {
-        self.largest = self.largest.max(message.len());
+        self.retry.record_packet(message.len());
         self.out.push(OutgoingMessage { to, message });
     }
 
@@ -254,7 +251,8 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     }
 
     fn start(&mut self, tick: u64) {
-        (self.began, self.quiet_since) = (tick, tick);
+        self.start_tick = tick;
+        self.retry.restart(tick);
         let first = self.agent.start();
         self.broadcast(first);
         if self.config.is_silent {
@@ -272,10 +270,10 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         InvalidMessage::Airplane.unless(place != self.config.me)?;
         let wired = self.read(place, bytes)?;
         (self.others[place].unanswered, self.others[place].is_there) = (0, true);
-        self.largest = self.largest.max(HEADER_BYTES + bytes.len());
+        self.retry.record_packet(HEADER_BYTES + bytes.len());
         match wired {
             WireMessage::Said(number, message) if self.others[place].accept(number) => {
-                self.quiet_since = tick;
+                self.retry.restart(tick);
                 let said = self.agent.on_message(place, message);
                 self.broadcast(said);
             }
@@ -293,8 +291,8 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         if self.next_timer().is_none_or(|due| due > tick) {
             return;
         }
-        self.quiet_since = tick;
-        let waited = tick.saturating_sub(self.began) as f64;
+        self.retry.restart(tick);
+        let waited = tick.saturating_sub(self.start_tick) as f64;
         let has_time = waited < self.agent.wait_fraction() * self.config.ticks as f64;
         for j in self.agent.awaited_members() {
             let RetryPolicy { tries, first_tries, .. } = self.config.patience;
@@ -313,10 +311,8 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         }
     }
 
-    /// Returns the tick in which its patience ends.
     fn next_timer(&self) -> Option<u64> {
-        let ticks = self.config.patience.timeout_ticks(self.largest);
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
+        (!self.is_done()).then(|| self.retry.due_tick())
     }
 
     fn is_done(&self) -> bool {

@@ -1,8 +1,7 @@
-//! Packets of airplanes: their topics, and how they leave.
+//! Protocols of airplanes, and their packets.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{EntityId, network};
-use std::sync::Arc;
+use sidestep_kernel::network;
 
 /// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -35,14 +34,3 @@ pub type ConversationId = network::ConversationId<Protocol>;
 
 /// The statements of an airplane's packet about its message.
 pub type PacketHeader = network::PacketHeader<Protocol>;
-
-/// A packet on its way out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Packet {
-    /// The receivers: one, or all others of the talk.
-    pub to: Arc<[EntityId]>,
-    /// Number among the sender's packets of the talk.
-    pub sequence: u32,
-    /// All of its bytes.
-    pub payload: Vec<u8>,
-}

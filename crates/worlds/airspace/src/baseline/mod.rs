@@ -5,6 +5,7 @@ pub(super) mod mvp;
 pub(super) mod orca;
 
 use super::flight::{Levels, Point};
+use super::settings::ReactiveSettings;
 use sidestep_kernel::{Slot, math};
 
 /// The part of an airplane that a method knows.
@@ -22,15 +23,6 @@ pub(super) struct AircraftState {
     pub(super) levels: Levels,
     /// Whether it gives way to others, too.
     pub(super) yields: bool,
-}
-
-/// The settings of a method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReactiveSettings {
-    /// Time in seconds within which losses of separation are avoided.
-    pub look_ahead_s: f64,
-    /// Factor on separations when avoiding.
-    pub margin: f64,
 }
 
 impl AircraftState {

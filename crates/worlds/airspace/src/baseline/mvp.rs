@@ -6,8 +6,9 @@
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::{AircraftState, ReactiveSettings, length};
+use super::{AircraftState, length};
 use crate::flight::Point;
+use crate::settings::ReactiveSettings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{Slot, math};
@@ -54,7 +55,7 @@ struct ClosestApproach {
 
 /// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
 /// `meets` says whether two are on one level.
-pub(in super::super) fn headings(
+pub(crate) fn headings(
     all: &[AircraftState],
     resolving: &mut [ActiveResolutions],
     settings: ReactiveSettings,

@@ -8,8 +8,9 @@
 //! one that violates the half-planes least. The margin on separations allows for the time that
 //! turning takes.
 
-use super::{AircraftState, ReactiveSettings, length};
+use super::{AircraftState, length};
 use crate::flight::Point;
+use crate::settings::ReactiveSettings;
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
@@ -27,7 +28,7 @@ struct HalfPlane {
 
 /// Returns the heading in radians that an airplane should fly among the others; `None` if it may
 /// fly to its way-point. `step_s` is the time until it looks again.
-pub(in super::super) fn heading_rad<'a>(
+pub(crate) fn heading_rad<'a>(
     own: &AircraftState,
     others: impl Iterator<Item = &'a AircraftState>,
     settings: ReactiveSettings,

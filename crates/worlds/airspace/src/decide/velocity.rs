@@ -8,8 +8,9 @@ use super::preferences::{rank_by_turn_rate, turn_profiles};
 use crate::baseline::{AircraftState, mvp, orca};
 use crate::flight::{FlightSegment, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperative;
+use crate::settings::Method;
 use crate::shield::TurnProfile;
-use crate::world::{AirspaceWorld, Method};
+use crate::world::AirspaceWorld;
 use sidestep_kernel::math;
 
 /// Length in meters of the way ahead that stands for a heading.

@@ -1,15 +1,16 @@
 //! The pilots of a group, on a network in memory.
 
-use super::drive::drive;
-use crate::PhaseContext;
 use crate::decide::ManeuverCandidates;
 use crate::join::ControlledGroup;
 use crate::non_cooperative::NonCooperative;
 use crate::pilot::{Control, Memory, Percept, Pilot, Schedule};
 use crate::purpose;
+use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::network::{Distances, FaultInjector, FaultStreams, FaultyTransport};
+use sidestep_kernel::network::{
+    AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, ReplyTiming,
+};
 use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
@@ -23,16 +24,16 @@ pub(crate) fn decide_group(
     let PhaseContext { world, state, now, clock, .. } = *turn;
     let began_ns = clock.thread_cpu_ns();
     let schedule = Schedule::for_cycle(now, world.network.as_ref());
-    let sights = Percept::from_group(turn, flown, intruders);
+    let sights = flown.percepts(turn, intruders);
     let talks = world.conversation_times_on(now, schedule);
-    let mut transport = network(world, state, &talks);
+    let mut network = network(world, state, &talks);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, sight) in pilots.iter_mut().zip(sights) {
         pilot.start_with_schedule(sight, schedule);
     }
-    drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
+    network.run(&mut pilots, schedule.begins, Pilot::has_decided);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
-    drive(&mut transport, &mut pilots, schedule.begins, Pilot::is_done);
+    network.run(&mut pilots, schedule.begins, Pilot::is_done);
     outcomes(pilots)
 }
 
@@ -56,8 +57,7 @@ pub(crate) fn run_pilots(
     pilots: &mut [Pilot],
 ) {
     let talks = world.conversation_times_on(now, schedule);
-    let mut transport = network(world, state, &talks);
-    drive(&mut transport, pilots, schedule.begins, Pilot::is_done);
+    network(world, state, &talks).run(pilots, schedule.begins, Pilot::is_done);
 }
 
 /// Returns the network of the talks of a cycle.
@@ -65,8 +65,14 @@ fn network<'a>(
     world: &'a AirspaceWorld,
     state: &'a AirspaceState,
     talks: &'a [(u64, f64)],
-) -> FaultyTransport<'a, MemoryTransport> {
-    FaultyTransport::in_memory(world.network.as_ref(), world.fault_streams(), Some(state), talks)
+) -> AgentLoop<FaultyTransport<'a, MemoryTransport>> {
+    let transport = FaultyTransport::in_memory(
+        world.network.as_ref(),
+        world.fault_streams(),
+        Some(state),
+        talks,
+    );
+    AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None }
 }
 
 impl Distances for AirspaceState {
@@ -112,8 +118,8 @@ fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<P
 mod tests {
     use super::*;
     use crate::events::EventKind;
-    use crate::pilot::{Fleet, Maneuver};
-    use crate::{AirspaceRun, airspace_run};
+    use crate::pilot::Maneuver;
+    use crate::{AirspaceRun, Fleet, airspace_run};
     use sidestep_scenario::Source;
 
     /// Returns the pilots of a group that looks for itself; the first one is of another build, and no other takes it

@@ -13,18 +13,16 @@
 //!
 //! The programs aboard are [`crate::agents`], and a [`Pilot`](crate::pilot::Pilot) goes with them through the
 //! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
-//! faults of the scenario ([`sidestep_kernel::network`]), by a loop that knows neither (`drive.rs`).
+//! faults of the scenario ([`sidestep_kernel::network`]).
 
-mod deployment;
-mod drive;
+#[cfg(test)]
+mod conversation_tests;
 mod group;
 #[cfg(test)]
 mod grouping_tests;
 #[cfg(test)]
 mod outage_tests;
 
-pub use deployment::Deployment;
-pub(crate) use deployment::unsupported_reason;
 pub(crate) use group::decide_group;
 #[cfg(test)]
 pub(crate) use group::run_pilots;

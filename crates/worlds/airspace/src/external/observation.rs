@@ -1,8 +1,8 @@
 //! Percepts: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
-use crate::PhaseContext;
 use crate::flight::{FlightSegment, KnownAircraft, Point, distance_m};
 use crate::non_cooperative::NonCooperative;
+use crate::scratch::PhaseContext;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{BufferMut, Space, SpaceKind};
 use sidestep_kernel::geometry::sub;

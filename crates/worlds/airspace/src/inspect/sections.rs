@@ -3,8 +3,8 @@
 use super::{Inspector, airplane};
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::flight::{Point, Pose2};
+use crate::settings::Method;
 use crate::shield::{Side, TurnProfile};
-use crate::world::Method;
 use sidestep_kernel::view::{
     FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape, Vec3,
 };

@@ -4,6 +4,7 @@ use crate::agents::ActionChoice;
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
+use crate::decide::ManeuverCandidates;
 use crate::events::Event;
 use crate::shield::{ShieldDecision, Side, TurnProfile};
 use serde::{Deserialize, Serialize};
@@ -69,6 +70,22 @@ pub struct Memory {
 }
 
 impl Maneuver {
+    /// Returns the course that follows from the shield's decision about those of the candidates that were `allowed`.
+    pub(crate) fn from_decision(
+        decision: ShieldDecision,
+        allowed: &[usize],
+        candidates: &ManeuverCandidates,
+    ) -> Self {
+        match decision.candidate.map(|k| allowed[k]) {
+            Some(wish) => Self::Way {
+                wish: wish as u32,
+                way: candidates.ways[wish].clone(),
+                side: decision.fallback,
+            },
+            None => Self::Orbit,
+        }
+    }
+
     /// Returns the course as a decision of the shield; `fallback` is the side of the stored orbit.
     pub(crate) fn shield_decision(&self, fallback: Side) -> ShieldDecision {
         match *self {

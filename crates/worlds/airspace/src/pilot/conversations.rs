@@ -12,7 +12,7 @@ use crate::agents::{
     OptimizingAgent, OutgoingMessage, Participant, Progress, WithOutcome, informed, sampling,
 };
 use crate::baseline::mvp::ActiveResolutions;
-use crate::deploy::Deployment;
+use crate::settings::Deployment;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::Estimator;

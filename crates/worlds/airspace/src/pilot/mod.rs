@@ -20,23 +20,20 @@
 //! aboard.rs               the state machine
 //! schedule.rs  early.rs   when talks start and end; packets of talks to come
 //! briefing.rs  talks.rs   the knowledge with which it goes into a talk; the parties to the talks
-//! fleet.rs                runs whose pilots are elsewhere
 //! ```
 
 mod common_knowledge;
 mod control;
 mod conversations;
 mod early_packets;
-mod fleet;
 mod percept;
 mod program;
 mod schedule;
 #[cfg(test)]
 mod tests;
 
-pub use crate::agents::packet::{ConversationId, Packet, Protocol};
+pub use crate::agents::packet::{ConversationId, Protocol};
 pub use control::{Control, Maneuver, Memory, OptimizerStats};
-pub use fleet::Fleet;
 pub use percept::{OwnshipState, Percept, SurveillanceReport};
 pub use program::Pilot;
 pub(crate) use schedule::Schedule;

@@ -1,17 +1,14 @@
 //! Sights: all that an airplane perceives at the start of a cycle.
 
-use crate::PhaseContext;
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
 use crate::flight::{FlightSegment, KnownAircraft, Levels, Pose2, distance_m};
-use crate::join::ControlledGroup;
 use crate::non_cooperative::NonCooperative;
-use crate::perceive::observed_pose;
 use crate::shield::{OrbitTracker, ShieldedAircraft, Side, TurnProfile};
 use crate::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId};
 
 /// Distance in meters beyond which all goals rank alike.
 const MAX_RANKED_DISTANCE_M: f64 = 2e9;
@@ -64,27 +61,6 @@ pub struct OwnshipState {
 }
 
 impl OwnshipState {
-    /// Returns an airplane as those aboard know it.
-    pub(crate) fn from_state(turn: &PhaseContext<'_>, slot: Slot) -> Self {
-        let PhaseContext { world, state, now, .. } = *turn;
-        let cell = &state.airplanes[slot as usize];
-        let (pose, held) = (cell.pose(), state.orbit_pose(slot));
-        Self {
-            id: slot,
-            pose,
-            held,
-            seen: observed_pose(world, slot, now, pose),
-            seen_held: observed_pose(world, slot, now, held),
-            altitude_m: cell.altitude_m.get(),
-            next: cell.next.get(),
-            orders: cell.orders.get().into(),
-            fallback: cell.fallback.get(),
-            refusals: cell.overrides.get(),
-            named: state.exempt_with(slot).to_vec(),
-            wish: state.external_action(slot),
-        }
-    }
-
     /// Returns the state that its group knows once it has sent it.
     pub(crate) fn known_aircraft(&self) -> KnownAircraft {
         let &Self { id, seen, next, orders, altitude_m, .. } = self;
@@ -139,47 +115,7 @@ impl OwnshipState {
     }
 }
 
-impl SurveillanceReport {
-    /// Returns an airplane as others see it.
-    pub(crate) fn from_state(turn: &PhaseContext<'_>, slot: Slot) -> Self {
-        let PhaseContext { world, state, now, .. } = *turn;
-        let cell = &state.airplanes[slot as usize];
-        Self {
-            id: slot,
-            pose: observed_pose(world, slot, now, cell.pose()),
-            altitude_m: cell.altitude_m.get(),
-            orbit: (cell.orbiting.get() > 0).then(|| cell.fallback.get()),
-        }
-    }
-
-    /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
-    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
-        let &Self { id, pose, altitude_m, .. } = self;
-        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
-    }
-}
-
 impl Percept {
-    /// Returns the perceptions of each airplane of a group; `intruders` are those that mind no other.
-    pub(crate) fn from_group(
-        turn: &PhaseContext<'_>,
-        flown: &ControlledGroup,
-        intruders: &[NonCooperative],
-    ) -> Vec<Self> {
-        let group: Vec<SurveillanceReport> =
-            flown.ids.iter().map(|&slot| SurveillanceReport::from_state(turn, slot)).collect();
-        let one = |(k, &slot): (usize, &Slot)| {
-            let sees = |id: Slot| flown.can_see(k, id);
-            Self {
-                cycle: turn.now,
-                own: OwnshipState::from_state(turn, slot),
-                group: group.iter().filter(|one| sees(one.id)).copied().collect(),
-                intruders: intruders.iter().filter(|one| sees(one.slot)).cloned().collect(),
-            }
-        };
-        flown.ids.iter().enumerate().map(one).collect()
-    }
-
     /// Checks a sight that came off a network: that it is about airplanes of the world, its own among them.
     ///
     /// # Errors

@@ -12,16 +12,19 @@ use super::early_packets::EarlyPackets;
 use super::percept::Percept;
 use super::schedule::{Schedule, retry_policy};
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::agents::packet::{ConversationId, Packet, Protocol};
+use crate::agents::packet::{ConversationId, Protocol};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{Conversation, ConversationInfo, EndpointConfig, Participant, Progress};
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
-use crate::world::{AirspaceWorld, Grouping};
+use crate::settings::Grouping;
+use crate::world::AirspaceWorld;
 use cycle_state::{ConversationTiming, CyclePhase, CycleState};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::{DropCounts, DropReason, digest, parse_packet};
+use sidestep_kernel::network::{
+    DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest, parse_packet,
+};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -39,7 +42,7 @@ pub struct Pilot {
     /// Talks that have ended for it.
     past: VecDeque<Conversation<dyn Participant>>,
     early: EarlyPackets,
-    out: Vec<Packet>,
+    out: Vec<OutgoingPacket>,
     refused: DropCounts,
 }
 
@@ -76,11 +79,6 @@ impl Pilot {
     pub fn with_build(self, build: &str) -> Self {
         let fingerprint = digest([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
-    }
-
-    /// Its airplane.
-    pub fn id(&self) -> EntityId {
-        self.id
     }
 
     /// Starts the talks of a cycle. Unfinished talks of an earlier one are given up.
@@ -123,57 +121,9 @@ impl Pilot {
         });
     }
 
-    /// Takes a packet that came off the network from an airplane: any bytes. Unreadable and unsound packets are
-    /// counted and dropped.
-    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        // Actions due by then are done first, because they may make it too late for the packet.
-        self.advance(tick);
-        if let Err(why) = self.receive(from, bytes, tick) {
-            self.refused.record(why);
-        }
-        self.advance(tick);
-    }
-
-    /// Performs the actions that are due by a tick.
-    pub fn on_timer(&mut self, tick: u64) {
-        self.advance(tick);
-        if let Some(talk) = self.turn.as_mut().and_then(CycleState::conversation) {
-            talk.on_timer(tick, &mut self.out);
-        }
-        // Others may still depend on it in a talk that has ended for it.
-        for talk in self.past.iter_mut().filter(|talk| tick < talk.info().end_tick) {
-            talk.on_timer(tick, &mut self.out);
-        }
-        self.advance(tick);
-    }
-
-    /// Returns the tick in which something is due, unless a packet comes before it.
-    pub fn next_timer(&self) -> Option<u64> {
-        let turn = self.turn.as_ref()?;
-        let present = match &turn.phase {
-            CyclePhase::Grouping(talk)
-            | CyclePhase::Deciding(talk)
-            | CyclePhase::Shielding(talk, _) => {
-                let ends = talk.info().end_tick;
-                Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
-            }
-            CyclePhase::Decided => Some(turn.schedule.shield_from),
-            CyclePhase::Over => None,
-        };
-        let of_cycle = self.past.iter().filter(|talk| talk.info().id.cycle == turn.percept.cycle);
-        let past =
-            of_cycle.filter_map(|talk| talk.next_timer().filter(|due| *due < talk.info().end_tick));
-        present.into_iter().chain(past).min()
-    }
-
     /// Returns the tick in which the talks of the present cycle end at the latest.
     pub fn deadline(&self) -> u64 {
         self.turn.as_ref().map_or(u64::MAX, |turn| turn.schedule.ends)
-    }
-
-    /// Takes out the packets that wait to be sent.
-    pub fn take_packets(&mut self) -> Vec<Packet> {
-        std::mem::take(&mut self.out)
     }
 
     /// Returns the ids of the group that it talks with, its own among them, rising.
@@ -392,6 +342,55 @@ impl Pilot {
             self.past.pop_front();
         }
         self.past.push_back(talk.into_past());
+    }
+}
+
+impl NetworkAgent for Pilot {
+    fn id(&self) -> EntityId {
+        self.id
+    }
+
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        // Actions due by then are done first, because they may make it too late for the packet.
+        self.advance(tick);
+        if let Err(why) = self.receive(from, bytes, tick) {
+            self.refused.record(why);
+        }
+        self.advance(tick);
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        self.advance(tick);
+        if let Some(talk) = self.turn.as_mut().and_then(CycleState::conversation) {
+            talk.on_timer(tick, &mut self.out);
+        }
+        // Others may still depend on it in a talk that has ended for it.
+        for talk in self.past.iter_mut().filter(|talk| tick < talk.info().end_tick) {
+            talk.on_timer(tick, &mut self.out);
+        }
+        self.advance(tick);
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        let turn = self.turn.as_ref()?;
+        let present = match &turn.phase {
+            CyclePhase::Grouping(talk)
+            | CyclePhase::Deciding(talk)
+            | CyclePhase::Shielding(talk, _) => {
+                let ends = talk.info().end_tick;
+                Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
+            }
+            CyclePhase::Decided => Some(turn.schedule.shield_from),
+            CyclePhase::Over => None,
+        };
+        let of_cycle = self.past.iter().filter(|talk| talk.info().id.cycle == turn.percept.cycle);
+        let past =
+            of_cycle.filter_map(|talk| talk.next_timer().filter(|due| *due < talk.info().end_tick));
+        present.into_iter().chain(past).min()
+    }
+
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+        std::mem::take(&mut self.out)
     }
 }
 

@@ -1,12 +1,12 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use super::values::{SeparationM, Speed, TurnRate, Turns};
 use crate::flight::Airplane;
 use crate::flight::{Model, Pose2, Timing, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::GeneratorKind;
 use crate::generate::{GeneratorParams, generate};
+use crate::settings::{SeparationM, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::traffic::MAX_SPEED_M_S;

@@ -1,16 +1,15 @@
 //! Compilation of a scenario's sections to an immutable world.
 
+use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
-use crate::baseline::ReactiveSettings;
-use crate::deploy::{Deployment, unsupported_reason};
 use crate::flight::Levels;
 use crate::flight::{Airplane, FlightTask};
 use crate::flight::{Timing, WaypointRule};
-use crate::memory::largest_start_group;
 use crate::perceive::observed_pose;
+use crate::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
 use crate::shield::{ErrorBounds, ExemptIds, ShieldedAircraft, Side, first_fallbacks};
 use crate::state::AirspaceState;
-use crate::world::{AirspaceWorld, Disturbance, Grouping, Method};
+use crate::world::AirspaceWorld;
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -151,7 +150,13 @@ impl<'a> Compiler<'a> {
             first_fallbacks: Arc::default(),
             teams: Arc::default(),
         };
-        Ok(world.with_derived_fields(self.known))
+        let mut world = world.with_derived_fields(self.known);
+        world.teams = match self.known {
+            // Teams follow from models alone, which no seed draws.
+            Some(known) => Arc::clone(&known.teams),
+            None => Arc::new(world.find_teams()),
+        };
+        Ok(world)
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
@@ -230,7 +235,7 @@ impl<'a> Compiler<'a> {
                           groups out";
             return Err(self.source.error(given.span(), cause, remedy));
         }
-        if let Some(reason) = unsupported_reason(world.deployment, &world.settings) {
+        if let Some(reason) = world.deployment.unsupported_reason(&world.settings) {
             let cause = format!("deployment {}: {reason}", world.deployment.name());
             let remedy = "set order = \"parallel\" and utility = \"joint\", or \
                           estimator = { kind = \"exact\" }";

@@ -1,10 +1,10 @@
 //! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
-use crate::deploy::Deployment;
 use crate::flight::Airplane;
 use crate::flight::Timing;
 use crate::flight::{FlightOrder, FlightTask};
+use crate::settings::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::network::{self, Network};

@@ -85,17 +85,6 @@ struct RadioTimeouts {
     ticks: u64,
 }
 
-/// A packet on its way out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutgoingPacket {
-    /// Id of the neighbor that it is for.
-    pub to: EntityId,
-    /// Its number among the sender's of the cycle.
-    pub sequence: u32,
-    /// Its bytes.
-    pub payload: Vec<u8>,
-}
-
 /// A place while a motion is prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TentativePosition<const D: usize> {
@@ -213,11 +202,6 @@ impl<const D: usize> ConnectorAgent<D> {
         Self { radio, ..self }
     }
 
-    /// Returns its id on the network.
-    pub fn id(&self) -> EntityId {
-        self.first_id + self.me
-    }
-
     /// Returns a word for its part in the present cycle, for people.
     pub fn role_name(&self) -> &'static str {
         match () {
@@ -295,16 +279,6 @@ impl<const D: usize> ConnectorAgent<D> {
                 _ => {}
             }
         }
-    }
-
-    /// Takes a packet. One that comes from no neighbor, cannot be read or makes no sense is counted
-    /// and dropped.
-    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        self.now = self.now.max(tick);
-        let Err(why) = self.receive(from, bytes) else { return };
-        self.refused.record(why);
-        // A packet that comes too late is of no use, and no sender's fault.
-        self.traffic.dropped += u64::from(why != DropReason::Stale);
     }
 
     fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), DropReason> {

@@ -1,7 +1,7 @@
 //! Beacons: messages of airplanes about themselves, before they know the others that they decide with.
 
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::Pose2;
+use crate::flight::{KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperative;
 use crate::shield::Side;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,14 @@ pub struct SurveillanceReport {
     pub altitude_m: f64,
     /// The side to which it turns, if it is seen to be on its stored orbit.
     pub orbit: Option<Side>,
+}
+
+impl SurveillanceReport {
+    /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
+    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
+        let &Self { id, pose, altitude_m, .. } = self;
+        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+    }
 }
 
 /// A message by which an airplane makes itself known.

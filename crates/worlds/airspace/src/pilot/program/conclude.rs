@@ -133,7 +133,7 @@ impl Pilot {
                     let event = Event::new(turn.percept.cycle, EventKind::HeldBack, self.id);
                     turn.control.events.push(event);
                 }
-                turn.control.course = turn.candidates.maneuver(decision, allowed);
+                turn.control.course = Maneuver::from_decision(decision, allowed, &turn.candidates);
                 contacts
             }
             // Without an agreement it no longer knows where any other airplane is.

@@ -82,7 +82,7 @@ fn told_more(
     }
     loop {
         for pilot in &mut *pilots {
-            for Packet { to, payload, .. } in pilot.take_packets() {
+            for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
                 due.extend(to.iter().map(|&other| (pilot.id(), other, payload.clone())));
             }
         }

@@ -26,7 +26,7 @@ fn decided(pilots: &mut [Pilot], sights: Vec<Percept>, draws: &mut Draws) -> Vec
             PilotInput::Sight(sight) => pilot.start(*sight, 0),
             PilotInput::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
         }
-        for Packet { to, payload, .. } in pilot.take_packets() {
+        for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
             due.extend(to.iter().map(|&other| (other, PilotInput::Packet(id, payload.clone()))));
         }
     }

@@ -1,7 +1,7 @@
 //! Bytes that no agent sends: they are counted and dropped in any case, and never cause a panic.
 
 use super::{network, sights};
-use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol, OutgoingPacket};
+use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol};
 use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, Situation};
 use crate::rods::chain::{Chain, Connector, Rod};
 use crate::rods::geometry::Point;
@@ -12,7 +12,8 @@ use crate::rods::veto::RequestSource;
 use proptest::prelude::*;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::network::{
-    ConversationId, DropReason, PacketBuffer, PacketHeader, parse_packet,
+    ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketBuffer, PacketHeader,
+    parse_packet,
 };
 
 const N: usize = 5;
@@ -61,7 +62,7 @@ fn packets() -> Vec<(u32, OutgoingPacket)> {
             return all;
         }
         for (from, out) in std::mem::take(&mut waiting) {
-            agents[out.to as usize].on_packet(from, &out.payload, 0);
+            agents[out.to[0] as usize].on_packet(from, &out.payload, 0);
             all.push((from, out));
         }
     }

@@ -1,10 +1,9 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
-use super::values::Held;
-use crate::baseline::ReactiveSettings;
 use crate::flight::Legs;
 use crate::objective::Objective;
+use crate::settings::{Held, ReactiveSettings};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;

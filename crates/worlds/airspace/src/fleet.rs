@@ -1,14 +1,13 @@
 //! Runs whose pilots are elsewhere: each cycle they receive their perceptions, and return their controls.
 
-use super::control::{Control, Maneuver};
-use super::percept::Percept;
-use crate::AirspaceRun;
 use crate::decide::possible_profiles;
-use crate::deploy::Deployment;
 use crate::events::EventKind;
+use crate::pilot::{Control, Maneuver, Percept};
+use crate::settings::{Deployment, Method};
 use crate::shield::TurnProfile;
 use crate::state::AirspaceState;
-use crate::world::{AirspaceWorld, Method};
+use crate::world::AirspaceWorld;
+use crate::world_impl::AirspaceRun;
 use sidestep_kernel::control::OrderError;
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use std::collections::BTreeMap;
@@ -67,7 +66,7 @@ impl AirspaceWorld {
     pub(crate) fn percepts(&self, state: &AirspaceState, now: Cycle) -> Vec<Percept> {
         let mut all = Vec::new();
         self.for_each_group(state, now, |turn, flown, intruders| {
-            all.extend(Percept::from_group(turn, flown, intruders));
+            all.extend(flown.percepts(turn, intruders));
         });
         all.sort_unstable_by_key(|sight| sight.own.id);
         all
