@@ -1,9 +1,9 @@
-//! Wishes that a caller orders, as an airplane keeps them until it decides.
+//! Actions that a caller orders, as an airplane keeps them until it decides.
 
 use super::flight::Point;
 use serde::{Deserialize, Serialize};
 
-/// An order from outside: the wish that an airplane is to have when it decides next.
+/// An external order: the action that an airplane is to propose in its next decision.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ExternalAction {
     /// Its actions by number, the best first.
@@ -22,7 +22,7 @@ impl ExternalAction {
     /// The order of a velocity.
     pub const VELOCITY: &'static str = "velocity_m_s";
 
-    /// Returns the wish of an order by its name; `None` where there is no such order.
+    /// Returns the action of an order by its name; `None` where there is no such order.
     pub(crate) fn from_order(order: &str, values: &[f64]) -> Option<Self> {
         match (order, values) {
             (Self::RANKING, actions) => {

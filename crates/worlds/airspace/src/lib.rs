@@ -82,15 +82,15 @@ impl Phases for AirspaceWorld {
         self.airplanes.len()
     }
 
-    fn claim(turn: &mut PhaseContext<'_>, bodies: Range<usize>) {
-        perceive::claim(turn, bodies);
+    fn claim(context: &mut PhaseContext<'_>, bodies: Range<usize>) {
+        perceive::claim(context, bodies);
     }
 
-    fn join(turn: &mut PhaseContext<'_>, bodies: Range<usize>, groups: &ConflictGroups) {
-        join::join(turn, bodies, groups);
+    fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups: &ConflictGroups) {
+        join::join(context, bodies, groups);
     }
 
-    fn act(turn: &mut PhaseContext<'_>, group: &mut [Slot]) {
-        act::act(turn, group);
+    fn act(context: &mut PhaseContext<'_>, group: &mut [Slot]) {
+        act::act(context, group);
     }
 }

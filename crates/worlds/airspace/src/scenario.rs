@@ -167,7 +167,7 @@ impl CompiledAirspace {
     }
 
     /// Returns the same scenario with another seed, as if compiled with that seed. Traffic that is drawn, and
-    /// everything that follows from positions with errors, is made anew; all else is shared.
+    /// everything that depends on positions with errors, is computed anew; all else is shared.
     ///
     /// # Errors
     /// When generated airplanes find no place with this seed, or come too near to be optimized together.
@@ -185,29 +185,39 @@ impl CompiledAirspace {
 
     /// Returns the state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
-        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
-            pose: airplane.start,
-            ended: PackedEnd::NONE,
-            counts: [0; 4],
-            fallback,
-            altitude_m: match &airplane.track {
-                Some(track) => track.altitude_at_m(airplane.appears_s),
-                None => airplane.altitude_m,
-            },
-            orders: [0; 2],
-            turn_rate_rad_s: 0.0,
-        };
-        let airplanes = self.world.airplanes.iter().zip(&*self.fallbacks).map(record).collect();
+        let airplanes = self
+            .world
+            .airplanes
+            .iter()
+            .zip(&*self.fallbacks)
+            .map(|(airplane, &fallback)| start_record(airplane, fallback))
+            .collect();
         Snapshot {
             cycle: 0,
             airplanes,
             contacts: Vec::new(),
             resolving: Vec::new(),
-            named: self.too_close.clone(),
-            held: Vec::new(),
-            wishes: Vec::new(),
-            handed: None,
+            exempt: self.too_close.clone(),
+            orbit_poses: Vec::new(),
+            external_actions: Vec::new(),
+            controls: None,
         }
+    }
+}
+
+/// Returns the state of an airplane at the start of its flight.
+fn start_record(airplane: &Airplane, fallback: Side) -> AirplaneRecord {
+    AirplaneRecord {
+        pose: airplane.start,
+        ended: PackedEnd::NONE,
+        counts: [0; 4],
+        fallback,
+        altitude_m: match &airplane.track {
+            Some(track) => track.altitude_at_m(airplane.appears_s),
+            None => airplane.altitude_m,
+        },
+        orders: [0; 2],
+        turn_rate_rad_s: 0.0,
     }
 }
 

@@ -1,4 +1,4 @@
-//! One talk, as one airplane takes part in it: a party, and the packets around its messages.
+//! One conversation, as one airplane takes part in it: a participant, and the packets around its messages.
 
 use super::network_traffic::NetworkTraffic;
 use super::packet::{ConversationId, PacketHeader};
@@ -7,10 +7,10 @@ use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{DropReason, OutgoingPacket};
 use std::sync::Arc;
 
-/// The identity, participants and times of a talk.
+/// The identity, participants and times of a conversation.
 #[derive(Debug, Clone)]
 pub struct ConversationInfo {
-    /// The talk.
+    /// The conversation.
     pub id: ConversationId,
     /// Ids of all participants, rising.
     pub members: Arc<[EntityId]>,
@@ -26,7 +26,7 @@ pub struct ConversationInfo {
     pub is_silent: bool,
 }
 
-/// A talk, with the party that is aboard.
+/// A conversation, with the participant that is aboard.
 pub struct Conversation<P: ?Sized> {
     info: ConversationInfo,
     others: Arc<[EntityId]>,
@@ -37,16 +37,10 @@ pub struct Conversation<P: ?Sized> {
 }
 
 impl<P: Participant + ?Sized> Conversation<P> {
-    /// Returns a talk in which nothing has been said yet.
-    pub fn new(frame: ConversationInfo, party: Box<P>) -> Self {
-        let others = frame.members.iter().copied().filter(|&id| id != frame.me).collect();
-        Self {
-            info: frame,
-            others,
-            sent: 0,
-            traffic: NetworkTraffic::default(),
-            participant: party,
-        }
+    /// Returns a conversation in which nothing has been said yet.
+    pub fn new(info: ConversationInfo, participant: Box<P>) -> Self {
+        let others = info.members.iter().copied().filter(|&id| id != info.me).collect();
+        Self { info, others, sent: 0, traffic: NetworkTraffic::default(), participant }
     }
 
     /// Its identity, members and times.
@@ -54,7 +48,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
         &self.info
     }
 
-    /// Returns how far the party has come.
+    /// Returns how far the participant has come.
     pub fn progress(&self) -> Progress {
         self.participant.progress()
     }
@@ -103,12 +97,12 @@ impl<P: Participant + ?Sized> Conversation<P> {
         self.participant.next_timer()
     }
 
-    /// Returns whether the party has come to its outcome.
+    /// Returns whether the participant has come to its outcome.
     pub fn is_done(&self) -> bool {
         self.participant.is_done()
     }
 
-    /// Seals all that the party has to send, and counts it.
+    /// Seals all that the participant has to send, and counts it.
     fn send(&mut self, out: &mut Vec<OutgoingPacket>) {
         let ConversationInfo { id, me, fingerprint, is_silent, .. } = self.info;
         for OutgoingMessage { to, message } in self.participant.take_messages() {
@@ -117,8 +111,8 @@ impl<P: Participant + ?Sized> Conversation<P> {
                 continue;
             }
             let sequence = self.sent;
-            let seal = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
-            let payload = message.into_packet(&seal);
+            let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
+            let payload = message.into_packet(&header);
             self.traffic.count(to.len(), payload.len());
             out.push(OutgoingPacket { to, sequence, payload });
             self.sent += 1;
@@ -127,16 +121,16 @@ impl<P: Participant + ?Sized> Conversation<P> {
 }
 
 impl<P: WithOutcome + ?Sized> Conversation<P> {
-    /// Returns the end of the talk; a party that is not done ends because time is up.
+    /// Returns the end of the conversation; a participant that is not done ends because time is up.
     pub fn finish(&mut self) -> ConversationEnd<P::Outcome> {
         self.participant.finish()
     }
 }
 
 impl<O> Conversation<dyn WithOutcome<Outcome = O>> {
-    /// Returns the talk as it remains for others once it has ended here: it answers their questions.
+    /// Returns the conversation as it remains for others once it has ended here: it answers their questions.
     pub fn into_past(self) -> Conversation<dyn Participant> {
-        let Self { info: frame, others, sent, traffic, participant: party } = self;
-        Conversation { info: frame, others, sent, traffic, participant: party }
+        let Self { info, others, sent, traffic, participant } = self;
+        Conversation { info, others, sent, traffic, participant }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::network;
 
-/// The subject of a talk: each cycle has one talk of each at most, in this order.
+/// The subject of a conversation: each cycle has one conversation of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Protocol {
     /// The choice of the airplanes that decide together, where groups are not announced.
@@ -29,7 +29,7 @@ impl network::Protocol for Protocol {
     }
 }
 
-/// The identity of a talk of airplanes.
+/// The identity of a conversation of airplanes.
 pub type ConversationId = network::ConversationId<Protocol>;
 
 /// The statements of an airplane's packet about its message.

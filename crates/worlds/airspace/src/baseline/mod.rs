@@ -1,4 +1,4 @@
-//! Other methods under the same limits, for comparison: each looks at the airplanes near it once per
+//! Other methods under the same limits, for comparison: each considers the airplanes near it once per
 //! step of `dtau`, and gives a heading, toward which the airplane turns as fast as it can.
 
 pub(super) mod mvp;

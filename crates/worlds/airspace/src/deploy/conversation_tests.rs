@@ -99,31 +99,33 @@ impl Agent for Adder {
     }
 }
 
-/// An agent that talks until it is done.
+/// An agent that sends until it is done.
 struct Alone {
-    talk: Conversation<dyn WithOutcome<Outcome = u64>>,
+    conversation: Conversation<dyn WithOutcome<Outcome = u64>>,
     out: Vec<OutgoingPacket>,
     ended: Option<ConversationEnd<u64>>,
 }
 
 impl Alone {
     fn settle(&mut self, tick: u64) {
-        if self.ended.is_none() && (self.talk.is_done() || tick >= self.talk.info().end_tick) {
-            self.ended = Some(self.talk.finish());
+        if self.ended.is_none()
+            && (self.conversation.is_done() || tick >= self.conversation.info().end_tick)
+        {
+            self.ended = Some(self.conversation.finish());
         }
     }
 }
 
 impl NetworkAgent for Alone {
     fn id(&self) -> EntityId {
-        self.talk.info().me
+        self.conversation.info().me
     }
 
     fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
         self.settle(tick);
-        if !self.talk.info().is_silent {
+        if !self.conversation.info().is_silent {
             let (_, message) = parse_packet::<Protocol>(bytes, 0).expect("a packet");
-            self.talk.receive(from, message, tick, &mut self.out).expect("a message");
+            self.conversation.receive(from, message, tick, &mut self.out).expect("a message");
         }
         self.settle(tick);
     }
@@ -131,14 +133,16 @@ impl NetworkAgent for Alone {
     fn on_timer(&mut self, tick: u64) {
         self.settle(tick);
         if self.ended.is_none() {
-            self.talk.on_timer(tick, &mut self.out);
+            self.conversation.on_timer(tick, &mut self.out);
         }
         self.settle(tick);
     }
 
     fn next_timer(&self) -> Option<u64> {
-        let ends = self.talk.info().end_tick;
-        self.ended.is_none().then(|| self.talk.next_timer().map_or(ends, |due| due.min(ends)))
+        let ends = self.conversation.info().end_tick;
+        self.ended
+            .is_none()
+            .then(|| self.conversation.next_timer().map_or(ends, |due| due.min(ends)))
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
@@ -163,7 +167,7 @@ fn network(loss: f64, max_delay_s: f64, silences: Vec<RadioOutage>) -> Network {
     }
 }
 
-/// Lets agents talk in cycle 3.
+/// Runs a conversation of agents in cycle 3.
 fn sums(
     network: Option<&Network>,
     seed: u64,
@@ -177,8 +181,8 @@ fn sums(
         let id = members[me];
         let is_silent = network.is_some_and(|network| network.is_radio_off(id, 15.0));
         let (ticks, patience) = (ends - begins, retry_policy(network, Protocol::Decision));
-        let radio = EndpointConfig { group: members.clone(), me, patience, ticks, is_silent };
-        let frame = ConversationInfo {
+        let config = EndpointConfig { group: members.clone(), me, patience, ticks, is_silent };
+        let info = ConversationInfo {
             id: ConversationId::new(3, Protocol::Decision, &members),
             members: members.clone(),
             me: id,
@@ -187,17 +191,17 @@ fn sums(
             end_tick: ends,
             is_silent,
         };
-        let party = Box::new(Endpoint::new(Adder::new(me, group, rounds), radio));
-        let mut talk: Conversation<dyn WithOutcome<Outcome = u64>> =
-            Conversation::new(frame, party);
+        let participant = Box::new(Endpoint::new(Adder::new(me, group, rounds), config));
+        let mut conversation: Conversation<dyn WithOutcome<Outcome = u64>> =
+            Conversation::new(info, participant);
         let mut out = Vec::new();
-        talk.start(begins, &mut out);
-        Alone { talk, out, ended: None }
+        conversation.start(begins, &mut out);
+        Alone { conversation, out, ended: None }
     };
     let mut stations: Vec<Alone> = (0..group).map(station).collect();
-    let talks = [(schedule.begins, 15.0)];
+    let conversations = [(schedule.begins, 15.0)];
     let draws = purpose::network_fault_streams(streams);
-    let transport = FaultyTransport::in_memory(network, draws, None, &talks);
+    let transport = FaultyTransport::in_memory(network, draws, None, &conversations);
     let mut network =
         AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None };
     network.run(&mut stations, begins, |station| station.ended.is_some());

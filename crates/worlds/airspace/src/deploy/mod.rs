@@ -12,7 +12,7 @@
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
 //! The programs aboard are [`crate::agents`], and a [`Pilot`](crate::pilot::Pilot) goes with them through the
-//! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
+//! conversations of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
 //! faults of the scenario ([`sidestep_kernel::network`]).
 
 #[cfg(test)]
@@ -145,7 +145,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         /// Whichever airplane falls silent, wherever and whenever, met before or not, and whichever
-        /// comes in later: all airplanes that had orbits apart when they came in stay apart.
+        /// enters later: all airplanes that had orbits apart when they entered stay apart.
         #[test]
         fn nobody_comes_near_a_silent_airplane(
             seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,

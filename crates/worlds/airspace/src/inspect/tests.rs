@@ -131,10 +131,11 @@ fn on_a_bad_network_it_is_told_since_when_others_were_heard() {
     assert_eq!(heard.len(), 3);
     assert_eq!(heard[1], &FactValue::number(15.0, ""), "before its radio fell silent: {heard:?}");
     assert_eq!(told.marks_with_role(MarkRole::Known).count(), 3);
-    let Some(talk) = told.section("Talk of the group").and_then(|s| s.table.as_ref()) else {
+    let Some(conversation) = told.section("Talk of the group").and_then(|s| s.table.as_ref())
+    else {
         panic!()
     };
-    let messages = talk.column("messages").expect("a column").cloned().collect::<Vec<_>>();
+    let messages = conversation.column("messages").expect("a column").cloned().collect::<Vec<_>>();
     assert!(
         messages.iter().all(|n| matches!(n, FactValue::Number { value, .. } if *value > 0.0)),
         "{messages:?}"

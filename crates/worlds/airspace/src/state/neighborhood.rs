@@ -17,7 +17,7 @@ pub(crate) struct Neighborhood {
 }
 
 impl Neighborhood {
-    /// Returns lists for `n` airplanes that mind each other up to `side_m` meters away.
+    /// Returns lists for `n` airplanes that consider each other up to `side_m` meters away.
     pub(super) fn new(n: usize, side_m: f64) -> Self {
         let buckets = (2 * n).next_power_of_two();
         Self {

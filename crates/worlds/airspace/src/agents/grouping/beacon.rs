@@ -38,8 +38,8 @@ pub struct Beacon {
     pub own: SurveillanceReport,
     /// Ids of those that it sees near it, rising.
     pub near: Vec<EntityId>,
-    /// Airplanes near it that mind no other, by rising id.
-    pub intruders: Vec<NonCooperative>,
+    /// Non-cooperative airplanes near it, by rising id.
+    pub non_cooperative: Vec<NonCooperative>,
 }
 
 /// A piece of knowledge about an airplane.
@@ -72,9 +72,9 @@ impl Item {
             Self::Report { heard, .. } => heard,
         };
         let is_known = |id: EntityId| (id as usize) < airplanes;
-        let rises = list.windows(2).all(|pair| pair[0] < pair[1]);
+        let is_ascending = list.windows(2).all(|pair| pair[0] < pair[1]);
         let are_others = list.iter().all(|&id| is_known(id) && id != self.about());
-        InvalidMessage::Airplane.unless(is_known(self.about()) && rises && are_others)?;
+        InvalidMessage::Airplane.unless(is_known(self.about()) && is_ascending && are_others)?;
         match self {
             Self::Beacon(beacon) => beacon.check(airplanes),
             Self::Report { .. } => Ok(()),
@@ -88,10 +88,10 @@ impl Beacon {
             self.own;
         InvalidMessage::Number.unless(heading_rad.abs() < MAX_HEADING_RAD)?;
         InvalidMessage::Number.unless(are_valid_coordinates([x, y, altitude_m]))?;
-        let rises = self.intruders.windows(2).all(|pair| pair[0].slot < pair[1].slot);
-        let are_known = self.intruders.iter().all(|one| (one.slot as usize) < airplanes);
-        InvalidMessage::Airplane.unless(rises && are_known)?;
-        InvalidMessage::Number.unless(self.intruders.iter().all(NonCooperative::is_valid))
+        let is_ascending = self.non_cooperative.windows(2).all(|pair| pair[0].slot < pair[1].slot);
+        let are_known = self.non_cooperative.iter().all(|one| (one.slot as usize) < airplanes);
+        InvalidMessage::Airplane.unless(is_ascending && are_known)?;
+        InvalidMessage::Number.unless(self.non_cooperative.iter().all(NonCooperative::is_valid))
     }
 }
 

@@ -67,7 +67,7 @@ impl TestCoordinator {
         (k..hotel.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(&mut self, hotel: &TestHost, here: &HostContext<'_>) -> CoordinatorStep {
+    fn hop(&mut self, hotel: &TestHost, context: &HostContext<'_>) -> CoordinatorStep {
         loop {
             match self.task {
                 TestTask::Visit(k) => match self.next(k, hotel) {
@@ -78,7 +78,7 @@ impl TestCoordinator {
                     None => self.task = TestTask::Return,
                 },
                 TestTask::Return => {
-                    let home = usize::from(here.epochs[0].owner);
+                    let home = usize::from(context.epochs[0].owner);
                     if home != hotel.me {
                         return CoordinatorStep::Hop(home);
                     }
@@ -116,14 +116,14 @@ impl MigratingCoordinator for TestCoordinator {
         Ok(read)
     }
 
-    fn advance(&mut self, hotel: &mut TestHost, here: &HostContext<'_>) -> CoordinatorStep {
+    fn advance(&mut self, hotel: &mut TestHost, context: &HostContext<'_>) -> CoordinatorStep {
         if !hotel.is_restless && !std::mem::replace(&mut hotel.is_rested, true) {
             return CoordinatorStep::Stay;
         }
         self.unreachable[hotel.me] = false;
-        let step = self.hop(hotel, here);
+        let step = self.hop(hotel, context);
         if matches!(self.task, TestTask::Tell(_)) {
-            hotel.told.get_or_insert(here.epochs[0]);
+            hotel.told.get_or_insert(context.epochs[0]);
         }
         hotel.is_rested = false;
         step

@@ -24,21 +24,21 @@ fn retry_policy(group: usize, tries: u32) -> (RetryPolicy, u64) {
 fn recovery(group: usize, (loss, tries): (f64, u32), seed: u64) -> Option<(u64, u64)> {
     let (patience, miss_ticks) = retry_policy(group, tries);
     let mut hosts = hosts(group, ROUNDS, patience, miss_ticks);
-    hosts.iter_mut().for_each(|host| host.ship.is_restless = true);
+    hosts.iter_mut().for_each(|host| host.services.is_restless = true);
     let mut group = Group::new(hosts, Faults { seed, loss, ..Faults::default() });
     // Somewhere in the first rounds, over all airplanes.
     let dies_at = 1 + seed % (10 * group.hosts.len() as u64);
     while group.tick < dies_at {
         assert!(group.step() && !group.is_done());
     }
-    let farthest = (0..group.hosts.len()).max_by_key(|&k| group.hosts[k].seats[0].accepted)?;
-    let lost = group.hosts[farthest].seats[0].accepted.epoch;
+    let farthest = (0..group.hosts.len()).max_by_key(|&k| group.hosts[k].replicas[0].accepted)?;
+    let lost = group.hosts[farthest].replicas[0].accepted.epoch;
     (group.is_alive[farthest], group.faults.crashes) = (false, vec![(farthest, 0)]);
     let died_at = group.tick;
     let mut back_at = None;
     while !group.is_done() {
         assert!(group.step());
-        let newest = group.hosts.iter().map(|host| host.seats[0].accepted.epoch).max()?;
+        let newest = group.hosts.iter().map(|host| host.replicas[0].accepted.epoch).max()?;
         if newest > lost && group.is_accepted(newest) {
             back_at.get_or_insert(group.tick);
         }
@@ -52,7 +52,7 @@ fn percentiles(mut all: Vec<u64>) -> (u64, u64) {
     (all[all.len() / 2], all[all.len() * 99 / 100])
 }
 
-/// At a millisecond for a tick the talk of a cycle of 5 s has 2,250 ticks: the control of the same cycle
+/// At a millisecond for a tick the conversation of a cycle of 5 s has 2,250 ticks: the control of the same cycle
 /// comes in time.
 #[test]
 fn a_coordinator_whose_host_dies_is_back_long_before_the_talk_ends() {
