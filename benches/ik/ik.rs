@@ -8,22 +8,22 @@
 //! every engine falls back on. In brackets what the prototype reached.
 
 use cpu_time::ProcessTime;
-use sidestep::import::urdf::Model;
-use sidestep::worlds::chain::geometry::{Point, along, angle_rad, distance, scaled, sub, unit};
-use sidestep::worlds::chain::ik::{Engine, Goal, Kind, Solver};
-use sidestep::worlds::chain::kinematics::{ArmGoal, SerialChain};
-use sidestep::worlds::chain::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod};
+use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver, SolutionKind};
+use sidestep_arms::kinematics::{ArmGoal, SerialChain};
+use sidestep_import::urdf::Model;
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::powf;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use sidestep_rods::geometry::{Point, add_scaled, angle_rad, distance, normalized, scaled, sub};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod};
 
 fn draws(index: u64) -> Draws {
     Streams::new(Seed(7)).draws(0, index, Purpose(1))
 }
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
-    unit(std::array::from_fn(|_| normal(draws))).expect("not zero")
+    normalized(std::array::from_fn(|_| normal(draws))).expect("not zero")
 }
 
 /// A random walk of rods of 1 m whose directions wander by `spread`.
@@ -31,8 +31,8 @@ fn walk<const D: usize>(n: usize, spread: f64, draws: &mut Draws) -> Vec<Point<D
     let mut u = direction(draws);
     let mut points = vec![[0.0; D]];
     for i in 0..n {
-        points.push(along(points[i], u, 1.0));
-        u = unit(along(u, direction(draws), spread)).expect("not zero");
+        points.push(add_scaled(points[i], u, 1.0));
+        u = normalized(add_scaled(u, direction(draws), spread)).expect("not zero");
     }
     points
 }
@@ -64,10 +64,14 @@ const TARGETS: usize = 300;
 
 fn measure<const D: usize>(chain: &Chain<D>, targets: &[Point<D>], engine: Engine) -> Row {
     let n = chain.rods().len();
-    let mut solver = Solver::default();
+    let mut solver = IkSolver::default();
     let (mut met, mut direct, mut steps) = (0, 0, Vec::new());
     let nothing = Obstacles::default();
-    let goal = |target| Goal { engine, tolerance_m: 1e-4 * n as f64, ..Goal::new(n, 0, target) };
+    let goal = |target| ChainIkGoal {
+        engine,
+        tolerance_m: 1e-4 * n as f64,
+        ..ChainIkGoal::new(n, 0, target)
+    };
     for target in targets {
         let answer = solver.solve(chain, &nothing, &goal(*target)).expect("right");
         let whole = chain_of_answer(chain, answer.points.clone());
@@ -266,12 +270,12 @@ impl<const D: usize> Scene<D> {
         let last = points[points.len() - 1];
         let into = points.len().checked_sub(2).map(|i| sub(last, points[i]));
         let u = match into {
-            Some(u) => unit(along(u, direction(draws), 0.5)).expect("not zero"),
+            Some(u) => normalized(add_scaled(u, direction(draws), 0.5)).expect("not zero"),
             None => direction(draws),
         };
-        let next = along(last, u, 1.0);
+        let next = add_scaled(last, u, 1.0);
         let clear = self.balls.iter().all(|(c, r)| {
-            let foot = sidestep::worlds::chain::geometry::nearest_on_segment(*c, last, next);
+            let foot = sidestep_rods::geometry::nearest_on_segment(*c, last, next);
             distance(*c, foot) > r + CONNECTOR_M + 1e-3
         });
         let bends = into.is_none_or(|v| angle_rad(v, u) <= self.max_bend_rad - 1e-6);
@@ -291,18 +295,18 @@ impl<const D: usize> Scene<D> {
 fn guarded_in<const D: usize>(n: usize, n_balls: u32, max_bend_deg: f64, before: &str) {
     const RUNS: usize = 60;
     let mut draws = draws(1000 * u64::from(n_balls) + n as u64 + D as u64 * 100_000);
-    let mut solver = Solver::default();
+    let mut solver = IkSolver::default();
     let (mut met, mut moved, mut times) = (0, 0, Vec::new());
     for _ in 0..RUNS {
         let scene = Scene::<D>::new(n, n_balls, max_bend_deg.to_radians(), &mut draws);
         let chain = scene.chain(scene.posture(n, &mut draws));
         let target = scene.posture(n, &mut draws)[n];
         let started = ProcessTime::now();
-        let answer = solver.solve(&chain, &scene.obstacles, &Goal::new(n, 0, target));
+        let answer = solver.solve(&chain, &scene.obstacles, &ChainIkGoal::new(n, 0, target));
         times.push(started.elapsed().as_secs_f64() * 1e6);
         let answer = answer.expect("right");
         met += usize::from(answer.reached);
-        moved += usize::from(answer.reached && answer.kind == Kind::Motion);
+        moved += usize::from(answer.reached && answer.kind == SolutionKind::Motion);
     }
     times.sort_by(f64::total_cmp);
     println!(
@@ -361,7 +365,7 @@ fn arm_row(name: &str, arm: &SerialChain, engine: Engine, restarts: usize) {
     const RUNS: usize = 500;
     let mut draws = draws(77);
     let mut random = || -> Vec<f64> {
-        let range = |l: Option<sidestep::import::urdf::Limits>| {
+        let range = |l: Option<sidestep_import::urdf::Limits>| {
             l.map_or([-3.0, 3.0], |l| [l.lower, l.upper])
         };
         let values = arm.variables.iter().map(|v| {

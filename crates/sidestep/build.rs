@@ -8,10 +8,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Folders of crates beside this one with sources that determine results.
-const CRATES: [&str; 6] = ["kernel", "scenario", "map", "import", "collectives", "statistics"];
-/// The sources of this crate that determine results.
-const OWN: &str = "src/experiment/sweep";
+/// The crate that makes tables of many runs; like the worlds, it determines results, with all that it uses.
+const EXPERIMENT: &str = "experiment";
+/// Folder of the crates of worlds.
+const WORLDS: &str = "worlds";
 
 fn main() {
     let here = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo says where"));
@@ -47,25 +47,79 @@ pub(crate) fn ingredients(here: &Path) -> io::Result<Ingredients> {
     Ok(found)
 }
 
-/// Returns the files that results follow from.
+/// Returns the files that results follow from: those of the worlds and of experiments, and of all that they use.
 fn sources(here: &Path, crates: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut roots: Vec<PathBuf> = CRATES.iter().map(|name| crates.join(name)).collect();
-    let worlds = crates.join("worlds");
-    println!("cargo::rerun-if-changed={}", worlds.display());
-    for entry in fs::read_dir(&worlds)? {
-        roots.push(entry?.path());
-    }
     let mut files = vec![here.join("Cargo.toml")];
-    let mut folders = vec![here.join(OWN)];
-    for root in roots {
-        files.push(root.join("Cargo.toml"));
-        folders.push(root.join("src"));
-    }
-    for folder in folders {
-        println!("cargo::rerun-if-changed={}", folder.display());
-        find_sources(&folder, &mut files)?;
+    for root in used_crates(crates)? {
+        let manifest = root.join("Cargo.toml");
+        let sources = root.join("src");
+        println!("cargo::rerun-if-changed={}", manifest.display());
+        println!("cargo::rerun-if-changed={}", sources.display());
+        files.push(manifest);
+        find_sources(&sources, &mut files)?;
     }
     Ok(files)
+}
+
+/// Returns the folders of the worlds and of experiments, and of the crates beside them that they use, through others
+/// too.
+fn used_crates(crates: &Path) -> io::Result<Vec<PathBuf>> {
+    let worlds = crates.join(WORLDS);
+    println!("cargo::rerun-if-changed={}", worlds.display());
+    let mut open = folders(&worlds)?;
+    open.push(crates.join(EXPERIMENT));
+    let mut others = Vec::new();
+    for folder in folders(crates)? {
+        // A folder without a manifest is no crate.
+        if let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml")) {
+            others.push((package_name(&manifest), folder));
+        }
+    }
+    let mut used: Vec<PathBuf> = Vec::new();
+    while let Some(folder) = open.pop() {
+        if used.contains(&folder) {
+            continue;
+        }
+        let manifest = fs::read_to_string(folder.join("Cargo.toml"))?;
+        let needs = dependencies(&manifest);
+        open.extend(
+            others.iter().filter(|(name, _)| needs.contains(name)).map(|(_, at)| at.clone()),
+        );
+        used.push(folder);
+    }
+    Ok(used)
+}
+
+fn folders(parent: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(parent)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+/// Returns the name in a manifest.
+fn package_name(manifest: &str) -> String {
+    let named = manifest.lines().find_map(|line| line.strip_prefix("name = "));
+    named.unwrap_or_default().trim_matches('"').to_string()
+}
+
+/// Returns the names of the packages that a manifest needs to be built. Reading it as TOML would need a library that
+/// is compiled before anything else.
+fn dependencies(manifest: &str) -> Vec<String> {
+    let mut is_inside = false;
+    let mut names = Vec::new();
+    for line in manifest.lines() {
+        if line.starts_with('[') {
+            is_inside = line == "[dependencies]";
+        } else if is_inside && let Some(end) = line.find(['.', ' ', '=']) {
+            names.push(line[..end].to_string());
+        }
+    }
+    names
 }
 
 /// Adds code and the presets that are compiled into it.

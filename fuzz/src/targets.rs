@@ -69,7 +69,7 @@ fn scenario(text: &str) {
 
 /// Compiles the default scenario of each world with one setting.
 fn overridden(setting: &str) {
-    for kind in WORLDS.0 {
+    for kind in WORLDS.iter() {
         let source = Source::new("f", kind.default_scenario(), folder());
         drop(
             source

@@ -279,13 +279,13 @@ def sweeps() -> None:
     usual, _engines.TASK_S = _engines.TASK_S, 0.0
     with ProcessPoolExecutor(1, mp_context=spawn) as pool:
         sidestep.sweep(floor, replicate=2, engine=pool)
-        took = sidestep.sweep(floor, replicate=60, engine=pool).told["took"]
+        took = sidestep.sweep(floor, replicate=60, engine=pool).output["took"]
     told("a task of one run on a process, beside its simulation", overhead(took), "15 ms")
     if importlib.util.find_spec("ray"):
         ray = importlib.import_module("ray")
         ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, object_store_memory=120_000_000)
         sidestep.sweep(floor, replicate=2, engine="ray")
-        took = sidestep.sweep(floor, replicate=60, engine="ray").told["took"]
+        took = sidestep.sweep(floor, replicate=60, engine="ray").output["took"]
         ray.shutdown()
         told("a task of one run on Ray, beside its simulation", overhead(took), "15 ms")
     _engines.TASK_S = usual
@@ -294,7 +294,7 @@ def sweeps() -> None:
         with ProcessPoolExecutor(workers, mp_context=spawn) as pool:
             sidestep.sweep(floor, replicate=2 * workers, engine=pool)
             swept = sidestep.sweep(floor, set={"cycles": 20_000}, replicate=40, engine=pool)
-        walls.append(swept.told["took"]["wall_s"])
+        walls.append(swept.output["took"]["wall_s"])
     told("a sweep on two processes against one", f"{walls[0] / walls[1]:.2f} times as fast", "1.8 times")
 
 

@@ -1,7 +1,6 @@
 """Simulation of many agents that must not collide: robots on a grid, chains, airplanes.
 
-The same scenario and seed give the same bits for any number of workers, and whether the command, the Rust library or
-Python runs it.
+The same scenario and seed give the same bits for any number of workers, in the command, the Rust library and Python.
 
 >>> import sidestep
 >>> scenario = sidestep.Scenario({
@@ -10,7 +9,7 @@ Python runs it.
 ...     "robots": [{"count": 3, "behaviour": {"kind": "external"}}],
 ... })
 >>> sim = sidestep.Simulation(scenario, seed=7)
->>> sim.order("action", 0)        # all go forward
+>>> sim.order("action", 0)        # all move forward
 >>> sim.step()
 1
 >>> sorted(sim.observe())
@@ -19,7 +18,7 @@ Python runs it.
 
 from . import collectives, learn, stats
 from ._agents import Agent, Each, each
-from ._arm import Placed, Reached, fk, ik
+from ._arm import FkResult, IkResult, fk, ik
 from ._errors import (
     CheckpointError,
     ClosedError,
@@ -45,7 +44,7 @@ from ._native import (
 )
 from ._read import Tables, read
 from ._status import SweepStatus, sweep_status
-from ._sweep import Compared, Sweep, compare, sweep
+from ._sweep import Comparison, Sweep, compare, sweep
 
 __all__ = [
     "Agent",
@@ -54,13 +53,13 @@ __all__ = [
     "Blocks",
     "CheckpointError",
     "ClosedError",
-    "Compared",
+    "Comparison",
     "Each",
     "EngineError",
+    "FkResult",
+    "IkResult",
     "InputError",
     "OrderError",
-    "Placed",
-    "Reached",
     "RecordError",
     "ReplayError",
     "Scenario",

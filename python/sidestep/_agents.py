@@ -1,4 +1,4 @@
-"""A class per agent, for teaching: an object of one's own decides for each agent of a team."""
+"""A class per agent, for teaching: a Python object decides for each agent of a team."""
 
 from __future__ import annotations
 
@@ -8,37 +8,39 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import wrong
+from ._errors import input_error
 from ._native import Team
 
 
 class Agent(Protocol):
-    """A function that decides for one agent."""
+    """An object that decides for one agent."""
 
     def decide(self, observed: dict[str, Any]) -> Any:
         """Returns the orders of the agent: a dict by name, or the only or first one.
 
-        ``observed`` has its observations by name: its row of those of its team.
+        ``observed`` has its observations by name: its row of the arrays of its team.
         """
         ...
 
 
 class Each:
-    """A function for ``decide=``, made of an object for each agent: see :func:`each`, which has an example."""
+    """A function for ``decide=`` with an object for each agent: see :func:`each`, which has an example."""
 
     def __init__(self, make: Callable[[int], Agent]) -> None:
         self._make = make
         self._teams: dict[str, _Members] = {}
 
     def of_team(self, team: Team) -> Callable[[dict[str, NDArray[Any]], Any], Any]:
-        """Returns the function that decides for a team; a run asks for it, and a team has the same one in all runs."""
+        """Returns the function that decides for a team: the same one in all runs."""
         if team.name not in self._teams:
             self._teams[team.name] = _Members([self._make(int(agent)) for agent in team.agents])
         return self._teams[team.name]
 
     def __call__(self, observed: dict[str, NDArray[Any]], state: Any) -> Any:
-        """Refuses: without a team it is unknown which agents these observations belong to."""
-        raise wrong("decide", "it was called without a team", "hand it to `Simulation.run`, or call `of_team` first")
+        """Raises InputError: without a team, the agents of these observations are unknown."""
+        raise input_error(
+            "decide", "it was called without a team", "pass it to `Simulation.run`, or call `of_team` first"
+        )
 
 
 class _Members:
@@ -49,20 +51,19 @@ class _Members:
 
     def __call__(self, observed: dict[str, NDArray[Any]], state: Any) -> Any:
         names, rows = tuple(observed), zip(*observed.values(), strict=True)
-        answers = [
+        decisions = [
             member.decide(dict(zip(names, row, strict=True))) for member, row in zip(self._members, rows, strict=True)
         ]
-        if not isinstance(answers[0], Mapping):
-            return np.asarray(answers)
-        return {name: np.asarray([answer[name] for answer in answers]) for name in answers[0]}
+        if not isinstance(decisions[0], Mapping):
+            return np.asarray(decisions)
+        return {name: np.asarray([decision[name] for decision in decisions]) for name in decisions[0]}
 
 
 def each(make: Callable[[int], Agent]) -> Each:
-    """Returns a function for ``decide=`` that asks an object per agent; ``make`` returns that of an agent by its id.
+    """Returns a function for ``decide=`` that calls an object per agent; ``make`` creates it from the agent's id.
 
-    It is for teaching and for trying things out: an agent takes about two microseconds more than in arrays. All
-    agents of a team return the same sort of thing: a number each, or dicts with the same names. The objects keep
-    their state from run to run.
+    It is for teaching and experiments: an agent costs about two microseconds more than with arrays. All agents of a
+    team return the same type: a number each, or dicts with the same names. The objects keep their state from run to run.
 
     >>> import sidestep
     >>> class Turner:

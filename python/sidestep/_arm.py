@@ -1,4 +1,4 @@
-"""Kinematics of arms: many postures, or many targets, in one call."""
+"""Kinematics of arms: many postures (joint configurations), or many targets, in one call."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._errors import whole, wrong
+from ._errors import checked_int, input_error
 from ._native import Arm
 
 _Floats = NDArray[np.float64]
 
 
-class Placed(NamedTuple):
-    """Positions of an arm in the frame of its base, one row per posture."""
+class FkResult(NamedTuple):
+    """Result of forward kinematics in the frame of the arm's base, one row per posture (joint configuration)."""
 
     #: Position of the tip in m, of the shape (n, 3).
     tip: _Floats
     #: Rotation matrices of the tip, of the shape (n, 3, 3).
     rotation: _Floats
-    #: The same as quaternions x, y, z, w, of the shape (n, 4).
+    #: The rotations as quaternions x, y, z, w, of the shape (n, 4).
     quaternion: _Floats
     #: Positions in m of the connectors, the points that the chain world moves, of the shape (n, connectors, 3).
     connectors: _Floats
@@ -30,35 +30,35 @@ class Placed(NamedTuple):
     inside_limits: NDArray[np.bool_]
 
 
-class Reached(NamedTuple):
-    """Answers to targets, one row per target."""
+class IkResult(NamedTuple):
+    """Result of inverse kinematics, one row per target."""
 
-    #: Joint values from the base out, in rad or m, of the shape (n, joints); where a target is not reached, those that
-    #: came nearest.
+    #: Joint values from the base out, in rad or m, of the shape (n, joints); where a target is not reached, the
+    #: closest ones found.
     joints: _Floats
     #: Whether it is reached, of the shape (n,).
     reached: NDArray[np.bool_]
     #: Distance of the tip from the target in m, along the axes that count, of the shape (n,).
     error_m: _Floats
-    #: Angle in rad by which the tip is turned otherwise than asked, of the shape (n,).
+    #: Orientation error of the tip in rad, of the shape (n,).
     error_rad: _Floats
-    #: Steps over all starts, of the shape (n,).
+    #: Iterations over all starts, of the shape (n,).
     iterations: NDArray[np.int64]
-    #: Postures that the search started from, of the shape (n,).
+    #: Number of postures that the search started from, of the shape (n,).
     starts: NDArray[np.int64]
     #: Reason why a target is not reached; None where it is.
     reasons: list[str | None]
-    #: Further postures that reach the target, of the shape (found, joints) each; with ``solutions`` above 1 alone.
+    #: Further postures that reach the target, of the shape (found, joints) each; only with ``solutions`` above 1.
     others: list[_Floats]
-    #: Meshes that stand as boxes, and shapes that could not be read.
+    #: Meshes that are approximated by boxes, and shapes that could not be read.
     remarks: list[str]
 
 
-def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Placed:
+def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> FkResult:
     """Forward kinematics: the positions of an arm's tip and connectors.
 
     ``arm`` is an :class:`Arm` or a URDF file. ``joints`` are values in rad or m, one for each of ``arm.joints``, of the shape
-    (joints,) or (n, joints); without any, each is as near to zero as its limits allow. Values outside of the limits are
+    (joints,) or (n, joints); without them, each is as close to zero as its limits allow. Values outside the limits are
     computed too.
 
     Raises InputError when a file or a shape is wrong.
@@ -72,7 +72,7 @@ def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Pl
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
     values = arm.posture() if joints is None else joints
-    return Placed(**arm.forward(_rows("joints", values)))
+    return FkResult(**arm.forward(_rows("joints", values)))
 
 
 def ik(
@@ -95,19 +95,19 @@ def ik(
     body: Literal["rods", "shapes", "own"] = "shapes",
     ignore_limits: bool = False,
     workers: int = 1,
-) -> Reached:
-    """Inverse kinematics: joint values that bring an arm's tip to targets, as ``sidestep ik`` finds them.
+) -> IkResult:
+    """Inverse kinematics: joint values that move an arm's tip to targets, as ``sidestep ik`` computes them.
 
     ``targets`` are positions of the tip in m in the frame of the base, of the shape (3,) or (n, 3). ``rpy`` (roll, pitch and yaw
-    in rad, of the shape (n, 3)) or ``quaternion`` (x, y, z, w, of the shape (n, 4)) ask for orientations; one for all may be of
-    one dimension. ``free`` names axes of the target's frame that do not count: ``"x"``, ``"y"``, ``"z"``, and ``"rx"``, ``"ry"``,
-    ``"rz"`` for turns about them. The search starts from ``start``, joint values of the shape (joints,) or (n, joints), then
-    from ``restarts`` random postures. With ``solutions`` above 1 it goes on until it has as many that are ``apart`` rad in some
-    joint; ``nearest`` finds those nearest to the start. ``obstacles`` are spheres, rows of x, y, z and radius in m; ``body`` is the
-    arm that they count for: ``"rods"`` between connectors, the links' collision ``"shapes"``, or ``"own"``, which must not touch each
-    other either. The answers do not depend on ``workers``.
+    in rad, of the shape (n, 3)) or ``quaternion`` (x, y, z, w, of the shape (n, 4)) give orientations; a single one for all targets may be
+    one-dimensional. ``free`` lists axes of the target's frame that are ignored: ``"x"``, ``"y"``, ``"z"``, and ``"rx"``, ``"ry"``,
+    ``"rz"`` for rotations about them. The search starts from ``start``, joint values of the shape (joints,) or (n, joints), then
+    from ``restarts`` random postures. With ``solutions`` above 1 it continues until it has as many that differ by ``apart`` rad in some
+    joint; ``nearest`` finds those closest to the start. ``obstacles`` are spheres, rows of x, y, z and radius in m; ``body`` is the
+    collision model of the arm: ``"rods"`` between connectors, the links' collision ``"shapes"``, or ``"own"``, shapes that must
+    not touch each other either. The results do not depend on ``workers``.
 
-    Raises InputError when a file, a shape or an option is wrong; a target out of reach is none: its row says why.
+    Raises InputError when a file, a shape or an option is wrong; a target out of reach is no error: its row gives the reason.
 
     >>> import sidestep
     >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
@@ -119,54 +119,54 @@ def ik(
     [None, None, "the target is ... m from the arm's first connector, and its rods reach 0.950000 m"]
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
-    places = _rows("targets", targets)
+    poses = _rows("targets", targets)
     if rpy is not None and quaternion is not None:
-        raise wrong("rpy", "a quaternion is asked for, too", "give one of them")
-    for name, turns, width in (("rpy", rpy, 3), ("quaternion", quaternion, 4)):
-        if turns is not None:
-            rows = _rows(name, turns)
-            if rows.shape[1] != width or len(rows) not in (1, len(places)):
-                told = f"({len(places)}, {width}) or ({width},)"
-                raise wrong(name, f"has the shape {rows.shape}", f"give an array of the shape {told}")
-            rows = np.broadcast_to(rows, (len(places), width))
-            places = np.hstack([_wide("targets", places, 3), rows])
+        raise input_error("rpy", "a quaternion is given, too", "give one of them")
+    for name, given, width in (("rpy", rpy, 3), ("quaternion", quaternion, 4)):
+        if given is not None:
+            rows = _rows(name, given)
+            if rows.shape[1] != width or len(rows) not in (1, len(poses)):
+                expected = f"({len(poses)}, {width}) or ({width},)"
+                raise input_error(name, f"has the shape {rows.shape}", f"give an array of the shape {expected}")
+            rows = np.broadcast_to(rows, (len(poses), width))
+            poses = np.hstack([_check_width("targets", poses, 3), rows])
     if rpy is None and quaternion is None:
-        places = _wide("targets", places, 3)
-    begin = _rows("start", arm.posture() if start is None else start)
-    if len(begin) not in (1, len(places)):
-        raise wrong("start", f"has {len(begin)} rows", f"give one row, or one per target, {len(places)}")
+        poses = _check_width("targets", poses, 3)
+    starts = _rows("start", arm.posture() if start is None else start)
+    if len(starts) not in (1, len(poses)):
+        raise input_error("start", f"has {len(starts)} rows", f"give one row, or one per target, {len(poses)}")
     spheres = np.empty((0, 4)) if obstacles is None else _rows("obstacles", obstacles)
     if not np.isfinite(spheres).all():
-        raise wrong("obstacles", "has values that are no numbers", "give x, y, z and radius in meters")
+        raise input_error("obstacles", "has values that are not numbers", "give x, y, z and radius in meters")
     options = {
         "free": list(free),
         "engine": engine,
         "tolerance_m": tolerance_m,
         "tolerance_rad": tolerance_rad,
-        "solutions": whole("solutions", solutions, 1, 10_000),
+        "solutions": checked_int("solutions", solutions, 1, 10_000),
         "apart": apart,
         "nearest": nearest,
-        "restarts": whole("restarts", restarts, 0, 1_000_000),
-        "seed": whole("seed", seed, 0, 2**64 - 1),
-        "obstacles": _wide("obstacles", spheres, 4).tolist(),
+        "restarts": checked_int("restarts", restarts, 0, 1_000_000),
+        "seed": checked_int("seed", seed, 0, 2**64 - 1),
+        "obstacles": _check_width("obstacles", spheres, 4).tolist(),
         "body": body,
         "ignore_limits": ignore_limits,
-        "workers": whole("workers", workers, 1, 1024),
+        "workers": checked_int("workers", workers, 1, 1024),
     }
-    return Reached(**arm.inverse(np.ascontiguousarray(places), begin, options))
+    return IkResult(**arm.inverse(np.ascontiguousarray(poses), starts, options))
 
 
 def _rows(name: str, values: ArrayLike) -> _Floats:
     try:
         array = np.atleast_2d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError) as error:
-        raise wrong(name, f"are no numbers: {error}", "give an array of numbers") from error
+        raise input_error(name, f"are not numbers: {error}", "give an array of numbers") from error
     if array.ndim != 2:
-        raise wrong(name, f"has the shape {array.shape}", "give an array of one or two dimensions")
+        raise input_error(name, f"has the shape {array.shape}", "give an array of one or two dimensions")
     return np.ascontiguousarray(array)
 
 
-def _wide(name: str, rows: _Floats, width: int) -> _Floats:
+def _check_width(name: str, rows: _Floats, width: int) -> _Floats:
     if rows.shape[1] != width:
-        raise wrong(name, f"has the shape {rows.shape}", f"give an array of the shape (n, {width})")
+        raise input_error(name, f"has the shape {rows.shape}", f"give an array of the shape (n, {width})")
     return rows

@@ -1,17 +1,17 @@
-"""The exceptions: each names the mistake, its place, and its remedy."""
+"""The exceptions: each gives the mistake, its place, and its remedy."""
 
 from __future__ import annotations
 
 
 class SidestepError(Exception):
-    """Anything that Sidestep reports; the other exceptions stand below it."""
+    """Base class of all exceptions of Sidestep."""
 
 
 class InputError(SidestepError, ValueError):
     """Wrong input: a scenario, a file, a table whose rows do not sum to 1.
 
-    Its text is the command's. ``place`` is the file or option, ``line`` and ``column`` count from 1 where they
-    are known, ``key`` is the key as :meth:`Scenario.set` names it, where it is known.
+    Its text is that of the command. ``place`` is the file or option, ``line`` and ``column`` count from 1 where they
+    are known, ``key`` is the key in the notation of :meth:`Scenario.set`, where it is known.
     """
 
     def __init__(
@@ -37,11 +37,11 @@ class InputError(SidestepError, ValueError):
 
 
 class OrderError(SidestepError, ValueError):
-    """An order that cannot be obeyed, or arrays of another shape; nothing of it was noted."""
+    """An order that is not allowed, or arrays of a wrong shape; no part of it takes effect."""
 
 
 class RecordError(SidestepError, OSError):
-    """Rows, files or pictures that cannot be stored."""
+    """Rows, files or images that cannot be stored."""
 
     def __str__(self) -> str:
         return str(self.args[0]) if self.args else ""
@@ -52,24 +52,24 @@ class CheckpointError(SidestepError, ValueError):
 
 
 class ReplayError(SidestepError, RuntimeError):
-    """A run that stopped, or did not come out as recorded; the text says how to replay it."""
+    """A run that stopped, or whose result differs from the recording; the text says how to replay it."""
 
 
 class EngineError(SidestepError, RuntimeError):
-    """An executor that cannot run the tasks of a sweep; finished runs are kept, and the same call goes on."""
+    """An executor that cannot run the tasks of a sweep; finished runs are kept, and the same call continues."""
 
 
 class ClosedError(SidestepError, RuntimeError):
-    """A simulation that was closed is used."""
+    """Use of a closed simulation."""
 
 
-def wrong(place: str, cause: str, remedy: str) -> InputError:
+def input_error(place: str, cause: str, remedy: str) -> InputError:
     """Returns the error of an argument."""
     return InputError(f"{place}: {cause}\n  help: {remedy}", place, None, None, None, cause, remedy)
 
 
-def whole(name: str, value: int, least: int, most: int) -> int:
-    """Returns a whole number, if it is in its range."""
-    if not least <= value <= most:
-        raise wrong(name, f"is {value}", f"give a number from {least} to {most}")
+def checked_int(name: str, value: int, low: int, high: int) -> int:
+    """Returns an integer, if it is in its range."""
+    if not low <= value <= high:
+        raise input_error(name, f"is {value}", f"give a number from {low} to {high}")
     return value

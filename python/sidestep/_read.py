@@ -6,15 +6,15 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 
 from . import _native, _notebook
-from ._errors import wrong
+from ._errors import input_error
 from ._native import Table, table_names
 
 
 class Tables(Mapping[str, Table]):
     """The tables of a run folder or of a sweep's folder by name, as :func:`read` returns them.
 
-    A table is read from its files when it is asked for first, and kept then. Asking raises InputError when a file is
-    damaged, and KeyError when there is no such table.
+    A table is read from its files on first access and cached. Access raises InputError when a file is damaged, and
+    KeyError when there is no such table.
     """
 
     def __init__(self, folder: str | os.PathLike[str], names: Sequence[str]) -> None:
@@ -46,10 +46,9 @@ class Tables(Mapping[str, Table]):
 
 
 def read(folder: str | os.PathLike[str], tables: Sequence[str] | None = None) -> Tables:
-    """Returns the tables of a run folder or a sweep's folder by name; each is read when it is asked for.
+    """Returns the tables of a run folder or a sweep's folder by name; each is read on first access.
 
-    ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
-    checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
+    ``tables`` lists the tables to return; by default all. A table of an unfinished run ends at its last checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
 
     Raises InputError when there is no such folder or table.
 
@@ -67,5 +66,5 @@ def read(folder: str | os.PathLike[str], tables: Sequence[str] | None = None) ->
     known = table_names(folder)
     unknown = [name for name in tables or () if name not in known]
     if unknown:
-        raise wrong(os.fspath(folder), f"there is no table `{unknown[0]}`", f"name some of {', '.join(known)}")
+        raise input_error(os.fspath(folder), f"there is no table `{unknown[0]}`", f"give some of {', '.join(known)}")
     return Tables(folder, known if tables is None else tables)

@@ -9,34 +9,39 @@ from typing import Any
 
 from . import _engines, _notebook
 from ._engines import Engine
-from ._errors import whole, wrong
+from ._errors import checked_int, input_error
 from ._native import Scenario, Table, compare_methods, run_sweep
 
-#: Largest number of runs of a variant.
-MOST_RUNS = 1_000_000
+#: Maximum number of runs of a variant.
+MAX_RUNS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Sweep:
     """The runs of a sweep and their summary, as :func:`sweep` returns them."""
 
-    #: One row per run: cell, variant, replicate, seed, parameters, metrics and the digest of the last state.
+    #: One row per run: its trial (column ``cell``), variant, replicate, seed, parameters, metrics and final digest.
     results: Table
-    #: Times that a clock measured of each run, in seconds; it differs when the runs are made again.
+    #: Measured times of each run in seconds; they differ if the sweep is repeated.
     timings: Table
     #: The output of ``sidestep sweep --json``: ``summary`` has every metric with intervals and comparisons.
-    told: dict[str, Any]
+    output: dict[str, Any]
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The same as ``output``."""
+        return self.output
 
     @property
     def summary(self) -> dict[str, Any]:
         """Variants, metrics with their intervals, comparisons with the baseline, effects of parameters."""
-        summary: dict[str, Any] = self.told["summary"]
+        summary: dict[str, Any] = self.output["summary"]
         return summary
 
     @property
     def failed(self) -> int:
-        """Number of runs that failed; the column ``failure`` says why."""
-        return int(self.told["failed"])
+        """Number of runs that failed; the column ``failure`` gives the reason."""
+        return int(self.output["failed"])
 
     def values(self, metric: str, variant: int | None = None) -> Any:
         """Returns a metric of all runs, or of one variant, by the number of the replicate: an array of shape (runs,).
@@ -56,18 +61,18 @@ class Sweep:
         return len(self.results)
 
     def __repr__(self) -> str:
-        name = self.told["name"] or self.told["world"]
+        name = self.output["name"] or self.output["world"]
         return f"Sweep({name}, {len(self)} runs of {len(self.summary['variants'])} variants)"
 
     def _repr_html_(self) -> str:
         return _notebook.sweep(self)
 
 
-class Compared(dict[str, Any]):
-    """Methods that were compared, as :func:`compare` returns them: a dict that notebooks show as a table."""
+class Comparison(dict[str, Any]):
+    """A comparison of methods, as :func:`compare` returns it: a dict that notebooks show as a table."""
 
     def _repr_html_(self) -> str:
-        return _notebook.compared(self)
+        return _notebook.comparison(self)
 
 
 def sweep(
@@ -90,45 +95,47 @@ def sweep(
     """Runs many variants of a scenario, each with many seeds, as ``sidestep sweep`` does, with the same bits.
 
     ``sweep`` is a sweep file, a dict of the keys of one, or a scenario of any sort. ``vary`` has a list of values for each
-    key, and every combination is a variant; ``set`` holds for all variants, and so does ``cycles``. Each is run ``replicate``
-    times (10), or ``until`` the 95 % intervals of means are narrow: ``"ci=0.05"``, a share of the mean, or ``"abs=2.5"``, in
-    the unit of the metric, and at most ``max_runs`` (1000) times. Replicate `k` of every variant has the seed ``seed + k``.
-    ``metrics`` are those to report, ``baseline`` the variant to compare with: its name, or the values that it has.
+    key, and every combination is a variant; ``set`` and ``cycles`` apply to all variants. Each is run ``replicate``
+    times (10), or ``until`` the 95 % intervals of means are narrow: ``"ci=0.05"``, a fraction of the mean, or ``"abs=2.5"``,
+    in the unit of the metric, and at most ``max_runs`` (1000) times. Replicate `k` of every variant has the seed ``seed + k``.
+    ``metrics`` are those to report, ``baseline`` the variant to compare with: its name or its values.
 
-    With ``out`` the runs are kept in a folder, which is that of the command, byte for byte: Ctrl-C or a kill lose no finished
-    run, and the same call goes on. ``record`` keeps a run folder of every run in it.
+    With ``out`` the runs are kept in a folder, byte for byte that of the command: Ctrl-C or a kill loses no finished
+    run, and the same call continues. ``record`` keeps a run folder of every run in it.
 
-    ``engine`` runs the cells: ``"local"``, on ``workers`` threads; ``"ray"``; or a ``concurrent.futures.Executor``, such as
-    ``ProcessPoolExecutor()``, Dask's ``client.get_executor()`` or one of mpi4py, or a function that makes one, which is then
-    called again when workers were killed. ``workers`` is then the number of tasks at once. The table is the same for
+    ``engine`` runs the trials: ``"local"``, on ``workers`` threads; ``"ray"``; or a ``concurrent.futures.Executor``, such as
+    ``ProcessPoolExecutor()``, Dask's ``client.get_executor()`` or one of mpi4py, or a function that creates one, which is
+    called again when workers are killed. ``workers`` is then the number of tasks at once. The table is the same for
     every engine.
 
-    Raises InputError when anything asked for is wrong, before any run starts; RecordError when the folder cannot be written;
-    EngineError when an executor is beyond help.
+    Raises InputError when an argument is wrong, before any run starts; RecordError when the folder cannot be written;
+    EngineError when an executor keeps failing.
 
     >>> import sidestep
     >>> floor = {"world": "robots", "cycles": 50, "map": {"ascii": "......\\n......"}, "robots": {"count": 2}}
-    >>> swept = sidestep.sweep(floor, vary={"robots.count": [2, 4]}, replicate=3, seed=7)
-    >>> swept
+    >>> result = sidestep.sweep(floor, vary={"robots.count": [2, 4]}, replicate=3, seed=7)
+    >>> result
     Sweep(robots, 6 runs of 2 variants)
-    >>> swept.results["seed"].tolist()
+    >>> result.results["seed"].tolist()
     [7, 8, 9, 7, 8, 9]
-    >>> [variant["name"] for variant in swept.summary["variants"]]
+    >>> [variant["name"] for variant in result.summary["variants"]]
     ['count=2', 'count=4']
     """
     if replicate is not None and until is not None:
-        raise wrong("replicate", "`until` says how often to run, too", "give one of them; max_runs bounds until")
+        raise input_error(
+            "replicate", "`until` also sets the number of runs", "give one of them; max_runs bounds until"
+        )
     if until is not None and not isinstance(until, str):
-        raise wrong("until", f"{until!r} is no text", 'write "ci=0.05" (of the mean) or "abs=2.5" (in units)')
+        raise input_error("until", f"{until!r} is not a text", 'write "ci=0.05" (of the mean) or "abs=2.5" (in units)')
     if isinstance(baseline, str) and "=" in baseline:
         remedy = 'give values as a dict, {"robots.count": 2}, or the name of a variant of the sweep file'
-        raise wrong("baseline", f"{baseline!r} is no name", remedy)
+        raise input_error("baseline", f"{baseline!r} is not a name", remedy)
     options = {
         "vary": _mapping("vary", vary),
         "set": {**_mapping("set", set), **({} if cycles is None else {"cycles": cycles})},
-        "replicate": _count("replicate", replicate, MOST_RUNS),
+        "replicate": _count("replicate", replicate, MAX_RUNS),
         "until": until,
-        "max_runs": _count("max_runs", max_runs, MOST_RUNS),
+        "max_runs": _count("max_runs", max_runs, MAX_RUNS),
         "metrics": _names("metrics", metrics),
         "baseline": baseline if isinstance(baseline, Mapping) else None,
         "baseline_name": baseline if isinstance(baseline, str) else None,
@@ -137,16 +144,16 @@ def sweep(
     }
     _count("workers", workers, 1024)
     if record and engine != "local":
-        raise wrong("record", "runs are recorded on this machine alone", 'leave it out, or give engine="local"')
+        raise input_error("record", "runs are recorded on this machine only", 'leave it out, or give engine="local"')
     if record and out is None:
-        raise wrong("record", "there is no folder to record runs to", "name one as `out`")
-    crew = _engines.crew(engine, workers)
-    if crew is None:
+        raise input_error("record", "there is no folder to record runs to", "give one as `out`")
+    pool = _engines.task_pool(engine, workers)
+    if pool is None:
         return Sweep(*run_sweep(sweep, options, out, workers or 0, None))
     try:
-        return Sweep(*run_sweep(sweep, options, out, crew.at_once, crew.run))
+        return Sweep(*run_sweep(sweep, options, out, pool.at_once, pool.run))
     finally:
-        crew.close()
+        pool.close()
 
 
 def compare(
@@ -156,44 +163,44 @@ def compare(
     runs: int = 10,
     seed: int | None = None,
     workers: int | None = None,
-) -> Compared:
-    """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` prints them.
+) -> Comparison:
+    """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` does.
 
     ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"`` and ``"none"``. Each flies ``runs``
-    times, with consecutive seeds from ``seed`` on (the scenario's). The answer has a dict of each method under ``"methods"``:
-    ``losses`` of separation, ``arrived`` (a share), ``delay_percent`` and others, each with its ``mean``, the ``interval`` of that
-    (95 %) and ``n``; ``min_separation_m`` is the nearest of all runs.
+    times, with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
+    ``losses`` of separation, ``arrived`` (a proportion), ``delay_percent`` and others, each with its ``mean``, its 95 %
+    ``interval`` and ``n``; ``min_separation_m`` is the minimum over all runs.
 
-    Any other two variants are compared by :func:`sweep` with ``baseline=``, or by :func:`sidestep.stats.paired`.
+    Use :func:`sweep` with ``baseline=``, or :func:`sidestep.stats.paired`, to compare any other two variants.
 
     Raises InputError when the scenario is of another world, or a method is unknown.
 
     >>> import sidestep
     >>> four = {"world": "airspace", "airspace": {"shield": "off", "generator": {"kind": "superconflict", "n": 4}}}
-    >>> compared = sidestep.compare(four, methods=["pc", "none"], runs=3)
-    >>> [(method["method"], method["loss_free"]) for method in compared["methods"]]
+    >>> comparison = sidestep.compare(four, methods=["pc", "none"], runs=3)
+    >>> [(method["method"], method["loss_free"]) for method in comparison["methods"]]
     [('pc', 3), ('none', 0)]
     """
-    count = _count("runs", runs, MOST_RUNS) or 1
+    count = _count("runs", runs, MAX_RUNS) or 1
     workers = _count("workers", workers, 1024) or 0
-    return Compared(compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers))
+    return Comparison(compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers))
 
 
 def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:
     if values is not None and not isinstance(values, Mapping):
-        raise wrong(name, f"{values!r} is no dict", "give a dict by keys of the scenario")
+        raise input_error(name, f"{values!r} is not a dict", "give a dict by keys of the scenario")
     return values or {}
 
 
-def _count(name: str, value: int | None, most: int) -> int | None:
-    return None if value is None else whole(name, value, 1, most)
+def _count(name: str, value: int | None, high: int) -> int | None:
+    return None if value is None else checked_int(name, value, 1, high)
 
 
 def _seed(seed: int | None) -> int | None:
-    return None if seed is None else whole("seed", seed, 0, 2**63 - 1)
+    return None if seed is None else checked_int("seed", seed, 0, 2**63 - 1)
 
 
 def _names(name: str, names: Sequence[str]) -> list[str]:
     if isinstance(names, str):
-        raise wrong(name, f"{names!r} is one text", f"give a list: [{names!r}]")
+        raise input_error(name, f"{names!r} is a single text", f"give a list: [{names!r}]")
     return list(names)

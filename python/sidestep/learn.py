@@ -1,7 +1,7 @@
 """Error models of real sensors and wheels, learned from tables: arrays, data frames, or the recording of a run.
 
-Every probability has its number of counts, and Wilson's 95 % interval. Other logs (MRCLAM, CARMEN, ROS 2 bags) are
-learned from by ``sidestep learn``.
+Every probability has its number of counts, and Wilson's 95 % interval. For other logs (MRCLAM, CARMEN, ROS 2 bags)
+use ``sidestep learn``.
 
 >>> from sidestep import learn
 >>> moves = {"action": ["forward"] * 4, "ahead_boxes": [1, 1, 1, 0], "left_boxes": [0] * 4, "turn_deg": [0] * 4}
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._errors import wrong
+from ._errors import input_error
 from ._native import Learned
 
 __all__ = ["Learned", "effector", "sensor"]
@@ -42,9 +42,9 @@ def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learne
 
     ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
-    of the start, ``turn_deg``, positive to the left, and perhaps ``contact`` (``"yes"`` where an obstacle stopped it: such rows
-    are left out). Or the folder of a run with ``record.calibration = true``. ``alpha`` is added to every count before rows
-    become probabilities; every ``hold_out``-th move is held out to test the fit.
+    of the start, ``turn_deg``, positive to the left, and optionally ``contact`` (``"yes"`` where an obstacle stopped it: such rows
+    are skipped). Or the folder of a run with ``record.calibration = true``. ``alpha`` is added to every count before rows
+    become probabilities; every ``hold_out``-th move is held out to test the model.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
@@ -83,9 +83,9 @@ def sensor(
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
     >>> from sidestep import learn
-    >>> seen = {"true": ["wall", "wall", "nothing"], "reported": ["wall", "nothing", "nothing"],
+    >>> readings = {"true": ["wall", "wall", "nothing"], "reported": ["wall", "nothing", "nothing"],
     ...         "true_distance_m": [1.0, 1.5, None], "reported_distance_m": [1.1, None, None]}
-    >>> learned = learn.sensor(seen, edges_m=[2.0], classes=["near", "far"], range_m=4.0)
+    >>> learned = learn.sensor(readings, edges_m=[2.0], classes=["near", "far"], range_m=4.0)
     >>> one = learned.report["probabilities"][0]
     >>> one["row"], one["column"], one["count"], one["of"]
     ('nothing', 'nothing', 1.0, 1.0)
@@ -102,17 +102,17 @@ def sensor(
 
 
 def _table(columns: Columns, known: Sequence[str]) -> tuple[str | None, str | None]:
-    """Returns a table as the text of one, or the folder that holds it."""
+    """Returns a table as CSV text, or the folder that contains it."""
     if isinstance(columns, str | os.PathLike):
         return None, os.fspath(columns)
     names = [name for name in known if _has(columns, name)]
     if not names:
-        raise wrong("columns", f"there is none of {', '.join(known)}", "give a dict of columns or a data frame")
+        raise input_error("columns", f"there is none of {', '.join(known)}", "give a dict of columns or a data frame")
     lists = [np.asarray(columns[name]).tolist() for name in names]
     lengths = {name: len(column) for name, column in zip(names, lists, strict=True)}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise wrong("columns", f"their lengths differ: {told}", "give one value of each per row")
+        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise input_error("columns", f"their lengths differ: {listed}", "give one value of each per row")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
@@ -129,7 +129,7 @@ def _is_missing(cell: Any) -> bool:
     try:
         return bool(cell != cell)
     except TypeError:
-        # The missing value of data frames is neither equal nor unequal to anything.
+        # The missing value of data frames has no truth value in comparisons.
         return True
 
 

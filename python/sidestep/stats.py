@@ -1,7 +1,7 @@
-"""Intervals, paired differences and the stopping rule: those of the command and of its reports.
+"""Intervals, paired differences and the stopping rule, as in the command and its reports.
 
-Intervals are two-sided at 95 %. A value that is NaN, infinite or None is missing: it is counted, and no part of a mean. All take
-values of different runs as independent, which different seeds make them; robots of one run are not.
+Intervals are two-sided at 95 %. A value that is NaN, infinite or None is missing: it is counted, but not part of a mean. All
+functions assume independent values, as of runs with different seeds; robots of one run are not independent.
 
 >>> from sidestep import stats
 >>> stats.mean([4.0, 5.0, 7.0, float("nan")])
@@ -20,21 +20,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native, _notebook
-from ._errors import wrong
+from ._errors import input_error
 
 __all__ = [
     "Correlation",
     "Interval",
     "Mean",
-    "Next",
     "Paired",
     "Quantile",
     "Share",
+    "StopDecision",
     "StoppingRule",
     "correlation",
     "holm",
     "mean",
     "paired",
+    "proportion",
     "quantile",
     "share",
 ]
@@ -56,7 +57,7 @@ class Mean(NamedTuple):
     sd: float | None
     #: Student's interval of the mean.
     interval: Interval | None
-    #: The bootstrap's (BCa) interval of the mean, for skewed values; None where all are equal.
+    #: Bootstrap (BCa) interval of the mean, for skewed values; None if all are equal.
     bootstrap: Interval | None
     #: Number of values.
     n: int
@@ -65,11 +66,11 @@ class Mean(NamedTuple):
 
 
 class Share(NamedTuple):
-    """A share of runs."""
+    """A proportion of runs."""
 
     #: From 0 to 1; None without runs.
     share: float | None
-    #: Wilson's interval: its coverage is 95 % on average over shares.
+    #: Wilson's interval: its coverage is 95 % on average over proportions.
     interval: Interval
     #: Clopper and Pearson's interval: its coverage is never below 95 %.
     exact: Interval
@@ -80,7 +81,7 @@ class Quantile(NamedTuple):
 
     #: The estimate; None without values.
     value: float | None
-    #: Interval by order statistics; None with too few values for an honest one.
+    #: Interval by order statistics; None with too few values for one.
     interval: Interval | None
     #: The coverage of that interval, 0.95 or more.
     coverage: float | None
@@ -91,23 +92,23 @@ class Paired(NamedTuple):
 
     #: Number of complete pairs.
     n: int
-    #: Number of cases of which one or both values are missing.
+    #: Number of cases with one or both values missing.
     incomplete: int
     #: Mean of a - b.
     difference: float | None
     #: Student's interval of it.
     interval: Interval | None
-    #: The bootstrap's interval of it.
+    #: Bootstrap interval of it.
     bootstrap: Interval | None
     #: Two-sided p-value of Student's paired test of no difference.
     p_value: float | None
-    #: Two-sided p-value of the sign test, which assumes nothing of the values.
+    #: Two-sided p-value of the sign test, which makes no assumption about the values.
     sign_p_value: float | None
     #: Numbers of pairs in which a is lower, equal, and higher.
     lower: int
     equal: int
     higher: int
-    #: Mean of a over mean of b; None where values are negative, or the mean of b may be 0.
+    #: Mean of a over mean of b; None if values are negative, or the mean of b may be 0.
     ratio: float | None
     #: Fieller's interval of it.
     ratio_interval: Interval | None
@@ -121,18 +122,18 @@ class Correlation(NamedTuple):
 
     #: From -1 to 1.
     value: float
-    #: Its interval; None below four pairs, or where the order is perfect.
+    #: Its interval; None below four pairs, or if the order is perfect.
     interval: Interval | None
     #: Number of complete pairs.
     n: int
 
 
-class Next(NamedTuple):
-    """The answer of a stopping rule."""
+class StopDecision(NamedTuple):
+    """The decision of a stopping rule."""
 
-    #: Number of runs to have in all; if there are enough, the first so many are the result.
+    #: Total number of runs needed; once reached, use only that many, from the first.
     runs: int
-    #: Reason why they are enough; None if they are not.
+    #: Reason to stop; None if more runs are needed.
     reason: str | None
 
 
@@ -140,9 +141,9 @@ def _values(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise wrong(name, f"are no numbers: {error}", "give numbers; NaN or None for missing ones") from error
+        raise input_error(name, f"are not numbers: {error}", "give numbers; NaN or None for missing ones") from error
     if array.ndim != 1:
-        raise wrong(name, f"have the shape {array.shape}", "give an array of one dimension")
+        raise input_error(name, f"have the shape {array.shape}", "give an array of one dimension")
     return np.ascontiguousarray(array)
 
 
@@ -155,7 +156,7 @@ def mean(values: ArrayLike) -> Mean:
 
     Trust ``interval`` from 5 values on if they are roughly symmetric, ``bootstrap`` from 20 on if they are skewed.
 
-    Raises InputError when they are no numbers.
+    Raises InputError when they are not numbers.
 
     >>> from sidestep import stats
     >>> stats.mean([2, 2, 2]).interval
@@ -165,19 +166,29 @@ def mean(values: ArrayLike) -> Mean:
     return Mean(center, sd, _interval(student), _interval(bootstrap), n, missing)
 
 
-def share(successes: int, n: int) -> Share:
-    """Returns the share of ``successes`` among ``n`` runs, with its intervals.
+def proportion(successes: int, n: int) -> Share:
+    """Returns the proportion of ``successes`` among ``n`` runs, with its intervals.
 
     Raises InputError when there are more successes than runs.
 
     >>> from sidestep import stats
-    >>> stats.share(9, 10).interval
+    >>> stats.proportion(9, 10).interval
     Interval(low=0.59..., high=0.98...)
     """
     if successes < 0 or n < 0:
-        raise wrong("share", f"{successes} of {n} cannot be", "give numbers from 0 on")
+        raise input_error("proportion", f"{successes} of {n} is impossible", "give numbers from 0 on")
     wilson, exact = _native.stats_share(successes, n)
     return Share(successes / n if n else None, Interval(*wilson), Interval(*exact))
+
+
+def share(successes: int, n: int) -> Share:
+    """The same as :func:`proportion`.
+
+    >>> from sidestep import stats
+    >>> stats.share(9, 10) == stats.proportion(9, 10)
+    True
+    """
+    return proportion(successes, n)
 
 
 def quantile(values: ArrayLike, q: float) -> Quantile:
@@ -188,7 +199,7 @@ def quantile(values: ArrayLike, q: float) -> Quantile:
     49.5
     """
     if not 0.0 < q < 1.0:
-        raise wrong("q", f"is {q}", "give a number between 0 and 1")
+        raise input_error("q", f"is {q}", "give a number between 0 and 1")
     value, interval, coverage = _native.stats_quantile(_values("values", values), q)
     return Quantile(value, _interval(interval), coverage)
 
@@ -196,14 +207,14 @@ def quantile(values: ArrayLike, q: float) -> Quantile:
 def paired(a: ArrayLike, b: ArrayLike) -> Paired:
     """Compares two treatments of the same cases: values of the shape (n,) each, case by case.
 
-    The interval of the difference is much narrower than two separate ones where cases differ among themselves, and their
-    overlap says nothing about pairs.
+    The interval of the difference is much narrower than separate ones if the cases differ among themselves; the overlap
+    of separate intervals says nothing about pairs.
 
-    Raises InputError when there is another number of both.
+    Raises InputError when the numbers of values differ.
 
     >>> from sidestep import stats
-    >>> compared = stats.paired([10.0, 21.0, 29.5, 42.0], [12.0, 23.0, 31.0, 44.5])
-    >>> compared.difference, compared.interval.high < 0
+    >>> pairs = stats.paired([10.0, 21.0, 29.5, 42.0], [12.0, 23.0, 31.0, 44.5])
+    >>> pairs.difference, pairs.interval.high < 0
     (-2.0, True)
     """
     counts, intervals, p_values, signs, ratio = _native.stats_paired(_values("a", a), _values("b", b))
@@ -212,7 +223,7 @@ def paired(a: ArrayLike, b: ArrayLike) -> Paired:
 
 
 def holm(p_values: Sequence[float | None]) -> list[float | None]:
-    """Returns p-values adjusted by Holm: whichever are below 0.05 stand, with 95 % confidence in all of them together.
+    """Returns p-values adjusted by Holm's method: all below 0.05 are significant together, at a confidence of 95 %.
 
     >>> from sidestep import stats
     >>> stats.holm([0.01, 0.04, None])
@@ -222,7 +233,7 @@ def holm(p_values: Sequence[float | None]) -> list[float | None]:
 
 
 def correlation(a: ArrayLike, b: ArrayLike) -> Correlation | None:
-    """Returns Spearman's rank correlation of two quantities of the shape (n,); None where one of them is constant.
+    """Returns Spearman's rank correlation of two quantities of the shape (n,); None if one of them is constant.
 
     >>> from sidestep import stats
     >>> stats.correlation([1, 2, 3, 4], [1, 4, 9, 16]).value
@@ -230,25 +241,27 @@ def correlation(a: ArrayLike, b: ArrayLike) -> Correlation | None:
     """
     first, second = _values("a", a), _values("b", b)
     if first.shape != second.shape:
-        raise wrong("correlation", f"{len(first)} and {len(second)} values are no pairs", "give two of each case")
-    found: Any = _native.stats_correlation(first, second)
-    return None if found is None else Correlation(found[0], _interval(found[1]), found[2])
+        raise input_error(
+            "correlation", f"{len(first)} and {len(second)} values are not pairs", "give two values of each case"
+        )
+    result: Any = _native.stats_correlation(first, second)
+    return None if result is None else Correlation(result[0], _interval(result[1]), result[2])
 
 
 @dataclass(frozen=True)
 class StoppingRule:
-    """The rule that ends a sweep at a precision: when Student's interval of the mean is narrow enough.
+    """The rule that ends a sweep at a precision: once Student's interval of the mean is narrow enough.
 
-    ``half_width`` is in the unit of the values or, if ``relative``, a share of the mean. The first look is after ``min_runs``.
-    The answer is a function of the values alone, not of how many were made at once, or by which process.
+    ``half_width`` is in the unit of the values or, if ``relative``, a fraction of the mean. It is first checked after
+    ``min_runs``. The decision depends only on the values, not on parallelism or processes.
 
     >>> from sidestep import stats
     >>> rule = stats.StoppingRule(0.05)
     >>> rule.next([])
-    Next(runs=10, reason=None)
+    StopDecision(runs=10, reason=None)
     >>> values = [10.0, 10.2, 9.9, 10.1, 9.8, 10.0, 10.3, 9.7, 10.0, 10.1]
     >>> rule.next(values)
-    Next(runs=10, reason='the interval is as narrow as wanted')
+    StopDecision(runs=10, reason='the interval is as narrow as wanted')
     """
 
     half_width: float
@@ -258,18 +271,18 @@ class StoppingRule:
 
     def __post_init__(self) -> None:
         if not (0.0 < self.half_width < float("inf")):
-            raise wrong("half_width", f"is {self.half_width}", "give a number above 0")
+            raise input_error("half_width", f"is {self.half_width}", "give a number above 0")
         if not 2 <= self.min_runs <= self.max_runs:
-            raise wrong("min_runs", f"is {self.min_runs}", f"give a number from 2 to max_runs, {self.max_runs}")
+            raise input_error("min_runs", f"is {self.min_runs}", f"give a number from 2 to max_runs, {self.max_runs}")
 
-    def next(self, *columns: ArrayLike) -> Next:
-        """Returns how many runs to have, after the values of those there are: one column per quantity, in the order of the
-        runs. With several columns they are enough when they are for all.
+    def next(self, *columns: ArrayLike) -> StopDecision:
+        """Returns whether to stop, given the values so far: one column per quantity, in the order of the runs. With several
+        columns, all must be precise enough.
 
         >>> from sidestep import stats
         >>> stats.StoppingRule(1.0, relative=False, max_runs=20).next([1.0, 9.0] * 5)
-        Next(runs=20, reason=None)
+        StopDecision(runs=20, reason=None)
         """
         values = [_values("columns", column) for column in columns]
         runs = (self.min_runs, self.max_runs)
-        return Next(*_native.stats_next(self.half_width, self.relative, runs, values))
+        return StopDecision(*_native.stats_next(self.half_width, self.relative, runs, values))

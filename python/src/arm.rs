@@ -6,12 +6,12 @@ use crate::watch::run_polling;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sidestep::experiment::sweep::scheduler::run_cells;
-use sidestep::kernel::InputError;
-use sidestep::worlds::chain::ik::Engine;
-use sidestep::worlds::chain::kinematics::{
+use sidestep::arms::ik::Engine;
+use sidestep::arms::kinematics::{
     ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
 };
+use sidestep::experiment::sweep::scheduler::run_cells;
+use sidestep::kernel::InputError;
 use std::path::PathBuf;
 
 /// An arm of a robot model (URDF): its joints from a base link to a tip link.

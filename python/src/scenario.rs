@@ -207,7 +207,7 @@ fn load_any(
                     argument_error("scenario", cause, "give a path or a dict, or text=...")
                 })?;
                 let read =
-                    run_interruptible(py, || sidestep_session::read_scenario(WORLDS, &path, &[]))?;
+                    run_interruptible(py, || sidestep_session::read_scenario(&WORLDS, &path, &[]))?;
                 let (source, compiled) = read.map_err(|e| error::input_error(&e))?;
                 Ok(LoadedScenario::from_compiled(compiled, ScenarioText::Own(source), false, None))
             }

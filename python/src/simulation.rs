@@ -18,6 +18,7 @@ use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
+use sidestep::worlds::WORLDS;
 use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
 use std::path::PathBuf;
@@ -77,7 +78,7 @@ impl Simulation {
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
             let journey =
-                ManagedRun::start(scenario.compiled.as_ref(), &source, workers, keep, None);
+                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, keep);
             journey.map_err(|e| error::session_error(&e))
         })?;
         let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();
@@ -534,18 +535,27 @@ impl Simulation {
         Ok(dict)
     }
 
-    /// Draws the present state: an array (height, width, 3) of red, green and blue (uint8).
+    /// Renders the present state as an image: an array (height, width, 3) of red, green and blue (uint8).
     ///
     /// Raises InputError when the width is 0 or above 4096 pixels.
     ///
-    /// >>> sim.picture(100).shape[1:]
+    /// >>> sim.render(100).shape[1:]
     /// (100, 3)
     #[pyo3(signature = (width=640))]
-    fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    fn render<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let (still, (width, height)) = self.draw(py, width)?;
         let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
         let pixels: Vec<u8> = opaque.copied().collect();
         PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
+    }
+
+    /// The same as `render`.
+    ///
+    /// >>> bool((sim.picture(100) == sim.render(100)).all())
+    /// True
+    #[pyo3(signature = (width=640))]
+    fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.render(py, width)
     }
 
     /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.

@@ -95,7 +95,7 @@ impl Space {
 /// >>> import sidestep
 /// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
 /// >>> team = sidestep.Simulation(floor).teams[0]
-/// >>> team.name, team.agents.tolist(), [space.name for space in team.ordered]
+/// >>> team.name, team.agents.tolist(), [space.name for space in team.action_spaces]
 /// ('robot', [0, 1], ['action', 'trip'])
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Team(pub(crate) Arc<control::Team>);
@@ -116,14 +116,26 @@ impl Team {
 
     /// The spaces of their observations.
     #[getter]
-    fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+    fn observation_spaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         to_list(py, self.0.observation_spaces.iter().cloned().map(Space))
     }
 
     /// The spaces of orders to them; empty for agents that decide for themselves.
     #[getter]
-    fn ordered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+    fn action_spaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         to_list(py, self.0.action_spaces.iter().cloned().map(Space))
+    }
+
+    /// The same as `observation_spaces`.
+    #[getter]
+    fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.observation_spaces(py)
+    }
+
+    /// The same as `action_spaces`.
+    #[getter]
+    fn ordered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.action_spaces(py)
     }
 
     fn __len__(&self) -> usize {

@@ -22,7 +22,7 @@ use sidestep_papers::methods;
 use sidestep_session::sweep::{
     self, CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task,
 };
-use sidestep_session::{Error, Watcher, build_id};
+use sidestep_session::{Error, Watcher};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
@@ -147,13 +147,13 @@ fn run(
     match out {
         Some(out) => {
             let there =
-                sweep::open_or_create(WORLDS, sweep, out, engine.planning_workers(), watcher)?;
-            ended = sweep::run_remaining(WORLDS, &there, engine, watcher)?;
+                sweep::open_or_create(&WORLDS, sweep, out, engine.planning_workers(), watcher)?;
+            ended = sweep::run_remaining(&WORLDS, &there, engine, watcher)?;
             plan = there.plan().clone();
             folder = Some(there);
         }
         None => {
-            (plan, ended) = sweep::run_in_memory(WORLDS, sweep, engine, watcher)?;
+            (plan, ended) = sweep::run_in_memory(&WORLDS, sweep, engine, watcher)?;
             folder = None;
         }
     }
@@ -166,7 +166,7 @@ fn sweep_result(
     folder: Option<&Folder>,
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
-    let summary = plan.summary(&done.table)?;
+    let summary = plan.summary(&WORLDS, &done.table)?;
     let own = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
         results: own(done.table.results()),
@@ -197,7 +197,7 @@ impl PyExecutor {
     ) -> PyResult<()> {
         let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
         let cells: Vec<CellTuple> = deal.cells().iter().map(tuple).collect();
-        let generator = self.begin.bind(py).call1((build_id(), cells))?;
+        let generator = self.begin.bind(py).call1((WORLDS.build(), cells))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -288,16 +288,16 @@ pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
-    cells: Vec<CellTuple>,
+    trials: Vec<CellTuple>,
 ) -> PyResult<Vec<String>> {
     let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
-    let cell = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
+    let trial = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
     let task = Task {
         build,
         scenarios: scenarios.into_iter().map(resolved).collect(),
-        cells: cells.into_iter().map(cell).collect(),
+        cells: trials.into_iter().map(trial).collect(),
     };
-    let outcomes = run_polling(py, |watcher| task.run(WORLDS, watcher))?;
+    let outcomes = run_polling(py, |watcher| task.run(&WORLDS, watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
     let text = |outcome: &Outcome| {
         serde_json::to_string(outcome)

@@ -184,7 +184,7 @@ STATS_ERRORS = [
     (lambda: stats.mean("abc"), "values: are no numbers"),
     (lambda: stats.mean([[1.0]]), "values: have the shape"),
     (lambda: stats.paired([1.0], [1.0, 2.0]), "1 and 2 values are no pairs"),
-    (lambda: stats.share(3, 2), "3 of 2 cannot be"),
+    (lambda: stats.proportion(3, 2), "3 of 2 is impossible"),
     (lambda: stats.quantile([1.0], 1.0), "q: is 1.0"),
     (lambda: stats.StoppingRule(0.0), "half_width: is 0.0"),
     (lambda: stats.StoppingRule(0.1, min_runs=1), "min_runs: is 1"),

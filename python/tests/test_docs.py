@@ -24,10 +24,10 @@ def test_the_code_of_a_page_runs_from_its_top_to_its_end(page, root, monkeypatch
 #: Names written in Python that belong to no module of their own.
 OF_PYTHON = (
     "Agent",
-    "Compared",
+    "Comparison",
     "Each",
-    "Placed",
-    "Reached",
+    "FkResult",
+    "IkResult",
     "Sweep",
     "SweepStatus",
     "Tables",

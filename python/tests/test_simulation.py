@@ -17,8 +17,8 @@ def test_observations_have_the_shapes_types_and_bounds_of_their_spaces(external)
     sim = sidestep.Simulation(external)
     for k, team in enumerate(sim.teams):
         observed = sim.observe(k)
-        assert list(observed) == [space.name for space in team.observed]
-        for space in team.observed:
+        assert list(observed) == [space.name for space in team.observation_spaces]
+        for space in team.observation_spaces:
             array = observed[space.name]
             assert array.shape == (len(team), *space.shape)
             assert array.dtype == np.dtype(space.dtype)
@@ -49,15 +49,15 @@ def test_a_snapshot_is_arrays_of_all_bodies(external):
 
 def test_a_picture_shows_the_present_state(external):
     sim = sidestep.Simulation(external)
-    before = sim.picture(200)
+    before = sim.render(200)
     assert before.shape[1:] == (200, 3)
     assert before.dtype == np.uint8
     sim.order("action", 0)
     sim.step(3)
-    assert (sim.picture(200) != before).any()
-    assert sim.picture(100).shape[1] == 100
+    assert (sim.render(200) != before).any()
+    assert sim.render(100).shape[1] == 100
     with pytest.raises(sidestep.InputError, match="1 to 4096"):
-        sim.picture(0)
+        sim.render(0)
 
 
 def test_an_inspection_tells_what_a_robot_perceives(external):

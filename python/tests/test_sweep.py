@@ -76,11 +76,11 @@ def test_a_sweep_is_that_of_the_command_byte_for_byte(floor, command, tmp_path):
     swept = sidestep.sweep(floor, vary=VARY, replicate=3, seed=7, out=tmp_path / "b", workers=2)
     assert files(tmp_path / "a") == files(tmp_path / "b")
     assert words["summary"] == swept.summary
-    assert words.keys() == swept.told.keys()
+    assert words.keys() == swept.output.keys()
     assert (len(swept), swept.failed, len(swept.timings)) == (12, 0, 12)
     again = sidestep.sweep(floor, vary=VARY, replicate=3, seed=7, out=tmp_path / "a")
     assert again.results["digest"].tolist() == swept.results["digest"].tolist()
-    assert again.told["took"] is None, "nothing was run again"
+    assert again.output["took"] is None, "nothing was run again"
 
 
 def test_a_precision_ends_a_sweep_as_it_ends_that_of_the_command(floor, command, tmp_path):
@@ -91,7 +91,7 @@ def test_a_precision_ends_a_sweep_as_it_ends_that_of_the_command(floor, command,
     with ThreadPoolExecutor(3) as pool:
         others = sidestep.sweep(floor, vary=VARY, **options, out=tmp_path / "c", engine=pool)
     assert files(tmp_path / "a") == files(tmp_path / "b") == files(tmp_path / "c")
-    assert words["stopped"] == local.told["stopped"] == others.told["stopped"]
+    assert words["stopped"] == local.output["stopped"] == others.output["stopped"]
 
 
 def test_a_sweep_file_a_dict_of_one_and_a_scenario_are_swept_alike(floor, tmp_path):
@@ -196,7 +196,7 @@ def goes_on(floor, out):
     finished = len(sidestep.read(out)["results"])
     assert 0 < finished < 24
     swept = sidestep.sweep(floor, **MANY, out=out, workers=2)
-    assert swept.told["took"]["runs"] == 24 - finished
+    assert swept.output["took"]["runs"] == 24 - finished
     sidestep.sweep(floor, **MANY, out=out.parent / "whole", workers=2)
     assert files(out) == files(out.parent / "whole")
 
@@ -270,7 +270,7 @@ def test_a_killed_worker_loses_nothing(floor, tmp_path):
     assert 0 < finished < 24
     with ProcessPoolExecutor(2, mp_context=SPAWN) as pool:
         swept = sidestep.sweep(floor, **options, out=out, engine=pool)
-    assert swept.told["took"]["runs"] == 24 - finished
+    assert swept.output["took"]["runs"] == 24 - finished
     assert files(out) == files(tmp_path / "local")
 
     Killing.left, out = 5, tmp_path / "replaced"
@@ -319,7 +319,7 @@ class Slow(ThreadPoolExecutor):
 
 
 def test_a_slow_task_is_sent_again_and_whichever_comes_first_counts(floor, tmp_path, monkeypatch):
-    monkeypatch.setattr(_engines, "SLOW_S", 0.0)
+    monkeypatch.setattr(_engines, "MIN_SLOW_S", 0.0)
     options = {"vary": VARY, "replicate": 2}
     sidestep.sweep(floor, **options, out=tmp_path / "local")
     pool = Slow()
@@ -376,13 +376,13 @@ def test_tasks_refuse_the_sweep_of_another_build(floor):
 
 
 def test_a_task_is_as_long_as_the_first_ones_took(floor):
-    crew = _engines.Crew(ThreadPoolExecutor(2), None)
+    pool = _engines.TaskPool(ThreadPoolExecutor(2), None)
     waiting = _engines.deque((k, 0, k, k) for k in range(100))
-    assert len(crew._cut(waiting).cells) == 1
-    crew._learn(['{"costs": {"compile_wall_s": 0.02, "run_wall_s": 0.08}}'])
-    assert len(crew._cut(waiting).cells) == 10
-    crew._learn(['{"costs": {"compile_wall_s": 0.0, "run_wall_s": 9.0}}'])
-    assert len(crew._cut(waiting).cells) == 1
+    assert len(pool._next_task(waiting).trials) == 1
+    pool._update_estimate(['{"costs": {"compile_wall_s": 0.02, "run_wall_s": 0.08}}'])
+    assert len(pool._next_task(waiting).trials) == 10
+    pool._update_estimate(['{"costs": {"compile_wall_s": 0.0, "run_wall_s": 9.0}}'])
+    assert len(pool._next_task(waiting).trials) == 1
 
 
 def needs(name):
@@ -449,7 +449,7 @@ def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, m
     finally:
         ray.shutdown()
         cluster.shutdown()
-    assert swept.told["took"]["at_once"] == 3
+    assert swept.output["took"]["at_once"] == 3
     assert files(tmp_path / "ray") == files(tmp_path / "local")
 
 
@@ -474,16 +474,28 @@ def test_the_status_of_a_sweep_is_that_of_the_command(floor, command, tmp_path):
     killed = b"".join([lines[0], *own[:3], own[3][:-20]])
     (out / "shares/2-of-3.journal").write_bytes(killed)
     status = sidestep.sweep_status(out)
-    assert (status.runs, status.of, status.failed, status.is_complete) == (15, 18, 0, False)
+    assert (status.runs, status.total, status.failed, status.is_complete) == (15, 18, 0, False)
     assert [(share["share"], share["runs"], share["of"], share["is_done"]) for share in status.shares] == [
         ("0/3", 6, 6, True), ("1/3", 6, 6, True), ("2/3", 3, 6, False),
     ]  # fmt: skip
     assert 0 < status.idle_s < 600 and status.runs_per_s > 0
     # The clock goes on between both looks.
     by_command = told(command, "sweep", "status", out)
-    for name in ("runs", "of", "failed", "failures", "is_complete", "until_precise", "runs_per_s"):
+    names = (
+        "runs",
+        "total",
+        "of",
+        "failed",
+        "failures",
+        "is_complete",
+        "is_active",
+        "is_worked_on",
+        "until_precise",
+        "runs_per_s",
+    )
+    for name in names:
         assert by_command[name] == getattr(status, name), name
     assert (out / "shares/2-of-3.journal").read_bytes() == killed, "looking changes nothing"
     sidestep.sweep(floor, vary={"robots.count": [2, 5]}, replicate=9, out=out)
     status = sidestep.sweep_status(out)
-    assert (status.runs, status.of, status.is_complete) == (18, 18, True)
+    assert (status.runs, status.total, status.is_complete) == (18, 18, True)

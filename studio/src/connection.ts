@@ -1,7 +1,7 @@
-/** One socket to the server: requests with replies, notices, frames, and attempts to connect again. */
+/** One socket to the server: requests with replies, notifications, frames, and reconnection. */
 
-import { waitBefore_ms } from "./backoff";
-import type { Answer, Call, Notice, Problem, Reply } from "./protocol";
+import { delayBefore_ms } from "./backoff";
+import type { ReplyBody, Method, ServerNotification, Problem, Reply } from "./protocol";
 
 /** The part of a WebSocket that a connection needs. */
 export interface Socket {
@@ -13,18 +13,18 @@ export interface Socket {
   close(): void;
 }
 
-/** Callbacks for all that happens on a connection. */
+/** Callbacks for everything that arrives on a connection. */
 export interface Listener {
-  notice(notice: Notice): void;
-  frame(bytes: ArrayBuffer): void;
-  /** Takes a problem of which the server could not tell which call it answers. */
-  problem(problem: Problem): void;
-  /** Notes that the socket is gone; the next attempt comes after this time. */
-  lost(attempt: number, wait_ms: number): void;
+  onNotification(notice: ServerNotification): void;
+  onFrame(bytes: ArrayBuffer): void;
+  /** Receives a problem that the server could not assign to a request. */
+  onProblem(problem: Problem): void;
+  /** Receives the loss of the socket; the next attempt starts after this time. */
+  onLost(attempt: number, wait_ms: number): void;
 }
 
-/** A call that was refused, or whose connection was lost. */
-export class Refused extends Error {
+/** A request that was refused, or whose connection was lost. */
+export class RequestError extends Error {
   readonly problem: Problem;
 
   constructor(problem: Problem) {
@@ -33,8 +33,8 @@ export class Refused extends Error {
   }
 }
 
-/** A problem that the page itself has noticed. */
-export function problemOf(place: string, cause: string, remedy: string): Problem {
+/** Creates a problem that the page itself has detected. */
+export function makeProblem(place: string, cause: string, remedy: string): Problem {
   return {
     place,
     line: null,
@@ -48,23 +48,23 @@ export function problemOf(place: string, cause: string, remedy: string): Problem
   };
 }
 
-/** A socket on which the server has not said hello by then is given up: a proxy in between may hold it open. */
-const GREETING_MS = 6000;
+/** A socket without the server's hello by then is abandoned: a proxy in between may hold it open. */
+const HELLO_TIMEOUT_MS = 6000;
 
-interface Waiting {
-  resolve(answer: Answer): void;
-  reject(reason: Refused): void;
+interface PendingRequest {
+  resolve(answer: ReplyBody): void;
+  reject(reason: RequestError): void;
 }
 
-/** The problem of calls whose connection was lost; the banner tells it for all of them. */
-export const LOST = problemOf(
+/** The problem of requests whose connection was lost; one banner reports it for all of them. */
+export const CONNECTION_LOST = makeProblem(
   "connection",
   "the connection to the server was lost",
-  "the page connects again by itself",
+  "the page reconnects automatically",
 );
 
 /** Clock and sockets, which tests replace. */
-export interface Surroundings {
+export interface Environment {
   open(): Socket;
   after(ms: number, then: () => void): unknown;
   cancel(timer: unknown): void;
@@ -73,16 +73,16 @@ export interface Surroundings {
 export class Connection {
   #socket: Socket | null = null;
   #isReady = false;
-  #next = 1;
+  #nextId = 1;
   #attempt = 0;
   #timer: unknown = null;
-  readonly #waiting = new Map<number, Waiting>();
+  readonly #pending = new Map<number, PendingRequest>();
   readonly #listener: Listener;
-  readonly #surroundings: Surroundings;
+  readonly #environment: Environment;
 
-  constructor(listener: Listener, surroundings: Surroundings) {
+  constructor(listener: Listener, surroundings: Environment) {
     this.#listener = listener;
-    this.#surroundings = surroundings;
+    this.#environment = surroundings;
   }
 
   /** Returns whether requests can be sent. */
@@ -92,52 +92,52 @@ export class Connection {
 
   /** Connects now, also if an attempt was planned for later. */
   connect(): void {
-    this.#surroundings.cancel(this.#timer);
+    this.#environment.cancel(this.#timer);
     this.#drop();
-    const socket = this.#surroundings.open();
+    const socket = this.#environment.open();
     this.#socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => (this.#isReady = true);
-    socket.onmessage = ({ data }) => this.#heard(data);
-    socket.onclose = () => this.#lost(socket);
-    this.#timer = this.#surroundings.after(GREETING_MS, () => this.#lost(socket));
+    socket.onmessage = ({ data }) => this.#onMessage(data);
+    socket.onclose = () => this.#onClose(socket);
+    this.#timer = this.#environment.after(HELLO_TIMEOUT_MS, () => this.#onClose(socket));
   }
 
   /** Sends a call; the promise fails with `Refused`. */
-  ask(call: Call): Promise<Answer> {
-    if (!this.#socket || !this.#isReady) return Promise.reject(new Refused(LOST));
-    const id = this.#next++;
-    const answer = new Promise<Answer>((resolve, reject) => this.#waiting.set(id, { resolve, reject }));
+  request(call: Method): Promise<ReplyBody> {
+    if (!this.#socket || !this.#isReady) return Promise.reject(new RequestError(CONNECTION_LOST));
+    const id = this.#nextId++;
+    const answer = new Promise<ReplyBody>((resolve, reject) => this.#pending.set(id, { resolve, reject }));
     this.#socket.send(JSON.stringify({ id, call }));
     return answer;
   }
 
-  /** Notes that the other side has said hello: the next wait begins small again. */
-  #greeted(): void {
-    this.#surroundings.cancel(this.#timer);
+  /** The server has said hello: the next delay starts small again. */
+  #onHello(): void {
+    this.#environment.cancel(this.#timer);
     this.#attempt = 0;
   }
 
-  #heard(data: unknown): void {
-    if (data instanceof ArrayBuffer) return this.#listener.frame(data);
-    const words = JSON.parse(String(data)) as Reply | Notice;
+  #onMessage(data: unknown): void {
+    if (data instanceof ArrayBuffer) return this.#listener.onFrame(data);
+    const words = JSON.parse(String(data)) as Reply | ServerNotification;
     if ("notice" in words) {
-      if (words.notice === "hello") this.#greeted();
-      return this.#listener.notice(words);
+      if (words.notice === "hello") this.#onHello();
+      return this.#listener.onNotification(words);
     }
-    if (words.id === 0 && "problem" in words) return this.#listener.problem(words.problem);
-    const waiting = this.#waiting.get(words.id);
-    this.#waiting.delete(words.id);
+    if (words.id === 0 && "problem" in words) return this.#listener.onProblem(words.problem);
+    const waiting = this.#pending.get(words.id);
+    this.#pending.delete(words.id);
     if ("answer" in words) waiting?.resolve(words.answer);
-    else waiting?.reject(new Refused(words.problem));
+    else waiting?.reject(new RequestError(words.problem));
   }
 
-  #lost(socket: Socket): void {
+  #onClose(socket: Socket): void {
     if (socket !== this.#socket) return;
     this.#drop();
-    const wait_ms = waitBefore_ms(this.#attempt++);
-    this.#timer = this.#surroundings.after(wait_ms, () => this.connect());
-    this.#listener.lost(this.#attempt, wait_ms);
+    const wait_ms = delayBefore_ms(this.#attempt++);
+    this.#timer = this.#environment.after(wait_ms, () => this.connect());
+    this.#listener.onLost(this.#attempt, wait_ms);
   }
 
   #drop(): void {
@@ -148,8 +148,8 @@ export class Connection {
       socket.onopen = socket.onclose = socket.onmessage = null;
       socket.close();
     }
-    const waiting = [...this.#waiting.values()];
-    this.#waiting.clear();
-    for (const one of waiting) one.reject(new Refused(LOST));
+    const waiting = [...this.#pending.values()];
+    this.#pending.clear();
+    for (const one of waiting) one.reject(new RequestError(CONNECTION_LOST));
   }
 }

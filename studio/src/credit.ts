@@ -1,9 +1,9 @@
-/** Credit for frames: the server sends none without. */
+/** Credit for frames: the server sends none without it. */
 
-/** Frames that may be under way at once. */
-export const MOST_UNDER_WAY = 2;
+/** Maximum number of frames in flight. */
+export const MAX_IN_FLIGHT = 2;
 
-/** Counts frames that were granted and have come; grants again those that were drawn or passed over. */
+/** Counts granted and received frames; grants again those that were drawn or skipped. */
 export class Credit {
   #granted = 0;
   readonly #grant: (frames: number) => void;
@@ -17,20 +17,20 @@ export class Credit {
     return this.#granted;
   }
 
-  /** Notes a frame that has come. */
-  arrived(): void {
+  /** Counts a received frame. */
+  onFrame(): void {
     this.#granted = Math.max(0, this.#granted - 1);
   }
 
-  /** Fills up once the newest frame is drawn (or the session begins), so that no passed-over frame is lost. */
-  drawn(): void {
-    const frames = MOST_UNDER_WAY - this.#granted;
+  /** Refills once the newest frame is drawn (or the session starts), so that skipped frames are granted again. */
+  refill(): void {
+    const frames = MAX_IN_FLIGHT - this.#granted;
     if (frames <= 0) return;
     this.#granted += frames;
     this.#grant(frames);
   }
 
-  /** Begins anew with the session at the server, which knows of no credit. */
+  /** Resets together with the session on the server, where no credit is left. */
   reset(): void {
     this.#granted = 0;
   }

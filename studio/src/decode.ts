@@ -1,4 +1,4 @@
-/** Binary frames: bytes to typed arrays, without a copy. The layout stands at the head of the server's protocol. */
+/** Binary frames: bytes to typed arrays, without a copy. The layout is documented in the server's protocol. */
 
 import { VERSION, type FrameText } from "./protocol";
 
@@ -7,19 +7,19 @@ export const MAGIC = 0x46545353;
 /** Bytes before the columns. */
 export const HEADER_BYTES = 56;
 
-/** The bodies that moved, at one cycle. Columns are in the order of the cast. */
+/** The moving bodies at one cycle. Columns are in the order of the body table. */
 export interface Frame {
   session: number;
-  cast: number;
+  tableId: number;
   dimensions: 2 | 3;
   cycle: number;
   time_s: number;
   bodies: number;
   leftOut: number;
   /** x y (z) of each body, in meters. */
-  places_m: Float32Array;
+  positions_m: Float32Array;
   /** Heading in rad in the plane, a quaternion x y z w in space. */
-  turns: Float32Array;
+  orientations: Float32Array;
   /** First point of each line, and the number of all points. */
   lineStarts: Uint32Array;
   points_m: Float32Array;
@@ -34,7 +34,7 @@ const NO_TEXT: FrameText = { scans: [], events: [], events_left_out: 0 };
 
 interface Header {
   session: number;
-  cast: number;
+  tableId: number;
   dimensions: 2 | 3;
   cycle: number;
   time_s: number;
@@ -60,7 +60,7 @@ function readHeader(bytes: ArrayBuffer): Header {
   return {
     dimensions,
     session: view.getUint32(8, true),
-    cast: view.getUint32(12, true),
+    tableId: view.getUint32(12, true),
     cycle: view.getFloat64(16, true),
     time_s: view.getFloat64(24, true),
     bodies: view.getUint32(32, true),
@@ -72,7 +72,7 @@ function readHeader(bytes: ArrayBuffer): Header {
 }
 
 /** The number of bytes that a frame with these counts has. */
-function bytesOf(head: Header): number {
+function frameBytes(head: Header): number {
   const d = head.dimensions;
   const turn = d === 2 ? 1 : 4;
   const words = head.bodies * (d + turn) + (head.lines + 1) + head.points * d;
@@ -81,17 +81,17 @@ function bytesOf(head: Header): number {
 
 function checkLines(starts: Uint32Array, points: number): void {
   for (let i = 1; i < starts.length; i++) {
-    if (starts[i]! < starts[i - 1]!) throw new FrameError("a frame whose lines run backwards");
+    if (starts[i]! < starts[i - 1]!) throw new FrameError("the lines of a frame are not in order");
   }
-  if (starts[starts.length - 1] !== points) throw new FrameError("a frame whose lines do not hold its points");
+  if (starts[starts.length - 1] !== points) throw new FrameError("the lines of a frame do not match its points");
 }
 
 /** Reads a frame; its arrays look at `bytes`. */
 export function decodeFrame(bytes: ArrayBuffer): Frame {
   const head = readHeader(bytes);
-  const wanted = bytesOf(head);
+  const wanted = frameBytes(head);
   if (bytes.byteLength !== wanted) {
-    throw new FrameError(`a frame of ${bytes.byteLength} bytes where its header promises ${wanted}`);
+    throw new FrameError(`a frame of ${bytes.byteLength} bytes where its header says ${wanted}`);
   }
   const d = head.dimensions;
   let at = HEADER_BYTES;
@@ -100,8 +100,8 @@ export function decodeFrame(bytes: ArrayBuffer): Frame {
     at += 4 * n;
     return column;
   };
-  const places_m = floats(d * head.bodies);
-  const turns = floats((d === 2 ? 1 : 4) * head.bodies);
+  const positions_m = floats(d * head.bodies);
+  const orientations = floats((d === 2 ? 1 : 4) * head.bodies);
   const lineStarts = new Uint32Array(bytes, at, head.lines + 1);
   at += 4 * (head.lines + 1);
   checkLines(lineStarts, head.points);
@@ -109,17 +109,17 @@ export function decodeFrame(bytes: ArrayBuffer): Frame {
   const conditions = new Uint8Array(bytes, at, head.bodies);
   at += 4 * Math.ceil(head.bodies / 4);
   const text = head.textBytes === 0 ? NO_TEXT : readText(new Uint8Array(bytes, at, head.textBytes));
-  const { session, cast, cycle, time_s, bodies, leftOut } = head;
+  const { session, tableId: table, cycle, time_s, bodies, leftOut } = head;
   return {
     session,
-    cast,
+    tableId: table,
     dimensions: d,
     cycle,
     time_s,
     bodies,
     leftOut,
-    places_m,
-    turns,
+    positions_m,
+    orientations,
     lineStarts,
     points_m,
     conditions,
@@ -131,6 +131,6 @@ function readText(bytes: Uint8Array): FrameText {
   try {
     return JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes)) as FrameText;
   } catch {
-    throw new FrameError("a frame whose text is not JSON");
+    throw new FrameError("the text of a frame is not JSON");
   }
 }

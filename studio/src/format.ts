@@ -1,12 +1,12 @@
-/** Numbers and names as people read them. */
+/** Numbers and names as text for people. */
 
-import type { Place, Value, Who } from "./protocol";
+import type { Point3, Value, BodyId } from "./protocol";
 
 /** Narrow space between a number and its unit. */
 const NARROW = "\u202f";
 
-/** Units that are words, for one of them. */
-const ONE: Record<string, string> = {
+/** Singular of units that are words. */
+const SINGULAR: Record<string, string> = {
   cycles: "cycle",
   boxes: "box",
   bodies: "body",
@@ -17,7 +17,7 @@ const ONE: Record<string, string> = {
 
 /** A number with at most four significant digits, and its unit. */
 export function withUnit(value: number, unit = ""): string {
-  return unit === "" ? number(value) : `${number(value)}${NARROW}${value === 1 ? (ONE[unit] ?? unit) : unit}`;
+  return unit === "" ? number(value) : `${number(value)}${NARROW}${value === 1 ? (SINGULAR[unit] ?? unit) : unit}`;
 }
 
 /** A number with at most four significant digits; whole numbers keep all of theirs, in groups of three. */
@@ -25,16 +25,16 @@ export function number(value: number): string {
   if (Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  if (Number.isInteger(value) && size < 1e15) return sign(grouped(value.toFixed(0)));
+  if (Number.isInteger(value) && size < 1e15) return sign(group(value.toFixed(0)));
   if (size !== 0 && (size < 1e-3 || size >= 1e6)) return sign(scientific(value));
-  return sign(grouped(size >= 1000 ? value.toFixed(0) : trimmed(value.toPrecision(4))));
+  return sign(group(size >= 1000 ? value.toFixed(0) : trim(value.toPrecision(4))));
 }
 
-function trimmed(text: string): string {
+function trim(text: string): string {
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }
 
-function grouped(text: string): string {
+function group(text: string): string {
   const [whole = "", rest] = text.split(".");
   const groups = whole.replace(/(?<=\d)(?=(\d{3})+$)/g, "\u202f");
   const long = whole.replace("-", "").length > 4 ? groups : whole;
@@ -43,7 +43,7 @@ function grouped(text: string): string {
 
 function scientific(value: number): string {
   const [mantissa = "", exponent = ""] = value.toExponential(2).split("e");
-  return `${trimmed(mantissa)}e${exponent.replace("+", "")}`;
+  return `${trim(mantissa)}e${exponent.replace("+", "")}`;
 }
 
 /** A number for the short labels of an axis. */
@@ -59,11 +59,11 @@ function sign(text: string): string {
   return text.replace("-", "−").replace("e-", "e−");
 }
 
-/** A share of one, in percent. */
+/** A proportion in percent. */
 export function share(value: number): string {
   const percent = 100 * value;
   const digits = percent !== 0 && Math.abs(percent) < 10 ? 1 : 0;
-  return `${sign(trimmed(percent.toFixed(digits)))}${NARROW}%`;
+  return `${sign(trim(percent.toFixed(digits)))}${NARROW}%`;
 }
 
 /** Simulated time: seconds below two minutes, then minutes and hours. */
@@ -74,39 +74,39 @@ export function time(time_s: number): string {
   return time_s < 3600 ? `${clock}${NARROW}min` : `${Math.floor(time_s / 3600)}:${clock}${NARROW}h`;
 }
 
-/** A place, with as many coordinates as the world has. */
-export function place(at_m: Place, dimensions: number): string {
+/** A position, with as many coordinates as the world has dimensions. */
+export function place(at_m: Point3, dimensions: number): string {
   return `(${at_m.slice(0, dimensions).map(number).join(", ")})${NARROW}m`;
 }
 
-/** A body that has no name of its own. */
-export function whoWords(who: Who): string {
+/** The label of a body without a name of its own. */
+export function bodyLabel(who: BodyId): string {
   return who.part === null ? `${who.kind} ${who.number}` : `${who.kind} ${who.number}/${who.part}`;
 }
 
-/** A key that is the same for the same body. */
-export function whoKey(who: Who): string {
+/** A unique key of a body. */
+export function bodyKey(who: BodyId): string {
   return `${who.kind}/${who.number}/${who.part ?? ""}`;
 }
 
 /** A value of an inspection, except bodies, which become links. */
-export function valueWords(value: Value, dimensions: number): string {
+export function valueText(value: Value, dimensions: number): string {
   if (value === "none") return "–";
   if ("number" in value) return withUnit(value.number.value, value.number.unit);
   if ("share" in value) return share(value.share);
   if ("text" in value) return value.text;
-  if ("who" in value) return whoWords(value.who);
+  if ("body" in value) return bodyLabel(value.body);
   if ("place" in value) return place(value.place, dimensions);
-  return value.yes ? "yes" : "no";
+  return value.flag ? "yes" : "no";
 }
 
-/** Cycles a second at least, to begin with: fewer look like none. */
-const LEAST_CYCLES_PER_S = 8;
+/** Minimum cycles per second at the start: a slower run looks stopped. */
+const MIN_CYCLES_PER_S = 8;
 
-/** The speed that a run of cycles of this length begins with. */
-export function firstSpeed(cycle_s: number): number {
-  return [1, 2, 5, 10, 20, 50].find((times) => times >= LEAST_CYCLES_PER_S * cycle_s) ?? 100;
+/** The initial speed of a run with cycles of this length. */
+export function initialSpeed(cycle_s: number): number {
+  return [1, 2, 5, 10, 20, 50].find((times) => times >= MIN_CYCLES_PER_S * cycle_s) ?? 100;
 }
 
-/** Speeds that the keys go through, in simulated seconds per second. */
+/** The speeds that keys switch between, in simulated seconds per second. */
 export const SPEEDS: readonly (number | "fastest")[] = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, "fastest"];

@@ -1,4 +1,4 @@
-/** The actions of keys, in one table that the help shows too. */
+/** Key bindings, in one table that the help shows too. */
 
 export type Action =
   | "play"
@@ -28,38 +28,38 @@ export type Action =
 
 interface Key {
   action: Action;
-  /** Keys as `KeyboardEvent.key` tells them. */
+  /** Keys as in `KeyboardEvent.key`. */
   keys: readonly string[];
   shift?: boolean;
-  shown: readonly string[];
+  labels: readonly string[];
   words: string;
 }
 
 export const KEYS: readonly Key[] = [
-  { action: "play", keys: [" "], shown: ["Space"], words: "play or pause" },
-  { action: "play-back", keys: ["b"], shown: ["b"], words: "play backwards or pause" },
-  { action: "next-ten", keys: ["ArrowRight"], shift: true, shown: ["Shift →"], words: "ten cycles on" },
-  { action: "back-ten", keys: ["ArrowLeft"], shift: true, shown: ["Shift ←"], words: "ten cycles back" },
-  { action: "next", keys: ["ArrowRight"], shown: ["→"], words: "one cycle on" },
-  { action: "back", keys: ["ArrowLeft"], shown: ["←"], words: "one cycle back" },
-  { action: "slower", keys: ["["], shown: ["["], words: "slower" },
-  { action: "faster", keys: ["]"], shown: ["]"], words: "faster" },
-  { action: "next-event", keys: ["j"], shown: ["j"], words: "next event of the shown kinds" },
-  { action: "previous-event", keys: ["k"], shown: ["k"], words: "previous event" },
-  { action: "filter", keys: ["/"], shown: ["/"], words: "filter agents" },
-  { action: "fit", keys: ["f"], shown: ["f"], words: "fit everything into the view" },
-  { action: "center", keys: ["c"], shown: ["c"], words: "center the selected" },
-  { action: "trails", keys: ["t"], shown: ["t"], words: "trails: of the selected, of all, none" },
-  { action: "left", keys: ["a"], shown: ["a"], words: "move or turn the view left" },
-  { action: "right", keys: ["d"], shown: ["d"], words: "right" },
-  { action: "up", keys: ["w"], shown: ["w"], words: "up" },
-  { action: "down", keys: ["s"], shown: ["s"], words: "down" },
-  { action: "nearer", keys: ["+", "="], shown: ["+"], words: "nearer" },
-  { action: "farther", keys: ["-"], shown: ["−"], words: "farther" },
-  { action: "session", keys: ["1", "2", "3", "4"], shown: ["1", "…", "4"], words: "go to a session" },
-  { action: "edit", keys: ["e"], shown: ["e"], words: "draw on the picture, or watch it" },
-  { action: "deselect", keys: ["Escape"], shown: ["Esc"], words: "deselect" },
-  { action: "help", keys: ["?"], shown: ["?"], words: "this help" },
+  { action: "play", keys: [" "], labels: ["Space"], words: "play or pause" },
+  { action: "play-back", keys: ["b"], labels: ["b"], words: "play backwards or pause" },
+  { action: "next-ten", keys: ["ArrowRight"], shift: true, labels: ["Shift →"], words: "ten cycles forward" },
+  { action: "back-ten", keys: ["ArrowLeft"], shift: true, labels: ["Shift ←"], words: "ten cycles back" },
+  { action: "next", keys: ["ArrowRight"], labels: ["→"], words: "one cycle forward" },
+  { action: "back", keys: ["ArrowLeft"], labels: ["←"], words: "one cycle back" },
+  { action: "slower", keys: ["["], labels: ["["], words: "slower" },
+  { action: "faster", keys: ["]"], labels: ["]"], words: "faster" },
+  { action: "next-event", keys: ["j"], labels: ["j"], words: "next visible event" },
+  { action: "previous-event", keys: ["k"], labels: ["k"], words: "previous event" },
+  { action: "filter", keys: ["/"], labels: ["/"], words: "filter agents" },
+  { action: "fit", keys: ["f"], labels: ["f"], words: "fit everything into the view" },
+  { action: "center", keys: ["c"], labels: ["c"], words: "center the selection" },
+  { action: "trails", keys: ["t"], labels: ["t"], words: "trails: of the selection, of all, none" },
+  { action: "left", keys: ["a"], labels: ["a"], words: "move or turn the view left" },
+  { action: "right", keys: ["d"], labels: ["d"], words: "right" },
+  { action: "up", keys: ["w"], labels: ["w"], words: "up" },
+  { action: "down", keys: ["s"], labels: ["s"], words: "down" },
+  { action: "nearer", keys: ["+", "="], labels: ["+"], words: "nearer" },
+  { action: "farther", keys: ["-"], labels: ["−"], words: "farther" },
+  { action: "session", keys: ["1", "2", "3", "4"], labels: ["1", "…", "4"], words: "go to a session" },
+  { action: "edit", keys: ["e"], labels: ["e"], words: "switch between drawing and watching" },
+  { action: "deselect", keys: ["Escape"], labels: ["Esc"], words: "deselect" },
+  { action: "help", keys: ["?"], labels: ["?"], words: "this help" },
 ];
 
 /** Returns the action of a pressed key, if it has one. */
@@ -73,7 +73,7 @@ export function actionOf(
   return found?.action ?? null;
 }
 
-/** Elements that need their keys for themselves. */
+/** Keys that focused elements handle themselves. */
 const OWN_KEYS: Record<string, RegExp> = {
   INPUT: /./,
   TEXTAREA: /./,
@@ -81,8 +81,8 @@ const OWN_KEYS: Record<string, RegExp> = {
   BUTTON: /^( |Enter)$/,
 };
 
-/** Returns whether the focused element takes this key itself. */
-export function isTaken(target: EventTarget | null, key: string): boolean {
+/** Returns whether the focused element handles this key itself. */
+export function isHandledByTarget(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.isContentEditable || target.closest("dialog, .cm-editor, [data-editor]")) return true;
   if (target instanceof HTMLInputElement && target.type === "range") return /^(Arrow|Home|End|Page)/.test(key);

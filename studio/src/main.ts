@@ -1,7 +1,7 @@
 import "./theme.css";
 import { mount } from "svelte";
 import App from "./App.svelte";
-import { enter, standing } from "./enter";
+import { signIn, fetchAccessStatus } from "./auth";
 import type { Socket } from "./connection";
 import { Studio } from "./state/studio.svelte";
 
@@ -15,8 +15,8 @@ const studio = new Studio({
   open,
   after: (ms, then) => setTimeout(then, ms),
   cancel: (timer) => clearTimeout(timer as number | undefined),
-  standing,
+  accessStatus: fetchAccessStatus,
 });
 
 mount(App, { target: document.getElementById("app")!, props: { studio } });
-void enter().then(() => studio.connect());
+void signIn().then(() => studio.connect());

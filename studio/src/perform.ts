@@ -1,16 +1,16 @@
-/** Performs the actions of keys. */
+/** Executes the actions of keys. */
 
 import type { Action } from "./keys";
 import { page } from "./state/page.svelte";
-import type { Session, TrailChoice } from "./state/session.svelte";
-import { stages } from "./state/stages";
+import type { Session, TrailMode } from "./state/session.svelte";
+import { viewports } from "./state/viewports";
 import type { Studio } from "./state/studio.svelte";
 
 const PAN_PX = 60;
 const ZOOM = 1.25;
-const TRAILS: readonly TrailChoice[] = ["none", "selected", "all"];
+const TRAILS: readonly TrailMode[] = ["none", "selected", "all"];
 
-/** Performs an action. Returns whether there was something to perform it on. */
+/** Executes an action. Returns whether it applied to anything. */
 export function perform(action: Action, key: string, studio: Studio): boolean {
   if (action === "help") page.showsHelp = true;
   else if (!studio.active) return false;
@@ -47,10 +47,10 @@ function transport(action: Action, studio: Studio): boolean {
       studio.step(-10);
       return true;
     case "slower":
-      for (const one of studio.led) one.changeSpeed(-1);
+      for (const one of studio.controlled) one.changeSpeed(-1);
       return true;
     case "faster":
-      for (const one of studio.led) one.changeSpeed(1);
+      for (const one of studio.controlled) one.changeSpeed(1);
       return true;
     case "next-event":
       active.jump(1);
@@ -64,7 +64,7 @@ function transport(action: Action, studio: Studio): boolean {
 }
 
 function view(action: Action, session: Session): void {
-  const stage = stages.get(session.key);
+  const viewport = viewports.get(session.key);
   const moves: Partial<Record<Action, [number, number]>> = {
     left: [PAN_PX, 0],
     right: [-PAN_PX, 0],
@@ -73,21 +73,21 @@ function view(action: Action, session: Session): void {
   };
   const move = moves[action];
   if (move) {
-    stage?.eye.rotate(...move);
-    stage?.moved();
+    viewport?.camera.rotate(...move);
+    viewport?.onCameraMove();
   }
-  if (action === "nearer" || action === "farther") stage?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
-  if (action === "fit") stage?.fit();
+  if (action === "nearer" || action === "farther") viewport?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
+  if (action === "fit") viewport?.fit();
   if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;
   if (action === "edit" && !session.isFleet) page.edits = !page.edits;
   if (action === "deselect") session.select(null);
   if (action === "filter") {
     page.tab = "agents";
-    page.wantsFilter++;
+    page.filterRequests++;
   }
   if (action === "center" && session.selected) {
     const index = session.bodies?.find(session.selected);
-    if (index !== undefined) stage?.center(index);
+    if (index !== undefined) viewport?.center(index);
   }
-  stage?.changed();
+  viewport?.requestDraw();
 }

@@ -22,7 +22,7 @@ export function launch(): Promise<Browser> {
   });
 }
 
-export interface Look {
+export interface PageOptions {
   width?: number;
   height?: number;
   isDark?: boolean;
@@ -32,7 +32,7 @@ export interface Look {
 export async function openPage(
   browser: Browser,
   url: string,
-  look: Look = {},
+  look: PageOptions = {},
 ): Promise<{ page: Page; complaints: string[] }> {
   const context = await browser.newContext({
     viewport: { width: look.width ?? 1280, height: look.height ?? 800 },

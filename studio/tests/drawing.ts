@@ -2,7 +2,7 @@
 
 import type { Page } from "playwright-core";
 
-export class Hand {
+export class PointerDriver {
   readonly #page: Page;
 
   constructor(page: Page) {
@@ -13,11 +13,11 @@ export class Hand {
   async at(x_m: number, y_m: number): Promise<[number, number]> {
     const layer = this.#page.locator("canvas.layer");
     await this.#page.waitForFunction(
-      () => document.querySelector<HTMLElement>("canvas.layer")?.dataset.eye !== undefined,
+      () => document.querySelector<HTMLElement>("canvas.layer")?.dataset.camera !== undefined,
     );
     return layer.evaluate(
       (canvas: HTMLElement, [x, y]) => {
-        const [x0, y0, m] = canvas.dataset.eye!.split(" ").map(Number) as [number, number, number];
+        const [x0, y0, m] = canvas.dataset.camera!.split(" ").map(Number) as [number, number, number];
         const box = canvas.getBoundingClientRect();
         return [box.left + box.width / 2 + (x! - x0) / m, box.top + box.height / 2 - (y! - y0) / m] as [number, number];
       },

@@ -2,10 +2,10 @@
 //! keep to the wall on their left.
 
 use sidestep::kernel::stream::Draws;
+use sidestep::worlds::WORLDS;
+use sidestep::worlds::robots::Robots;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Sector};
 use sidestep::worlds::robots::effector::{FORWARD, LEFT, RIGHT};
-use sidestep::worlds::robots::scenario::Behaviours;
-use std::sync::Arc;
 
 #[derive(Debug)]
 struct FollowWall;
@@ -22,6 +22,6 @@ impl Behaviour for FollowWall {
 }
 
 fn main() -> std::process::ExitCode {
-    let wall = Arc::new(FollowWall) as Arc<dyn Behaviour>;
-    sidestep_cli::main_with(Behaviours::from([("wall".into(), wall)]))
+    let robots = Robots::new().with_behaviour("wall", FollowWall);
+    sidestep_cli::main_with(WORLDS.clone().with(robots))
 }

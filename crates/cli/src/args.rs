@@ -3,6 +3,7 @@
 use crate::commands::{Command, GROUPS};
 use crate::console::{Console, check_write, prose_columns};
 use crate::exit::ExitCode;
+use crate::worlds;
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ const GLOBAL_DISPLAY_ORDER: usize = 900;
 
 /// Simulate and compare decentralized motion of many agents that must not collide.
 #[derive(Debug, Parser)]
-#[command(name = "sidestep", version = sidestep_session::build_id(), after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "sidestep", version = worlds().build(), after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// Print one JSON object to standard output and nothing else
     #[arg(long, global = true, display_order = GLOBAL_DISPLAY_ORDER)]

@@ -3,6 +3,7 @@
 use crate::exit::Failure;
 use crate::interrupt;
 use crate::link;
+use crate::worlds;
 use sidestep_server::FleetFeed;
 use sidestep_session::fleet::{Job, JobError, LinkMessage, Tls, WatchJob};
 use std::path::{Path, PathBuf};
@@ -42,7 +43,7 @@ pub(crate) fn split_endpoints(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) 
 /// When the program that carries the network is not there, or the fleet does not answer.
 pub(crate) fn start_watching(endpoint: &str, tls: Option<Tls>) -> Result<Arc<FleetFeed>, Failure> {
     let job = Job::Watch(WatchJob {
-        build: sidestep_session::build_id().into(),
+        build: worlds().build().into(),
         connect: vec![endpoint.to_string()],
         tls,
         patience_s: FLEET_TIMEOUT_S,

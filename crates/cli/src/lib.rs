@@ -11,7 +11,7 @@
 //!
 //! The crate `sidestep-session` drives the runs.
 //!
-//! A program with robots' behaviors of its own has the whole command line by [`main_with`]: it checks, runs,
+//! A program with worlds or parts of its own has the whole command line by [`main_with`]: it checks, runs,
 //! sweeps, films and replays scenarios that name them.
 
 mod args;
@@ -33,26 +33,25 @@ mod sweep;
 use exit::ExitCode;
 use sidestep::kernel::Digest;
 use sidestep::scenario::Worlds;
-use sidestep::worlds::robots::scenario::Behaviours;
-use sidestep::worlds::{WORLDS, with_behaviours};
+use sidestep::worlds::WORLDS;
 use std::sync::OnceLock;
 
 /// The worlds of this program, once they are not the usual ones.
 static OWN_WORLDS: OnceLock<Worlds> = OnceLock::new();
 
 /// Returns the worlds of this program.
-fn worlds() -> Worlds {
-    OWN_WORLDS.get().copied().unwrap_or(WORLDS)
+fn worlds() -> &'static Worlds {
+    OWN_WORLDS.get().unwrap_or(&WORLDS)
 }
 
-/// Runs the command that the arguments of this process ask for, with further behaviors of robots, which
-/// scenarios call by these names. Recordings belong to the program that made them: another program, or
+/// Runs the command that the arguments of this process ask for, with other worlds: further ones, or those of
+/// [`WORLDS`] with parts of your own. Recordings belong to the program that made them: another program, or
 /// this one with other code, does not continue them.
-pub fn main_with(own: Behaviours) -> std::process::ExitCode {
+pub fn main_with(worlds: Worlds) -> std::process::ExitCode {
     // Results follow from the added code, of which the program itself is all there is to see.
     let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
-    sidestep_session::register_added_code(&Digest::hash_bytes(&program).to_string());
-    OWN_WORLDS.get_or_init(|| with_behaviours(own));
+    let digest = Digest::hash_bytes(&program).to_string();
+    OWN_WORLDS.get_or_init(|| worlds.with_added_code(&digest));
     main()
 }
 

@@ -2,6 +2,7 @@
 
 use crate::exit::Failure;
 use crate::interrupt;
+use crate::worlds;
 use clap::Args;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{
@@ -67,7 +68,7 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 impl LinkArgs {
     /// Returns the settings for a scenario.
     pub(crate) fn common_settings(&self, file: PathBuf, overrides: Vec<String>) -> CommonSettings {
-        let build = sidestep_session::build_id().into();
+        let build = worlds().build().into();
         CommonSettings {
             flown: JobScenario { file, overrides, build },
             tls: self.tls.files(),

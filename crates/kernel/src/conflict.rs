@@ -159,6 +159,7 @@ mod tests {
         #[test]
         fn joining_from_two_threads_gives_the_same_groups(edges in prop::collection::vec((0usize..300, 0usize..300), 0..400)) {
             let groups = ConflictGroups::new(300);
+            #[expect(clippy::disallowed_methods, reason = "tested from several threads")]
             std::thread::scope(|scope| {
                 for part in 0..2 {
                     let (groups, edges) = (&groups, &edges);

@@ -45,6 +45,7 @@ pub mod stream;
 pub mod text;
 pub mod units;
 pub mod view;
+#[expect(clippy::disallowed_methods, reason = "the one place that starts threads")]
 pub mod workers;
 pub mod world;
 

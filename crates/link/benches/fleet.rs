@@ -53,7 +53,7 @@ fn rounds(team: u32, rounds: usize) {
         .zip(&held)
         .map(|(agent, held)| Member {
             agent,
-            life: Incarnation(0),
+            incarnation: Incarnation(0),
             listens: vec![held.endpoint.clone()],
         })
         .collect();
@@ -146,7 +146,7 @@ fn text(n: u32, cycles: u64) -> String {
 }
 
 fn job(folder: &Path, clock: ClockMode) -> FleetJob {
-    let build = sidestep_session::build_id().into();
+    let build = WORLDS.build().into();
     let flown = JobScenario { file: folder.join("s.toml"), overrides: Vec::new(), build };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
@@ -195,7 +195,7 @@ fn conflict(n: u32) {
     for _ in 0..3 {
         let began = Instant::now();
         let journey =
-            ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+            ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
                 .expect("started");
         let alone = journey.run_to_end(&NoWatcher).expect("flown");
         let alone_s = began.elapsed().as_secs_f64();
@@ -237,11 +237,11 @@ fn start_watched(job: FleetJob) -> (Child, Receiver<FleetNews>) {
     let (tells, news) = channel();
     let out = BufReader::new(child.stdout.take().expect("a pipe"));
     let logs = BufReader::new(child.stderr.take().expect("a pipe"));
-    let told = tells.clone();
+    let message = tells.clone();
     std::thread::spawn(move || {
         for line in out.lines().map_while(Result::ok) {
             if let Ok(LinkMessage::Fleet(now)) = serde_json::from_str(&line) {
-                let _ = told.send(FleetNews::Fleet(now));
+                let _ = message.send(FleetNews::Fleet(now));
             }
         }
     });

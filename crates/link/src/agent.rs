@@ -1,4 +1,5 @@
-//! Percepts, controls and packets of agents, and ports to their programs: as bytes, so that any world can be flown.
+//! Percepts, controls and packets of agents, and interfaces of their programs: as bytes, so that this crate needs to know
+//! no world's types.
 
 use crate::protocol::CycleStart;
 pub use sidestep::kernel::network::OutgoingPacket;
@@ -12,13 +13,13 @@ pub type Controls = Vec<(EntityId, Vec<u8>)>;
 pub struct AgentPercept {
     /// The agent.
     pub agent: EntityId,
-    /// The agents that decide together in this cycle, this one among them, rising.
+    /// The agents that decide together in this cycle, including this one, in ascending order.
     pub group: Vec<EntityId>,
-    /// The percept, as sent.
-    pub begin: CycleStart,
+    /// The message that carries the percept.
+    pub start: CycleStart,
 }
 
-/// A control that makes no sense.
+/// A control that cannot be read or carried out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InvalidControl {
     /// The agent that sent it.
@@ -27,27 +28,28 @@ pub struct InvalidControl {
     pub reason: String,
 }
 
-/// The part of a cycle in which an agent is, for people.
+/// The present activity of an agent, for logs and tables.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Activity {
-    /// A word for it, e.g. `optimize`.
-    pub word: &'static str,
-    /// Number of rounds so far.
+    /// Its name, e.g. `optimize`.
+    pub name: &'static str,
+    /// Number of rounds of the conversation so far.
     pub round: u32,
-    /// Epoch of the coordinator that it follows.
+    /// Epoch of the coordinator that the agent follows.
     pub epoch: u64,
 }
 
-/// The program of an agent: a state machine without a clock, a socket or a thread.
+/// The program of an agent: a state machine without a clock, a socket or a thread, so that the same program runs in the
+/// simulator and at a node.
 pub trait AgentProgram: Send {
-    /// Begins a cycle with the agent's percept; anything begun in the cycle before is over. Returns the tick in
-    /// which the cycle begins.
+    /// Starts a cycle with the agent's percept, and abandons the cycle before. Returns the tick in which the cycle
+    /// starts.
     ///
     /// # Errors
     /// When the percept cannot be read, with the reason.
-    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String>;
+    fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String>;
 
-    /// Takes a packet of another agent.
+    /// Receives a packet of another agent.
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64);
 
     /// Does everything that is due by a tick.
@@ -56,7 +58,7 @@ pub trait AgentProgram: Send {
     /// Returns the tick of the next timer.
     fn next_timer(&self) -> Option<u64>;
 
-    /// Takes the packets that it wants to send.
+    /// Takes the packets to be sent.
     fn take_packets(&mut self) -> Vec<OutgoingPacket>;
 
     /// Returns whether its control is ready.
@@ -68,14 +70,14 @@ pub trait AgentProgram: Send {
     /// Returns its present activity.
     fn activity(&self) -> Activity;
 
-    /// Returns the others that it has heard in this cycle, or in the one before if it has just begun.
+    /// Returns the other agents that it has heard in this cycle, or in the one before if it has heard none yet.
     fn heard_agents(&self) -> Vec<EntityId>;
 
     /// Returns counts of packets that it has dropped, by reason.
     fn drop_counts(&self) -> Vec<(String, u64)>;
 }
 
-/// A packet on its way to one receiver.
+/// A packet in transit to one receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Transmission {
     /// The receiver.
@@ -92,20 +94,20 @@ pub struct Transmission {
 /// An arrival of a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arrival {
-    /// The tick in which all of it is on its way: a large packet occupies the link for some time.
-    pub leaves: u64,
+    /// The tick in which its last byte leaves the sender: a large packet occupies the link for some time.
+    pub departs: u64,
     /// The tick in which it arrives.
     pub arrives: u64,
 }
 
 /// The faults of packets from one agent to others, drawn from the scenario's seed.
 pub trait Channel: Send {
-    /// Returns the arrivals of a packet: none if it is lost, two if it is doubled.
-    fn arrivals(&mut self, sent: &Transmission) -> Vec<Arrival>;
+    /// Returns the arrivals of a packet: none if it is lost, two if it is duplicated.
+    fn arrivals(&mut self, packet: &Transmission) -> Vec<Arrival>;
 
     /// Duration of a tick, in seconds of the scenario.
     fn tick_s(&self) -> f64;
 
-    /// Begins a cycle: links are free again.
+    /// Starts a cycle: links are idle again.
     fn start_cycle(&mut self, cycle: Cycle);
 }

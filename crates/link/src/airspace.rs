@@ -1,4 +1,4 @@
-//! Airplanes: their world at the server, and a pilot at each node.
+//! Airplanes: their world at the server, and the program of a pilot at each node.
 
 use crate::agent::{
     Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
@@ -14,9 +14,12 @@ use sidestep::worlds::airspace::settings::Deployment;
 use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld, Fleet};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Part of a cycle after which an agent asks again: an eighth of the time that a talk has, and a little less.
+/// Fraction of a cycle after which an agent repeats a request in real time, where the scenario has no network. A scenario
+/// must leave room for eight requests in a conversation, and two conversations have nine tenths of a cycle: 0.45 / 8,
+/// rounded down.
 const RETRY_DELAY_FRACTION: f64 = 0.05;
 
 /// Airplanes that may be nodes.
@@ -67,63 +70,73 @@ impl DistributedWorld for DistributedAirspace {
     }
 
     fn timeout_override(&self, _: f64) -> Option<String> {
-        // As long as possible, because processes answer more slowly than agents in memory.
+        // As long as a scenario may give: processes answer more slowly than agents in memory, and a shorter time would
+        // repeat requests that are about to be answered.
         let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
         (!self.has_faults()).then(|| format!("airspace.network.patience_s={patience_s}"))
     }
 
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
-        let beyond = airspace_run(run).out_of_range();
-        let one = |percept: Percept| {
+        let run = airspace_run(run);
+        let out_of_range: BTreeMap<EntityId, Vec<EntityId>> =
+            run.out_of_range().into_iter().collect();
+        let mut agent_percepts = Vec::new();
+        for percept in run.percepts() {
             let agent = percept.own.id;
-            let place = beyond.binary_search_by_key(&agent, |(id, _)| *id);
-            let beyond = place.map(|k| beyond[k].1.clone()).unwrap_or_default();
-            let sight = postcard::to_stdvec(&percept).expect("percepts are plain data");
-            let begin = CycleStart { cycle: percept.cycle, sight, beyond };
-            AgentPercept { agent, group: percept.members(), begin }
-        };
-        airspace_run(run).percepts().into_iter().map(one).collect()
+            let start = CycleStart {
+                cycle: percept.cycle,
+                percept: postcard::to_stdvec(&percept).expect("percepts are plain data"),
+                out_of_range: out_of_range.get(&agent).cloned().unwrap_or_default(),
+            };
+            agent_percepts.push(AgentPercept { agent, group: percept.members(), start });
+        }
+        agent_percepts
     }
 
     fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
-        let refused = airspace_run(run).invalid_controls(controls).into_iter();
-        refused.map(|(agent, reason)| InvalidControl { agent, reason }).collect()
+        let invalid = airspace_run(run).invalid_controls(controls).into_iter();
+        invalid.map(|(agent, reason)| InvalidControl { agent, reason }).collect()
     }
 
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram> {
         let pilot = Pilot::new(self.world.clone(), agent, Default::default()).with_build(build);
-        Box::new(PilotProgram { world: self.world.clone(), pilot, heard: RecentSenders::default() })
+        Box::new(PilotProgram {
+            world: self.world.clone(),
+            pilot,
+            senders: RecentSenders::default(),
+        })
     }
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let talks = move |cycle| world.conversation_times(cycle).to_vec();
-        Some(Box::new(FaultyChannel::new(self.world.fault_injector()?, agent, talks)))
+        let conversation_starts = move |cycle| world.conversation_times(cycle).to_vec();
+        let injector = self.world.fault_injector()?;
+        Some(Box::new(FaultyChannel::new(injector, agent, conversation_starts)))
     }
 }
 
-/// A pilot, at a node.
+/// The program of a pilot, at a node.
 struct PilotProgram {
     world: Arc<AirspaceWorld>,
     pilot: Pilot,
-    heard: RecentSenders,
+    senders: RecentSenders,
 }
 
 impl AgentProgram for PilotProgram {
-    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
-        let percept: Percept = postcard::from_bytes(sight).map_err(|e| e.to_string())?;
+    fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String> {
+        let percept: Percept = postcard::from_bytes(percept).map_err(|e| e.to_string())?;
         if (percept.own.id, percept.cycle) != (self.pilot.id(), cycle) {
             return Err("it is of another airplane, or of another cycle".into());
         }
-        percept.check(&self.world).map_err(|why| format!("it cannot be: {why:?}"))?;
-        self.heard.start_cycle();
+        percept.check(&self.world).map_err(|error| format!("it cannot be: {error:?}"))?;
+        self.senders.start_cycle();
         let tick = self.world.conversation_times(cycle)[0].0;
         self.pilot.start(percept, tick);
         Ok(tick)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
-        self.heard.record(from);
+        self.senders.record(from);
         self.pilot.on_packet(from, payload, tick);
     }
 
@@ -149,18 +162,21 @@ impl AgentProgram for PilotProgram {
     }
 
     fn activity(&self) -> Activity {
-        let word = match &self.pilot {
-            pilot if pilot.is_done() => "done",
-            pilot if pilot.has_decided() => "shield",
-            pilot if pilot.has_group() => "decide",
-            _ => "group",
+        let name = if self.pilot.is_done() {
+            "done"
+        } else if self.pilot.has_decided() {
+            "shield"
+        } else if self.pilot.has_group() {
+            "decide"
+        } else {
+            "group"
         };
         let progress = self.pilot.progress().unwrap_or_default();
-        Activity { word, round: progress.round, epoch: progress.epoch.into() }
+        Activity { name, round: progress.round, epoch: progress.epoch.into() }
     }
 
     fn heard_agents(&self) -> Vec<EntityId> {
-        self.heard.senders()
+        self.senders.senders()
     }
 
     fn drop_counts(&self) -> Vec<(String, u64)> {

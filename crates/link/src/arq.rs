@@ -1,54 +1,61 @@
-//! Letters between two parties: numbered, acknowledged, repeated until they have come, and taken in order.
+//! Reliable delivery to one other peer: messages are numbered, acknowledged, retransmitted and accepted in order.
 //!
-//! A receiver that misses one drops those after it, and the sender repeats all of them (go back N). That is simple,
-//! and rare: frames are lost only where a link breaks or a queue is full.
+//! A receiver that misses one drops those after it, and the sender retransmits all of them (go-back-N). Selective
+//! repeat would spare retransmissions, but needs a reorder buffer; frames are lost only where a link breaks or a queue
+//! is full, so they are rare.
 //!
-//! A state machine without a clock: the time is handed in, from any fixed start.
+//! A state machine without a clock: callers pass the time, measured from any fixed start, so that tests need not sleep.
 
 use crate::protocol::Message;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Time after which a letter is first sent again.
+/// Time to the first retransmission of a message. It is longer than [`ACK_DELAY`] and a round trip, so that without
+/// losses nothing is sent twice.
 const MIN_RETRANSMIT_DELAY: Duration = Duration::from_millis(200);
 
-/// Longest time between two transmissions of a letter.
+/// Maximum time between two transmissions of a message: with exponential backoff alone a link that was down for a
+/// minute could stay silent for another minute after it is back.
 const MAX_RETRANSMIT_DELAY: Duration = Duration::from_secs(2);
 
-/// Time after which a letter is acknowledged, if no other frame to its sender has done so by then.
+/// Time after which a message is acknowledged by a frame of its own, unless another frame to its sender has carried the
+/// acknowledgment by then. Most messages are answered sooner, so most acknowledgments cost no frame.
 const ACK_DELAY: Duration = Duration::from_millis(40);
 
-/// Most letters that are sent again at once.
+/// Maximum number of messages that are retransmitted at once: all of a long backlog would fill the very queue that has
+/// dropped them.
 const MAX_RETRANSMIT_BURST: usize = 16;
 
-/// The letters from and to one other party.
+/// Both directions of the reliable messages between this peer and another one.
 #[derive(Debug)]
 pub(crate) struct ArqLink {
-    /// Letters that the other may not have, from the oldest on. They may be shared with other posts.
-    waiting: VecDeque<Arc<Message>>,
-    /// Number of the oldest of them.
+    /// Messages that the other end has not acknowledged, from the oldest on. A message to several peers is shared by
+    /// their links.
+    unacked: VecDeque<Arc<Message>>,
+    /// Sequence number of the oldest of them.
     oldest: u64,
     /// Time at which it became the oldest.
     oldest_since: Option<Duration>,
-    /// Time at which they are sent again.
-    again_at: Option<Duration>,
-    wait: Duration,
-    /// Number of the next letter of the other.
-    next: u64,
-    /// Time at which the receipt of the other's letters is acknowledged.
+    /// Time at which they are retransmitted.
+    retransmit_at: Option<Duration>,
+    /// Delay of the next retransmission; it doubles each time and starts anew with an acknowledgment.
+    retransmit_delay: Duration,
+    /// Sequence number of the next message to be accepted from the other end.
+    next_received: u64,
+    /// Time at which received messages are acknowledged by a frame of its own.
     acknowledge_at: Option<Duration>,
 }
 
 impl Default for ArqLink {
     fn default() -> Self {
         Self {
-            waiting: VecDeque::new(),
+            unacked: VecDeque::new(),
             oldest: 0,
             oldest_since: None,
-            again_at: None,
-            wait: MIN_RETRANSMIT_DELAY,
-            next: 0,
+            retransmit_at: None,
+            retransmit_delay: MIN_RETRANSMIT_DELAY,
+            next_received: 0,
             acknowledge_at: None,
         }
     }
@@ -57,79 +64,83 @@ impl Default for ArqLink {
 /// Frames that are due.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct DueFrames {
-    /// Letters that are sent again, with their numbers.
-    pub(crate) again: Vec<(u64, Arc<Message>)>,
-    /// Whether receipts are sent to the other in a frame of their own.
+    /// Messages to retransmit, with their sequence numbers.
+    pub(crate) retransmissions: Vec<(u64, Arc<Message>)>,
+    /// Whether an acknowledgment is due in a frame of its own.
     pub(crate) acknowledge: bool,
 }
 
 impl ArqLink {
-    /// Keeps a letter until it is acknowledged, and returns its number.
-    pub(crate) fn send(&mut self, word: Arc<Message>, now: Duration) -> u64 {
-        self.waiting.push_back(word);
+    /// Keeps a message until it is acknowledged, and returns its sequence number.
+    pub(crate) fn send(&mut self, message: Arc<Message>, now: Duration) -> u64 {
+        self.unacked.push_back(message);
         self.oldest_since.get_or_insert(now);
-        self.again_at.get_or_insert(now + self.wait);
-        self.oldest + self.waiting.len() as u64 - 1
+        self.retransmit_at.get_or_insert(now + self.retransmit_delay);
+        self.oldest + self.unacked.len() as u64 - 1
     }
 
-    /// Returns the number up to which all letters of the other have come: every frame to it contains that number.
+    /// Returns the cumulative acknowledgment for the next frame to the other end; no frame of its own is due for it then.
     pub(crate) fn take_cumulative_ack(&mut self) -> u64 {
         self.acknowledge_at = None;
-        self.next
+        self.next_received
     }
 
-    /// Returns whether a letter of the other is the next one: then it is taken.
-    pub(crate) fn accept(&mut self, number: u64, now: Duration) -> bool {
-        let is_next = number == self.next;
-        self.next += u64::from(is_next);
-        // A repeated one, too: the other does not know yet that it came.
+    /// Accepts a message if it is the next one in order, and returns whether it is.
+    pub(crate) fn accept(&mut self, sequence: u64, now: Duration) -> bool {
+        let is_next = sequence == self.next_received;
+        if is_next {
+            self.next_received += 1;
+        }
+        // A duplicate is acknowledged, too: the acknowledgment of the first one may be lost.
         self.acknowledge_at.get_or_insert(now + ACK_DELAY);
         is_next
     }
 
-    /// Notes that the other has received all letters below a number.
-    pub(crate) fn on_ack(&mut self, number: u64, now: Duration) {
-        let new = number.saturating_sub(self.oldest).min(self.waiting.len() as u64);
-        if new == 0 {
+    /// Records that the other end has received all messages below a sequence number.
+    pub(crate) fn on_ack(&mut self, sequence: u64, now: Duration) {
+        // A number beyond all that was sent comes from a faulty peer, and must not panic here.
+        let newly_acked = sequence.saturating_sub(self.oldest).min(self.unacked.len() as u64);
+        if newly_acked == 0 {
             return;
         }
-        self.waiting.drain(..new as usize);
-        self.oldest += new;
-        self.wait = MIN_RETRANSMIT_DELAY;
-        self.oldest_since = (!self.waiting.is_empty()).then_some(now);
-        self.again_at = self.oldest_since.map(|since| since + self.wait);
+        self.unacked.drain(..newly_acked as usize);
+        self.oldest += newly_acked;
+        self.retransmit_delay = MIN_RETRANSMIT_DELAY;
+        self.oldest_since = (!self.unacked.is_empty()).then_some(now);
+        self.retransmit_at = self.oldest_since.map(|since| since + self.retransmit_delay);
     }
 
     /// Returns the frames that are due.
     pub(crate) fn take_due(&mut self, now: Duration) -> DueFrames {
         let mut due = DueFrames::default();
-        if self.again_at.is_some_and(|at| at <= now) {
-            let numbered = (self.oldest..).zip(&self.waiting).take(MAX_RETRANSMIT_BURST);
-            due.again = numbered.map(|(number, word)| (number, word.clone())).collect();
-            self.wait = (2 * self.wait).min(MAX_RETRANSMIT_DELAY);
-            self.again_at = Some(now + self.wait);
+        if self.retransmit_at.is_some_and(|at| at <= now) {
+            let sequence = (self.oldest..).zip(&self.unacked).take(MAX_RETRANSMIT_BURST);
+            due.retransmissions =
+                sequence.map(|(sequence, message)| (sequence, message.clone())).collect();
+            self.retransmit_delay = (2 * self.retransmit_delay).min(MAX_RETRANSMIT_DELAY);
+            self.retransmit_at = Some(now + self.retransmit_delay);
         }
         if self.acknowledge_at.is_some_and(|at| at <= now) {
             self.acknowledge_at = None;
-            // Letters acknowledge, too.
-            due.acknowledge = due.again.is_empty();
+            // Retransmissions carry the acknowledgment, too.
+            due.acknowledge = due.retransmissions.is_empty();
         }
         due
     }
 
-    /// Returns the time since which no letter has arrived although some are waiting; none where all have arrived.
+    /// Returns the time since which no message was acknowledged although some are unacknowledged.
     pub(crate) fn unacked_since(&self) -> Option<Duration> {
         self.oldest_since
     }
 
     /// Returns the time at which frames are due next.
     pub(crate) fn next_due(&self) -> Option<Duration> {
-        self.again_at.into_iter().chain(self.acknowledge_at).min()
+        self.retransmit_at.into_iter().chain(self.acknowledge_at).min()
     }
 
-    /// Returns whether all letters have arrived.
+    /// Returns whether all messages were acknowledged.
     pub(crate) fn has_delivered(&self) -> bool {
-        self.waiting.is_empty()
+        self.unacked.is_empty()
     }
 }
 
@@ -140,72 +151,74 @@ mod tests {
 
     const STEP: Duration = Duration::from_millis(10);
 
-    fn letter(number: u64) -> Arc<Message> {
-        Arc::new(Message::Close(number))
+    fn message(sequence: u64) -> Arc<Message> {
+        Arc::new(Message::Close(sequence))
     }
 
-    /// A frame from one post to another: the number up to which letters have come, and a letter.
-    type Flying = (u64, Option<(u64, Arc<Message>)>);
+    /// A frame in transit: its cumulative acknowledgment, and a numbered message.
+    type InTransit = (u64, Option<(u64, Arc<Message>)>);
 
-    /// Two posts and the frames between them.
+    /// The two ends of a link, and the frames in transit.
     struct Pair {
-        posts: [ArqLink; 2],
-        flying: Vec<(usize, Flying)>,
+        links: [ArqLink; 2],
+        in_transit: Vec<(usize, InTransit)>,
         now: Duration,
-        taken: Vec<Arc<Message>>,
+        accepted: Vec<Arc<Message>>,
     }
 
     impl Pair {
         fn new() -> Self {
-            let posts = [ArqLink::default(), ArqLink::default()];
-            Self { posts, flying: Vec::new(), now: Duration::ZERO, taken: Vec::new() }
+            let links = [ArqLink::default(), ArqLink::default()];
+            Self { links, in_transit: Vec::new(), now: Duration::ZERO, accepted: Vec::new() }
         }
 
-        fn fly(&mut self, from: usize, letter: Option<(u64, Arc<Message>)>) {
-            let received = self.posts[from].take_cumulative_ack();
-            self.flying.push((1 - from, (received, letter)));
+        fn transmit(&mut self, from: usize, message: Option<(u64, Arc<Message>)>) {
+            let ack = self.links[from].take_cumulative_ack();
+            self.in_transit.push((1 - from, (ack, message)));
         }
 
-        fn arrive(&mut self, (to, (received, letter)): (usize, Flying)) {
-            self.posts[to].on_ack(received, self.now);
-            if let Some((number, word)) = letter
-                && self.posts[to].accept(number, self.now)
+        fn arrive(&mut self, (to, (ack, message)): (usize, InTransit)) {
+            self.links[to].on_ack(ack, self.now);
+            if let Some((sequence, message)) = message
+                && self.links[to].accept(sequence, self.now)
             {
-                self.taken.push(word);
+                self.accepted.push(message);
             }
         }
 
         fn step(&mut self) {
             self.now += STEP;
             for from in 0..2 {
-                let due = self.posts[from].take_due(self.now);
-                let is_told = due.acknowledge;
-                due.again.into_iter().for_each(|letter| self.fly(from, Some(letter)));
-                if is_told {
-                    self.fly(from, None);
+                let due = self.links[from].take_due(self.now);
+                let acknowledges = due.acknowledge;
+                due.retransmissions
+                    .into_iter()
+                    .for_each(|message| self.transmit(from, Some(message)));
+                if acknowledges {
+                    self.transmit(from, None);
                 }
             }
         }
     }
 
     proptest! {
-        /// With frames lost, doubled and overtaken, until the network is well again.
+        /// With frames lost, duplicated and reordered, until the network is well again.
         #[test]
-        fn all_letters_come_once_and_in_order(
+        fn all_messages_arrive_once_and_in_order(
             count in 1u64..40, faults in prop::collection::vec((0u8..4, any::<prop::sample::Index>()), 0..200),
         ) {
             let mut pair = Pair::new();
-            for number in 0..count {
-                let numbered = pair.posts[0].send(letter(number), pair.now);
-                prop_assert_eq!(numbered, number);
-                pair.fly(0, Some((number, letter(number))));
+            for sequence in 0..count {
+                let assigned = pair.links[0].send(message(sequence), pair.now);
+                prop_assert_eq!(assigned, sequence);
+                pair.transmit(0, Some((sequence, message(sequence))));
             }
             for (fault, which) in faults {
                 pair.step();
-                if pair.flying.is_empty() {
+                if pair.in_transit.is_empty() {
                     continue;
                 }
-                let frame = pair.flying.swap_remove(which.index(pair.flying.len()));
+                let frame = pair.in_transit.swap_remove(which.index(pair.in_transit.len()));
                 match fault {
                     0 => {}
                     1 => {
@@ -216,57 +229,57 @@ mod tests {
                 }
             }
             let mut steps = 0;
-            while !pair.posts[0].has_delivered() {
+            while !pair.links[0].has_delivered() {
                 steps += 1;
                 prop_assert!(steps < 10_000, "it never comes to an end");
                 pair.step();
-                for frame in std::mem::take(&mut pair.flying) {
+                for frame in std::mem::take(&mut pair.in_transit) {
                     pair.arrive(frame);
                 }
             }
-            let all: Vec<Arc<Message>> = (0..count).map(letter).collect();
-            prop_assert_eq!(pair.taken, all);
+            let all: Vec<Arc<Message>> = (0..count).map(message).collect();
+            prop_assert_eq!(pair.accepted, all);
         }
     }
 
     #[test]
-    fn a_letter_is_repeated_less_and_less_often_and_a_word_of_the_other_ends_that() {
-        let mut post = ArqLink::default();
-        post.send(letter(0), Duration::ZERO);
+    fn a_message_is_retransmitted_less_and_less_often_until_it_is_acknowledged() {
+        let mut link = ArqLink::default();
+        link.send(message(0), Duration::ZERO);
         let mut times = Vec::new();
         while times.len() < 6 {
-            let at = post.next_due().expect("it waits");
-            assert_eq!(post.take_due(at).again, [(0, letter(0))]);
+            let at = link.next_due().expect("it waits");
+            assert_eq!(link.take_due(at).retransmissions, [(0, message(0))]);
             times.push(at.as_millis());
         }
         assert_eq!(times, [200, 600, 1400, 3000, 5000, 7000]);
-        post.on_ack(1, Duration::from_secs(8));
-        assert!(post.has_delivered() && post.next_due().is_none());
+        link.on_ack(1, Duration::from_secs(8));
+        assert!(link.has_delivered() && link.next_due().is_none());
     }
 
     #[test]
     fn a_number_that_was_never_sent_is_no_harm() {
-        let mut post = ArqLink::default();
-        post.send(letter(0), Duration::ZERO);
-        post.on_ack(u64::MAX, Duration::ZERO);
-        assert!(post.has_delivered());
-        assert_eq!(post.send(letter(1), Duration::ZERO), 1);
+        let mut link = ArqLink::default();
+        link.send(message(0), Duration::ZERO);
+        link.on_ack(u64::MAX, Duration::ZERO);
+        assert!(link.has_delivered());
+        assert_eq!(link.send(message(1), Duration::ZERO), 1);
     }
 
     #[test]
-    fn it_is_known_since_when_no_letter_has_come() {
+    fn it_is_known_since_when_no_message_was_acknowledged() {
         let at = Duration::from_secs;
-        let (mut post, word) = (ArqLink::default(), Arc::new(Message::Hello));
-        assert_eq!(post.unacked_since(), None);
+        let (mut link, message) = (ArqLink::default(), Arc::new(Message::Hello));
+        assert_eq!(link.unacked_since(), None);
         for second in 1..4 {
-            post.send(word.clone(), at(second));
+            link.send(message.clone(), at(second));
         }
-        assert_eq!(post.unacked_since(), Some(at(1)));
-        post.on_ack(2, at(8));
-        assert_eq!(post.unacked_since(), Some(at(8)), "two have come then");
-        post.on_ack(2, at(9));
-        assert_eq!(post.unacked_since(), Some(at(8)), "none has since");
-        post.on_ack(3, at(10));
-        assert_eq!(post.unacked_since(), None);
+        assert_eq!(link.unacked_since(), Some(at(1)));
+        link.on_ack(2, at(8));
+        assert_eq!(link.unacked_since(), Some(at(8)), "two are acknowledged then");
+        link.on_ack(2, at(9));
+        assert_eq!(link.unacked_since(), Some(at(8)), "none has been since");
+        link.on_ack(3, at(10));
+        assert_eq!(link.unacked_since(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Connectors of chains: their world at the server, and the agent of one at each node.
+//! Connectors of chains: their world at the server, and the program of one at each node.
 
 use crate::agent::{
     Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
@@ -15,10 +15,12 @@ use sidestep_session::fleet::AgentName;
 use std::any::Any;
 use std::sync::Arc;
 
-/// Part of a cycle after which a connector asks again: an eighth of the time that a talk has, and a little less.
+/// Fraction of a cycle after which a connector repeats a request in real time, where the scenario gives no usable time.
+/// A scenario must leave room for eight requests in a conversation, which has nine tenths of a cycle: 0.9 / 8, rounded
+/// down.
 const RETRY_DELAY_FRACTION: f64 = 0.1;
 
-/// Seconds of real time in which a process answers: a request repeated sooner is useless.
+/// Time in seconds of real time in which a process answers: a request that is repeated sooner is useless.
 const MIN_RETRY_DELAY_S: f64 = 2e-3;
 
 /// Connectors that may be nodes, of chains in `D` dimensions.
@@ -46,21 +48,24 @@ impl<const D: usize> DistributedChains<D> {
         self.world.find_connector(agent).expect("agents are the connectors of the world")
     }
 
-    /// Returns the neighbors that a connector's radio does not reach, rising.
+    /// Returns the neighbors that a connector's radio does not reach, in ascending order.
     fn unreachable_neighbors(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
         let range_m = self.world.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
         let neighbors =
             [agent.wrapping_sub(1), agent + 1].into_iter().zip(percept.neighbor_distances_m());
-        let is_beyond = |apart_m: Option<f64>| apart_m.is_some_and(|apart_m| apart_m > range_m);
-        neighbors.filter(|(_, apart_m)| is_beyond(*apart_m)).map(|(id, _)| id).collect()
+        // An end of a chain has one neighbor: the distance to the other one is none.
+        neighbors
+            .filter(|(_, distance_m)| distance_m.is_some_and(|distance_m| distance_m > range_m))
+            .map(|(id, _)| id)
+            .collect()
     }
 }
 
 impl<const D: usize> DistributedWorld for DistributedChains<D> {
     fn count(&self) -> usize {
-        let chains = 0..;
-        let lengths = chains.map(|chain| self.world.connector_count(chain) as usize);
-        lengths.take_while(|&n| n > 0).sum()
+        // Chains are numbered from 0 on; one that does not exist has no connectors.
+        let connectors = (0..).map(|chain| self.world.connector_count(chain) as usize);
+        connectors.take_while(|&count| count > 0).sum()
     }
 
     fn name(&self, agent: EntityId) -> AgentName {
@@ -84,46 +89,57 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
     }
 
     fn timeout_override(&self, speed: f64) -> Option<String> {
-        // A bus answers in microseconds, and a process does not: repeating so soon would send everything many times.
-        let is_long = |given_s: f64| given_s / speed >= MIN_RETRY_DELAY_S;
-        let given_s = self.world.network.as_ref().map(|network| network.patience_s);
         let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
-        let is_kept = given_s.is_some_and(|given_s| is_long(given_s) || given_s >= patience_s);
-        (!is_kept).then(|| format!("chain.network.patience_s={patience_s}"))
+        if let Some(network) = &self.world.network {
+            let given_s = network.patience_s;
+            // A scenario may describe a bus, which answers in microseconds. Processes do not: repeating a request that
+            // soon would send everything many times.
+            let is_long_enough = given_s / speed >= MIN_RETRY_DELAY_S;
+            if is_long_enough || given_s >= patience_s {
+                return None;
+            }
+        }
+        Some(format!("chain.network.patience_s={patience_s}"))
     }
 
     fn waits_for_lost_nodes(&self) -> bool {
+        // A connector remembers nothing between cycles that the server does not tell it: another node can take over.
         true
     }
 
     fn keeps_controls_of_lost_nodes(&self) -> bool {
-        // Its messages to neighbors since its decision may be lost with it.
+        // What it has sent its neighbors since its decision may be lost with it: they may have decided otherwise, and a rod
+        // would tear if only one of its ends moved.
         false
     }
 
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
         let run = self.chain_run(run);
-        let mut sights = Vec::new();
+        let mut agent_percepts = Vec::new();
         for (chain, percepts) in self.world.percepts_at(run.state(), run.cycle()) {
             let n = percepts.len() as u32;
             let first = self.world.connector_id(chain, 0).expect("a chain has connectors");
             let group: Vec<EntityId> = (first..first + n).collect();
             for (&agent, percept) in group.iter().zip(&percepts) {
-                let sight = postcard::to_stdvec(percept).expect("percepts are plain data");
-                let beyond = self.unreachable_neighbors(agent, percept);
-                let begin = CycleStart { cycle: percept.cycle, sight, beyond };
-                sights.push(AgentPercept { agent, group: group.clone(), begin });
+                let start = CycleStart {
+                    cycle: percept.cycle,
+                    percept: postcard::to_stdvec(percept).expect("percepts are plain data"),
+                    out_of_range: self.unreachable_neighbors(agent, percept),
+                };
+                agent_percepts.push(AgentPercept { agent, group: group.clone(), start });
             }
         }
-        sights.sort_unstable_by_key(|sight| sight.agent);
-        sights
+        agent_percepts.sort_unstable_by_key(|percept| percept.agent);
+        agent_percepts
     }
 
     fn max_further_rounds(&self, run: &dyn Simulation, groups: usize) -> usize {
         let run = self.chain_run(run);
-        let waits = |chain: &usize| !run.state().has_submitted_controls(*chain, run.cycle());
-        let waiting = (0..run.state().len()).filter(waits).count();
-        waiting.saturating_sub(groups)
+        let undecided = (0..run.state().len())
+            .filter(|&chain| !run.state().has_submitted_controls(chain, run.cycle()))
+            .count();
+        // In the worst case each of the other chains waits for another one, and decides in a round of its own.
+        undecided.saturating_sub(groups)
     }
 
     fn accept_controls(
@@ -131,75 +147,77 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         run: &dyn Simulation,
         groups: &[Vec<EntityId>],
         controls: &mut Controls,
-        gone: &[EntityId],
+        lost: &[EntityId],
     ) -> Vec<InvalidControl> {
         let run = self.chain_run(run);
-        let absurd = self.invalid_controls(run, controls);
-        controls.retain(|(agent, _)| absurd.iter().all(|one| one.agent != *agent));
-        controls.extend(gone.iter().map(|&id| (id, ChainControls::<D>::ABSENT_CONTROL.to_vec())));
-        let read = self.world.read_controls(run.cycle(), controls).expect("all were read");
-        let mut read: Vec<Option<ChainControls<D>>> = read.into_iter().map(Some).collect();
+        let invalid = self.invalid_controls(run, controls);
+        controls.retain(|(agent, _)| invalid.iter().all(|one| one.agent != *agent));
+        // The neighbors of a lost connector have decided without its answers: the world must know that it was absent.
+        controls.extend(lost.iter().map(|&id| (id, ChainControls::<D>::ABSENT_CONTROL.to_vec())));
+        let by_chain = self.world.read_controls(run.cycle(), controls).expect("all are valid");
+        let mut by_chain: Vec<Option<ChainControls<D>>> = by_chain.into_iter().map(Some).collect();
         for group in groups {
             let (chain, _) = self.chain_and_number(group[0]);
-            let handed = read[chain as usize].take().expect("a chain talks once in a cycle");
-            self.world.submit_controls(run.state(), chain, handed).expect("all were read");
+            let controls = by_chain[chain as usize].take().expect("a chain decides once a cycle");
+            self.world.submit_controls(run.state(), chain, controls).expect("all are valid");
         }
-        absurd
+        invalid
     }
 
     fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
-        let now = run.cycle();
-        let why = |(agent, bytes): &(EntityId, Vec<u8>)| {
-            let reason = match self.world.read_control(now, *agent, bytes) {
+        let mut invalid = Vec::new();
+        for (agent, bytes) in controls {
+            let reason = match self.world.read_control(run.cycle(), *agent, bytes) {
                 Err(reason) => reason,
-                // Only the server declares an agent gone.
+                // It reads as an absent connector, and only the server may declare one absent.
                 Ok(None) => "it is no decision".into(),
-                Ok(Some(_)) => return None,
+                Ok(Some(_)) => continue,
             };
-            Some(InvalidControl { agent: *agent, reason })
-        };
-        controls.iter().filter_map(why).collect()
+            invalid.push(InvalidControl { agent: *agent, reason });
+        }
+        invalid
     }
 
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram> {
         let (chain, connector) = self.chain_and_number(agent);
-        let first_tick = {
-            let world = self.world.clone();
-            Box::new(move |cycle| world.negotiation_start(cycle).0)
-        };
-        let agent = ConnectorAgent::new(&self.world, chain, connector).with_build(build);
-        Box::new(ConnectorProgram { first_tick, agent, heard: RecentSenders::default() })
+        let world = self.world.clone();
+        Box::new(ConnectorProgram {
+            first_tick: Box::new(move |cycle| world.negotiation_start(cycle).0),
+            agent: ConnectorAgent::new(&self.world, chain, connector).with_build(build),
+            senders: RecentSenders::default(),
+        })
     }
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let talks = move |cycle| vec![world.negotiation_start(cycle)];
-        Some(Box::new(FaultyChannel::new(self.world.fault_injector()?, agent, talks)))
+        let conversation_starts = move |cycle| vec![world.negotiation_start(cycle)];
+        let injector = self.world.fault_injector()?;
+        Some(Box::new(FaultyChannel::new(injector, agent, conversation_starts)))
     }
 }
 
-/// The agent of a connector, at a node. Of the world it knows the clock and the agent's behavior.
+/// The program of a connector, at a node. Of the world it knows the clock and the agent's behavior.
 struct ConnectorProgram<const D: usize> {
-    /// Returns the first tick of a cycle's talk.
+    /// Returns the first tick of a cycle's conversation.
     first_tick: Box<dyn Fn(Cycle) -> u64 + Send>,
     agent: ConnectorAgent<D>,
-    heard: RecentSenders,
+    senders: RecentSenders,
 }
 
 impl<const D: usize> AgentProgram for ConnectorProgram<D> {
-    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
-        let percept: Percept<D> = postcard::from_bytes(sight).map_err(|e| e.to_string())?;
+    fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String> {
+        let percept: Percept<D> = postcard::from_bytes(percept).map_err(|e| e.to_string())?;
         if percept.cycle != cycle {
             return Err("it is of another cycle".into());
         }
         let tick = (self.first_tick)(cycle);
         self.agent.start(percept, tick).map_err(|e| e.to_string())?;
-        self.heard.start_cycle();
+        self.senders.start_cycle();
         Ok(tick)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
-        self.heard.record(from);
+        self.senders.record(from);
         self.agent.on_packet(from, payload, tick);
     }
 
@@ -225,11 +243,11 @@ impl<const D: usize> AgentProgram for ConnectorProgram<D> {
     }
 
     fn activity(&self) -> Activity {
-        Activity { word: self.agent.role_name(), ..Activity::default() }
+        Activity { name: self.agent.role_name(), ..Activity::default() }
     }
 
     fn heard_agents(&self) -> Vec<EntityId> {
-        self.heard.senders()
+        self.senders.senders()
     }
 
     fn drop_counts(&self) -> Vec<(String, u64)> {

@@ -1,4 +1,4 @@
-//! A world with agents that may be processes: the interface that a server and its nodes use.
+//! A world whose agents may be processes: the interface that a server and its nodes use.
 
 use crate::agent::{AgentPercept, AgentProgram, Channel, Controls, InvalidControl};
 use sidestep::kernel::{EntityId, InputError, Simulation};
@@ -18,52 +18,53 @@ pub trait DistributedWorld: Send + Sync {
     /// Duration of a cycle, in seconds of the scenario.
     fn cycle_s(&self) -> f64;
 
-    /// Returns whether packets may be lost, delayed or doubled.
+    /// Returns whether packets may be lost, delayed or duplicated.
     fn has_faults(&self) -> bool;
 
-    /// Returns the change of the scenario, as `key=value`, that keeps agents from waiting forever for one that is
-    /// gone where time passes `speed` times as fast; none where they never do.
+    /// Returns the change of the scenario, as `key=value`, that gives agents a timeout for the answers of others, where
+    /// time passes `speed` times as fast: without one they would wait forever for an agent whose node is lost. None where
+    /// the scenario's own timeout will do.
     fn timeout_override(&self, speed: f64) -> Option<String>;
 
-    /// Returns whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
+    /// Returns whether a fleet in lockstep waits for a lost node to be replaced. Otherwise it ends.
     fn waits_for_lost_nodes(&self) -> bool {
         false
     }
 
-    /// Returns the percepts of the agents that decide next in the cycle to come, by rising id.
+    /// Returns the percepts of the agents that decide next in the present cycle, by ascending id.
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept>;
 
     /// Returns the largest number of rounds of this cycle that may follow one with this number of groups; 0 where all
-    /// decide at once.
+    /// agents decide at once.
     fn max_further_rounds(&self, _: &dyn Simulation, _: usize) -> usize {
         0
     }
 
-    /// Returns whether a control counts if it came before the node of its agent was lost.
+    /// Returns whether a control counts if it arrived before the node of its agent was lost.
     fn keeps_controls_of_lost_nodes(&self) -> bool {
         true
     }
 
-    /// Takes the controls of a round with the given groups, where later rounds depend on them; those that make no
-    /// sense are left out. Agents that are gone are noted; none of the controls is theirs, unless these
-    /// are heeded ([`DistributedWorld::keeps_controls_of_lost_nodes`]).
+    /// Receives the controls of a round with the given groups, where later rounds depend on them, and removes invalid
+    /// ones, which it returns. `lost` are the agents without a node; `controls` has none of theirs unless these count
+    /// ([`DistributedWorld::keeps_controls_of_lost_nodes`]).
     fn accept_controls(
         &self,
         _run: &dyn Simulation,
         _groups: &[Vec<EntityId>],
         _controls: &mut Controls,
-        _gone: &[EntityId],
+        _lost: &[EntityId],
     ) -> Vec<InvalidControl> {
         Vec::new()
     }
 
-    /// Returns the controls of the cycle to come that make no sense.
+    /// Returns the controls of the present cycle that cannot be read or carried out.
     fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl>;
 
-    /// Returns the program of an agent, which talks only with those of the same build.
+    /// Returns the program of an agent, which accepts packets only from programs of the same build.
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram>;
 
-    /// Returns the faults of the scenario's network for packets of an agent; none where it loses nothing.
+    /// Returns the faults of the scenario's network for packets of an agent; none where it has no network.
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>>;
 
     /// Returns the id of a named agent.
@@ -77,7 +78,7 @@ pub trait DistributedWorld: Send + Sync {
         })
     }
 
-    /// Returns words for the existing agents, by the option that names one.
+    /// Returns a remedy that lists the existing agents, by the option that selects one.
     fn agent_hint(&self) -> String {
         let last = self.name(self.count().saturating_sub(1) as EntityId);
         format!("give {} to {last}", self.name(0).option())

@@ -5,42 +5,48 @@ use sidestep::kernel::network::FaultInjector;
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, EntityId};
 
-/// First ticks of a cycle's talks, each with its time in seconds after the start of the run.
+/// Returns the first ticks of a cycle's conversations, each with its time in seconds after the start of the run.
 type ConversationStarts = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
 
 /// The faults of the scenario's network, for the packets of one agent.
 pub(crate) struct FaultyChannel {
-    ether: FaultInjector,
+    injector: FaultInjector,
     sender: EntityId,
-    talks: ConversationStarts,
+    conversation_starts: ConversationStarts,
 }
 
 impl FaultyChannel {
-    /// Returns the faults of a network, with the given talks in each cycle.
+    /// Returns the faults of a network whose conversations start at the given times of each cycle.
     pub(crate) fn new(
-        ether: FaultInjector,
+        injector: FaultInjector,
         sender: EntityId,
-        talks: impl Fn(Cycle) -> Vec<(u64, f64)> + Send + 'static,
+        conversation_starts: impl Fn(Cycle) -> Vec<(u64, f64)> + Send + 'static,
     ) -> Self {
-        Self { ether, sender, talks: Box::new(talks) }
+        Self { injector, sender, conversation_starts: Box::new(conversation_starts) }
     }
 }
 
 impl Channel for FaultyChannel {
-    fn arrivals(&mut self, sent: &Transmission) -> Vec<Arrival> {
-        let &Transmission { to, tick, sequence, bytes } = sent;
-        let payload = vec![0; bytes];
-        let sender = self.sender;
-        let packet = Envelope { cycle: tick, sender, sequence, receiver: to, payload };
-        let arrivals = self.ether.arrivals(packet).into_iter();
-        arrivals.map(|(leaves, arrives)| Arrival { leaves, arrives }).collect()
+    fn arrivals(&mut self, packet: &Transmission) -> Vec<Arrival> {
+        let &Transmission { to, tick, sequence, bytes } = packet;
+        let envelope = Envelope {
+            // A transport of the kernel counts ticks where an envelope has its cycle.
+            cycle: tick,
+            sender: self.sender,
+            sequence,
+            receiver: to,
+            // Faults depend on the size, never on the content.
+            payload: vec![0; bytes],
+        };
+        let arrivals = self.injector.arrivals(envelope).into_iter();
+        arrivals.map(|(departs, arrives)| Arrival { departs, arrives }).collect()
     }
 
     fn tick_s(&self) -> f64 {
-        self.ether.tick_s()
+        self.injector.tick_s()
     }
 
     fn start_cycle(&mut self, cycle: Cycle) {
-        self.ether.start_cycle((self.talks)(cycle));
+        self.injector.start_cycle((self.conversation_starts)(cycle));
     }
 }

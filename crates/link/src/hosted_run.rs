@@ -1,42 +1,43 @@
-//! The stage of a fleet at its server: a recorded run with agents that decide elsewhere.
+//! The run at the server of a fleet: recorded, and with agents that decide at their nodes.
 
 use crate::agent::{AgentPercept, Controls, InvalidControl};
 use crate::distributed::DistributedWorld;
-use sidestep::kernel::view::{Frame, FrameOptions as View};
+use sidestep::kernel::view::{Frame, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep_session::{Error, ManagedRun, Watcher};
 use std::sync::Arc;
 
-/// A run of agents that are nodes.
+/// A run whose agents are nodes.
 ///
-/// A cycle is one round of sights and controls, or several where agents decide one after the other; then it is made.
+/// A cycle is one round of percepts and controls, or several where agents decide one after the other; then
+/// [`HostedRun::advance`] computes it.
 pub struct HostedRun {
-    journey: ManagedRun,
+    run: ManagedRun,
     watcher: &'static dyn Watcher,
     world: Arc<dyn DistributedWorld>,
-    /// Controls of the cycle to come.
+    /// Controls of the present cycle.
     controls: Controls,
-    is_watched: bool,
+    keeps_events: bool,
 }
 
 impl HostedRun {
-    /// Returns the stage of a run of a world.
+    /// Returns a run of a world, at its present cycle.
     pub fn new(
-        journey: ManagedRun,
+        run: ManagedRun,
         world: Arc<dyn DistributedWorld>,
         watcher: &'static dyn Watcher,
     ) -> Self {
-        Self { journey, watcher, world, controls: Vec::new(), is_watched: false }
+        Self { run, watcher, world, controls: Vec::new(), keeps_events: false }
     }
 
     /// Returns the run, to be finished.
     pub fn into_managed_run(self) -> ManagedRun {
-        self.journey
+        self.run
     }
 
-    /// Returns the run, for reading.
-    pub fn run(&self) -> &dyn Simulation {
-        self.journey.simulation()
+    /// Returns the simulation, for reading.
+    pub fn simulation(&self) -> &dyn Simulation {
+        self.run.simulation()
     }
 
     /// Returns the world, with its agents.
@@ -44,7 +45,7 @@ impl HostedRun {
         self.world.as_ref()
     }
 
-    /// Returns the agents that have nodes, rising.
+    /// Returns the agents that have nodes, in ascending order.
     pub fn agents(&self) -> impl Iterator<Item = EntityId> + use<> {
         0..self.world.count() as EntityId
     }
@@ -55,67 +56,72 @@ impl HostedRun {
         format!("{} {name}", name.noun())
     }
 
-    /// Returns the cycle that comes next.
+    /// Returns the present cycle: the one to be computed next.
     pub fn cycle(&self) -> Cycle {
-        self.journey.cycle()
+        self.run.cycle()
     }
 
     /// Returns whether there is no further cycle.
     pub fn is_over(&self) -> bool {
-        self.run().is_over() || self.run().cycle() >= self.run().config().cycles
+        let simulation = self.simulation();
+        simulation.is_over() || simulation.cycle() >= simulation.config().cycles
     }
 
-    /// Returns the percepts of the agents that decide in the next round of the cycle to come, by rising id.
+    /// Returns the percepts of the agents that decide in the next round of the present cycle, by ascending id.
     pub fn percepts(&self) -> Vec<AgentPercept> {
-        self.world.percepts(self.run())
+        self.world.percepts(self.simulation())
     }
 
     /// Returns the largest number of rounds of this cycle that may follow one with this number of groups.
     pub fn max_further_rounds(&self, groups: usize) -> usize {
-        self.world.max_further_rounds(self.run(), groups)
+        self.world.max_further_rounds(self.simulation(), groups)
     }
 
-    /// Takes the controls of a round with the given groups; agents without one do the safe thing. Returns those that
-    /// make no sense.
+    /// Receives the controls of a round with the given groups; agents without one do what is safe without. Returns the
+    /// invalid ones.
     pub fn accept_controls(
         &mut self,
         groups: &[Vec<EntityId>],
         mut controls: Controls,
-        gone: &[EntityId],
+        lost: &[EntityId],
     ) -> Vec<InvalidControl> {
-        let absurd =
-            self.world.accept_controls(self.journey.simulation(), groups, &mut controls, gone);
+        let invalid =
+            self.world.accept_controls(self.run.simulation(), groups, &mut controls, lost);
         self.controls.append(&mut controls);
-        absurd
+        invalid
     }
 
-    /// Makes the cycle to come with the controls that were taken. Those that make no sense are returned, and their
-    /// agents do the safe thing.
+    /// Computes the present cycle with the controls of its rounds. Invalid ones are returned, and their agents do what is
+    /// safe without one.
     ///
     /// # Errors
-    /// When it cannot be recorded.
+    /// When the cycle cannot be recorded.
     pub fn advance(&mut self) -> Result<Vec<InvalidControl>, Error> {
         let mut controls = std::mem::take(&mut self.controls);
         controls.sort_by_key(|(agent, _)| *agent);
-        let mut absurd = Vec::new();
-        if self.journey.simulation_mut().submit_controls(&controls).is_err() {
-            absurd = self.world.invalid_controls(self.run(), &controls);
-            controls.retain(|(agent, _)| absurd.iter().all(|one| one.agent != *agent));
-            let handed = self.journey.simulation_mut().submit_controls(&controls);
-            handed.map_err(|e| Error::other(e.to_string(), "please report it: this is a bug"))?;
+        let mut invalid = Vec::new();
+        // A simulation takes all controls or none. So the check of each by itself, which costs as much again, is made only
+        // if there is an invalid one.
+        if self.run.simulation_mut().submit_controls(&controls).is_err() {
+            invalid = self.world.invalid_controls(self.simulation(), &controls);
+            controls.retain(|(agent, _)| invalid.iter().all(|one| one.agent != *agent));
+            let submitted = self.run.simulation_mut().submit_controls(&controls);
+            submitted
+                .map_err(|e| Error::other(e.to_string(), "please report it: this is a bug"))?;
         }
-        let next = self.journey.cycle() + 1;
-        self.journey.advance_to(next, self.watcher)?;
-        Ok(absurd)
+        let next = self.run.cycle() + 1;
+        self.run.advance_to(next, self.watcher)?;
+        Ok(invalid)
     }
 
-    /// Returns the present frame, with the events since the frame before. Looking changes nothing.
+    /// Returns the present frame, with the events since the frame before. The state of the run does not change.
     pub fn frame(&mut self) -> Frame {
-        let run = self.journey.simulation_mut();
-        // Events are kept from now on: a fleet without watchers keeps none.
-        if !std::mem::replace(&mut self.is_watched, true) {
-            run.enable_events();
+        let simulation = self.run.simulation_mut();
+        // The simulation keeps events from the first frame on: without a viewer nobody would ever take them.
+        if !self.keeps_events {
+            simulation.enable_events();
+            self.keeps_events = true;
         }
-        run.frame(View::WITHOUT_SCANS)
+        simulation.frame(FrameOptions::WITHOUT_SCANS)
     }
 }

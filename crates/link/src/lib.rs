@@ -1,15 +1,20 @@
 //! A fleet: a world at a server, and its agents as processes on a network.
 //!
 //! ```text
-//! wire/      frames between parties: in memory, or by Zenoh (the one file that names sockets)
-//! party.rs     names of the parties                  post.rs   letters: numbered, acknowledged, repeated
-//! mail.rs      a party's letters and notes           words.rs  words that parties exchange
-//! deployed.rs  the interface of a world              ports.rs  the interface of an agent's program
-//! worlds.rs    the known worlds                      stage.rs  the run at the server
-//! airspace.rs  airplanes and their pilots            chain.rs  connectors of chains and their agents
-//! faults.rs    the faults of a scenario's network    heard.rs  agents that an agent has heard
-//! program/   the process: job, logs, metrics, other processes
-//! server/    the world's server                      node/     the node of an agent
+//! wire/              frames between peers: in memory, or by Zenoh (the only code that opens sockets)
+//! peer.rs            participants of a fleet: the server, and a node for each agent
+//! protocol.rs        messages between peers, and the frames that carry them
+//! arq.rs             reliable delivery to one peer: numbered, acknowledged, retransmitted
+//! messenger.rs       a peer's reliable and best-effort messages to and from all other peers
+//! agent.rs           the interface of an agent's program, of its percepts, controls and packets
+//! distributed.rs     the interface of a world whose agents are processes
+//! worlds.rs          the worlds that have it: airspace.rs (pilots), chain.rs (connectors)
+//! faults.rs          the faults of the scenario's network, for the packets of one agent
+//! recent_senders.rs  the senders that an agent has heard lately
+//! hosted_run.rs      the recorded run at the server
+//! server/            the server of the world
+//! node/              the node of an agent
+//! program/           the process: its job, logs, metrics and child processes
 //! ```
 
 pub mod agent;

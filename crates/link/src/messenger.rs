@@ -1,4 +1,4 @@
-//! Mail of one party: notes, which may be lost, and letters, which are not, over one wire.
+//! A peer's messages to and from all others over one wire: best-effort ones, which may be lost, and reliable ones.
 
 use crate::arq::ArqLink;
 use crate::protocol::{Frame, Incarnation, Member, Message, Recipient};
@@ -9,231 +9,257 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time in which no letter comes to another node before the direct link there is checked.
+/// Time without an acknowledgment from another node after which the direct link to it is probed: as long as Zenoh waits
+/// for a sign of life before it gives up a broken link by itself.
 const LINK_CHECK_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Counts of a party's mail.
+/// Reasons for which a messenger drops frames and messages, as named in metrics.
+mod drop_reason {
+    /// The frame is for an earlier process of this peer.
+    pub(super) const FORMER_LIFE: &str = "former-life";
+    /// The message is reliable, and the two peers have not connected.
+    pub(super) const STRANGER: &str = "stranger";
+    /// The message is a duplicate, or one before it is missing.
+    pub(super) const OUT_OF_ORDER: &str = "out-of-order";
+}
+
+/// Counts of a messenger.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MessengerStats {
     /// Frames sent.
     pub frames: u64,
     /// Bytes of these frames.
     pub bytes: u64,
-    /// Letters that were sent again.
+    /// Messages that were retransmitted.
     pub retries: u64,
     /// Frames that were dropped, by reason.
     pub dropped: BTreeMap<&'static str, u64>,
 }
 
-/// Another party, in its present life.
+/// Another peer, in its present incarnation.
 #[derive(Debug)]
 struct PeerState {
-    life: Incarnation,
-    post: ArqLink,
-    /// Time at which it was heard last.
-    heard: Duration,
+    incarnation: Incarnation,
+    link: ArqLink,
+    /// Time at which it was last heard.
+    last_heard: Duration,
 }
 
 impl PeerState {
-    /// Returns the address of a letter, or of a note.
-    fn recipient(&mut self, party: Peer, number: Option<u64>) -> Recipient {
+    /// Returns the recipient of a frame to this peer; `sequence` is that of a reliable message.
+    fn recipient(&mut self, peer: Peer, sequence: Option<u64>) -> Recipient {
         Recipient {
-            party,
-            life: Some(self.life),
-            received: self.post.take_cumulative_ack(),
-            number,
+            peer,
+            incarnation: Some(self.incarnation),
+            ack: self.link.take_cumulative_ack(),
+            sequence,
         }
     }
 }
 
-/// A received word.
+/// A received message.
 #[derive(Debug, PartialEq)]
 pub struct Received {
     /// The sender.
     pub from: Peer,
-    /// The sender's life.
-    pub life: Incarnation,
-    /// The word.
-    pub word: Message,
+    /// The sender's incarnation.
+    pub incarnation: Incarnation,
+    /// The message.
+    pub message: Message,
 }
 
-/// A party's letters and notes to and from all others.
+/// A peer's reliable and best-effort messages to and from all other peers.
 pub struct Messenger {
     me: Peer,
-    life: Incarnation,
+    incarnation: Incarnation,
     wire: Box<dyn Wire>,
-    began: Instant,
-    others: BTreeMap<Peer, PeerState>,
-    counts: MessengerStats,
+    started: Instant,
+    /// The peers with which it has connected.
+    peers: BTreeMap<Peer, PeerState>,
+    stats: MessengerStats,
 }
 
 impl Messenger {
-    /// Returns the mail of a party in a new life.
+    /// Returns the messenger of a peer in a new incarnation.
     pub fn new(me: Peer, wire: Box<dyn Wire>) -> Self {
-        let began = Instant::now();
-        let (others, counts) = (BTreeMap::new(), MessengerStats::default());
-        Self { me, life: new_incarnation(), wire, began, others, counts }
+        Self {
+            me,
+            incarnation: new_incarnation(),
+            wire,
+            started: Instant::now(),
+            peers: BTreeMap::new(),
+            stats: MessengerStats::default(),
+        }
     }
 
-    /// Returns the party's own life.
+    /// Returns the peer's own incarnation.
     pub fn incarnation(&self) -> Incarnation {
-        self.life
+        self.incarnation
     }
 
     /// Returns the counts so far.
     pub fn stats(&self) -> &MessengerStats {
-        &self.counts
+        &self.stats
     }
 
-    /// Returns whether all letters to another party have come, or it was not met.
-    pub fn has_delivered_to(&self, other: Peer) -> bool {
-        self.others.get(&other).is_none_or(|other| other.post.has_delivered())
+    /// Returns whether all reliable messages to another peer were acknowledged, or the two are not connected.
+    pub fn has_delivered_to(&self, peer: Peer) -> bool {
+        self.peers.get(&peer).is_none_or(|state| state.link.has_delivered())
     }
 
     fn now(&self) -> Duration {
-        self.began.elapsed()
+        self.started.elapsed()
     }
 
-    /// Begins to exchange letters with one life of another party. Letters that an earlier life has not
-    /// taken are lost with it.
-    pub fn connect(&mut self, other: Peer, life: Incarnation) {
-        if self.others.get(&other).is_none_or(|known| known.life != life) {
-            let (post, heard) = (ArqLink::default(), self.now());
-            self.others.insert(other, PeerState { life, post, heard });
+    /// Connects with one incarnation of another peer, so that reliable messages can be exchanged. Those that an earlier
+    /// incarnation has not acknowledged are lost with it.
+    pub fn connect(&mut self, peer: Peer, incarnation: Incarnation) {
+        let is_connected =
+            self.peers.get(&peer).is_some_and(|state| state.incarnation == incarnation);
+        if !is_connected {
+            let last_heard = self.now();
+            let state = PeerState { incarnation, link: ArqLink::default(), last_heard };
+            self.peers.insert(peer, state);
         }
     }
 
-    /// Ends the exchange with another party; letters that it has not taken are lost.
-    pub fn disconnect(&mut self, other: Peer) {
-        self.others.remove(&other);
+    /// Ends the exchange with another peer; reliable messages that it has not acknowledged are lost.
+    pub fn disconnect(&mut self, peer: Peer) {
+        self.peers.remove(&peer);
     }
 
-    /// Returns the time for which another party that was met has been silent.
-    pub fn silent_for(&self, other: Peer) -> Option<Duration> {
-        let heard = self.others.get(&other)?.heard;
-        Some(self.now().saturating_sub(heard))
+    /// Returns the time since a connected peer was last heard.
+    pub fn silent_for(&self, peer: Peer) -> Option<Duration> {
+        let last_heard = self.peers.get(&peer)?.last_heard;
+        Some(self.now().saturating_sub(last_heard))
     }
 
-    /// Returns whether the direct link to another node is deaf: no letter arrives there, and its end has left
-    /// questions unanswered for some time.
+    /// Returns whether the direct link to another node is half-open: no message arrives there, and the link's other end
+    /// has left probes unanswered for the given time.
     pub fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
-        let other = self.others.get(&Peer::Node(member.agent));
-        let since = other.and_then(|other| other.post.unacked_since());
-        since.is_some_and(|since| self.now().saturating_sub(since) > LINK_CHECK_TIMEOUT)
+        let state = self.peers.get(&Peer::Node(member.agent));
+        let Some(since) = state.and_then(|state| state.link.unacked_since()) else { return false };
+        self.now().saturating_sub(since) > LINK_CHECK_TIMEOUT
             && self.wire.is_half_open(member, within)
     }
 
     /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be taken again: everything goes by the server then, and it can be tried once more.
+    /// When an endpoint cannot be bound again: everything goes through the server then, and the call can be repeated.
     pub fn reopen_links(&mut self) -> Result<(), WireError> {
         self.wire.reopen_links()
     }
 
-    /// Returns whether all letters to all others have come.
+    /// Returns whether all reliable messages to all peers were acknowledged.
     pub fn has_delivered(&self) -> bool {
-        self.others.values().all(|other| other.post.has_delivered())
+        self.peers.values().all(|state| state.link.has_delivered())
     }
 
-    /// Sends a word that may be lost.
-    pub fn send_best_effort(&mut self, to: Peer, word: Message) {
-        self.multicast_best_effort(&[to], &word);
+    /// Sends a message that may be lost.
+    pub fn send_best_effort(&mut self, to: Peer, message: Message) {
+        self.multicast_best_effort(&[to], &message);
     }
 
-    /// Sends a word that may be lost to some parties.
-    pub fn multicast_best_effort(&mut self, to: &[Peer], word: &Message) {
-        let address = |&party: &Peer| match self.others.get_mut(&party) {
-            Some(other) => other.recipient(party, None),
-            None => Recipient { party, life: None, received: 0, number: None },
-        };
-        let to = to.iter().map(address).collect();
-        self.transmit(to, Some(word));
+    /// Sends a message that may be lost to several peers.
+    pub fn multicast_best_effort(&mut self, to: &[Peer], message: &Message) {
+        let mut recipients = Vec::with_capacity(to.len());
+        for &peer in to {
+            recipients.push(match self.peers.get_mut(&peer) {
+                Some(state) => state.recipient(peer, None),
+                None => Recipient { peer, incarnation: None, ack: 0, sequence: None },
+            });
+        }
+        self.transmit(recipients, Some(message));
     }
 
-    /// Sends a word that may be lost to one life of another party, regardless of the life with which it exchanges
-    /// letters.
-    pub fn reply(&mut self, to: Peer, life: Incarnation, word: Message) {
-        let address = Recipient { party: to, life: Some(life), received: 0, number: None };
-        self.transmit(vec![address], Some(&word));
+    /// Sends a message that may be lost to one incarnation of another peer, whether or not it is the connected one: a
+    /// second process for an agent that has a node already must be answered, too.
+    pub fn reply(&mut self, to: Peer, incarnation: Incarnation, message: Message) {
+        let recipient =
+            Recipient { peer: to, incarnation: Some(incarnation), ack: 0, sequence: None };
+        self.transmit(vec![recipient], Some(&message));
     }
 
-    /// Sends a word that is repeated until it has come; lost if the other was not met.
-    pub fn send_reliable(&mut self, to: Peer, word: Message) {
-        self.multicast_reliable(&[to], word);
+    /// Sends a message that is retransmitted until it has arrived; it is lost if the peer is not connected.
+    pub fn send_reliable(&mut self, to: Peer, message: Message) {
+        self.multicast_reliable(&[to], message);
     }
 
-    /// Sends a word to some parties, to each of which it is repeated until it has come there; lost to those that were
-    /// not met.
-    pub fn multicast_reliable(&mut self, to: &[Peer], word: Message) {
-        let (now, word) = (self.now(), Arc::new(word));
-        let mut addresses = Vec::with_capacity(to.len());
-        for &party in to {
-            let Some(other) = self.others.get_mut(&party) else {
-                self.count_drop("stranger");
+    /// Sends a message to several peers, to each of which it is retransmitted until it has arrived there; it is lost for
+    /// peers that are not connected.
+    pub fn multicast_reliable(&mut self, to: &[Peer], message: Message) {
+        let now = self.now();
+        let message = Arc::new(message);
+        let mut recipients = Vec::with_capacity(to.len());
+        for &peer in to {
+            let Some(state) = self.peers.get_mut(&peer) else {
+                self.count_drop(drop_reason::STRANGER);
                 continue;
             };
-            let number = other.post.send(word.clone(), now);
-            addresses.push(other.recipient(party, Some(number)));
+            let sequence = state.link.send(message.clone(), now);
+            recipients.push(state.recipient(peer, Some(sequence)));
         }
-        self.transmit(addresses, Some(&word));
+        self.transmit(recipients, Some(&message));
     }
 
-    fn transmit(&mut self, to: Vec<Recipient>, word: Option<&Message>) {
-        let parties: Vec<Peer> = to.iter().map(|address| address.party).collect();
-        if parties.is_empty() {
+    fn transmit(&mut self, to: Vec<Recipient>, message: Option<&Message>) {
+        if to.is_empty() {
             return;
         }
-        let frame = Frame { from: self.me, life: self.life, to, word }.encode();
-        self.counts.frames += 1;
-        self.counts.bytes += frame.len() as u64;
-        self.wire.send(&parties, &frame);
+        let peers: Vec<Peer> = to.iter().map(|recipient| recipient.peer).collect();
+        let frame = Frame { from: self.me, incarnation: self.incarnation, to, message }.encode();
+        self.stats.frames += 1;
+        self.stats.bytes += frame.len() as u64;
+        self.wire.send(&peers, &frame);
     }
 
     fn count_drop(&mut self, reason: &'static str) {
-        *self.counts.dropped.entry(reason).or_default() += 1;
+        *self.stats.dropped.entry(reason).or_default() += 1;
     }
 
-    /// Sends the frames that are due: letters again, and acknowledgments.
+    /// Sends the frames that are due: retransmissions and acknowledgments.
     fn send_due(&mut self) {
         let now = self.now();
-        let is_due = |other: &PeerState| other.post.next_due().is_some_and(|at| at <= now);
-        let due: Vec<Peer> =
-            self.others.iter().filter(|(_, other)| is_due(other)).map(|(&who, _)| who).collect();
-        for to in due {
-            let Some(other) = self.others.get_mut(&to) else { continue };
-            let due = other.post.take_due(now);
-            let address = other.recipient(to, None);
-            self.counts.retries += due.again.len() as u64;
-            for (number, word) in due.again {
-                self.transmit(vec![Recipient { number: Some(number), ..address }], Some(&word));
+        let is_due = |state: &PeerState| state.link.next_due().is_some_and(|at| at <= now);
+        let due_peers: Vec<Peer> =
+            self.peers.iter().filter(|(_, state)| is_due(state)).map(|(&peer, _)| peer).collect();
+        for peer in due_peers {
+            let Some(state) = self.peers.get_mut(&peer) else { continue };
+            let due = state.link.take_due(now);
+            let recipient = state.recipient(peer, None);
+            self.stats.retries += due.retransmissions.len() as u64;
+            for (sequence, message) in due.retransmissions {
+                let recipient = Recipient { sequence: Some(sequence), ..recipient };
+                self.transmit(vec![recipient], Some(&message));
             }
             if due.acknowledge {
-                self.transmit(vec![address], None);
+                self.transmit(vec![recipient], None);
             }
         }
     }
 
-    /// Makes the direct links from this node to all others, where there are any.
+    /// Opens the direct links from this node to all others, where there are any.
     ///
     /// # Errors
-    /// When an endpoint cannot be taken.
+    /// When an endpoint cannot be bound.
     pub fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
         self.wire.connect_mesh(me, members)
     }
 
-    /// Returns the next word that comes within some time; none if none does. Words come in the order in which
-    /// their sender has sent them, except for notes. Of parties that were not met, only notes come.
+    /// Returns the next message that arrives within some time, if any. Reliable messages arrive in the order in which
+    /// their sender has sent them. Peers that are not connected can send only best-effort messages.
     pub fn receive(&mut self, within: Duration) -> Option<Received> {
         let until = self.now().saturating_add(within);
         loop {
             self.send_due();
             let now = self.now();
-            let due = self.others.values().filter_map(|other| other.post.next_due()).min();
-            let wait = due.map_or(until, |due| due.min(until)).saturating_sub(now);
-            if let Some(bytes) = self.wire.receive(wait) {
-                if let Some(heard) = self.decode_frame(&bytes) {
-                    return Some(heard);
+            // Wakes up for retransmissions and acknowledgments that become due while it waits.
+            let next_due = self.peers.values().filter_map(|state| state.link.next_due()).min();
+            let wake_at = next_due.map_or(until, |due| due.min(until));
+            if let Some(bytes) = self.wire.receive(wake_at.saturating_sub(now)) {
+                if let Some(received) = self.decode_frame(&bytes) {
+                    return Some(received);
                 }
             } else if self.now() >= until {
                 return None;
@@ -249,44 +275,46 @@ impl Messenger {
                 return None;
             }
         };
-        let Frame { from, life, to, word } = frame;
-        // Where all hear the frames meant for most, some frames are not meant for this party.
-        let address = to.into_iter().find(|address| address.party == self.me)?;
-        // It is addressed to the process that was here before, with its own numbers of letters.
-        if address.life.is_some_and(|to| to != self.life) {
-            self.count_drop("former-life");
+        let Frame { from, incarnation, to, message } = frame;
+        // A frame for most nodes is published to all of them, so some frames are not for this peer.
+        let recipient = to.into_iter().find(|recipient| recipient.peer == self.me)?;
+        // A frame to the process that was here before has sequence numbers that mean nothing to this one.
+        if recipient.incarnation.is_some_and(|to| to != self.incarnation) {
+            self.count_drop(drop_reason::FORMER_LIFE);
             return None;
         }
-        if let Err(reason) = self.record_acks(from, life, &address) {
+        if let Err(reason) = self.process_header(from, incarnation, &recipient) {
             self.count_drop(reason);
             return None;
         }
-        Some(Received { from, life, word: word? })
+        Some(Received { from, incarnation, message: message? })
     }
 
-    /// Notes the acknowledgments of a frame; an error is the reason why its word does not count.
-    fn record_acks(
+    /// Processes the acknowledgment and the sequence number of a frame; an error is the reason why its message is dropped.
+    fn process_header(
         &mut self,
         from: Peer,
-        life: Incarnation,
-        address: &Recipient,
+        incarnation: Incarnation,
+        header: &Recipient,
     ) -> Result<(), &'static str> {
         let now = self.now();
-        let Some(other) = self.others.get_mut(&from).filter(|other| other.life == life) else {
-            return if address.number.is_none() { Ok(()) } else { Err("stranger") };
+        let state = self.peers.get_mut(&from).filter(|state| state.incarnation == incarnation);
+        let Some(state) = state else {
+            return if header.sequence.is_none() { Ok(()) } else { Err(drop_reason::STRANGER) };
         };
-        other.heard = now;
-        if address.life.is_some() {
-            other.post.on_ack(address.received, now);
+        state.last_heard = now;
+        // Without an incarnation the sender is not connected, and has nothing to acknowledge.
+        if header.incarnation.is_some() {
+            state.link.on_ack(header.ack, now);
         }
-        match address.number {
-            Some(number) if !other.post.accept(number, now) => Err("out-of-order"),
+        match header.sequence {
+            Some(sequence) if !state.link.accept(sequence, now) => Err(drop_reason::OUT_OF_ORDER),
             _ => Ok(()),
         }
     }
 }
 
-/// Returns a number that no other life has.
+/// Returns a random number, so that no two processes of a peer share it.
 fn new_incarnation() -> Incarnation {
     // The standard library seeds its hash maps from the system's source of randomness.
     Incarnation(RandomState::new().hash_one(std::process::id()))
@@ -300,18 +328,18 @@ mod tests {
     const SOON: Duration = Duration::from_millis(1);
     const LATER: Duration = Duration::from_secs(20);
 
-    /// A wire that loses the first frames on the way to their last receiver.
+    /// A wire that loses the first frames to their last receiver.
     struct Lossy {
         wire: Box<dyn Wire>,
-        lost: usize,
+        drops: usize,
     }
 
     impl Wire for Lossy {
         fn send(&mut self, to: &[Peer], frame: &[u8]) {
-            match self.lost {
+            match self.drops {
                 0 => self.wire.send(to, frame),
                 _ => {
-                    self.lost -= 1;
+                    self.drops -= 1;
                     self.wire.send(&to[..to.len() - 1], frame);
                 }
             }
@@ -322,15 +350,15 @@ mod tests {
         }
     }
 
-    fn mail(exchange: &MemoryHub, me: Peer, lost: usize) -> Messenger {
-        Messenger::new(me, Box::new(Lossy { wire: Box::new(exchange.wire(me)), lost }))
+    fn messenger(hub: &MemoryHub, me: Peer, drops: usize) -> Messenger {
+        Messenger::new(me, Box::new(Lossy { wire: Box::new(hub.wire(me)), drops }))
     }
 
     #[test]
-    fn a_letter_whose_frame_is_lost_comes_all_the_same_and_a_note_does_not() {
-        let exchange = MemoryHub::default();
+    fn a_reliable_message_arrives_although_its_frame_is_lost_and_a_best_effort_one_does_not() {
+        let hub = MemoryHub::default();
         let (a, b) = (Peer::Server, Peer::Node(3));
-        let (mut first, mut second) = (mail(&exchange, a, 2), mail(&exchange, b, 0));
+        let (mut first, mut second) = (messenger(&hub, a, 2), messenger(&hub, b, 0));
         first.connect(b, second.incarnation());
         second.connect(a, first.incarnation());
         first.send_best_effort(b, Message::Hello);
@@ -343,57 +371,57 @@ mod tests {
                 }
                 first.stats().retries
             });
-            let heard = second.receive(LATER).expect("it is sent again");
-            assert_eq!((heard.from, heard.word), (a, Message::End));
+            let received = second.receive(LATER).expect("it is sent again");
+            assert_eq!((received.from, received.message), (a, Message::End));
             while !sends.is_finished() {
-                assert_eq!(second.receive(SOON), None, "it comes once");
+                assert_eq!(second.receive(SOON), None, "it arrives once");
             }
             assert!(sends.join().expect("no panic") >= 1);
         });
     }
 
     #[test]
-    fn a_letter_to_several_comes_once_to_each_in_the_order_of_its_own_letters() {
-        let exchange = MemoryHub::default();
+    fn a_reliable_multicast_arrives_once_at_each_peer_in_the_order_of_its_link() {
+        let hub = MemoryHub::default();
         let [a, b, c] = [1, 2, 3].map(Peer::Node);
-        let mut first = mail(&exchange, a, 0);
-        let mut others = [b, c].map(|party| mail(&exchange, party, 0));
-        first.connect(b, others[0].incarnation());
+        let mut first = messenger(&hub, a, 0);
+        let mut peers = [b, c].map(|peer| messenger(&hub, peer, 0));
+        first.connect(b, peers[0].incarnation());
         first.send_reliable(b, Message::Hello);
         first.multicast_reliable(&[b, c], Message::Close(1));
-        assert_eq!(first.stats().dropped["stranger"], 1, "one of them was not met");
-        first.connect(c, others[1].incarnation());
-        first.wire = Box::new(Lossy { wire: Box::new(exchange.wire(a)), lost: 1 });
+        assert_eq!(first.stats().dropped["stranger"], 1, "one of them is not connected");
+        first.connect(c, peers[1].incarnation());
+        first.wire = Box::new(Lossy { wire: Box::new(hub.wire(a)), drops: 1 });
         first.multicast_reliable(&[b, c], Message::Close(2));
-        for other in &mut others {
-            other.connect(a, first.incarnation());
+        for peer in &mut peers {
+            peer.connect(a, first.incarnation());
         }
-        let mut heard = [Vec::new(), Vec::new()];
+        let mut received = [Vec::new(), Vec::new()];
         while !first.has_delivered() {
             first.receive(SOON);
-            for (other, heard) in others.iter_mut().zip(&mut heard) {
-                heard.extend(other.receive(SOON).map(|heard| heard.word));
+            for (peer, received) in peers.iter_mut().zip(&mut received) {
+                received.extend(peer.receive(SOON).map(|received| received.message));
             }
         }
-        assert_eq!(heard[0], [Message::Hello, Message::Close(1), Message::Close(2)]);
-        assert_eq!(heard[1], [Message::Close(2)], "lost at first, and sent again");
+        assert_eq!(received[0], [Message::Hello, Message::Close(1), Message::Close(2)]);
+        assert_eq!(received[1], [Message::Close(2)], "lost at first, and sent again");
     }
 
     #[test]
-    fn frames_to_an_earlier_life_and_letters_of_strangers_are_dropped_and_counted() {
-        let exchange = MemoryHub::default();
+    fn frames_to_a_former_incarnation_and_reliable_messages_of_strangers_are_dropped_and_counted() {
+        let hub = MemoryHub::default();
         let (a, b) = (Peer::Server, Peer::Node(3));
-        let (mut first, mut second) = (mail(&exchange, a, 0), mail(&exchange, b, 0));
+        let (mut first, mut second) = (messenger(&hub, a, 0), messenger(&hub, b, 0));
         first.connect(b, Incarnation(17));
         first.send_reliable(b, Message::End);
         assert_eq!(second.receive(SOON), None);
         assert_eq!(second.stats().dropped["former-life"], 1);
-        let life = second.incarnation();
-        first.connect(b, life);
+        let incarnation = second.incarnation();
+        first.connect(b, incarnation);
         first.send_reliable(b, Message::End);
-        assert_eq!(second.receive(SOON), None, "it has not met the server");
+        assert_eq!(second.receive(SOON), None, "it has not connected with the server");
         assert_eq!(second.stats().dropped["stranger"], 1);
-        exchange.wire(Peer::Node(9)).send(&[b], b"something else");
+        hub.wire(Peer::Node(9)).send(&[b], b"something else");
         assert_eq!(second.receive(SOON), None);
         assert_eq!(second.stats().dropped["foreign"], 1);
     }

@@ -1,10 +1,10 @@
-//! Parties of a fleet, by which words and wires name the sender.
+//! Participants of a fleet, by which messages and wires identify sender and receiver.
 
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::EntityId;
 use std::fmt;
 
-/// A party of a fleet.
+/// A participant of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Peer {
     /// The server of the world.

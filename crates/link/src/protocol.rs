@@ -1,7 +1,7 @@
-//! Words that parties of a fleet exchange, and the frames in which they travel.
+//! Messages that the peers of a fleet exchange, and the frames that carry them.
 //!
-//! A frame is postcard after a magic number and the version of this format. An unreadable frame is counted and
-//! dropped, so that none can do harm.
+//! A frame is a magic number with the version of this format, followed by postcard. An unreadable frame is counted
+//! and dropped: a foreign program on the same network must not be able to stop a fleet.
 
 use crate::peer::Peer;
 use serde::{Deserialize, Serialize};
@@ -11,77 +11,79 @@ pub use sidestep_session::fleet::{ClockMode, Topology};
 /// First bytes of every frame: `Sk`, and the version of the format.
 const MAGIC: [u8; 3] = [b'S', b'k', 2];
 
-/// Most bytes of a frame: a longer one is not read.
+/// Maximum size of a frame, far above any percept: no node can make another one decode more than this.
 pub const MAX_FRAME_BYTES: usize = 64 << 20;
 
-/// One life of a party: a process that starts again begins another one.
+/// Incarnation of a peer: a process that starts again gets a new one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Incarnation(pub u64);
 
-/// A frame on a wire: a word for some parties, or only acknowledgments.
+/// A frame on a wire: a message for some peers, or only acknowledgments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Frame<W = Message> {
+pub struct Frame<M = Message> {
     /// The sender.
     pub from: Peer,
-    /// The sender's life.
-    pub life: Incarnation,
+    /// The sender's incarnation.
+    pub incarnation: Incarnation,
     /// The receivers.
     pub to: Vec<Recipient>,
-    /// The word, which is the same for all of them.
-    pub word: Option<W>,
+    /// The message, the same for all receivers; none in a frame that only acknowledges.
+    pub message: Option<M>,
 }
 
-/// A receiver of a frame, and the facts for it alone.
+/// A receiver of a frame, with the header fields that differ by receiver: so a message to many is serialized once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recipient {
     /// The receiver.
-    pub party: Peer,
-    /// Its life, where the sender knows of one.
-    pub life: Option<Incarnation>,
-    /// All letters of the receiver below this number have come.
-    pub received: u64,
-    /// Number of the word among the letters to the receiver, which are repeated until they have come; none for a
-    /// note, which may be lost.
-    pub number: Option<u64>,
+    pub peer: Peer,
+    /// Its incarnation, if the sender knows it.
+    pub incarnation: Option<Incarnation>,
+    /// Cumulative acknowledgment: the sender has received all reliable messages of the receiver below this number.
+    pub ack: u64,
+    /// Sequence number of the message among the reliable ones to the receiver; none for a best-effort message.
+    pub sequence: Option<u64>,
 }
 
-/// A word from one party to another.
+/// A message from one peer to another.
+///
+/// Messages are reliable (retransmitted until acknowledged) unless said to be best-effort. Joining is best-effort,
+/// because reliable messages need a known incarnation at both ends, and joining is how peers learn it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Message {
-    /// Node to server, as a note: "May I join?"
+    /// Node to server, best-effort: asks to join.
     Join(Join),
-    /// Server to node, as a note: "You may."
+    /// Server to node, best-effort: the node may join.
     Welcome(Welcome),
-    /// Server to node, as a note: "You may not", with the reasons.
+    /// Server to node, best-effort: the node may not join, or has lost its place, with the reasons.
     Refused(JoinError),
-    /// Node to server, as a note: its status.
+    /// Node to server, best-effort: its status.
     Status(Status),
-    /// Server to node: all nodes, when they are complete or have changed.
+    /// Server to node: all nodes, sent when they are complete or have changed.
     Roster(Vec<Member>),
-    /// Node to node: a test whether it is heard.
+    /// Node to node: a test whether the other one receives it; the acknowledgment is the answer.
     Hello,
-    /// Node to server: all other nodes have heard it.
+    /// Node to server: all other nodes have acknowledged its `Hello`.
     Ready,
     /// Server to node: a cycle begins.
-    Begin(CycleStart),
-    /// Server to node, where time is counted in ticks: go on to a tick.
-    Tick(AdvanceGrant),
+    CycleStart(CycleStart),
+    /// Server to node, where time is counted in ticks: advance to a tick.
+    Grant(AdvanceGrant),
     /// Node to server: it has done a tick.
-    Ticked(AdvanceDone),
-    /// Node to node: packets of a talk, sent in one step.
+    TickDone(AdvanceDone),
+    /// Node to node: packets of a conversation, sent in one step.
     Packets(Vec<Packet>),
-    /// Server to node: the cycle's talks are over, or its time is up.
+    /// Server to node: the cycle's conversations are over, or its time is up.
     Close(Cycle),
     /// Node to server: the agent's control.
     Control(Control),
-    /// Server to node, as a note: a sign of life.
-    Beat,
+    /// Server to node, best-effort: a sign of life.
+    Heartbeat,
     /// Node to server: packets that it has sent, where all are recorded.
-    Log(Vec<PacketRecord>),
+    PacketLog(Vec<PacketRecord>),
     /// Server to node: the fleet has ended.
     End,
-    /// Node to server: it has sent its last word.
-    Left,
+    /// Node to server: goodbye, nothing follows.
+    Goodbye,
 }
 
 /// A node that wants to join.
@@ -95,11 +97,12 @@ pub struct Join {
     pub build: String,
     /// Endpoints at which other nodes reach it; none in a star.
     pub listens: Vec<String>,
-    /// Its process on its machine.
+    /// Its process id on its machine.
     pub process: u32,
 }
 
-/// A digest of the things that two processes must have in common, in hexadecimal digits.
+/// A digest of a scenario and its files, in hexadecimal digits: two processes that differ in it would simulate
+/// different worlds.
 pub type Fingerprint = String;
 
 /// The server's answer to a node that may join.
@@ -107,7 +110,7 @@ pub type Fingerprint = String;
 pub struct Welcome {
     /// The clock by which time passes.
     pub clock: ClockMode,
-    /// The way from node to node.
+    /// The path of packets from node to node.
     pub topology: Topology,
     /// Changes of the scenario beyond those that the node was given, as `key=value`.
     pub overrides: Vec<String>,
@@ -129,8 +132,8 @@ pub struct JoinError {
 pub struct Member {
     /// Its agent.
     pub agent: EntityId,
-    /// Its present life.
-    pub life: Incarnation,
+    /// Its present incarnation.
+    pub incarnation: Incarnation,
     /// Endpoints at which it is reached.
     pub listens: Vec<String>,
 }
@@ -142,19 +145,20 @@ pub struct CycleStart {
     pub cycle: Cycle,
     /// The agent's percept, serialized.
     #[serde(with = "bytes")]
-    pub sight: Vec<u8>,
-    /// Agents that its radio does not reach, rising.
-    pub beyond: Vec<EntityId>,
+    pub percept: Vec<u8>,
+    /// Agents out of range of its radio, in ascending order.
+    pub out_of_range: Vec<EntityId>,
 }
 
-/// A tick that a node may go on to.
+/// A tick to which a node may advance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AdvanceGrant {
     /// The cycle.
     pub cycle: Cycle,
     /// The tick.
     pub tick: u64,
-    /// Number of packets of the cycle that arrive at the node until then.
+    /// Number of packets of the cycle that arrive at the node by that tick: it waits for all of them first, because
+    /// other nodes' packets and this message travel over different links.
     pub packets: u64,
 }
 
@@ -165,22 +169,22 @@ pub struct AdvanceDone {
     pub cycle: Cycle,
     /// The tick.
     pub tick: u64,
-    /// Packets that it has sent in it: receiver, and the tick of arrival.
+    /// Packets that it has sent in it: receiver, and tick of arrival.
     pub sent: Vec<(EntityId, u64)>,
     /// The tick of its next timer.
-    pub timer: Option<u64>,
+    pub next_timer: Option<u64>,
     /// Whether its control is ready.
     pub is_done: bool,
 }
 
-/// A packet of a talk.
+/// A packet of a conversation between agents.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Packet {
-    /// The cycle of the talk.
+    /// The cycle of the conversation.
     pub cycle: Cycle,
-    /// The tick in which all of it was on its way.
-    pub left: u64,
-    /// Its number among the sender's, in the talk or, in real time, in the cycle.
+    /// The tick in which its last byte left the sender.
+    pub departs: u64,
+    /// Its number among the sender's, in the conversation or, in real time, in the cycle.
     pub sequence: u32,
     /// The tick in which it arrives, where time is counted in ticks.
     pub arrives: u64,
@@ -192,17 +196,17 @@ pub struct Packet {
 /// A packet to one receiver, as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PacketRecord {
-    /// The cycle of the talk.
+    /// The cycle of the conversation.
     pub cycle: Cycle,
     /// The tick in which it was sent.
     pub sent: u64,
     /// The receiver.
     pub to: EntityId,
-    /// Its number among the sender's, in the talk or, in real time, in the cycle.
+    /// Its number among the sender's, in the conversation or, in real time, in the cycle.
     pub sequence: u32,
     /// Its size.
     pub bytes: u32,
-    /// Number of times that it arrives: 0 if the scenario's faults take it, 2 if they double it.
+    /// Number of times that it arrives: 0 if the scenario's faults drop it, 2 if they duplicate it.
     pub copies: u32,
     /// The tick in which it first arrives; 0 if it does not.
     pub arrives: u64,
@@ -222,19 +226,19 @@ pub struct Control {
 pub struct Status {
     /// The cycle that it is in.
     pub cycle: Cycle,
-    /// Words for its part in the cycle, e.g. `optimize`.
-    pub doing: String,
-    /// Number of rounds of the present talk.
+    /// Name of its activity in the cycle, e.g. `optimize`.
+    pub activity: String,
+    /// Number of rounds of the present conversation.
     pub round: u32,
     /// Epoch of the coordinator that it follows.
     pub epoch: u64,
-    /// Others that it heard in the last cycle.
+    /// Other agents that it has heard in the last cycle.
     pub heard: Vec<EntityId>,
     /// Packets that it has sent so far.
     pub packets: u64,
     /// Bytes of these packets.
     pub bytes: u64,
-    /// Frames that were sent again.
+    /// Messages that were retransmitted.
     pub retries: u64,
     /// Frames and packets that it has dropped, by reason.
     pub dropped: Vec<(String, u64)>,
@@ -243,15 +247,15 @@ pub struct Status {
 /// The reason why a frame is dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DecodeError {
-    /// It is not one of ours, or of another version.
+    /// It is of another program, or of another version of this format.
     Foreign,
-    /// It is one of ours, and damaged.
+    /// It is of this format, and damaged.
     Damaged,
     /// It is longer than a frame may be.
     TooLong,
 }
 
-impl<W: Serialize> Frame<W> {
+impl<M: Serialize> Frame<M> {
     /// Returns the bytes of the frame.
     pub fn encode(&self) -> Vec<u8> {
         postcard::to_extend(self, MAGIC.to_vec()).expect("frames are plain data")
@@ -276,7 +280,7 @@ impl Frame {
 }
 
 impl DecodeError {
-    /// Returns the reason in a word, its name in metrics.
+    /// Returns the name of the reason in metrics.
     pub fn name(self) -> &'static str {
         match self {
             Self::Foreign => "foreign",
@@ -286,7 +290,8 @@ impl DecodeError {
     }
 }
 
-/// Bytes in one piece: reading them one by one takes ten times as long. The format is the same.
+/// Bytes in one piece: serde reads a `Vec<u8>` number by number, which takes ten times as long. The encoded bytes are
+/// the same.
 mod bytes {
     use serde::de::{Deserializer, Error, Visitor};
     use serde::ser::Serializer;
@@ -321,16 +326,16 @@ mod tests {
     use proptest::prelude::*;
 
     fn frame(payload: Vec<u8>) -> Frame {
-        let packet = Packet { cycle: 3, left: 5, sequence: 7, arrives: 6, payload };
-        let address = |id, number| Recipient {
-            party: Peer::Node(id),
-            life: Some(Incarnation(2)),
-            received: 11,
-            number,
+        let packet = Packet { cycle: 3, departs: 5, sequence: 7, arrives: 6, payload };
+        let recipient = |id, sequence| Recipient {
+            peer: Peer::Node(id),
+            incarnation: Some(Incarnation(2)),
+            ack: 11,
+            sequence,
         };
-        let to = vec![address(5, Some(9)), address(6, None)];
-        let word = Some(Message::Packets(vec![packet.clone(), packet]));
-        Frame { from: Peer::Node(4), life: Incarnation(1), to, word }
+        let to = vec![recipient(5, Some(9)), recipient(6, None)];
+        let message = Some(Message::Packets(vec![packet.clone(), packet]));
+        Frame { from: Peer::Node(4), incarnation: Incarnation(1), to, message }
     }
 
     proptest! {

@@ -1,36 +1,38 @@
-//! The packets that an agent has heard, and those that it has dropped.
+//! The senders that an agent has heard lately, and counts of the packets that it has dropped.
 
 use sidestep::kernel::EntityId;
 use sidestep::kernel::network::{DropCounts, DropReason};
 use std::collections::BTreeSet;
 
-/// The senders that an agent has heard in a cycle, and in the one before.
+/// The senders that an agent has heard in this cycle and in the one before.
 #[derive(Debug, Default)]
 pub(crate) struct RecentSenders {
-    now: BTreeSet<EntityId>,
-    before: BTreeSet<EntityId>,
+    current: BTreeSet<EntityId>,
+    previous: BTreeSet<EntityId>,
 }
 
 impl RecentSenders {
-    /// Begins a cycle.
+    /// Starts a cycle.
     pub(crate) fn start_cycle(&mut self) {
-        self.before = std::mem::take(&mut self.now);
+        self.previous = std::mem::take(&mut self.current);
     }
 
-    /// Notes that a packet has come.
+    /// Records the sender of a received packet.
     pub(crate) fn record(&mut self, from: EntityId) {
-        self.now.insert(from);
+        self.current.insert(from);
     }
 
-    /// Returns the senders heard in this cycle, or in the one before if it has just begun.
+    /// Returns the senders heard in this cycle, or in the one before if there are none yet: a table that is read at any
+    /// moment would else show empty cells at the start of each cycle.
     pub(crate) fn senders(&self) -> Vec<EntityId> {
-        let heard = if self.now.is_empty() { &self.before } else { &self.now };
-        heard.iter().copied().collect()
+        let senders = if self.current.is_empty() { &self.previous } else { &self.current };
+        senders.iter().copied().collect()
     }
 }
 
-/// Returns counts of dropped packets by reason.
-pub(crate) fn drop_counts(refused: &DropCounts) -> Vec<(String, u64)> {
-    let counts = DropReason::ALL.iter().map(|&why| (why.name().to_string(), refused.get(why)));
+/// Returns the names of the reasons for which packets were dropped, with their counts.
+pub(crate) fn drop_counts(dropped: &DropCounts) -> Vec<(String, u64)> {
+    let counts =
+        DropReason::ALL.iter().map(|&reason| (reason.name().to_string(), dropped.get(reason)));
     counts.filter(|(_, count)| *count > 0).collect()
 }

@@ -8,6 +8,7 @@ use sidestep::experiment::sweep::seeds::seed_remedy;
 use sidestep::kernel::{Digest, InputError, Interrupt, Simulation};
 use sidestep::scenario::{SeedEffect, Source};
 use sidestep::statistics::{Interval, wilson};
+use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
@@ -264,7 +265,7 @@ fn table_note(results: &[MethodResult]) -> String {
         ));
     }
     if results.iter().all(|result| result.seeds != SeedEffect::Decide) {
-        words.extend(seed_remedy("airspace"));
+        words.extend(WORLDS.find("airspace").and_then(seed_remedy));
     }
     words.join(" ")
 }

@@ -134,7 +134,7 @@ impl Study {
         progress: &mut Progress<'_>,
     ) -> Result<StudyResults, InputError> {
         self.run_by(workers, what, progress, |scenario, _, cell| {
-            let run = start_cell(WORLDS, *cell, &scenario()?, 1)?;
+            let run = start_cell(&WORLDS, *cell, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
         })
     }

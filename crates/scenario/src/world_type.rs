@@ -6,9 +6,13 @@ use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
 use std::path::Path;
+use std::sync::Arc;
+
+/// Digits of the digest of added code in the name of a build: as many as a build's own digest has.
+const ADDED_CODE_DIGITS: usize = 12;
 
 /// A world: its name, its files, and the compilation of its scenarios.
-pub trait WorldType: Sync {
+pub trait WorldType: Send + Sync {
     /// The name, as scenarios write it.
     fn name(&self) -> &'static str;
 
@@ -129,44 +133,126 @@ pub struct ImportedScenario {
     pub lines: KeyValues,
 }
 
-/// All worlds of a program.
-#[derive(Clone, Copy)]
-pub struct Worlds(pub &'static [&'static dyn WorldType]);
+/// The worlds of a program, by name, and the build that their results follow from. Clones share the worlds.
+#[derive(Clone)]
+pub struct Worlds {
+    types: Vec<Arc<dyn WorldType>>,
+    build: Arc<str>,
+}
 
 impl Worlds {
+    /// Returns an empty list for a build, as `0.1.0+0123456789ab`. Only the build that started a run or a sweep
+    /// continues it.
+    pub fn new(build: impl Into<Arc<str>>) -> Self {
+        Self { types: Vec::new(), build: build.into() }
+    }
+
+    /// Returns the list with a further world, which takes the place of one with the same name.
+    #[must_use]
+    pub fn with(mut self, world: impl WorldType + 'static) -> Self {
+        let world = Arc::new(world);
+        match self.types.iter_mut().find(|known| known.name() == world.name()) {
+            Some(known) => *known = world,
+            None => self.types.push(world),
+        }
+        self
+    }
+
+    /// Returns the list for a program that adds code that affects results, identified by a digest of it: recordings
+    /// belong to the program that made them.
+    #[must_use]
+    pub fn with_added_code(self, digest: &str) -> Self {
+        let short = &digest[..digest.len().min(ADDED_CODE_DIGITS)];
+        let build = format!("{}.own-{short}", self.build).into();
+        Self { build, ..self }
+    }
+
+    /// The build that results follow from.
+    pub fn build(&self) -> &str {
+        &self.build
+    }
+
+    /// Returns the worlds, in the order of the list.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &dyn WorldType> + Clone {
+        self.types.iter().map(AsRef::as_ref)
+    }
+
     /// Returns the names of the worlds.
-    pub fn names(self) -> Vec<&'static str> {
-        self.0.iter().map(|kind| kind.name()).collect()
+    pub fn names(&self) -> Vec<&'static str> {
+        self.iter().map(WorldType::name).collect()
     }
 
     /// Returns the world with this name.
-    pub fn find(self, name: &str) -> Option<&'static dyn WorldType> {
-        self.0.iter().copied().find(|kind| kind.name() == name)
+    pub fn find(&self, name: &str) -> Option<&dyn WorldType> {
+        self.iter().find(|world| world.name() == name)
     }
 
     /// Compiles a scenario of any of these worlds.
     ///
     /// # Errors
     /// When no such world is known, or the scenario is wrong.
-    pub fn compile(self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
-        let world = source.preamble()?.world;
-        let kind = self.find(world.get_ref()).ok_or_else(|| {
-            let cause = format!("unknown world `{}`", world.get_ref());
-            source.error(Some(world.span()), cause, suggestion(world.get_ref(), &self.names()))
+    pub fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
+        let name = source.preamble()?.world;
+        let world = self.find(name.get_ref()).ok_or_else(|| {
+            let cause = format!("unknown world `{}`", name.get_ref());
+            source.error(Some(name.span()), cause, suggestion(name.get_ref(), &self.names()))
         })?;
-        kind.compile(source)
+        world.compile(source)
     }
 
     /// Translates a file of another program; `None` for scenario files.
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn translate(self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
-        for kind in self.0 {
-            if let Some(foreign) = kind.translate(file)? {
+    pub fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+        for world in self.iter() {
+            if let Some(foreign) = world.translate(file)? {
                 return Ok(Some(foreign));
             }
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Named(&'static str, &'static str);
+
+    impl WorldType for Named {
+        fn name(&self) -> &'static str {
+            self.0
+        }
+
+        fn agent(&self) -> &'static str {
+            "agent"
+        }
+
+        fn about(&self) -> &'static str {
+            self.1
+        }
+
+        fn default_scenario(&self) -> &'static str {
+            ""
+        }
+
+        fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
+            Err(source.error(None, "not in this test", ""))
+        }
+    }
+
+    #[test]
+    fn a_world_takes_the_place_of_the_one_with_its_name() {
+        let worlds = Worlds::new("1+a").with(Named("sea", "old")).with(Named("sky", "old"));
+        let worlds = worlds.clone().with(Named("sea", "new"));
+        assert_eq!(worlds.names(), ["sea", "sky"]);
+        assert_eq!(worlds.find("sea").map(WorldType::about), Some("new"));
+    }
+
+    #[test]
+    fn added_code_is_part_of_the_build() {
+        let worlds = Worlds::new("1+a").with_added_code("0123456789abcdef");
+        assert_eq!(worlds.build(), "1+a.own-0123456789ab");
     }
 }

@@ -5,10 +5,10 @@
 
 use cpu_time::ProcessTime;
 use serde_json::{Value, json};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
+use sidestep_scenario::Source;
 use sidestep_server::protocol::FrameText;
 use sidestep_server::{Encoder, Options, Studio};
 use std::net::TcpStream;
@@ -135,7 +135,7 @@ impl Page {
 fn studio(folder: &Path, text: &str) -> (Studio, Page) {
     std::fs::write(folder.join("s.toml"), text).expect("written");
     let options = Options {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         program: "bench".into(),
         named: vec![folder.to_path_buf()],
         host: "127.0.0.1".into(),
@@ -143,12 +143,14 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         read_only: false,
         workers: 1,
         foxglove: None,
-        screens: Vec::new(),
+        fleets: Vec::new(),
     };
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);
     let path = folder.join("s.toml").display().to_string();
-    page.ask(&json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }));
+    page.ask(
+        &json!({ "do": "open", "target": { "kind": "scenario", "path": path }, "seed": null }),
+    );
     (studio, page)
 }
 
@@ -232,7 +234,7 @@ fn inspecting() {
         let asked = (0..200_u32).map(|k| {
             let who = json!({ "kind": kind, "number": k % count, "part": part });
             let start = Instant::now();
-            page.ask(&json!({ "do": "inspect", "session": 1, "who": who }));
+            page.ask(&json!({ "do": "inspect", "session": 1, "body": who }));
             start.elapsed().as_secs_f64() * 1e3
         });
         let times = sorted(asked.collect());

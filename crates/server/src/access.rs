@@ -13,7 +13,7 @@ use std::net::{IpAddr, SocketAddr};
 /// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
 const COOKIE_NAME: &str = "sidestep-studio-";
 
-/// The header in which browsers tell the origin of the asking page.
+/// The header in which browsers report whether the requesting page is of the same origin.
 const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
 /// The reason why a request is refused.
@@ -42,10 +42,7 @@ impl AccessPolicy {
     /// # Errors
     /// When the system gives no random numbers for the token.
     pub(crate) fn new(address: SocketAddr, name: &str) -> std::io::Result<Self> {
-        let token = match address.ip().is_loopback() {
-            true => None,
-            false => Some(new_token()?),
-        };
+        let token = if address.ip().is_loopback() { None } else { Some(new_token()?) };
         let is_name = name.parse::<IpAddr>().is_err();
         let name = is_name.then(|| name.to_ascii_lowercase());
         Ok(Self { port: address.port(), name, token })
@@ -70,10 +67,10 @@ impl AccessPolicy {
         }
         let origin =
             single_header(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
-        match origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
-            true => Ok(()),
-            false => Err(AccessError::Origin),
+        if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
+            return Err(AccessError::Origin);
         }
+        Ok(())
     }
 
     /// Checks that a request may do more than read the page.
@@ -88,10 +85,10 @@ impl AccessPolicy {
         let mut values = cookies
             .flat_map(|all| all.split(';'))
             .filter_map(|cookie| cookie.trim().strip_prefix(name.as_str())?.strip_prefix('='));
-        match values.any(|value| constant_time_eq(value, token)) {
-            true => Ok(()),
-            false => Err(AccessError::Token),
+        if !values.any(|value| constant_time_eq(value, token)) {
+            return Err(AccessError::Token);
         }
+        Ok(())
     }
 
     /// Checks that a request for something that costs work comes from our own page, even if it has no `Origin`:
@@ -102,25 +99,24 @@ impl AccessPolicy {
     pub(crate) fn authorize_fetch(&self, headers: &HeaderMap) -> Result<(), AccessError> {
         self.authorize(headers)?;
         let is_own = |site: &HeaderValue| site == "same-origin" || site == "none";
-        match headers.get_all(SEC_FETCH_SITE).iter().all(is_own) {
-            true => Ok(()),
-            false => Err(AccessError::Origin),
+        // Programs that are no browsers do not send it.
+        if !headers.get_all(SEC_FETCH_SITE).iter().all(is_own) {
+            return Err(AccessError::Origin);
         }
+        Ok(())
     }
 
     /// Returns the cookie for a client that knows the token.
     ///
     /// # Errors
     /// When the client's token is wrong.
-    pub(crate) fn sign_in(&self, said: &str) -> Result<String, AccessError> {
+    pub(crate) fn sign_in(&self, given: &str) -> Result<String, AccessError> {
         let token = self.token.as_deref().unwrap_or_default();
-        match self.token.is_none() || constant_time_eq(said.trim(), token) {
-            true => {
-                let name = self.cookie_name();
-                Ok(format!("{name}={token}; HttpOnly; SameSite=Strict; Path=/"))
-            }
-            false => Err(AccessError::Token),
+        if self.token.is_some() && !constant_time_eq(given.trim(), token) {
+            return Err(AccessError::Token);
         }
+        let name = self.cookie_name();
+        Ok(format!("{name}={token}; HttpOnly; SameSite=Strict; Path=/"))
     }
 
     fn cookie_name(&self) -> String {
@@ -147,10 +143,10 @@ fn single_header<'a>(headers: &'a HeaderMap, name: &axum::http::HeaderName) -> O
     values.next().is_none().then_some(value)
 }
 
-/// Compares two texts in a time that does not depend on where they differ.
-fn constant_time_eq(said: &str, token: &str) -> bool {
-    let differing = said.bytes().zip(token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
-    said.len() == token.len() && differing == 0
+/// Compares two texts in a time that does not depend on where they differ, so that a token cannot be guessed byte by byte.
+fn constant_time_eq(given: &str, token: &str) -> bool {
+    let differing = given.bytes().zip(token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    given.len() == token.len() && differing == 0
 }
 
 /// Returns a new token of 128 random bits.
@@ -184,7 +180,7 @@ mod tests {
 
     #[test]
     fn hosts_are_numbers_localhost_and_the_name_that_was_given() {
-        let admits = |guard: &AccessPolicy, host| guard.check_origin(&headers(&[("host", host)]));
+        let admits = |access: &AccessPolicy, host| access.check_origin(&headers(&[("host", host)]));
         for host in
             ["127.0.0.1:7800", "localhost:7800", "[::1]:7800", "localhost:9999", "LOCALHOST"]
         {
@@ -244,20 +240,20 @@ mod tests {
 
     #[test]
     fn a_server_that_others_can_reach_wants_its_token() {
-        let guard = open();
-        let token = guard.token().expect("a token").to_string();
+        let access = open();
+        let token = access.token().expect("a token").to_string();
         assert_eq!(token.len(), 32);
         assert_ne!(Some(token.as_str()), open().token(), "a new one for each server");
         let trusts = |cookie: &str| {
-            guard.authorize(&headers(&[("host", "192.0.2.1:7800"), ("cookie", cookie)]))
+            access.authorize(&headers(&[("host", "192.0.2.1:7800"), ("cookie", cookie)]))
         };
         assert_eq!(trusts(""), Err(AccessError::Token));
         assert_eq!(trusts("sidestep-studio-7800="), Err(AccessError::Token));
         assert_eq!(trusts(&format!("sidestep-studio-7801={token}")), Err(AccessError::Token));
         assert_eq!(trusts(&format!("a=b; sidestep-studio-7800={token}")), Ok(()));
-        assert_eq!(guard.sign_in(&token[1..]), Err(AccessError::Token));
-        assert_eq!(guard.sign_in(""), Err(AccessError::Token));
-        let cookie = guard.sign_in(&format!("{token}\n")).expect("known");
+        assert_eq!(access.sign_in(&token[1..]), Err(AccessError::Token));
+        assert_eq!(access.sign_in(""), Err(AccessError::Token));
+        let cookie = access.sign_in(&format!("{token}\n")).expect("known");
         assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
         assert!(local().token().is_none() && local().sign_in("").is_ok());
     }

@@ -1,4 +1,4 @@
-//! Compression of answers: gzip, for browsers that take it, which all of today's do.
+//! Compression of responses: gzip, which all browsers of today accept.
 
 use axum::http::HeaderMap;
 use axum::http::header::ACCEPT_ENCODING;
@@ -6,10 +6,10 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
 
-/// Returns whether a browser takes gzip.
+/// Returns whether a browser accepts gzip: not with the weight `q=0`.
 pub(crate) fn accepts_gzip(headers: &HeaderMap) -> bool {
-    let said = headers.get_all(ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
-    let mut parts = said.flat_map(|all| all.split(','));
+    let values = headers.get_all(ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
+    let mut parts = values.flat_map(|value| value.split(','));
     parts.any(|part| {
         let (name, weight) = part.split_once(';').unwrap_or((part, ""));
         let weight = weight.trim().trim_start_matches("q=");

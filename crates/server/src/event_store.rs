@@ -1,31 +1,31 @@
 //! The events of a session, each kept once, however often its cycle is computed.
 
 use crate::encode::event;
-use crate::protocol::{Event, ReplyBody};
-use sidestep::kernel::Cycle;
-use sidestep::kernel::view::{Frame, LogEvent};
+use crate::protocol::{ReplyBody, RunEvent};
+use sidestep_kernel::Cycle;
+use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
 
-/// The largest number of events kept; further ones are counted.
+/// Maximum number of events kept; further ones are counted.
 const MAX_EVENTS: usize = 100_000;
-/// The number of cycles for which events that are not kept are counted together.
+/// Number of cycles for which events that are not kept are counted together, so that the counts stay few.
 const LOSS_BUCKET_CYCLES: Cycle = 1024;
-/// The largest number of events in a frame, the last ones.
+/// Maximum number of events in a frame, the last ones.
 const MAX_FRAME_EVENTS: usize = 100;
 
 /// The events of one run.
 #[derive(Debug, Default)]
 pub(crate) struct EventStore {
-    /// Entries as the kernel reports them: most are never asked for, and the others get their words then.
+    /// Events as the kernel reports them: most are never requested, so they are converted only then.
     kept: Vec<LogEvent>,
     /// The first cycle not computed yet.
     frontier: Cycle,
-    /// Numbers of events that were not kept, with their approximate cycles.
+    /// Numbers of events that were not kept, with the first cycle of each bucket.
     lost: Vec<(Cycle, u64)>,
     /// The events since the last frame that was sent.
-    fresh: UnsentEvents,
-    /// The events since the last frame shown to viewers beside the page, if there may be any.
-    others: Option<UnsentEvents>,
+    unsent: UnsentEvents,
+    /// The events since the last frame sent to Foxglove viewers, if they are served.
+    unsent_to_viewers: Option<UnsentEvents>,
 }
 
 /// The last of the events that have not been reported yet.
@@ -38,25 +38,27 @@ struct UnsentEvents {
 impl UnsentEvents {
     fn push(&mut self, log: &[LogEvent], left_out: u64) {
         let last = &log[log.len().saturating_sub(MAX_FRAME_EVENTS)..];
-        let too_many = (self.entries.len() + last.len()).saturating_sub(MAX_FRAME_EVENTS);
-        self.entries.drain(..too_many);
+        let excess = (self.entries.len() + last.len()).saturating_sub(MAX_FRAME_EVENTS);
+        self.entries.drain(..excess);
         self.entries.extend_from_slice(last);
-        self.left_out += left_out + (log.len() - last.len() + too_many) as u64;
+        self.left_out += left_out + (log.len() - last.len() + excess) as u64;
     }
 }
 
 impl EventStore {
-    /// Takes over the events before a frame.
+    /// Takes the events of a frame that is shown.
     pub(crate) fn record(&mut self, frame: &mut Frame) {
-        for fresh in [Some(&mut self.fresh), self.others.as_mut()].into_iter().flatten() {
-            fresh.push(&frame.log, frame.log_left_out);
+        self.unsent.push(&frame.log, frame.log_left_out);
+        if let Some(unsent) = &mut self.unsent_to_viewers {
+            unsent.push(&frame.log, frame.log_left_out);
         }
         self.record_ahead(frame);
     }
 
-    /// Takes over the events before a frame without a watcher.
+    /// Takes the events of a frame that is not shown.
     pub(crate) fn record_ahead(&mut self, frame: &mut Frame) {
         let mut log = std::mem::take(&mut frame.log);
+        // A cycle that is computed again, after a seek backward, has the events that are kept already.
         if frame.cycle <= self.frontier {
             return;
         }
@@ -78,36 +80,36 @@ impl EventStore {
         }
     }
 
-    /// Returns the cycle up to which everything is known.
+    /// Returns the cycle before which all events are known.
     pub(crate) fn frontier(&self) -> Cycle {
         self.frontier
     }
 
     /// Takes the last events since the last call, and the number of those that are not among them.
-    pub(crate) fn take_unsent(&mut self) -> (Vec<Event>, u64) {
-        let UnsentEvents { entries, left_out } = std::mem::take(&mut self.fresh);
+    pub(crate) fn take_unsent(&mut self) -> (Vec<RunEvent>, u64) {
+        let UnsentEvents { entries, left_out } = std::mem::take(&mut self.unsent);
         (entries.iter().map(event).collect(), left_out)
     }
 
-    /// Keeps events for viewers beside the page, too.
+    /// Keeps unsent events for Foxglove viewers, too.
     pub(crate) fn enable_viewers(&mut self) {
-        self.others.get_or_insert_default();
+        self.unsent_to_viewers.get_or_insert_default();
     }
 
-    /// Takes the last events for them, and the number of those that are not among them.
+    /// Takes the last events since the last call for Foxglove viewers, and the number of those that are not among them.
     pub(crate) fn take_for_viewers(&mut self) -> (Vec<LogEvent>, u64) {
         let UnsentEvents { entries, left_out } =
-            self.others.as_mut().map(std::mem::take).unwrap_or_default();
+            self.unsent_to_viewers.as_mut().map(std::mem::take).unwrap_or_default();
         (entries, left_out)
     }
 
     /// Returns at most the given number of events of some cycles, after the first `skip` ones.
-    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, most: u32) -> ReplyBody {
+    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, limit: u32) -> ReplyBody {
         let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
         let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);
         let start = start.saturating_add(skip as usize).min(end);
-        let entries: Vec<Event> =
-            self.kept[start..end].iter().take(most as usize).map(event).collect();
+        let entries: Vec<RunEvent> =
+            self.kept[start..end].iter().take(limit as usize).map(event).collect();
         let lost = self.lost.iter().filter(|(cycle, _)| cycles.contains(cycle));
         let lost: u64 = lost.map(|(_, count)| count).sum();
         let left_out = (end - start - entries.len()) as u64 + lost;
@@ -118,7 +120,7 @@ impl EventStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::{BodyId, BodyKind, LogEvent, LogEventKind, Severity};
+    use sidestep_kernel::view::{BodyId, BodyKind, LogEvent, LogEventKind, Severity};
 
     fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
         let entry = |&cycle: &Cycle| {
@@ -136,37 +138,37 @@ mod tests {
 
     #[test]
     fn what_is_computed_again_is_not_told_twice() {
-        let mut chronicle = EventStore::default();
-        chronicle.record(&mut frame(10, &[1, 5, 9]));
-        chronicle.record(&mut frame(6, &[5]));
-        chronicle.record(&mut frame(14, &[9, 10, 12]));
-        assert_eq!(cycles(&chronicle.answer(0..99, 0, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
-        assert_eq!(cycles(&chronicle.answer(5..12, 0, 99)), (vec![5.0, 9.0, 10.0], 0));
-        assert_eq!(cycles(&chronicle.answer(0..99, 0, 2)), (vec![1.0, 5.0], 3));
-        assert_eq!(cycles(&chronicle.answer(Range { start: 9, end: 3 }, 0, 2)), (vec![], 0));
-        assert_eq!(chronicle.take_unsent().0.len(), 7, "a frame shows what led to it");
-        assert_eq!(chronicle.take_unsent().0.len(), 0);
+        let mut events = EventStore::default();
+        events.record(&mut frame(10, &[1, 5, 9]));
+        events.record(&mut frame(6, &[5]));
+        events.record(&mut frame(14, &[9, 10, 12]));
+        assert_eq!(cycles(&events.answer(0..99, 0, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
+        assert_eq!(cycles(&events.answer(5..12, 0, 99)), (vec![5.0, 9.0, 10.0], 0));
+        assert_eq!(cycles(&events.answer(0..99, 0, 2)), (vec![1.0, 5.0], 3));
+        assert_eq!(cycles(&events.answer(Range { start: 9, end: 3 }, 0, 2)), (vec![], 0));
+        assert_eq!(events.take_unsent().0.len(), 7, "a frame shows what led to it");
+        assert_eq!(events.take_unsent().0.len(), 0);
     }
 
     #[test]
     fn a_cycle_of_more_events_than_an_answer_holds_is_told_in_parts() {
-        let mut chronicle = EventStore::default();
-        chronicle.record(&mut frame(10, &[3, 3, 3, 3, 3, 7]));
-        assert_eq!(cycles(&chronicle.answer(3..9, 2, 2)), (vec![3.0, 3.0], 2));
-        assert_eq!(cycles(&chronicle.answer(3..9, 4, 2)), (vec![3.0, 7.0], 0));
-        assert_eq!(cycles(&chronicle.answer(3..9, u32::MAX, 2)), (vec![], 0));
+        let mut events = EventStore::default();
+        events.record(&mut frame(10, &[3, 3, 3, 3, 3, 7]));
+        assert_eq!(cycles(&events.answer(3..9, 2, 2)), (vec![3.0, 3.0], 2));
+        assert_eq!(cycles(&events.answer(3..9, 4, 2)), (vec![3.0, 7.0], 0));
+        assert_eq!(cycles(&events.answer(3..9, u32::MAX, 2)), (vec![], 0));
     }
 
     #[test]
     fn frames_and_memory_hold_so_many_and_the_rest_is_counted() {
-        let mut chronicle = EventStore::default();
+        let mut events = EventStore::default();
         let happened: Vec<Cycle> = vec![3; MAX_EVENTS + 7];
-        chronicle.record(&mut Frame { log_left_out: 2, ..frame(4, &happened) });
-        let (shown, left_out) = chronicle.take_unsent();
+        events.record(&mut Frame { log_left_out: 2, ..frame(4, &happened) });
+        let (shown, left_out) = events.take_unsent();
         assert_eq!(
             (shown.len(), left_out),
             (MAX_FRAME_EVENTS, (MAX_EVENTS + 7 - MAX_FRAME_EVENTS + 2) as u64)
         );
-        assert_eq!(cycles(&chronicle.answer(0..9, 0, u32::MAX)).1, 9);
+        assert_eq!(cycles(&events.answer(0..9, 0, u32::MAX)).1, 9);
     }
 }

@@ -1,32 +1,30 @@
-//! Files that a scenario can name.
+//! Files to which a scenario can refer, for lists to choose from.
 
 use crate::files::AllowedFiles;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 use std::collections::{BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-/// The largest number of files listed.
+/// Maximum number of files listed.
 const MAX_FILES: usize = 300;
-/// The largest number of files and folders examined.
+/// Maximum number of files and folders examined: a scenario may lie in a home folder with millions of files.
 const MAX_ENTRIES: usize = 3000;
-/// The largest depth of folders in folders that is examined.
+/// Maximum depth of folders in folders that is examined.
 const MAX_DEPTH: usize = 3;
 
 impl AllowedFiles {
     /// Returns the files below a scenario's folder, and those elsewhere among some names, in the scenario's own
     /// notation; only those that may be read.
     pub(crate) fn file_choices(&self, source: &Source, names: &[String]) -> Vec<String> {
-        let folder = match source.folder.as_os_str().is_empty() {
-            true => Path::new("."),
-            false => &source.folder,
-        };
+        let folder =
+            if source.folder.as_os_str().is_empty() { Path::new(".") } else { &source.folder };
         let mut found: BTreeSet<String> = BTreeSet::new();
         if folder.canonicalize().is_ok_and(|real| self.contains(&real)) {
             found.extend(self.files_below(folder).iter().filter_map(|path| slash_path(path)));
         }
-        let is_there = |name: &&String| self.is_readable_file(&source.path(Path::new(name)));
-        found.extend(names.iter().filter(is_there).take(MAX_FILES).cloned());
+        let is_readable = |name: &&String| self.is_readable_file(&source.path(Path::new(name)));
+        found.extend(names.iter().filter(is_readable).take(MAX_FILES).cloned());
         found.into_iter().collect()
     }
 
@@ -34,18 +32,20 @@ impl AllowedFiles {
         path.canonicalize().is_ok_and(|real| self.contains(&real) && real.is_file())
     }
 
-    /// Returns the paths of files below a folder, relative to it, the nearest first.
+    /// Returns the paths of files below a folder, relative to it, breadth first: the nearest are the likeliest.
     fn files_below(&self, folder: &Path) -> Vec<PathBuf> {
-        let mut open = VecDeque::from([(PathBuf::new(), 0)]);
-        let (mut found, mut seen) = (Vec::new(), 0);
-        while let Some((below, depth)) = open.pop_front() {
-            for name in entries(&folder.join(&below), MAX_ENTRIES - seen) {
-                seen += 1;
+        let mut queue = VecDeque::from([(PathBuf::new(), 0)]);
+        let mut found = Vec::new();
+        let mut examined = 0;
+        while let Some((below, depth)) = queue.pop_front() {
+            for name in entries(&folder.join(&below), MAX_ENTRIES - examined) {
+                examined += 1;
                 let path = below.join(&name);
                 let whole = folder.join(&path);
+                // A link could lead back up, and around forever.
                 let is_link = whole.is_symlink();
                 if whole.is_dir() && !is_link && depth < MAX_DEPTH {
-                    open.push_back((path, depth + 1));
+                    queue.push_back((path, depth + 1));
                 } else if found.len() < MAX_FILES && self.is_readable_file(&whole) {
                     found.push(path);
                 }
@@ -56,9 +56,10 @@ impl AllowedFiles {
 }
 
 /// Returns the names in a folder that are not hidden, in order.
-fn entries(folder: &Path, most: usize) -> Vec<PathBuf> {
+fn entries(folder: &Path, limit: usize) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
-    let names = entries.take(most).filter_map(|entry| Some(PathBuf::from(entry.ok()?.file_name())));
+    let names =
+        entries.take(limit).filter_map(|entry| Some(PathBuf::from(entry.ok()?.file_name())));
     let mut names: Vec<PathBuf> =
         names.filter(|name| !name.as_os_str().as_encoded_bytes().starts_with(b".")).collect();
     names.sort();

@@ -1,42 +1,42 @@
-//! Files that a page may read: those below the folders that were named at start, after links are resolved.
+//! Files that a page may read: those below the folders given at start, after links are resolved.
 
 use crate::encode::problem;
 use crate::protocol::{FileEntry, FileKind, Problem};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
-use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_kernel::InputError;
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The largest number of entries listed of a folder; further ones are left out.
+/// Maximum number of entries of a folder that are listed.
 const MAX_ENTRIES: usize = 1000;
-/// The size of the largest file that is read when a folder is listed.
+/// Maximum size of a file that is read when its folder is listed: a list must not take seconds.
 const MAX_FILE_BYTES: u64 = 1 << 20;
-/// The number of files of other programs that are read in a folder.
+/// Maximum number of files of unknown kind in a folder that are read to see whether they are scenarios of other programs.
 const MAX_FOREIGN_FILES: usize = 50;
 
 /// The folders and files that may be read.
 #[derive(Debug, Clone)]
 pub(crate) struct AllowedFiles {
     roots: Arc<Vec<Root>>,
-    /// Real places elsewhere named by the scenarios that were named at start.
+    /// Files elsewhere to which the scenarios given at start refer, links resolved.
     granted: Arc<BTreeSet<PathBuf>>,
 }
 
-/// A folder or a file that was named at start.
+/// A folder or a file given at start.
 #[derive(Debug)]
 struct Root {
-    /// The path as it was named.
+    /// The path as it was given.
     path: PathBuf,
-    /// Its real place, links resolved.
+    /// The path with links resolved.
     real: PathBuf,
 }
 
-/// The first keys of a TOML file, by which it is known.
+/// The keys of a TOML file by which its kind is known.
 #[derive(Deserialize)]
 struct TomlHeader {
     world: Option<String>,
@@ -45,7 +45,7 @@ struct TomlHeader {
     profile: Option<String>,
 }
 
-/// Endings of maps and images of floors, and words for such a file.
+/// Extensions of maps and images of floors, with a description.
 const MAP_EXTENSIONS: [(&str, &str); 6] = [
     ("yaml", "map of ROS"),
     ("yml", "map of ROS"),
@@ -59,34 +59,33 @@ impl AllowedFiles {
     /// Returns the files that may be read: everything below these folders, and these files.
     ///
     /// # Errors
-    /// When one of them is not there.
-    pub(crate) fn from_roots(named: &[PathBuf]) -> Result<Self, Problem> {
-        let root = |path: &PathBuf| {
+    /// When one of them does not exist.
+    pub(crate) fn from_roots(paths: &[PathBuf]) -> Result<Self, Problem> {
+        let mut roots = Vec::with_capacity(paths.len());
+        for path in paths {
             let real = path.canonicalize().map_err(|e| {
                 let remedy = "name a scenario, a recording or a folder that is there";
                 Problem::new(path.display().to_string(), e.to_string(), remedy)
             })?;
-            Ok(Root { path: path.clone(), real })
-        };
-        let roots: Result<Vec<Root>, Problem> = named.iter().map(root).collect();
-        Ok(Self { roots: Arc::new(roots?), granted: Arc::default() })
+            roots.push(Root { path: path.clone(), real });
+        }
+        Ok(Self { roots: Arc::new(roots), granted: Arc::default() })
     }
 
-    /// Also allows the files named by these scenarios, because a user who starts the studio with a scenario wants it
-    /// to run. Texts written by pages later can name no further files elsewhere.
+    /// Also allows the files to which these scenarios refer, because a user who starts the studio with a scenario wants it
+    /// to run. Texts that pages write later can refer to no further files elsewhere.
     pub(crate) fn with_files_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
-        let sources = scenarios.filter_map(|path| Source::read(path, &[]).ok());
-        let named = sources.flat_map(|source| {
-            let names = strings_in(&source).unwrap_or_default();
-            names
-                .into_iter()
-                .filter_map(move |name| source.path(Path::new(&name)).canonicalize().ok())
-        });
-        let granted = named.filter(|real| !self.contains(real)).collect();
+        let mut granted = BTreeSet::new();
+        for source in scenarios.filter_map(|path| Source::read(path, &[]).ok()) {
+            for name in strings_in(&source).unwrap_or_default() {
+                let real = source.path(Path::new(&name)).canonicalize();
+                granted.extend(real.ok().filter(|real| !self.contains(real)));
+            }
+        }
         Self { granted: Arc::new(granted), ..self }
     }
 
-    /// Returns the first folder that was named.
+    /// Returns the first folder given at start.
     pub(crate) fn first_root_folder(&self) -> PathBuf {
         let folder = self.roots.iter().find(|root| root.real.is_dir());
         folder.map_or_else(PathBuf::new, |root| root.path.clone())
@@ -95,18 +94,19 @@ impl AllowedFiles {
     /// Returns a path that a page may read.
     ///
     /// # Errors
-    /// When it is not there, or elsewhere.
+    /// When it does not exist, or is elsewhere.
     pub(crate) fn resolve(&self, path: &str) -> Result<PathBuf, Problem> {
-        let found = PathBuf::from(path);
-        // A missing path and a forbidden one are reported alike: a page learns nothing about the rest of the disk. A
-        // pipe or a device might keep its reader waiting forever.
-        let is_plain = |real: &Path| real.is_file() || real.is_dir();
-        let is_allowed =
-            found.canonicalize().is_ok_and(|real| self.contains(&real) && is_plain(&real));
-        if is_allowed { Ok(found) } else { Err(outside_roots(path)) }
+        let given = PathBuf::from(path);
+        let is_allowed = given.canonicalize().is_ok_and(|real| {
+            // A pipe or a device might keep its reader waiting forever.
+            let is_plain = real.is_file() || real.is_dir();
+            is_plain && self.contains(&real)
+        });
+        // A missing path and a forbidden one are reported alike: a page learns nothing about the rest of the disk.
+        if is_allowed { Ok(given) } else { Err(outside_roots(path)) }
     }
 
-    /// Returns whether a path without links is below the folders, or is named by a scenario that was named at start.
+    /// Returns whether a path without links is below the folders, or a scenario given at start refers to it.
     pub(crate) fn contains(&self, real: &Path) -> bool {
         self.relative_to_root(real).is_some() || self.granted.contains(real)
     }
@@ -116,7 +116,8 @@ impl AllowedFiles {
         self.roots.iter().find_map(|root| real.strip_prefix(&root.real).ok())
     }
 
-    /// Refuses a text that names a file elsewhere: under any key, a value that is the path of something that exists.
+    /// Refuses a text that refers to a file elsewhere: under any key, a value that is the path of something that exists. Which
+    /// keys are paths only the worlds know.
     ///
     /// # Errors
     /// With the value.
@@ -131,33 +132,36 @@ impl AllowedFiles {
         if real.is_ok_and(|real| !self.contains(&real)) { Err(outside_roots(text)) } else { Ok(()) }
     }
 
-    /// Lists the things that can be opened in a folder, or everything that was named at start.
+    /// Lists everything in a folder that can be opened, or everything given at start.
     ///
     /// # Errors
     /// When it is no folder that may be read.
     pub(crate) fn list(
         &self,
         folder: Option<&str>,
-        worlds: Worlds,
+        worlds: &Worlds,
     ) -> Result<Vec<FileEntry>, Problem> {
         let Some(folder) = folder else {
-            let named = |root: &Root| entry(&root.path, worlds, &mut 0);
-            return Ok(self.roots.iter().filter_map(named).collect());
+            let roots = self.roots.iter();
+            return Ok(roots.filter_map(|root| entry(&root.path, worlds, &mut 0)).collect());
         };
         let path = self.resolve(folder)?;
-        let told = |e: std::io::Error| {
+        let unreadable = |e: std::io::Error| {
             Problem::new(folder, format!("cannot be listed: {e}"), "name a folder that may be read")
         };
         let mut paths = Vec::new();
-        for item in fs::read_dir(&path).map_err(told)?.take(MAX_ENTRIES) {
-            paths.push(item.map_err(told)?.path());
+        for item in fs::read_dir(&path).map_err(unreadable)?.take(MAX_ENTRIES) {
+            paths.push(item.map_err(unreadable)?.path());
         }
         paths.sort();
         let mut foreign = 0;
-        let listed =
-            paths.iter().filter(|path| path.canonicalize().is_ok_and(|p| self.contains(&p)));
-        let mut entries: Vec<FileEntry> =
-            listed.filter_map(|path| entry(path, worlds, &mut foreign)).collect();
+        let mut entries: Vec<FileEntry> = Vec::new();
+        for path in &paths {
+            // A link may lead elsewhere.
+            if path.canonicalize().is_ok_and(|real| self.contains(&real)) {
+                entries.extend(entry(path, worlds, &mut foreign));
+            }
+        }
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
         Ok(entries)
     }
@@ -172,7 +176,7 @@ fn outside_roots(path: &str) -> Problem {
 /// Returns all strings in a text, any of which may be the path of a file.
 ///
 /// # Errors
-/// When it is no TOML.
+/// When it is not TOML.
 fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
     let mut open = vec![source.parse::<Value>()?];
     let mut names = Vec::new();
@@ -189,27 +193,30 @@ fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
 
 /// Returns the entry of a file or folder; `None` if it cannot be opened. `foreign` counts the files of other programs
 /// that were read.
-fn entry(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<FileEntry> {
+fn entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
     let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
     if name.starts_with('.') && name.len() > 1 && name != ".." {
         return None;
     }
-    let (kind, about) = match path.is_dir() {
-        true => (kind_of_folder(path), String::new()),
-        false => kind_of_file(path, worlds, foreign)?,
+    let (kind, about) = if path.is_dir() {
+        (kind_of_folder(path), String::new())
+    } else {
+        kind_of_file(path, worlds, foreign)?
     };
     Some(FileEntry { path: path.to_str()?.into(), name: name.into(), kind, about })
 }
 
 fn kind_of_folder(path: &Path) -> FileKind {
-    match () {
-        () if path.join("run.json").is_file() => FileKind::Run,
-        () if path.join("sweep.json").is_file() => FileKind::Sweep,
-        () => FileKind::Folder,
+    if path.join("run.json").is_file() {
+        FileKind::Run
+    } else if path.join("sweep.json").is_file() {
+        FileKind::Sweep
+    } else {
+        FileKind::Folder
     }
 }
 
-fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
+fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
     let bytes = fs::metadata(path).ok().filter(fs::Metadata::is_file)?.len();
     let ends_in =
         |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
@@ -221,25 +228,30 @@ fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(Fil
         return None;
     }
     if ends_in("toml") {
-        let known: TomlHeader = Source::read(path, &[]).ok()?.parse().ok()?;
-        return match (known.world, known.scenario) {
-            (Some(world), _) => {
-                let name = known.name.filter(|name| !name.is_empty());
-                Some((
-                    FileKind::Scenario,
-                    name.map_or(world.clone(), |name| format!("{world}: {name}")),
-                ))
-            }
-            (None, Some(_)) => Some((FileKind::Sweep, String::new())),
-            (None, None) => known.profile.map(|name| (FileKind::Profile, name)),
-        };
+        let header: TomlHeader = Source::read(path, &[]).ok()?.parse().ok()?;
+        return kind_of_toml(header);
     }
     if let Some((_, about)) = MAP_EXTENSIONS.iter().find(|(ending, _)| ends_in(ending)) {
         return Some((FileKind::Map, (*about).into()));
     }
     *foreign += 1;
-    let told = (*foreign <= MAX_FOREIGN_FILES).then(|| worlds.translate(path))?.ok()??;
-    told.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
+    if *foreign > MAX_FOREIGN_FILES {
+        return None;
+    }
+    let imported = worlds.translate(path).ok()??;
+    imported.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
+}
+
+fn kind_of_toml(header: TomlHeader) -> Option<(FileKind, String)> {
+    match (header.world, header.scenario) {
+        (Some(world), _) => {
+            let name = header.name.filter(|name| !name.is_empty());
+            let about = name.map_or(world.clone(), |name| format!("{world}: {name}"));
+            Some((FileKind::Scenario, about))
+        }
+        (None, Some(_)) => Some((FileKind::Sweep, String::new())),
+        (None, None) => header.profile.map(|name| (FileKind::Profile, name)),
+    }
 }
 
 #[cfg(test)]
@@ -276,7 +288,7 @@ mod tests {
     fn a_folder_lists_what_can_be_opened() {
         let (folder, files) = places();
         let inside = folder.path().join("in");
-        let listed = files.list(inside.to_str(), WORLDS).expect("listed");
+        let listed = files.list(inside.to_str(), &WORLDS).expect("listed");
         let told: Vec<_> =
             listed.iter().map(|e| (e.name.as_str(), e.kind, e.about.as_str())).collect();
         assert_eq!(
@@ -292,7 +304,7 @@ mod tests {
                 ("t.scn", FileKind::Foreign, ""),
             ]
         );
-        let roots = files.list(None, WORLDS).expect("listed");
+        let roots = files.list(None, &WORLDS).expect("listed");
         assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
         assert!(files.resolve(&listed[1].path).is_ok());
     }
@@ -319,10 +331,10 @@ mod tests {
             problems.iter().all(|p| p.cause == problems[0].cause),
             "nothing is told of what is there"
         );
-        assert!(files.list(Some(&path("out")), WORLDS).is_err());
-        assert!(files.list(Some(&path("in/..")), WORLDS).is_err());
+        assert!(files.list(Some(&path("out")), &WORLDS).is_err());
+        assert!(files.list(Some(&path("in/..")), &WORLDS).is_err());
         assert!(files.resolve("/etc/passwd").is_err() && files.resolve("").is_err());
-        let listed = files.list(Some(&path("in")), WORLDS).expect("listed");
+        let listed = files.list(Some(&path("in")), &WORLDS).expect("listed");
         assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
         assert!(files.resolve(&path("in/deep/../a.toml")).is_ok());
     }

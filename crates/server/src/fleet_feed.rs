@@ -1,69 +1,71 @@
-//! Screens: views of fleets that fly elsewhere, for the sessions that show them.
+//! Feeds: views of fleets in other processes, for the sessions that show them.
 //!
-//! The thread that hears a fleet puts the newest view here and never waits; sessions take it when they can.
+//! The thread that receives the views of a fleet puts the newest one here and never waits; sessions take it when they can.
 
-use crate::protocol::{BodyId, Fleet, Node, Problem};
+use crate::protocol::{BodyId, Fleet, FleetNode, Problem};
 use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus, NodeStatus};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A fleet as heard from its server.
+/// The views of a fleet, as received from its server.
 #[derive(Debug)]
 pub struct FleetFeed {
-    /// The endpoint by which it is named.
+    /// The endpoint of the fleet's server.
     pub(crate) endpoint: String,
-    shown: Mutex<FeedSnapshot>,
+    snapshot: Mutex<FeedSnapshot>,
 }
 
 /// The newest view, and whether it is the last.
 #[derive(Debug, Clone)]
 pub(crate) struct FeedSnapshot {
-    /// The part that stays the same while one fleet flies.
-    pub(crate) staged: Arc<FleetScene>,
-    pub(crate) seen: Option<Arc<FleetFrame>>,
-    pub(crate) heard: Instant,
-    /// The reason why no more views come.
+    /// The part that stays the same while one fleet runs.
+    pub(crate) scene: Arc<FleetScene>,
+    pub(crate) view: Option<Arc<FleetFrame>>,
+    /// The time of the last view.
+    pub(crate) last_heard: Instant,
+    /// The reason why no more views arrive.
     pub(crate) lost: Option<Problem>,
 }
 
 impl FleetFeed {
-    /// Returns a screen that shows nothing yet.
-    pub fn new(endpoint: String, staged: FleetScene) -> Self {
-        Self { endpoint, shown: Mutex::new(FeedSnapshot::from_scene(staged)) }
+    /// Returns a feed without a view.
+    pub fn new(endpoint: String, scene: FleetScene) -> Self {
+        Self { endpoint, snapshot: Mutex::new(FeedSnapshot::from_scene(scene)) }
     }
 
-    /// Begins to show another fleet at the endpoint, or the same one once more, without a view yet.
-    pub fn restart(&self, staged: FleetScene) {
-        *self.lock() = FeedSnapshot::from_scene(staged);
+    /// Switches to another fleet at the endpoint, or to a new start of the same one, without a view yet.
+    pub fn restart(&self, scene: FleetScene) {
+        *self.lock() = FeedSnapshot::from_scene(scene);
     }
 
     fn lock(&self) -> MutexGuard<'_, FeedSnapshot> {
-        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+        self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Shows a view in place of the one before.
-    pub fn publish(&self, seen: FleetFrame) {
-        let mut shown = self.lock();
-        (shown.seen, shown.heard) = (Some(Arc::new(seen)), Instant::now());
+    /// Replaces the view.
+    pub fn publish(&self, view: FleetFrame) {
+        let mut snapshot = self.lock();
+        snapshot.view = Some(Arc::new(view));
+        snapshot.last_heard = Instant::now();
     }
 
-    /// Notes why no more views come of a fleet that has not come to its end.
+    /// Records why no more views arrive of a fleet that has not come to its end.
     pub fn mark_lost(&self, cause: &str, remedy: &str) {
-        let mut shown = self.lock();
-        if shown.seen.as_ref().is_none_or(|seen| !seen.is_over) {
-            shown.lost = Some(Problem::new(self.endpoint.as_str(), cause, remedy));
+        let mut snapshot = self.lock();
+        if snapshot.view.as_ref().is_none_or(|view| !view.is_over) {
+            snapshot.lost = Some(Problem::new(self.endpoint.as_str(), cause, remedy));
         }
     }
 
-    /// Returns the present view.
+    /// Returns the present state of the feed.
     pub(crate) fn snapshot(&self) -> FeedSnapshot {
         self.lock().clone()
     }
 }
 
 impl FeedSnapshot {
-    fn from_scene(staged: FleetScene) -> Self {
-        Self { staged: Arc::new(staged), seen: None, heard: Instant::now(), lost: None }
+    fn from_scene(scene: FleetScene) -> Self {
+        Self { scene: Arc::new(scene), view: None, last_heard: Instant::now(), lost: None }
     }
 }
 
@@ -79,10 +81,10 @@ pub(crate) fn to_protocol(now: &FleetStatus, silent_s: f64) -> Fleet {
     }
 }
 
-fn to_protocol_node(noun: &str, now: &NodeStatus) -> Node {
-    Node {
+fn to_protocol_node(noun: &str, now: &NodeStatus) -> FleetNode {
+    FleetNode {
         agent: now.agent,
-        who: BodyId { kind: noun.into(), number: now.number, part: now.part },
+        body: BodyId { kind: noun.into(), number: now.number, part: now.part },
         state: now.state.clone(),
         epoch: now.epoch,
         heard: now.heard_of.clone(),

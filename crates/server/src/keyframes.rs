@@ -1,17 +1,18 @@
-//! Checkpoints that are kept as a run goes on, so that any earlier cycle is near one of them.
+//! Checkpoints that are kept as a run advances, so that any earlier cycle is near one of them.
 //!
-//! They are spaced by computing time, not by cycles: the stretch between two of them takes about as long
-//! everywhere. Beyond the bound of memory every second one goes, and the next ones are twice as far apart.
+//! They are spaced by computing time, not by cycles, because the time of a cycle varies by orders of magnitude within a run
+//! and a seek should take about as long everywhere. When the memory is full every second one is dropped, and the next
+//! ones are twice as far apart.
 
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Duration;
 
-/// The least time of computing between two keyframes, before any thinning.
+/// Minimum computing time between two keyframes, before any thinning. A seek computes half of it on average: nobody notices.
 const MIN_SPACING: Duration = Duration::from_millis(20);
-/// The least ratio of computing time to the time spent on keyframes.
+/// Minimum ratio of computing time to the time spent on keyframes: they slow a run down by 2 % at most.
 const MIN_COST_RATIO: u32 = 50;
 
 /// The memory for the keyframes of all runs, which share it evenly.
@@ -19,84 +20,99 @@ const MIN_COST_RATIO: u32 = 50;
 pub(crate) struct MemoryBudget {
     used: AtomicUsize,
     runs: AtomicUsize,
-    most: usize,
-    most_of_one: usize,
+    total_bytes: usize,
+    max_bytes_per_run: usize,
 }
 
 impl MemoryBudget {
-    /// Returns a budget of `most` bytes in all, and at most `most_of_one` for one run.
-    pub(crate) fn new(most: usize, most_of_one: usize) -> Self {
-        Self { used: AtomicUsize::new(0), runs: AtomicUsize::new(0), most, most_of_one }
+    /// Returns a budget of some bytes in all, and a maximum for one run.
+    pub(crate) fn new(total_bytes: usize, max_bytes_per_run: usize) -> Self {
+        Self {
+            used: AtomicUsize::new(0),
+            runs: AtomicUsize::new(0),
+            total_bytes,
+            max_bytes_per_run,
+        }
     }
 
-    /// Returns the part of each run.
+    /// Returns the number of bytes that each run may use.
     fn share(&self) -> usize {
-        (self.most / self.runs.load(Relaxed).max(1)).min(self.most_of_one)
+        (self.total_bytes / self.runs.load(Relaxed).max(1)).min(self.max_bytes_per_run)
     }
 }
 
 /// The keyframes of one run.
 #[derive(Debug)]
 pub(crate) struct Keyframes {
-    kept: BTreeMap<Cycle, Vec<u8>>,
+    checkpoints: BTreeMap<Cycle, Vec<u8>>,
     bytes: usize,
     budget: Arc<MemoryBudget>,
     spacing: Duration,
     /// The computing time since the last keyframe.
     computed: Duration,
-    /// The time that the last keyframe took.
-    took: Duration,
+    /// The time that it took to make the last keyframe.
+    last_cost: Duration,
 }
 
 impl Keyframes {
-    /// Returns a store for one run's part of a budget, without anything in it.
+    /// Returns an empty store for one run's share of a budget.
     pub(crate) fn new(budget: &Arc<MemoryBudget>) -> Self {
         budget.runs.fetch_add(1, Relaxed);
-        let (spacing, zero, budget) = (MIN_SPACING, Duration::ZERO, budget.clone());
-        Self { kept: BTreeMap::new(), bytes: 0, budget, spacing, computed: zero, took: zero }
+        Self {
+            checkpoints: BTreeMap::new(),
+            bytes: 0,
+            budget: budget.clone(),
+            spacing: MIN_SPACING,
+            computed: Duration::ZERO,
+            last_cost: Duration::ZERO,
+        }
     }
 
-    /// Notes that computing up to a cycle took a time; returns whether a keyframe of that cycle is wanted.
-    pub(crate) fn is_due(&mut self, cycle: Cycle, took: Duration) -> bool {
-        // Cycles computed before are kept already.
-        if self.kept.last_key_value().is_some_and(|(&last, _)| cycle <= last) {
+    /// Records the time that it took to compute up to a cycle; returns whether a keyframe of that cycle is due.
+    pub(crate) fn is_due(&mut self, cycle: Cycle, computing_time: Duration) -> bool {
+        // A cycle that is computed again, after a seek backward, has its keyframes already.
+        if self.checkpoints.last_key_value().is_some_and(|(&last, _)| cycle <= last) {
             return false;
         }
-        self.computed += took;
-        self.kept.is_empty()
-            || self.computed >= self.spacing.max(self.took.saturating_mul(MIN_COST_RATIO))
+        self.computed += computing_time;
+        let min_time = self.spacing.max(self.last_cost.saturating_mul(MIN_COST_RATIO));
+        self.checkpoints.is_empty() || self.computed >= min_time
     }
 
-    /// Keeps a checkpoint that took a time to make.
-    pub(crate) fn push(&mut self, cycle: Cycle, checkpoint: Vec<u8>, took: Duration) {
-        (self.computed, self.took) = (Duration::ZERO, took);
-        self.kept.insert(cycle, checkpoint);
+    /// Keeps a checkpoint; `cost` is the time that it took to make it.
+    pub(crate) fn push(&mut self, cycle: Cycle, checkpoint: Vec<u8>, cost: Duration) {
+        self.computed = Duration::ZERO;
+        self.last_cost = cost;
+        self.checkpoints.insert(cycle, checkpoint);
         self.update_bytes();
-        // Others may have more than their part for a while: the memory missing then is missing here.
-        while self.budget.used.load(Relaxed) > self.budget.most && self.kept.len() > 1 {
+        // Other runs shrink to their shares only when it is their turn: until then this one gets less than its own.
+        while self.budget.used.load(Relaxed) > self.budget.total_bytes && self.checkpoints.len() > 1
+        {
             self.thin();
         }
         self.shrink_to_budget();
     }
 
-    /// Drops keyframes beyond the run's part, which shrinks whenever another run begins.
+    /// Drops keyframes beyond the run's share, which shrinks whenever another run starts.
     pub(crate) fn shrink_to_budget(&mut self) {
-        while self.bytes > self.budget.share() && self.kept.len() > 1 {
+        while self.bytes > self.budget.share() && self.checkpoints.len() > 1 {
             self.thin();
         }
     }
 
-    /// Notes the number of bytes kept.
+    /// Updates the number of bytes, here and in the budget.
     fn update_bytes(&mut self) {
-        let bytes = self.kept.values().map(Vec::len).sum();
+        let bytes = self.checkpoints.values().map(Vec::len).sum();
+        // In this order: the sum of all runs never falls below 0.
         self.budget.used.fetch_add(bytes, Relaxed);
-        self.budget.used.fetch_sub(std::mem::replace(&mut self.bytes, bytes), Relaxed);
+        self.budget.used.fetch_sub(self.bytes, Relaxed);
+        self.bytes = bytes;
     }
 
-    /// Drops every second keyframe, but never the first.
+    /// Drops every second keyframe, but never the first: a seek to any cycle needs one before it.
     fn thin(&mut self) {
         let mut is_odd = true;
-        self.kept.retain(|_, _| {
+        self.checkpoints.retain(|_, _| {
             is_odd = !is_odd;
             !is_odd
         });
@@ -106,7 +122,7 @@ impl Keyframes {
 
     /// Returns the last keyframe that is not after a cycle.
     pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &[u8])> {
-        self.kept.range(..=cycle).next_back().map(|(&at, bytes)| (at, bytes.as_slice()))
+        self.checkpoints.range(..=cycle).next_back().map(|(&at, bytes)| (at, bytes.as_slice()))
     }
 }
 
@@ -181,7 +197,7 @@ mod tests {
             let mut keyframes = alone(1000);
             for (cycle, size) in (0..).zip(sizes) {
                 keyframes.push(cycle, vec![0; size], MS);
-                let kept: usize = keyframes.kept.values().map(Vec::len).sum();
+                let kept: usize = keyframes.checkpoints.values().map(Vec::len).sum();
                 prop_assert!(kept <= 1000 && kept == keyframes.bytes);
                 prop_assert_eq!(keyframes.before(0).map(|(at, _)| at), Some(0));
             }
@@ -197,7 +213,7 @@ mod tests {
                 }
                 cycle += 1;
             }
-            let at: Vec<Cycle> = keyframes.kept.keys().copied().collect();
+            let at: Vec<Cycle> = keyframes.checkpoints.keys().copied().collect();
             let widest = at.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
             prop_assert!(widest <= 2 * (count / 7).max(2), "{at:?}");
         }

@@ -1,20 +1,18 @@
 //! The studio's server: runs of any world, watched and steered by a page, over one WebSocket.
 //!
 //! ```text
-//! listen.rs    the port              http.rs      routes and headers      guard.rs   rules of access
-//! page.rs      files of the page     socket.rs    one page                house.rs   shared state
-//! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  mail to be sent
-//! session/     one thread per run    keyframes.rs checkpoints for seeking
-//! serve.rs     connections           doors.rs     limits of these
-//! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
-//! files.rs     readable files        write.rs     writable files          beside.rs      files a text can name
-//! results/     reports, exports      zip.rs       answers made small
-//! screen.rs    fleets that fly elsewhere
+//! listen.rs    the port              http.rs      routes and headers      access.rs        rules of access
+//! serve.rs     connections           limits.rs    limits of these         state.rs         state of all sockets
+//! page.rs      files of the page     compress.rs  gzip                    socket.rs        one page
+//! protocol/    messages and frames   request.rs   text -> requests        outbox.rs        messages to be sent
+//! session/     one thread per run    keyframes.rs checkpoints for seeking encode/          frames as bytes
+//! samples.rs   metrics over time     event_store.rs  events               fleet_feed.rs    views of fleets
+//! files.rs     readable files        write.rs     writable files          file_choices.rs  files for a text
+//! results/     reports, exports
 //! ```
-//! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
-//! and frames from an outbox into which sessions put without waiting. So no action or omission of a page affects a
-//! result, and a slow page loses frames, never the run. The worlds are passed in by the program that starts the
-//! server.
+//! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel, and take replies, states
+//! and frames from an outbox; sessions put them there without waiting. So no action or omission of a page affects a
+//! result, and a slow page loses frames, never the run. The program that starts the server passes in the worlds.
 
 mod access;
 mod compress;
@@ -49,8 +47,8 @@ use keyframes::MemoryBudget;
 use protocol::{Problem, TargetRef};
 use serve::Timeouts;
 use session::{FoxgloveHost, SessionDeps};
-use sidestep::kernel::InputError;
-use sidestep::scenario::Worlds;
+use sidestep_kernel::InputError;
+use sidestep_scenario::Worlds;
 use sidestep_session::{Error, ViewerAddress};
 use state::{AppState, MAX_BLOCKING_THREADS};
 use std::net::{IpAddr, SocketAddr, TcpListener};
@@ -62,11 +60,11 @@ use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 
-/// The largest number of frames made by a session in a second.
+/// Maximum number of frames of a session in a second: what the eye takes for motion.
 pub const MAX_FRAMES_PER_S: u32 = 30;
-/// The bound of memory for the keyframes of a session.
+/// Maximum memory for the keyframes of a session.
 pub const MAX_KEYFRAME_BYTES: usize = 256 << 20;
-/// The bound of memory for the keyframes of all sessions together, which share it evenly.
+/// Maximum memory for the keyframes of all sessions together, which share it evenly.
 pub const MAX_TOTAL_KEYFRAME_BYTES: usize = 1 << 30;
 /// Speeds at which a run can be played, in simulated seconds per second.
 pub const SPEED_RANGE: RangeInclusive<f64> = 0.1..=100.0;
@@ -90,15 +88,15 @@ pub struct Options {
     pub workers: usize,
     /// The configured address at which viewers of Foxglove's protocol watch the session that was opened last.
     pub foxglove: Option<ViewerAddress>,
-    /// Fleets that fly elsewhere, which are opened and only watched.
-    pub screens: Vec<Arc<FleetFeed>>,
+    /// Fleets in other processes, which are opened and only watched.
+    pub fleets: Vec<Arc<FleetFeed>>,
 }
 
 /// A running server, until it is ended or dropped.
 pub struct Studio {
     address: SocketAddr,
     token: Option<String>,
-    ending: watch::Sender<bool>,
+    shutdown: watch::Sender<bool>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -106,43 +104,42 @@ impl Studio {
     /// Starts a server in its own thread.
     ///
     /// # Errors
-    /// When something that was named is not there, or the port cannot be taken.
+    /// When something that was named does not exist, or the port cannot be bound.
     pub fn start(options: Options) -> Result<Self, Error> {
         let (folders, mut open) = split_targets(&options.named);
-        open.extend(
-            options
-                .screens
-                .iter()
-                .map(|screen| TargetRef { kind: "fleet".into(), path: screen.endpoint.clone() }),
-        );
+        for fleet in &options.fleets {
+            open.push(TargetRef { kind: "fleet".into(), path: fleet.endpoint.clone() });
+        }
         let scenarios = open.iter().filter(|named| named.kind == "scenario");
         let files = AllowedFiles::from_roots(&folders).map_err(|p| input_error(&p))?;
         let files = files.with_files_named_by(scenarios.map(|named| Path::new(&named.path)));
         let listener = listen::bind(&options.host, options.port)?;
-        let failed = |e: std::io::Error| {
-            Error::other(
-                format!("the server cannot be started: {e}"),
-                "end other programs, and try again",
-            )
+        listener.set_nonblocking(true).map_err(start_error)?;
+        let address = listener.local_addr().map_err(start_error)?;
+        let access = AccessPolicy::new(address, &options.host).map_err(start_error)?;
+        let token = access.token().map(String::from);
+        let deps = SessionDeps {
+            worlds: options.worlds,
+            files,
+            workers: options.workers,
+            read_only: options.read_only,
+            budget: Arc::new(MemoryBudget::new(MAX_TOTAL_KEYFRAME_BYTES, MAX_KEYFRAME_BYTES)),
+            foxglove: options.foxglove.map(|address| Arc::new(FoxgloveHost::new(address))),
+            fleets: options.fleets,
         };
-        listener.set_nonblocking(true).map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
-        let guard = AccessPolicy::new(address, &options.host).map_err(failed)?;
-        let token = guard.token().map(String::from);
-        let (ending, ends) = watch::channel(false);
-        let Options { worlds, workers, read_only, program, foxglove, screens, .. } = options;
-        let budget = Arc::new(MemoryBudget::new(MAX_TOTAL_KEYFRAME_BYTES, MAX_KEYFRAME_BYTES));
-        let showcase = foxglove.map(|at| Arc::new(FoxgloveHost::new(at)));
-        let means = SessionDeps { worlds, files, workers, read_only, budget, showcase, screens };
-        let house = Arc::new(AppState::new(means, guard, program, open, ends));
+        let (shutdown, shutdown_signal) = watch::channel(false);
+        let state = Arc::new(AppState::new(deps, access, options.program, open, shutdown_signal));
+        // One thread for all sockets: they only pass messages on. Sessions have threads of their own.
         let runtime = Builder::new_current_thread()
             .enable_all()
             .max_blocking_threads(MAX_BLOCKING_THREADS)
-            .build();
-        let runtime = runtime.map_err(failed)?;
-        let thread = std::thread::Builder::new().name("studio".into());
-        let thread = thread.spawn(move || run(runtime, listener, &house)).map_err(failed)?;
-        Ok(Self { address, token, ending, thread: Some(thread) })
+            .build()
+            .map_err(start_error)?;
+        let thread = std::thread::Builder::new()
+            .name("studio".into())
+            .spawn(move || run(runtime, listener, &state))
+            .map_err(start_error)?;
+        Ok(Self { address, token, shutdown, thread: Some(thread) })
     }
 
     /// Returns the page's address, with the token in it where one is needed: one that others can open, too, if they
@@ -182,7 +179,7 @@ impl Studio {
 impl Drop for Studio {
     /// Ends all sessions, and waits for them.
     fn drop(&mut self) {
-        self.ending.send_replace(true);
+        self.shutdown.send_replace(true);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -190,37 +187,45 @@ impl Drop for Studio {
 }
 
 /// Answers requests until the server is ended.
-fn run(runtime: Runtime, listener: TcpListener, house: &Arc<AppState>) {
+fn run(runtime: Runtime, listener: TcpListener, state: &Arc<AppState>) {
     runtime.block_on(async {
         // A bound, nonblocking listener is never refused.
         let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-        let (routes, ending) = (http::routes(house.clone()), house.shutdown_signal());
-        serve::serve(listener, routes, ending, Timeouts::default()).await;
-        house.wait_for_sessions().await;
+        let routes = http::routes(state.clone());
+        serve::serve(listener, routes, state.shutdown_signal(), Timeouts::default()).await;
+        state.wait_for_sessions().await;
     });
+    // A report or an export under way is not waited for.
     runtime.shutdown_timeout(Duration::from_millis(100));
 }
 
 /// Returns the folders that may be read, and the things to open.
 fn split_targets(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
-    let (mut folders, mut open): (Vec<PathBuf>, Vec<TargetRef>) = Default::default();
+    let mut folders: Vec<PathBuf> = Vec::new();
+    let mut open = Vec::new();
     for path in named {
         let is_run = path.join("run.json").is_file();
-        let is_film = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+        let is_mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
         let is_sweep = path.join("sweep.json").is_file();
         if !path.is_dir() || is_run || is_sweep {
-            let kind = match () {
-                () if is_sweep => "sweep",
-                () if is_run || is_film => "recording",
-                () => "scenario",
+            let kind = if is_sweep {
+                "sweep"
+            } else if is_run || is_mcap {
+                "recording"
+            } else {
+                "scenario"
             };
             open.push(TargetRef { kind: kind.into(), path: path.display().to_string() });
         }
-        // The files that a scenario names lie beside it.
-        let folder = match (path.is_dir() || !path.exists(), path.parent()) {
-            (false, Some(parent)) if parent != Path::new("") => parent.to_path_buf(),
-            (false, _) => ".".into(),
-            (true, _) => path.clone(),
+        let folder = if path.is_dir() || !path.exists() {
+            // A path that does not exist is reported as it was given.
+            path.clone()
+        } else {
+            // Maps and other files of a scenario lie beside it.
+            match path.parent() {
+                Some(parent) if parent != Path::new("") => parent.to_path_buf(),
+                _ => ".".into(),
+            }
         };
         if !folders.contains(&folder) {
             folders.push(folder);
@@ -230,6 +235,13 @@ fn split_targets(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
         folders.push(".".into());
     }
     (folders, open)
+}
+
+fn start_error(error: std::io::Error) -> Error {
+    Error::other(
+        format!("the server cannot be started: {error}"),
+        "end other programs, and try again",
+    )
 }
 
 fn input_error(problem: &Problem) -> InputError {
@@ -259,7 +271,7 @@ mod tests {
         assert_eq!(
             split_targets(&["a.toml".into()]).0,
             [PathBuf::from("a.toml")],
-            "it is not there"
+            "it does not exist"
         );
     }
 }

@@ -1,6 +1,6 @@
 //! The port: found and bound; and the address by which others reach it.
 
-use sidestep::kernel::InputError;
+use sidestep_kernel::InputError;
 use sidestep_session::next_free_port;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
@@ -8,7 +8,7 @@ use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 /// The first port that is tried where none is given.
 const FIRST_PORT: u16 = 7800;
 /// The number of ports that are tried.
-const PORTS_TRIED: u16 = 100;
+const PORT_COUNT: u16 = 100;
 
 /// Binds the given port, or the first free one of a range.
 ///
@@ -18,7 +18,7 @@ pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputEr
     let ip = resolve(host)?;
     let at = |port: u16| TcpListener::bind(SocketAddr::new(ip, port));
     let Some(port) = port else {
-        let mut tried = (FIRST_PORT..FIRST_PORT + PORTS_TRIED).map(at);
+        let mut tried = (FIRST_PORT..FIRST_PORT + PORT_COUNT).map(at);
         let found = tried.find(|bound| !is_taken(bound)).unwrap_or_else(|| at(0));
         return found.map_err(|e| host_error(host, &e));
     };
@@ -74,7 +74,7 @@ mod tests {
         let port = taken.local_addr().expect("bound").port();
         let error = bind("127.0.0.1", Some(port)).expect_err("in use");
         assert_eq!(error.place(), format!("--port {port}"));
-        assert!(error.remedy().contains("--port ") || port > u16::MAX - PORTS_TRIED, "{error}");
+        assert!(error.remedy().contains("--port ") || port > u16::MAX - PORT_COUNT, "{error}");
         assert!(bind("127.0.0.1", None).is_ok());
     }
 

@@ -1,8 +1,9 @@
-//! Messages that wait to be sent to one socket: all texts, but only the newest frames and states.
+//! Messages that wait to be sent by one socket: all replies and notifications, but only the newest frame and status of each
+//! session.
 //!
-//! Sessions put things here from their threads and never wait; the socket takes them when it can.
+//! Sessions put them here from their threads and never wait; the socket takes them when it can.
 
-use crate::protocol::{Notification, Reply, SessionId};
+use crate::protocol::{Reply, ServerNotification, SessionId};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
@@ -16,22 +17,22 @@ pub(crate) enum OutboxItem {
     Frame(Vec<u8>),
 }
 
-/// The mail of one socket.
+/// The outgoing messages of one socket.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    waiting: Mutex<PendingMessages>,
+    pending: Mutex<PendingMessages>,
     ready: Notify,
 }
 
 #[derive(Debug, Default)]
 struct PendingMessages {
     texts: VecDeque<String>,
-    /// Number of requests that were taken in and are not answered yet.
+    /// Number of requests that were received and are not answered yet.
     open_requests: usize,
     /// Numbers and bytes of the long ones among them.
     long: Vec<(u32, usize)>,
     newest: BTreeMap<SessionId, LatestUpdate>,
-    /// The session that was served last, so that all have their turn.
+    /// The session that was served last: the next one has its turn first.
     last: SessionId,
 }
 
@@ -39,7 +40,7 @@ struct PendingMessages {
 #[derive(Debug, Default)]
 struct LatestUpdate {
     status: Option<String>,
-    cast: Option<String>,
+    bodies: Option<String>,
     frame: Option<Vec<u8>>,
 }
 
@@ -50,22 +51,22 @@ fn to_json(value: &impl serde::Serialize) -> String {
 
 impl Outbox {
     fn lock(&self) -> MutexGuard<'_, PendingMessages> {
-        // The mail is consistent after every step, even if a thread panicked between two of them.
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+        // It is consistent even if a thread has panicked while it held the lock.
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes that a request was taken in; each needs one reply.
+    /// Records that a request was received; each needs one reply.
     pub(crate) fn expect_reply(&self) {
         self.lock().open_requests += 1;
     }
 
     /// Returns the number of requests without a reply, and of replies that were not sent yet.
     pub(crate) fn backlog(&self) -> usize {
-        let waiting = self.lock();
-        waiting.open_requests + waiting.texts.len()
+        let pending = self.lock();
+        pending.open_requests + pending.texts.len()
     }
 
-    /// Notes that the request just taken in is a long one.
+    /// Records that the request just received is a long one.
     pub(crate) fn record_long_request(&self, id: u32, bytes: usize) {
         self.lock().long.push((id, bytes));
     }
@@ -78,73 +79,74 @@ impl Outbox {
     /// Sends a reply.
     pub(crate) fn send_reply(&self, reply: &Reply) {
         let text = to_json(reply);
-        let mut waiting = self.lock();
-        waiting.open_requests = waiting.open_requests.saturating_sub(1);
-        if let Some(at) = waiting.long.iter().position(|(id, _)| *id == reply.id) {
-            waiting.long.swap_remove(at);
+        let mut pending = self.lock();
+        pending.open_requests = pending.open_requests.saturating_sub(1);
+        if let Some(at) = pending.long.iter().position(|(id, _)| *id == reply.id) {
+            pending.long.swap_remove(at);
         }
-        waiting.texts.push_back(text);
-        drop(waiting);
+        pending.texts.push_back(text);
+        drop(pending);
         self.ready.notify_one();
     }
 
     /// Sends a notice; all of them go out, in their order.
-    pub(crate) fn send_notification(&self, notice: &Notification) {
+    pub(crate) fn send_notification(&self, notice: &ServerNotification) {
         let text = to_json(notice);
         self.lock().texts.push_back(text);
         self.ready.notify_one();
     }
 
     /// Sends the state of a session, unless a newer one comes before it has been sent.
-    pub(crate) fn send_status(&self, session: SessionId, status: &Notification) {
+    pub(crate) fn send_status(&self, session: SessionId, status: &ServerNotification) {
         let text = to_json(status);
         self.lock().newest.entry(session).or_default().status = Some(text);
         self.ready.notify_one();
     }
 
-    /// Sends a frame, and the cast that it begins, unless a newer one comes before it has been sent. Returns whether
+    /// Sends a frame, and the body table that it begins, unless a newer one comes before it has been sent. Returns whether
     /// it replaces one that was not sent.
     pub(crate) fn send_frame(
         &self,
         session: SessionId,
-        cast: Option<&Notification>,
+        bodies: Option<&ServerNotification>,
         frame: Vec<u8>,
     ) -> bool {
-        let cast = cast.map(to_json);
-        let mut waiting = self.lock();
-        let newest = waiting.newest.entry(session).or_default();
-        if cast.is_some() {
-            newest.cast = cast;
+        let bodies = bodies.map(to_json);
+        let mut pending = self.lock();
+        let newest = pending.newest.entry(session).or_default();
+        if bodies.is_some() {
+            newest.bodies = bodies;
         }
         let replaces = newest.frame.replace(frame).is_some();
-        drop(waiting);
+        drop(pending);
         self.ready.notify_one();
         replaces
     }
 
-    /// Takes back the frame and the state of a session that were not sent; returns whether there was a frame.
+    /// Removes the frame and the status of a session that were not sent; returns whether there was a frame.
     pub(crate) fn clear(&self, session: SessionId) -> bool {
         let newest = self.lock().newest.remove(&session);
         newest.is_some_and(|newest| newest.frame.is_some())
     }
 
-    /// Returns the next message to send: texts first, then the mail of the sessions in turn.
+    /// Returns the next message to send: replies and notifications first, because the user waits for them, then those of the
+    /// sessions in turn.
     pub(crate) fn pop(&self) -> Option<OutboxItem> {
-        let mut waiting = self.lock();
-        if let Some(text) = waiting.texts.pop_front() {
+        let mut pending = self.lock();
+        if let Some(text) = pending.texts.pop_front() {
             return Some(OutboxItem::Text(text));
         }
-        let last = waiting.last;
-        let all = waiting.newest.range(last + 1..).chain(waiting.newest.range(..=last));
+        let last = pending.last;
+        let all = pending.newest.range(last + 1..).chain(pending.newest.range(..=last));
         let session = all.map(|(&session, _)| session).next()?;
-        let newest = waiting.newest.get_mut(&session)?;
-        let text = newest.status.take().or_else(|| newest.cast.take()).map(OutboxItem::Text);
-        let mail = text.or_else(|| newest.frame.take().map(OutboxItem::Frame));
-        if newest.status.is_none() && newest.cast.is_none() && newest.frame.is_none() {
-            waiting.newest.remove(&session);
-            waiting.last = session;
+        let newest = pending.newest.get_mut(&session)?;
+        let text = newest.status.take().or_else(|| newest.bodies.take()).map(OutboxItem::Text);
+        let item = text.or_else(|| newest.frame.take().map(OutboxItem::Frame));
+        if newest.status.is_none() && newest.bodies.is_none() && newest.frame.is_none() {
+            pending.newest.remove(&session);
+            pending.last = session;
         }
-        mail
+        item
     }
 
     /// Waits until there may be something to send.
@@ -162,13 +164,13 @@ mod tests {
         Reply { id, result: ReplyResult::Answer(ReplyBody::Done) }
     }
 
-    fn notice(text: &str) -> Notification {
+    fn notice(text: &str) -> ServerNotification {
         let (program, worlds, open) = (text.to_string(), Vec::new(), Vec::new());
-        Notification::Hello { version: 1, program, worlds, read_only: false, open }
+        ServerNotification::Hello { version: 1, program, worlds, read_only: false, open }
     }
 
     fn all(outbox: &Outbox) -> Vec<String> {
-        let name = |mail| match mail {
+        let name = |item| match item {
             OutboxItem::Frame(bytes) => format!("frame {}", bytes[0]),
             OutboxItem::Text(text) if text.contains("\"id\"") => "reply".to_string(),
             OutboxItem::Text(text) => text.split('"').nth(9).expect("a program").to_string(),
@@ -179,7 +181,7 @@ mod tests {
     #[test]
     fn replies_go_first_and_of_frames_and_states_the_newest_alone() {
         let outbox = Outbox::default();
-        assert!(!outbox.send_frame(1, Some(&notice("cast 1")), vec![1]));
+        assert!(!outbox.send_frame(1, Some(&notice("table 1")), vec![1]));
         assert!(outbox.send_frame(1, None, vec![2]));
         outbox.send_status(1, &notice("old"));
         outbox.send_status(1, &notice("new"));
@@ -187,7 +189,7 @@ mod tests {
         assert_eq!(outbox.backlog(), 1);
         outbox.send_reply(&reply(1));
         assert_eq!(outbox.backlog(), 1);
-        assert_eq!(all(&outbox), ["reply", "new", "cast 1", "frame 2"]);
+        assert_eq!(all(&outbox), ["reply", "new", "table 1", "frame 2"]);
         assert_eq!(outbox.backlog(), 0);
     }
 

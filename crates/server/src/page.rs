@@ -29,10 +29,10 @@ static GZIPPED: LazyLock<BTreeMap<&str, Vec<u8>>> = LazyLock::new(|| {
     smaller.map(|(asset, zipped)| (asset.path, zipped)).collect()
 });
 
-/// Files in this folder have a digest in their names: a loaded file stays right.
+/// Files in this folder have a digest in their names, so a browser may keep them for good.
 const IMMUTABLE_FOLDER: &str = "assets/";
 
-/// Returns the file at a path. A path without a dot is the page itself, so that its own addresses can be opened.
+/// Returns the file at a path. A path without a dot is the page itself, so that the addresses that it shows can be opened.
 pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     let path = path.trim_start_matches('/');
     let is_page = path.is_empty() || !path.rsplit('/').next().unwrap_or_default().contains('.');
@@ -40,23 +40,26 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     let Some(asset) = ASSETS.iter().find(|asset| asset.path == name) else {
         return (StatusCode::NOT_FOUND, "There is no such file.\n").into_response();
     };
-    let is_lasting = asset.path.starts_with(IMMUTABLE_FOLDER);
-    let cache = if is_lasting { "public, max-age=31536000, immutable" } else { "no-cache" };
+    let is_immutable = asset.path.starts_with(IMMUTABLE_FOLDER);
+    let cache = if is_immutable { "public, max-age=31536000, immutable" } else { "no-cache" };
     let zipped = GZIPPED.get(asset.path).filter(|_| compress::accepts_gzip(headers));
-    // A different sequence of bytes needs a different tag.
-    let tag = match zipped {
-        Some(_) => asset.tag.trim_end_matches('"').to_string() + "-gzip\"",
-        None => asset.tag.to_string(),
+    // HTTP wants another tag for other bytes, even if they decode to the same.
+    let tag = if zipped.is_some() {
+        asset.tag.trim_end_matches('"').to_string() + "-gzip\""
+    } else {
+        asset.tag.to_string()
     };
     let is_known = headers.get(IF_NONE_MATCH).is_some_and(|known| known == tag.as_str());
     let about = [(CACHE_CONTROL, cache), (ETAG, tag.as_str()), (VARY, "accept-encoding")];
     let media = [(CONTENT_TYPE, asset.media)];
-    match (is_known, zipped) {
-        (true, _) => (StatusCode::NOT_MODIFIED, about).into_response(),
-        (false, None) => (about, media, asset.bytes).into_response(),
-        (false, Some(zipped)) => {
+    if is_known {
+        return (StatusCode::NOT_MODIFIED, about).into_response();
+    }
+    match zipped {
+        Some(zipped) => {
             (about, media, [(CONTENT_ENCODING, "gzip")], zipped.as_slice()).into_response()
         }
+        None => (about, media, asset.bytes).into_response(),
     }
 }
 

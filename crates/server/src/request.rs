@@ -1,6 +1,6 @@
 //! Reading of requests: every message of a page gets an answer.
 
-use crate::protocol::{Method, Problem, Request, SessionId};
+use crate::protocol::{ClientRequest, Method, Problem, SessionId};
 use serde::Deserialize;
 
 /// Longest text of a request, in bytes: room for the longest scenario that can be read (16 MiB), and for the one that
@@ -17,7 +17,7 @@ struct RequestNumber {
 ///
 /// # Errors
 /// With the number of the request, 0 if it cannot be found, and the problem.
-pub fn decode(text: &str) -> Result<Request, Box<(u32, Problem)>> {
+pub fn decode(text: &str) -> Result<ClientRequest, Box<(u32, Problem)>> {
     if text.len() > MAX_REQUEST_BYTES {
         let cause = format!("it has more than {MAX_REQUEST_BYTES} bytes");
         let remedy = "make the text shorter, or change the file with another program";
@@ -48,7 +48,7 @@ impl Method {
             | Self::Step { session, .. }
             | Self::Seek { session, .. }
             | Self::Restart { session, .. }
-            | Self::Look { session, .. }
+            | Self::SelectScans { session, .. }
             | Self::Credit { session, .. }
             | Self::Inspect { session, .. }
             | Self::Metrics { session, .. }
@@ -74,8 +74,8 @@ mod tests {
         for (text, call) in [
             (r#"{"do":"files"}"#, Method::Files { folder: None }),
             (
-                r#"{"do":"open","what":{"kind":"new","world":"robots"},"seed":null}"#,
-                Method::Open { what: OpenTarget::New { world: "robots".into() }, seed: None },
+                r#"{"do":"open","target":{"kind":"new","world":"robots"},"seed":null}"#,
+                Method::Open { target: OpenTarget::New { world: "robots".into() }, seed: None },
             ),
             (
                 r#"{"do":"play","session":3,"speed":{"times":2.5}}"#,
@@ -87,7 +87,7 @@ mod tests {
             ),
         ] {
             let request = decode(&format!(r#"{{"id":7,"call":{text}}}"#)).expect(text);
-            assert_eq!(request, Request { id: 7, call });
+            assert_eq!(request, ClientRequest { id: 7, call });
         }
     }
 
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn the_longest_scenario_that_can_be_read_is_saved_over_another_one() {
         let text = "seed = 1\n\"a\" = 2\n".repeat((16 << 20) / 19);
-        let call = serde_json::json!({ "do": "save", "session": 1, "text": text, "to": null, "base": text, "over": true });
+        let call = serde_json::json!({ "do": "save", "session": 1, "text": text, "to": null, "base": text, "overwrite": true });
         let request = serde_json::json!({ "id": 7, "call": call }).to_string();
         assert_eq!(decode(&request).map(|request| request.id), Ok(7));
     }

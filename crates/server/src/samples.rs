@@ -1,50 +1,52 @@
-//! Samples of all numbers that a run measures, for lines against time.
+//! Samples of all metrics of a run, for charts over time.
 
 use crate::protocol::{MetricName, ReplyBody};
 use serde_json::Value;
-use sidestep::kernel::Cycle;
-use sidestep::scenario::{MetricInfo, MetricLabel, metric_label};
+use sidestep_kernel::Cycle;
+use sidestep_scenario::{MetricInfo, MetricLabel, metric_label};
 use std::time::Duration;
 
-/// The largest number of samples; beyond it they are thinned by half.
+/// Maximum number of samples; beyond it every second one is dropped. A chart is at most about 2000 pixels wide.
 const MAX_SAMPLES: usize = 2048;
-/// The largest number of metrics; further ones are left out.
+/// Maximum number of metrics; further ones are left out.
 const MAX_METRICS: usize = 400;
-/// The least time between two samples, before any thinning.
+/// Minimum time between two samples, before any thinning.
 const MIN_SPACING: Duration = Duration::from_millis(100);
-/// The least ratio of total time to the time spent on sampling.
+/// Minimum ratio of total time to the time spent on sampling: it slows a run down by 1 % at most.
 const MIN_COST_RATIO: u32 = 100;
 
 /// The samples of one run.
 pub(crate) struct Samples {
-    meanings: &'static [MetricInfo],
+    infos: &'static [MetricInfo],
     names: Vec<MetricName>,
     cycles: Vec<Cycle>,
     /// Values in each sample, metric by metric.
     values: Vec<Vec<Option<f64>>>,
+    /// Number of times that every second sample was dropped.
     thinned: u32,
     spacing: Duration,
-    took: Duration,
+    /// The time that it took to take the last sample.
+    last_cost: Duration,
 }
 
 impl Samples {
-    /// Returns a store for the metrics of a world, without anything in it.
-    pub(crate) fn new(meanings: &'static [MetricInfo]) -> Self {
+    /// Returns an empty store for the metrics of a world.
+    pub(crate) fn new(infos: &'static [MetricInfo]) -> Self {
         Self {
-            meanings,
+            infos,
             names: Vec::new(),
             cycles: Vec::new(),
             values: Vec::new(),
             thinned: 0,
             spacing: MIN_SPACING,
-            took: Duration::ZERO,
+            last_cost: Duration::ZERO,
         }
     }
 
-    /// Returns whether a sample of a cycle is wanted, a given time after the last one.
+    /// Returns whether a sample of a cycle is due, some time after the last one.
     pub(crate) fn is_due(&self, cycle: Cycle, since: Duration) -> bool {
         let Some(&last) = self.cycles.last() else { return true };
-        cycle > last && since >= self.spacing.max(self.took.saturating_mul(MIN_COST_RATIO))
+        cycle > last && since >= self.spacing.max(self.last_cost.saturating_mul(MIN_COST_RATIO))
     }
 
     /// Returns whether a cycle comes after all samples.
@@ -52,9 +54,9 @@ impl Samples {
         self.cycles.last().is_none_or(|&last| cycle > last)
     }
 
-    /// Keeps the metrics of a cycle, and the time that it took to get them.
-    pub(crate) fn push(&mut self, cycle: Cycle, metrics: &Value, took: Duration) {
-        self.took = took;
+    /// Keeps the metrics of a cycle; `cost` is the time that it took to compute them.
+    pub(crate) fn push(&mut self, cycle: Cycle, metrics: &Value, cost: Duration) {
+        self.last_cost = cost;
         let mut found = Vec::new();
         collect_numbers(metrics, "", &mut found);
         let row = self.cycles.len();
@@ -76,8 +78,8 @@ impl Samples {
         if known.is_some() || self.names.len() == MAX_METRICS {
             return known;
         }
-        let MetricLabel { words, unit, .. } = metric_label(self.meanings, &key);
-        self.names.push(MetricName { key, words, unit: unit.unwrap_or_default().into() });
+        let MetricLabel { words, unit, .. } = metric_label(self.infos, &key);
+        self.names.push(MetricName { key, label: words, unit: unit.unwrap_or_default().into() });
         self.values.push(vec![None; self.cycles.len()]);
         Some(self.names.len() - 1)
     }
@@ -106,7 +108,7 @@ impl Samples {
     }
 }
 
-/// Collects the numbers of a tree, named by the path to them; lists are no metrics.
+/// Collects the numbers of a tree by their paths; lists are no metrics.
 fn collect_numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
     match tree {
         Value::Number(number) => {
@@ -126,22 +128,22 @@ mod tests {
     use serde_json::json;
 
     /// The names of all metrics, and the samples from a number on.
-    struct Told {
+    struct Sampled {
         keys: Vec<String>,
         first: u32,
         cycles: Vec<f64>,
         values: Vec<Vec<Option<f64>>>,
     }
 
-    fn told_of(samples: &Samples, from: u32) -> Told {
+    fn sampled(samples: &Samples, from: u32) -> Sampled {
         let ReplyBody::Metrics { names, first, cycles, values, .. } = samples.answer(from) else {
             panic!("no metrics");
         };
-        Told { keys: names.into_iter().map(|name| name.key).collect(), first, cycles, values }
+        Sampled { keys: names.into_iter().map(|name| name.key).collect(), first, cycles, values }
     }
 
     #[test]
-    fn numbers_are_named_by_the_way_to_them_and_new_ones_have_no_past() {
+    fn numbers_are_named_by_their_path_and_new_ones_have_no_past() {
         let mut samples = Samples::new(&[]);
         samples.push(
             0,
@@ -149,21 +151,21 @@ mod tests {
             MIN_SPACING,
         );
         samples.push(5, &json!({ "a": 2, "of": { "c": 3 } }), MIN_SPACING);
-        let all = told_of(&samples, 0);
+        let all = sampled(&samples, 0);
         assert_eq!((all.first, all.keys), (0, ["a", "of.b", "of.c"].map(String::from).into()));
         assert_eq!(all.cycles, [0.0, 5.0]);
         assert_eq!(all.values, [[Some(1.0), Some(2.0)], [Some(2.5), None], [None, Some(3.0)]]);
-        let last = told_of(&samples, 1);
+        let last = sampled(&samples, 1);
         assert_eq!((last.first, last.cycles), (1, vec![5.0]));
         assert_eq!(last.values[0], [Some(2.0)]);
-        assert_eq!(told_of(&samples, 9).first, 2);
+        assert_eq!(sampled(&samples, 9).first, 2);
     }
 
     #[test]
     fn samples_stay_within_their_bound_and_keep_the_first() {
         let mut samples = Samples::new(&[]);
         (0..5000).for_each(|cycle| samples.push(cycle, &json!({ "n": cycle }), Duration::ZERO));
-        let Told { cycles, values, .. } = told_of(&samples, 0);
+        let Sampled { cycles, values, .. } = sampled(&samples, 0);
         assert!(cycles.len() <= MAX_SAMPLES && cycles.len() > MAX_SAMPLES / 4);
         assert_eq!(cycles[0], 0.0);
         let same = |(cycle, value): (&f64, &Option<f64>)| Some(*cycle) == *value;

@@ -1,4 +1,4 @@
-//! Connections: taken, served for a time, and ended. No silent one keeps its place.
+//! Connections: accepted, served for some time, and ended. No idle one keeps its permit.
 
 use crate::limits::{ConnectionLimiter, ConnectionPermit};
 use axum::Router;
@@ -15,100 +15,100 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{sleep, timeout};
 
-/// The patience with connections that are no sockets.
+/// Timeouts of connections that are no WebSockets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Timeouts {
     /// The time for the head of a request, and between two requests.
     head: Duration,
-    /// The time after which a connection ends with the answer that is under way; the browser opens another one.
-    longest: Duration,
-    /// The time in which a peer has to read something of such an answer.
-    reading: Duration,
+    /// The time after which a connection ends with the response in progress; the browser opens another one. Otherwise one
+    /// that repeats a request again and again would keep its permit for good.
+    max_lifetime: Duration,
+    /// The time in which a peer has to read some of such a response.
+    stall: Duration,
 }
 
 impl Default for Timeouts {
     fn default() -> Self {
-        let [head, longest, reading] = [20, 600, 60].map(Duration::from_secs);
-        Self { head, longest, reading }
+        Self {
+            head: Duration::from_secs(20),
+            max_lifetime: Duration::from_secs(600),
+            stall: Duration::from_secs(60),
+        }
     }
 }
 
-/// The time that an answer under way has when a connection ends.
+/// The time that a response in progress has when the server ends.
 const GRACE_TIMEOUT: Duration = Duration::from_secs(1);
-/// The wait where the system gives no connections, because too many files are open.
+/// The delay after a failure to accept, because of too many open files for instance: retrying at once would be a busy loop.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(500);
-/// The number of connections refused with an answer at a time.
+/// Maximum number of connections that are refused with a response at a time; further ones are only closed.
 const MAX_REFUSALS: usize = 32;
 const TOO_MANY_RESPONSE: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
     connection: close\r\ncontent-length: 63\r\n\r\nThere are too many connections: close pages, and try it again.\n";
 
-/// Answers requests until the server ends, as `ending` signals.
+/// Answers requests until `shutdown` signals the end of the server.
 pub(crate) async fn serve(
     listener: TcpListener,
     routes: Router,
-    ending: watch::Receiver<bool>,
-    patience: Timeouts,
+    shutdown: watch::Receiver<bool>,
+    timeouts: Timeouts,
 ) {
-    let (doors, told) =
-        (Arc::new(ConnectionLimiter::default()), Arc::new(Semaphore::new(MAX_REFUSALS)));
+    let limiter = Arc::new(ConnectionLimiter::default());
+    let refusals = Arc::new(Semaphore::new(MAX_REFUSALS));
     loop {
         let accepted = tokio::select! {
-            () = wait_for_shutdown(ending.clone()) => break,
+            () = wait_for_shutdown(shutdown.clone()) => break,
             accepted = listener.accept() => accepted,
         };
         let Ok((stream, address)) = accepted else {
             sleep(ACCEPT_RETRY_DELAY).await;
             continue;
         };
-        // With it frames are sent at once; without it they are only late.
+        // Without it Nagle's algorithm would delay small frames. If it cannot be set, frames are only late.
         let _ = stream.set_nodelay(true);
-        match (doors.acquire(address.ip()), told.clone().try_acquire_owned()) {
-            (Some(place), _) => {
-                let connection = Connection { stream, stuck: StallTimer::default(), _place: place };
-                tokio::spawn(serve_connection(
-                    connection,
-                    routes.clone(),
-                    ending.clone(),
-                    patience,
-                ));
-            }
-            (None, Ok(turn)) => drop(tokio::spawn(async move {
-                let _turn = turn;
+        if let Some(permit) = limiter.acquire(address.ip()) {
+            let connection =
+                Connection { stream, stall_timer: StallTimer::default(), _permit: permit };
+            tokio::spawn(serve_connection(connection, routes.clone(), shutdown.clone(), timeouts));
+        } else if let Ok(permit) = refusals.clone().try_acquire_owned() {
+            tokio::spawn(async move {
+                let _permit = permit;
                 let _ = timeout(GRACE_TIMEOUT, refuse(stream)).await;
-            })),
-            (None, Err(_)) => {}
+            });
         }
     }
-    let emptied = async {
-        while !doors.is_empty() {
-            sleep(Duration::from_millis(5)).await;
-        }
-    };
-    let _ = timeout(GRACE_TIMEOUT, emptied).await;
+    let _ = timeout(GRACE_TIMEOUT, wait_until_empty(&limiter)).await;
 }
 
-/// Serves one connection, until it ends, becomes a socket, or has had its time. An answer that is under way then comes
-/// to its end, however long it takes to make or to send, unless its peer does not read it.
+async fn wait_until_empty(limiter: &ConnectionLimiter) {
+    while !limiter.is_empty() {
+        sleep(Duration::from_millis(5)).await;
+    }
+}
+
+/// Serves one connection, until it ends, becomes a WebSocket, or has reached its maximum lifetime. A response that is in
+/// progress then is completed, however long it takes to make or to send (an export may take minutes), unless its peer
+/// does not read it.
 async fn serve_connection(
     connection: Connection,
     routes: Router,
-    ending: watch::Receiver<bool>,
-    patience: Timeouts,
+    shutdown: watch::Receiver<bool>,
+    timeouts: Timeouts,
 ) {
-    let stuck = connection.stuck.clone();
+    let stall_timer = connection.stall_timer.clone();
     let mut http = http1::Builder::new();
-    let http = http.timer(TokioTimer::new()).header_read_timeout(patience.head);
+    let http = http.timer(TokioTimer::new()).header_read_timeout(timeouts.head);
     let served = http.serve_connection(TokioIo::new(connection), TowerToHyperService::new(routes));
     let mut served = pin!(served.with_upgrades());
     tokio::select! {
         _ = &mut served => return,
-        () = wait_for_shutdown(ending.clone()) => {}
-        () = sleep(patience.longest) => {
+        () = wait_for_shutdown(shutdown.clone()) => {}
+        () = sleep(timeouts.max_lifetime) => {
             served.as_mut().graceful_shutdown();
             tokio::select! {
                 _ = &mut served => return,
-                () = wait_for_shutdown(ending) => {}
-                () = stuck.wait_for_stall(patience.reading) => return,
+                () = wait_for_shutdown(shutdown) => {}
+                () = stall_timer.wait_for_stall(timeouts.stall) => return,
             }
         }
     }
@@ -116,50 +116,51 @@ async fn serve_connection(
     let _ = timeout(GRACE_TIMEOUT, served).await;
 }
 
-/// The instant since which a peer has taken none of the written bytes, as long as it takes none.
+/// The instant since which a peer has read none of the written bytes; none while it reads.
 #[derive(Debug, Clone, Default)]
 struct StallTimer(Arc<Mutex<Option<Instant>>>);
 
 impl StallTimer {
-    /// Notes whether a write had to wait.
+    /// Records whether a write had to wait.
     fn record(&self, waits: bool) {
         let mut since = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *since = if waits { since.or_else(|| Some(Instant::now())) } else { None };
     }
 
-    /// Waits until the peer has taken nothing for the given time.
-    async fn wait_for_stall(&self, longest: Duration) {
+    /// Waits until the peer has read nothing for the given time.
+    async fn wait_for_stall(&self, limit: Duration) {
         loop {
             let since = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            match since.map_or(longest, |since| longest.saturating_sub(since.elapsed())) {
-                Duration::ZERO => return,
-                rest => sleep(rest).await,
+            let remaining = since.map_or(limit, |since| limit.saturating_sub(since.elapsed()));
+            if remaining.is_zero() {
+                return;
             }
+            sleep(remaining).await;
         }
     }
 }
 
 /// Waits until the server ends.
-pub(crate) async fn wait_for_shutdown(mut ending: watch::Receiver<bool>) {
-    // An error means that its owner is gone: then it ends, too.
-    let _ = ending.wait_for(|ends| *ends).await;
+pub(crate) async fn wait_for_shutdown(mut shutdown: watch::Receiver<bool>) {
+    // An error means that the owner of the server was dropped: then it ends, too.
+    let _ = shutdown.wait_for(|is_requested| *is_requested).await;
 }
 
 /// Tells a peer that there are too many connections.
 async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     stream.write_all(TOO_MANY_RESPONSE).await?;
     stream.shutdown().await?;
-    // Its request must be read, or the system may discard our answer.
-    let mut said = [0; 1024];
-    while stream.read(&mut said).await? > 0 {}
+    // Closing a socket with unread data resets the connection, and the peer may never see the response.
+    let mut unread = [0; 1024];
+    while stream.read(&mut unread).await? > 0 {}
     Ok(())
 }
 
-/// A connection, and its place among all.
+/// A connection, with its permit.
 struct Connection {
     stream: TcpStream,
-    stuck: StallTimer,
-    _place: ConnectionPermit,
+    stall_timer: StallTimer,
+    _permit: ConnectionPermit,
 }
 
 impl AsyncRead for Connection {
@@ -179,7 +180,7 @@ impl AsyncWrite for Connection {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.stuck.record(written.is_pending());
+        self.stall_timer.record(written.is_pending());
         written
     }
 
@@ -198,14 +199,14 @@ mod tests {
     use axum::routing::get;
     use std::io::{Read, Write};
 
-    /// A server of one word, with little patience; returns its address, and the sender that ends it.
-    fn impatient(longest: Duration) -> (std::net::SocketAddr, watch::Sender<bool>) {
+    /// Starts a server with short timeouts; returns its address, and the sender that ends it.
+    fn impatient(max_lifetime: Duration) -> (std::net::SocketAddr, watch::Sender<bool>) {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("bound");
         listener.set_nonblocking(true).expect("set");
-        let (ends, ending) = watch::channel(false);
-        let [head, reading] = [200, 2000].map(Duration::from_millis);
-        let patience = Timeouts { head, longest, reading };
+        let (ends, shutdown) = watch::channel(false);
+        let [head, stall] = [200, 2000].map(Duration::from_millis);
+        let timeouts = Timeouts { head, max_lifetime, stall };
         std::thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
             runtime.expect("a runtime").block_on(async {
@@ -217,7 +218,7 @@ mod tests {
                 let routes = Router::new().route("/", get(|| async { "here" }));
                 let routes = routes.route("/late", get(late));
                 let routes = routes.route("/much", get(|| async { "much ".repeat(20 << 20) }));
-                serve(listener, routes, ending, patience).await;
+                serve(listener, routes, shutdown, timeouts).await;
             });
         });
         (address, ends)

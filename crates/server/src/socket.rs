@@ -1,4 +1,4 @@
-//! One page's socket: requests to sessions, and their messages.
+//! The socket of one page: requests go to sessions, and their messages to the page.
 
 use crate::outbox::{Outbox, OutboxItem};
 use crate::protocol::{Method, OpenTarget, Problem, Reply, ReplyBody, ReplyResult, SessionId};
@@ -9,7 +9,7 @@ use crate::session::{
 };
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
-use sidestep::scenario::{Source, Worlds};
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -18,51 +18,58 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::spawn_blocking;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// The largest number of sessions of a socket.
+/// Maximum number of sessions of a socket.
 const MAX_SESSIONS: usize = 4;
-/// The largest number of open requests and unsent replies; further ones wait in the network.
+/// Maximum number of requests without a reply and of unsent replies. Further requests are not read from the socket, so TCP
+/// holds the page back.
 const MAX_BACKLOG: usize = 64;
-/// The size in bytes above which a request is long.
+/// Size in bytes above which a request is long.
 const LONG_REQUEST_BYTES: usize = 1 << 20;
-/// The bytes of unanswered long requests beyond which others wait in the network.
+/// Bytes of long requests without a reply beyond which further requests are not read: each may be 40 MiB, and
+/// [`MAX_BACKLOG`] of them would be gigabytes.
 const MAX_LONG_REQUEST_BYTES: usize = 64 << 20;
 /// Sustained number of requests per second.
 const MAX_REQUESTS_PER_S: f64 = 300.0;
-/// The number of requests that may come at once.
+/// Number of requests that may arrive at once.
 const MAX_REQUEST_BURST: f64 = 600.0;
-/// The time between two requests for a sign of life.
+/// Time between two pings.
 const PING_INTERVAL: Duration = Duration::from_secs(30);
-/// The silence after which a page counts as gone.
+/// Time without a message or a pong after which a page counts as gone. A laptop that sleeps for some minutes keeps its
+/// sessions.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Serves a page until it leaves or the server ends. Its sessions end with it.
 pub(crate) async fn serve(
     mut socket: WebSocket,
-    house: Arc<AppState>,
-    _seat: OwnedSemaphorePermit,
+    state: Arc<AppState>,
+    _permit: OwnedSemaphorePermit,
 ) {
     let outbox = Arc::new(Outbox::default());
-    outbox.send_notification(&house.hello());
-    let (house_, outbox_, aside) = (house.clone(), outbox.clone(), Arc::new(Semaphore::new(1)));
-    let desk = SocketSessions { house: house_, outbox: outbox_, sessions: BTreeMap::new(), aside };
+    outbox.send_notification(&state.hello());
+    let sessions = SocketSessions {
+        state: state.clone(),
+        outbox: outbox.clone(),
+        sessions: BTreeMap::new(),
+        blocking_turn: Arc::new(Semaphore::new(1)),
+    };
     tokio::select! {
-        () = house.wait_for_shutdown() => {}
-        () = run(&mut socket, desk, &outbox) => {}
+        () = state.wait_for_shutdown() => {}
+        () = run(&mut socket, sessions, &outbox) => {}
     }
-    // A page that reads learns that this is the end; there is no need to wait for any other.
+    // A page that reads learns that this is the end; one that does not is not waited for.
     let _ = timeout(Duration::from_millis(200), socket.send(Message::Close(None))).await;
 }
 
-async fn run(socket: &mut WebSocket, mut desk: SocketSessions, outbox: &Outbox) {
-    let mut allowance = RateLimiter { left: MAX_REQUEST_BURST, at: Instant::now() };
+async fn run(socket: &mut WebSocket, mut sessions: SocketSessions, outbox: &Outbox) {
+    let mut rate_limiter = RateLimiter { left: MAX_REQUEST_BURST, at: Instant::now() };
     let mut ping = interval(PING_INTERVAL);
     ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut heard = Instant::now();
+    let mut last_heard = Instant::now();
     loop {
         tokio::select! {
             () = outbox.wait_until_ready() => {
-                while let Some(mail) = outbox.pop() {
-                    let message = match mail {
+                while let Some(item) = outbox.pop() {
+                    let message = match item {
                         OutboxItem::Text(text) => Message::text(text),
                         OutboxItem::Frame(bytes) => Message::binary(bytes),
                     };
@@ -72,17 +79,17 @@ async fn run(socket: &mut WebSocket, mut desk: SocketSessions, outbox: &Outbox) 
                 }
             }
             message = socket.recv(), if has_room(outbox) => {
-                heard = Instant::now();
+                last_heard = Instant::now();
                 match message {
-                    Some(Ok(Message::Text(text))) => desk.on_request(&text),
-                    Some(Ok(Message::Binary(_))) => desk.refuse_binary(),
+                    Some(Ok(Message::Text(text))) => sessions.on_request(&text),
+                    Some(Ok(Message::Binary(_))) => sessions.refuse_binary(),
                     Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
                     Some(Ok(Message::Close(_)) | Err(_)) | None => return,
                 }
-                allowance.acquire().await;
+                rate_limiter.acquire().await;
             }
             _ = ping.tick() => {
-                if heard.elapsed() > SILENCE_TIMEOUT || !send(socket, Message::Ping(Vec::new().into())).await {
+                if last_heard.elapsed() > SILENCE_TIMEOUT || !send(socket, Message::Ping(Vec::new().into())).await {
                     return;
                 }
             }
@@ -90,28 +97,29 @@ async fn run(socket: &mut WebSocket, mut desk: SocketSessions, outbox: &Outbox) 
     }
 }
 
-/// Returns whether a further request may be taken in.
+/// Returns whether a further request may be read.
 fn has_room(outbox: &Outbox) -> bool {
     outbox.backlog() < MAX_BACKLOG && outbox.long_bytes() < MAX_LONG_REQUEST_BYTES
 }
 
-/// Sends a message; returns whether the page is still there.
+/// Sends a message; returns whether the page is still connected.
 async fn send(socket: &mut WebSocket, message: Message) -> bool {
     timeout(SILENCE_TIMEOUT, socket.send(message)).await.is_ok_and(|sent| sent.is_ok())
 }
 
-/// The number of requests that a page may still send.
+/// A token bucket: the number of requests that a page may send at present.
 struct RateLimiter {
     left: f64,
     at: Instant,
 }
 
 impl RateLimiter {
-    /// Takes one request; waits if there were too many.
+    /// Takes a token for one request; waits if there were too many.
     async fn acquire(&mut self) {
         let now = Instant::now();
         let more = now.duration_since(self.at).as_secs_f64() * MAX_REQUESTS_PER_S;
-        (self.left, self.at) = ((self.left + more).min(MAX_REQUEST_BURST) - 1.0, now);
+        self.left = (self.left + more).min(MAX_REQUEST_BURST) - 1.0;
+        self.at = now;
         if self.left < 0.0 {
             sleep(Duration::from_secs_f64(-self.left / MAX_REQUESTS_PER_S)).await;
         }
@@ -120,27 +128,28 @@ impl RateLimiter {
 
 /// The sessions of a socket.
 struct SocketSessions {
-    house: Arc<AppState>,
+    state: Arc<AppState>,
     outbox: Arc<Outbox>,
     sessions: BTreeMap<SessionId, Session>,
-    /// One thread for work that reads files, so that a page with many such requests keeps no other page waiting.
-    aside: Arc<Semaphore>,
+    /// The turn of requests that are answered in another thread because they read files: one at a time, so that a page with
+    /// many such requests keeps no other page waiting.
+    blocking_turn: Arc<Semaphore>,
 }
 
 impl Drop for SocketSessions {
     fn drop(&mut self) {
-        // Work that waits for its turn is no longer wanted.
-        self.aside.close();
+        // Requests that wait for their turn are dropped.
+        self.blocking_turn.close();
     }
 }
 
 impl SocketSessions {
-    /// Takes a request; it is answered now, or later by a session.
+    /// Processes a request; it is answered now, or later by a session.
     fn on_request(&mut self, text: &str) {
         self.outbox.expect_reply();
         match decode(text) {
-            Err(unread) => {
-                let (id, problem) = *unread;
+            Err(unreadable) => {
+                let (id, problem) = *unreadable;
                 refuse(&self.outbox, id, problem);
             }
             Ok(request) => {
@@ -164,38 +173,38 @@ impl SocketSessions {
     fn dispatch(&mut self, id: u32, call: Method) -> Option<Result<ReplyBody, Problem>> {
         match call {
             Method::Files { folder } => {
-                let means = self.house.means.clone();
+                let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || {
-                    let entries = means.files.list(folder.as_deref(), means.worlds)?;
+                    let entries = deps.files.list(folder.as_deref(), &deps.worlds)?;
                     Ok(ReplyBody::Files { entries })
                 });
                 None
             }
             Method::Runs { folder } => {
-                let means = self.house.means.clone();
-                self.answer_in_thread(id, move || runs(&means.files.resolve(&folder)?));
+                let deps = self.state.deps.clone();
+                self.answer_in_thread(id, move || runs(&deps.files.resolve(&folder)?));
                 None
             }
-            Method::Open { what, seed } => self.open(id, what, seed).err().map(Err),
+            Method::Open { target, seed } => self.open(id, target, seed).err().map(Err),
             Method::Close { session } => {
                 let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
                 self.outbox.clear(session);
                 Some(closed.map(|_| ReplyBody::Done))
             }
-            Method::Check { session, text } => self.on_text(id, session, move |means, source| {
-                Ok(ReplyBody::Problems { problems: text_problems(means, source, text)? })
+            Method::Check { session, text } => self.on_text(id, session, move |deps, source| {
+                Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
             }),
             Method::Edit { session, text, edits } => {
-                self.on_text(id, session, move |means, source| {
-                    apply_edits(means, source, text, edits)
+                self.on_text(id, session, move |deps, source| {
+                    apply_edits(deps, source, text, edits)
                 })
             }
             Method::Model { session, text } => {
-                self.on_text(id, session, move |means, source| model(means, source, text))
+                self.on_text(id, session, move |deps, source| model(deps, source, text))
             }
             Method::Schema { world } => {
-                let worlds = self.house.means.worlds;
-                self.answer_in_thread(id, move || schema(worlds, &world));
+                let worlds = self.state.deps.worlds.clone();
+                self.answer_in_thread(id, move || schema(&worlds, &world));
                 None
             }
             call => {
@@ -206,16 +215,15 @@ impl SocketSessions {
         }
     }
 
-    fn open(&mut self, id: u32, what: OpenTarget, seed: Option<u64>) -> Result<(), Problem> {
+    fn open(&mut self, id: u32, target: OpenTarget, seed: Option<u64>) -> Result<(), Problem> {
         self.sessions.retain(|_, session| !session.is_finished());
         if self.sessions.len() == MAX_SESSIONS {
             let cause = format!("this page has {MAX_SESSIONS} sessions already");
             return Err(Problem::new("open", cause, "close one first"));
         }
-        let (session, place) = self.house.acquire_session()?;
-        let opening = OpenRequest { session, id, what, seed };
-        let (means, outbox) = (self.house.means.clone(), self.outbox.clone());
-        let started = Session::start(means, opening, outbox, place);
+        let (session, permit) = self.state.acquire_session()?;
+        let request = OpenRequest { session, id, target, seed };
+        let started = Session::start(self.state.deps.clone(), request, self.outbox.clone(), permit);
         let started = started.map_err(|e| {
             let cause = format!("no thread can be started: {e}");
             Problem::new("open", cause, "close other sessions or programs")
@@ -234,21 +242,22 @@ impl SocketSessions {
         let Some(source) = self.sessions.get(&session).and_then(Session::source) else {
             return Some(Err(no_such_session()));
         };
-        let means = self.house.means.clone();
-        self.answer_in_thread(id, move || work(&means, &source));
+        let deps = self.state.deps.clone();
+        self.answer_in_thread(id, move || work(&deps, &source));
         None
     }
 
-    /// Answers a request in another thread, one after the other, because it may read files.
+    /// Answers a request in another thread, because it may read files.
     fn answer_in_thread(
         &self,
         id: u32,
         work: impl FnOnce() -> Result<ReplyBody, Problem> + Send + 'static,
     ) {
-        let (outbox, aside) = (self.outbox.clone(), self.aside.clone());
+        let outbox = self.outbox.clone();
+        let turn = self.blocking_turn.clone();
         tokio::spawn(async move {
-            let Ok(_turn) = aside.acquire().await else { return };
-            // It cannot panic: its work is guarded.
+            let Ok(_turn) = turn.acquire().await else { return };
+            // A panic of the work is caught within, so joining cannot fail.
             let _ = spawn_blocking(move || catch_panic(&outbox, id, || Some(work()))).await;
         });
     }
@@ -258,7 +267,7 @@ impl SocketSessions {
 ///
 /// # Errors
 /// When there is no such world.
-fn schema(worlds: Worlds, world: &str) -> Result<ReplyBody, Problem> {
+fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let schema = worlds.schema(Some(world)).ok_or_else(|| {
         let names = worlds.names().join(", ");
         Problem::new(world, "no such world is known", format!("name one of {names}"))

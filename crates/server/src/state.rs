@@ -1,7 +1,7 @@
 //! The state that all sockets of a server share.
 
 use crate::access::AccessPolicy;
-use crate::protocol::{Notification, Problem, SessionId, TargetRef, VERSION};
+use crate::protocol::{Problem, ServerNotification, SessionId, TargetRef, VERSION};
 use crate::results::JobQueue;
 use crate::serve::wait_for_shutdown;
 use crate::session::SessionDeps;
@@ -10,88 +10,88 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
-/// The largest number of sessions at a time, of all sockets.
+/// Maximum number of sessions at a time, of all sockets.
 const MAX_SESSIONS: u32 = 12;
-/// The largest number of sockets at a time.
+/// Maximum number of sockets at a time.
 const MAX_SOCKETS: usize = 16;
-/// The number of threads for work done aside: one for each socket, and some for results.
+/// Number of threads for blocking work: one for each socket, and some for results.
 pub(crate) const MAX_BLOCKING_THREADS: usize = MAX_SOCKETS + 4;
 /// The time that sessions have to end with the server.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The state that all sockets share.
 pub(crate) struct AppState {
-    /// The means that sessions need to begin.
-    pub(crate) means: SessionDeps,
+    /// The dependencies of sessions.
+    pub(crate) deps: SessionDeps,
     /// The rules of access.
-    pub(crate) guard: AccessPolicy,
-    /// The place where results are made.
-    pub(crate) workshop: JobQueue,
+    pub(crate) access: AccessPolicy,
+    /// The queue of reports and exports.
+    pub(crate) jobs: JobQueue,
     program: String,
     open: Vec<TargetRef>,
-    next: AtomicU32,
+    next_session: AtomicU32,
     sessions: Arc<Semaphore>,
     sockets: Arc<Semaphore>,
-    ending: watch::Receiver<bool>,
+    shutdown: watch::Receiver<bool>,
 }
 
 impl AppState {
     pub(crate) fn new(
-        means: SessionDeps,
-        guard: AccessPolicy,
+        deps: SessionDeps,
+        access: AccessPolicy,
         program: String,
         open: Vec<TargetRef>,
-        ending: watch::Receiver<bool>,
+        shutdown: watch::Receiver<bool>,
     ) -> Self {
         Self {
-            means,
-            guard,
-            workshop: JobQueue::default(),
+            deps,
+            access,
+            jobs: JobQueue::default(),
             program,
             open,
-            next: AtomicU32::new(1),
+            next_session: AtomicU32::new(1),
             sessions: Arc::new(Semaphore::new(MAX_SESSIONS as usize)),
             sockets: Arc::new(Semaphore::new(MAX_SOCKETS)),
-            ending,
+            shutdown,
         }
     }
 
     /// Returns the first notice for a page.
-    pub(crate) fn hello(&self) -> Notification {
-        Notification::Hello {
+    pub(crate) fn hello(&self) -> ServerNotification {
+        ServerNotification::Hello {
             version: VERSION,
             program: self.program.clone(),
-            worlds: self.means.worlds.names().into_iter().map(String::from).collect(),
-            read_only: self.means.read_only,
+            worlds: self.deps.worlds.names().into_iter().map(String::from).collect(),
+            read_only: self.deps.read_only,
             open: self.open.clone(),
         }
     }
 
-    /// Returns a number for a new session, and its place among all.
+    /// Returns the number of a new session, and its permit.
     ///
     /// # Errors
     /// When there are too many.
     pub(crate) fn acquire_session(&self) -> Result<(SessionId, OwnedSemaphorePermit), Problem> {
-        let place = self.sessions.clone().try_acquire_owned().map_err(|_| {
+        let permit = self.sessions.clone().try_acquire_owned().map_err(|_| {
             let cause = format!("there are {MAX_SESSIONS} sessions already");
             Problem::new("open", cause, "close one first, here or in another window")
         })?;
-        Ok((self.next.fetch_add(1, Ordering::Relaxed), place))
+        Ok((self.next_session.fetch_add(1, Ordering::Relaxed), permit))
     }
 
-    /// Returns the place of a new socket; `None` if there are too many.
+    /// Returns the permit of a new socket; `None` if there are too many.
     pub(crate) fn acquire_socket(&self) -> Option<OwnedSemaphorePermit> {
         self.sockets.clone().try_acquire_owned().ok()
     }
 
-    /// Returns whether there is no place for another socket.
+    /// Returns whether no further socket is accepted.
     pub(crate) fn is_full(&self) -> bool {
         self.sockets.available_permits() == 0
     }
 
     /// Returns the receiver that signals the end of the server.
     pub(crate) fn shutdown_signal(&self) -> watch::Receiver<bool> {
-        self.ending.clone()
+        self.shutdown.clone()
     }
 
     /// Waits until the server ends.

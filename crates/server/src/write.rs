@@ -3,12 +3,12 @@
 use crate::files::AllowedFiles;
 use crate::protocol::Problem;
 use serde_json::Value;
-use sidestep::scenario::Source;
+use sidestep_scenario::Source;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The size of the largest file that is replaced.
+/// Maximum size of a file that is replaced: that of the longest scenario that can be read.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
 const BYTE_ORDER_MARK: &str = "\u{feff}";
@@ -25,7 +25,7 @@ pub(crate) struct WriteTarget {
 /// A file that is replaced.
 struct OldContent {
     text: String,
-    has_mark: bool,
+    has_byte_order_mark: bool,
     permissions: Permissions,
 }
 
@@ -39,9 +39,9 @@ impl AllowedFiles {
             let remedy = "name a .toml file below the folders that were named at start";
             Err(Problem::new(path, cause, remedy))
         };
-        let named = PathBuf::from(path);
+        let given = PathBuf::from(path);
         // A missing folder and a forbidden one are reported alike.
-        let real = real_path(&named).unwrap_or_default();
+        let real = real_path(&given).unwrap_or_default();
         let Some(below) = self.relative_to_root(&real) else {
             return refuse("is in no folder below those that were named at start");
         };
@@ -51,9 +51,9 @@ impl AllowedFiles {
         }
         match fs::symlink_metadata(&real) {
             Ok(found) if !found.is_file() => refuse("is no plain file"),
-            Ok(_) => Ok(WriteTarget { path: named, real }),
+            Ok(_) => Ok(WriteTarget { path: given, real }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Ok(WriteTarget { path: named, real })
+                Ok(WriteTarget { path: given, real })
             }
             Err(_) => refuse("cannot be read"),
         }
@@ -62,7 +62,7 @@ impl AllowedFiles {
 
 /// Returns the path without links of a file that exists, or that can be created.
 fn real_path(path: &Path) -> Option<PathBuf> {
-    // A link to nowhere could be made to lead anywhere.
+    // Links are followed even where they lead nowhere: the target could be created later, anywhere.
     if path.is_symlink() || path.exists() {
         return path.canonicalize().ok();
     }
@@ -89,38 +89,41 @@ pub(crate) fn replace_file(
     if !may_replace(found) {
         return Ok(old.map(|old| old.text));
     }
-    let growing =
-        PartialFile::new(target).and_then(|growing| growing.with_text(text, old.as_ref()));
-    let growing = growing.map_err(|error| write_error(target, &error))?;
-    // Writing took a while.
-    let again = read(target)?;
-    match again
-        .filter(|again| Some(again.text.as_str()) != found && !may_replace(Some(&again.text)))
+    let partial = PartialFile::new(target)
+        .and_then(|partial| partial.with_text(text, old.as_ref()))
+        .map_err(|error| write_error(target, &error))?;
+    // Writing takes some time, in which another program may have changed the file.
+    if let Some(present) = read(target)?
+        && Some(present.text.as_str()) != found
+        && !may_replace(Some(&present.text))
     {
-        Some(again) => Ok(Some(again.text)),
-        None => growing.finish(target).map(|()| None).map_err(|error| write_error(target, &error)),
+        return Ok(Some(present.text));
     }
+    partial.finish(target).map_err(|error| write_error(target, &error))?;
+    Ok(None)
 }
 
 fn read(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
-    let told = |cause: String, remedy: &str| {
+    let refuse = |cause: String, remedy: &str| {
         Err(Problem::new(target.path.display().to_string(), cause, remedy))
     };
     match try_read(&target.real) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => told(format!("cannot be read: {error}"), "save it under another name"),
+        Err(error) => refuse(format!("cannot be read: {error}"), "save it under another name"),
         Ok((bytes, _)) if bytes.starts_with(GZIP_MAGIC) => {
-            told("is packed with gzip".into(), "unpack it, or save it under another name")
+            refuse("is packed with gzip".into(), "unpack it, or save it under another name")
         }
         Ok((bytes, _)) if bytes.len() as u64 > MAX_FILE_BYTES => {
-            told(format!("has more than {MAX_FILE_BYTES} bytes"), "save it under another name")
+            refuse(format!("has more than {MAX_FILE_BYTES} bytes"), "save it under another name")
         }
         Ok((bytes, permissions)) => match String::from_utf8(bytes) {
-            Err(_) => told("is no text (UTF-8)".into(), "save it under another name"),
+            Err(_) => refuse("is no text (UTF-8)".into(), "save it under another name"),
             Ok(text) => {
-                let plain = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
-                let has_mark = plain.is_some();
-                Ok(Some(OldContent { text: plain.unwrap_or(text), has_mark, permissions }))
+                // Kept aside, so that texts are compared without it, and it is written again.
+                let unmarked = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
+                let has_byte_order_mark = unmarked.is_some();
+                let text = unmarked.unwrap_or(text);
+                Ok(Some(OldContent { text, has_byte_order_mark, permissions }))
             }
         },
     }
@@ -148,13 +151,11 @@ fn check_replaceable(target: &WriteTarget, old: &OldContent, is_own: bool) -> Re
     }
     let values = Source::new(place.as_str(), old.text.as_str(), "").parse::<Value>();
     let is_scenario = values.is_ok_and(|values| values["world"].is_string());
-    match is_own || is_scenario || old.text.trim().is_empty() {
-        true => Ok(()),
-        false => {
-            let cause = "holds something else than a scenario";
-            Err(Problem::new(place, cause, "save it under another name"))
-        }
+    if !is_own && !is_scenario && !old.text.trim().is_empty() {
+        let cause = "holds something else than a scenario";
+        return Err(Problem::new(place, cause, "save it under another name"));
     }
+    Ok(())
 }
 
 fn write_error(target: &WriteTarget, error: &io::Error) -> Problem {
@@ -166,7 +167,8 @@ fn write_error(target: &WriteTarget, error: &io::Error) -> Problem {
     Problem::new(target.path.display().to_string(), cause, remedy)
 }
 
-/// A file that is written beside the one that it will replace, and removed if it does not.
+/// A file that is written beside the one that it will replace, because renaming is atomic only within a folder. It is
+/// removed if it does not replace the other.
 struct PartialFile {
     path: PathBuf,
     file: File,
@@ -185,7 +187,7 @@ impl PartialFile {
         if let Some(old) = old {
             self.file.set_permissions(old.permissions.clone())?;
         }
-        if old.is_some_and(|old| old.has_mark) {
+        if old.is_some_and(|old| old.has_byte_order_mark) {
             self.file.write_all(BYTE_ORDER_MARK.as_bytes())?;
         }
         self.file.write_all(text.as_bytes())?;
@@ -196,7 +198,8 @@ impl PartialFile {
     fn finish(mut self, target: &WriteTarget) -> io::Result<()> {
         fs::rename(&self.path, &target.real)?;
         self.is_done = true;
-        // The file is replaced by now, and either text is whole in any case. Not all file systems sync folders.
+        // An error changes nothing: the file is replaced, and after a crash one of the two texts is there, whole. Not all
+        // file systems can sync folders.
         let _ = sync_folder(&target.real);
         Ok(())
     }

@@ -2,10 +2,10 @@
 
 use crate::Error;
 use crate::run_tables::has_rows;
-use sidestep::kernel::InputError;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{MemoryRecorder, Values};
-use sidestep::kernel::view::{BodyId, PositionColumns};
+use sidestep_kernel::InputError;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::ports::{MemoryRecorder, Values};
+use sidestep_kernel::view::{BodyId, PositionColumns};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub(crate) fn compare_poses(
     if recorded.is_empty() {
         return Ok(0);
     }
-    let rejected = |e: sidestep::kernel::checkpoint::CheckpointError| {
+    let rejected = |e: sidestep_kernel::checkpoint::CheckpointError| {
         InputError::new(folder.display(), e.to_string(), "this is a bug: please report it")
     };
     again.restore(&run.checkpoint()).map_err(rejected)?;
@@ -119,7 +119,7 @@ fn bits(values: &Values, row: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::{Axis, BodyKind};
+    use sidestep_kernel::view::{Axis, BodyKind};
 
     #[test]
     fn one_changed_cell_is_found() {

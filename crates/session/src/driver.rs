@@ -6,9 +6,9 @@ use crate::live::LiveControl;
 use crate::run_recorder::{RunRecorder, next_multiple};
 use crate::watcher::{Progress, ProgressGuard, Watcher};
 use cpu_time::ProcessTime;
-use sidestep::kernel::Cycle;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::Recorder;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::ports::Recorder;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,8 @@
 //! The error type of sessions.
 
-use sidestep::kernel::ports::RecordError;
-use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::DrawError;
+use sidestep_kernel::ports::RecordError;
+use sidestep_kernel::{Cycle, InputError};
 use std::path::Path;
 
 /// The reason why work stopped before its end.

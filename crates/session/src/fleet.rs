@@ -5,9 +5,9 @@
 //! its parent has ended.
 
 use serde::{Deserialize, Serialize};
-use sidestep::kernel::text::KeyValues;
-use sidestep::kernel::view::{Frame, Scenery};
-use sidestep::kernel::{Cycle, EntityId, InputError};
+use sidestep_kernel::text::KeyValues;
+use sidestep_kernel::view::{Frame, Scenery};
+use sidestep_kernel::{Cycle, EntityId, InputError};
 use std::fmt;
 use std::path::PathBuf;
 

@@ -1,23 +1,10 @@
 //! The identity of builds: only the build that started a run or a sweep continues it.
 
-use sidestep::kernel::InputError;
-use sidestep::{BUILD, VERSION};
+use sidestep_kernel::InputError;
 use std::path::Path;
-use std::sync::OnceLock;
 
-/// The identity of a program that adds code of its own, for the whole process.
-static EXTENDED_BUILD_ID: OnceLock<String> = OnceLock::new();
-
-/// Returns the identity of this program: the library's build, and the code that was added to it.
-pub fn build_id() -> &'static str {
-    EXTENDED_BUILD_ID.get().map_or(BUILD, String::as_str)
-}
-
-/// Declares that this program adds code that affects results, identified by a digest of it. The first
-/// digest stays.
-pub fn register_added_code(digest: &str) {
-    EXTENDED_BUILD_ID.get_or_init(|| format!("{BUILD}.own-{}", &digest[..digest.len().min(12)]));
-}
+/// The version of Sidestep.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The program that made a run or a sweep, as recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,20 +16,21 @@ pub(crate) struct Producer {
 }
 
 impl Producer {
-    /// Refuses the work of another build, or of another version if no build is recorded, because
+    /// Refuses the work of another build than `own`, or of another version if no build is recorded, because
     /// results may change between them. The noun `what` names the work, at `place`; `remedy` gets
-    /// the maker's name.
+    /// the name of the build that made it.
     ///
     ///  # Errors
     /// When the makers differ.
     pub(crate) fn check(
         &self,
+        own: &str,
         place: &Path,
         what: &str,
         remedy: impl FnOnce(&str) -> String,
     ) -> Result<(), InputError> {
         let (wrote, reads) = match &self.build {
-            Some(made) => (made.as_str(), build_id()),
+            Some(made) => (made.as_str(), own),
             None => (self.version.as_str(), VERSION),
         };
         if wrote == reads {
@@ -57,11 +45,13 @@ impl Producer {
 mod tests {
     use super::*;
 
+    const BUILD: &str = "0.1.0+0123456789ab";
+
     #[test]
     fn builds_are_compared_and_versions_where_there_is_none() {
         let check = |version: &str, build: Option<&str>| {
             let maker = Producer { version: version.into(), build: build.map(Into::into) };
-            maker.check(Path::new("x"), "run", |wrote| format!("use {wrote}"))
+            maker.check(BUILD, Path::new("x"), "run", |wrote| format!("use {wrote}"))
         };
         assert!(check(VERSION, None).is_ok() && check(VERSION, Some(BUILD)).is_ok());
         assert!(check("0.0.1", None).is_err());

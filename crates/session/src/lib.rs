@@ -17,7 +17,7 @@
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
-//! list of worlds take [`Worlds`](sidestep::scenario::Worlds), and report their progress to a
+//! list of worlds take [`Worlds`](sidestep_scenario::Worlds), and report their progress to a
 //! [`Watcher`].
 
 mod compare;
@@ -40,6 +40,8 @@ mod run_recorder;
 mod run_tables;
 mod scenario;
 mod summary;
+#[cfg(test)]
+mod testing;
 mod watcher;
 
 pub mod export;
@@ -51,7 +53,7 @@ pub use driver::{RunTiming, Sinks, drive};
 pub use error::Error;
 pub use files::{display_path, write_atomically};
 pub use frame_sink::{EndReason, FrameSink, McapSink, frame_rows};
-pub use identity::{build_id, register_added_code};
+pub use identity::VERSION;
 pub use live::{LiveControl, ViewerAddress, ViewerServer, next_free_port};
 pub use managed_run::{ManagedRun, OutputPaths, RestoreError};
 pub use pacer::Pacer;
@@ -62,7 +64,7 @@ pub use replay::{ReplayReport, replay_all, replay_to};
 pub use row_store::RowSelection;
 pub use run_recorder::RunRecorder;
 pub use run_tables::{csv_table, read_summary};
-pub use scenario::{problems, read_scenario};
+pub use scenario::{GivenScenario, problems, read_scenario};
 pub use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 pub use summary::{Phases, RunStatus, Summary};
 pub use watcher::{NoWatcher, Progress, Watcher};

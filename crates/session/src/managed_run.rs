@@ -1,5 +1,6 @@
 //! One run, from its present cycle to its end, with everything that it records.
 
+use crate::VERSION;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::files::resolve_path;
 use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink};
@@ -10,11 +11,10 @@ use crate::row_store::{RowSelection, RowStore};
 use crate::run_recorder::{RunRecorder, restore_run};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
-use sidestep::VERSION;
-use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
-use sidestep::kernel::{Cycle, InputError, Simulation};
-use sidestep::scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
+use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_record::{IfExists, McapRecorder, RunFolder};
+use sidestep_scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
@@ -84,20 +84,34 @@ impl OutputPaths<'_> {
         &self,
         resolved: &ResolvedScenario,
         run: &mut dyn Simulation,
+        build: &str,
     ) -> Result<(Option<RunRecorder>, Option<McapSink>), Error> {
-        let film = |run: &mut dyn Simulation| -> Result<_, Error> {
-            let begin = |(file, every)| McapSink::start(file, every, resolved.clone(), run);
-            self.mcap.map(begin).transpose()
-        };
-        let recording = |run: &mut dyn Simulation| -> Result<_, Error> {
-            let create = |folder| RunRecorder::create(folder, resolved, run, self.if_exists());
-            self.folder.map(create).transpose()
-        };
         if self.is_mcap_in_folder() {
-            return Ok((recording(run)?, film(run)?));
+            let recording = self.create_folder(resolved, run, build)?;
+            return Ok((recording, self.create_mcap(resolved, run, build)?));
         }
-        let film = film(run)?;
-        Ok((recording(run)?, film))
+        let film = self.create_mcap(resolved, run, build)?;
+        Ok((self.create_folder(resolved, run, build)?, film))
+    }
+
+    fn create_mcap(
+        &self,
+        resolved: &ResolvedScenario,
+        run: &mut dyn Simulation,
+        build: &str,
+    ) -> Result<Option<McapSink>, Error> {
+        let Some((file, every)) = self.mcap else { return Ok(None) };
+        McapSink::start(file, every, resolved.clone(), run, build).map(Some)
+    }
+
+    fn create_folder(
+        &self,
+        resolved: &ResolvedScenario,
+        run: &mut dyn Simulation,
+        build: &str,
+    ) -> Result<Option<RunRecorder>, Error> {
+        let Some(folder) = self.folder else { return Ok(None) };
+        RunRecorder::create(folder, resolved, run, self.if_exists(), build).map(Some)
     }
 
     /// Returns whether the MCAP file is to be in the folder.
@@ -109,22 +123,21 @@ impl OutputPaths<'_> {
 }
 
 impl ManagedRun {
-    /// Returns a run of a scenario at its start; `told` is the report about the file that the
-    /// scenario was made from.
+    /// Returns a run of a scenario of one of `worlds` at its start.
     ///
     /// # Errors
     /// When a place is taken, or cannot be created.
     pub fn start(
+        worlds: &Worlds,
         compiled: &dyn CompiledScenario,
         source: &Source,
         workers: usize,
         keep: OutputPaths<'_>,
-        told: Option<ImportedScenario>,
     ) -> Result<Self, Error> {
         keep.check()?;
         if keep.folder.is_none() && keep.mcap.is_none() {
             let run = compiled.start(source, workers);
-            return Ok(Self::new(run, None, None, workers).with_import_report(told));
+            return Ok(Self::new(run, None, None, workers));
         }
         let resolved = compiled.resolve(source)?;
         let mut run = match keep.folder {
@@ -134,8 +147,8 @@ impl ManagedRun {
                 compiled.start(&itself, workers)
             }
         };
-        let (recording, film) = keep.create(&resolved, run.as_mut())?;
-        Ok(Self::new(run, recording, film, workers).with_import_report(told))
+        let (recording, film) = keep.create(&resolved, run.as_mut(), worlds.build())?;
+        Ok(Self::new(run, recording, film, workers))
     }
 
     /// Returns a stopped run at the point from which its folder can continue, to go on to its end
@@ -145,7 +158,7 @@ impl ManagedRun {
     /// When the folder holds no run of one of `worlds` that this build can continue, or the run
     /// is past that cycle.
     pub fn resume(
-        worlds: Worlds,
+        worlds: &Worlds,
         path: &Path,
         workers: usize,
         until: Option<Cycle>,
@@ -154,7 +167,7 @@ impl ManagedRun {
         let manifest = folder.manifest();
         let maker =
             Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-        maker.check(path, "run", |wrote| {
+        maker.check(worlds.build(), path, "run", |wrote| {
             format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
         })?;
         let place = path.join("scenario.toml").display().to_string();
@@ -189,7 +202,9 @@ impl ManagedRun {
         }
     }
 
-    fn with_import_report(self, told: Option<ImportedScenario>) -> Self {
+    /// Returns the run with the report about the file of another program that its scenario was made from.
+    #[must_use]
+    pub fn with_import_report(self, told: Option<ImportedScenario>) -> Self {
         Self { told, ..self }
     }
 

@@ -1,8 +1,8 @@
 //! The recorded orders and controls of a run that was decided from outside.
 
-use sidestep::kernel::control::{ControlReader, OrderReader};
-use sidestep::kernel::ports::{TableSchema, Values};
-use sidestep::kernel::{InputError, Simulation};
+use sidestep_kernel::control::{ControlReader, OrderReader};
+use sidestep_kernel::ports::{TableSchema, Values};
+use sidestep_kernel::{InputError, Simulation};
 use sidestep_record::{for_each_block, tables};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! The time at which the next cycle of a run is due.
 
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use std::time::{Duration, Instant};
 
 /// The delay beyond which a run does not rush to catch up.

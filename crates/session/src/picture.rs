@@ -1,12 +1,12 @@
 //! Pictures as files.
 
 use crate::Error;
+use crate::VERSION;
 use crate::files::write_atomically;
 use crate::run_tables::read_trails;
-use sidestep::VERSION;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
 use sidestep_draw::{PictureOptions, describe, draw, to_png};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
 use sidestep_record::RunFolder;
 use std::io::Write;
 use std::path::Path;

@@ -5,12 +5,12 @@ use crate::identity::Producer;
 use crate::orders::replay_recorded;
 use crate::playback::RecordedPlayback;
 use crate::run_recorder::{restore_run, write_inputs};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::checkpoint::decode_header;
-use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::ResolvedScenario;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::checkpoint::decode_header;
+use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{McapRunInfo, ResumePoint, RunReader, Status, is_mcap, tables};
+use sidestep_scenario::ResolvedScenario;
+use sidestep_scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
 
 /// A recorded run, in a folder or a file.
@@ -42,7 +42,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// When it is neither, or is damaged.
-    pub fn open(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+    pub fn open(worlds: &Worlds, path: &Path) -> Result<Self, Error> {
         if is_mcap(path) {
             Self::from_mcap(worlds, path)
         } else {
@@ -50,12 +50,12 @@ impl RecordedRun {
         }
     }
 
-    fn from_folder(worlds: Worlds, path: &Path) -> Result<Self, InputError> {
+    fn from_folder(worlds: &Worlds, path: &Path) -> Result<Self, InputError> {
         let view = RunReader::open(path)?;
         let place = path.join("scenario.toml").display().to_string();
         Ok(Self {
             path: path.to_path_buf(),
-            worlds,
+            worlds: worlds.clone(),
             maker: Producer { version: view.manifest.program_version, build: view.manifest.build },
             is_complete: view.manifest.status == Status::Complete,
             cycles_done: view.manifest.cycles_done,
@@ -67,7 +67,7 @@ impl RecordedRun {
         })
     }
 
-    fn from_mcap(worlds: Worlds, path: &Path) -> Result<Self, Error> {
+    fn from_mcap(worlds: &Worlds, path: &Path) -> Result<Self, Error> {
         let run = McapRunInfo::open(path)?;
         let files =
             tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
@@ -75,7 +75,7 @@ impl RecordedRun {
         let place = format!("{}: scenario.toml", path.display());
         Ok(Self {
             path: path.to_path_buf(),
-            worlds,
+            worlds: worlds.clone(),
             maker: Producer { version: run.program_version, build: run.build },
             is_complete: run.status == Status::Complete,
             cycles_done: run.cycles_done,
@@ -108,6 +108,11 @@ impl RecordedRun {
         Ok(ResolvedScenario { text: self.source.text.clone(), files })
     }
 
+    /// The build of this program, which makes what is computed again.
+    pub(crate) fn build(&self) -> &str {
+        self.worlds.build()
+    }
+
     /// Returns the names of the recorded tables; none for a recording for viewers.
     ///
     /// # Errors
@@ -123,7 +128,7 @@ impl RecordedRun {
     /// the scenario is no longer valid.
     pub fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
         let compiled = self.worlds.compile(&self.source)?;
-        self.maker.check(&self.path, "run", |wrote| {
+        self.maker.check(self.worlds.build(), &self.path, "run", |wrote| {
             format!("use sidestep {wrote}, or run its scenario again")
         })?;
         let mut run = compiled.start(&self.source, workers);
@@ -147,7 +152,8 @@ impl RecordedRun {
 
     /// Returns the build that made the recording, if it is another one: then it is not computed again.
     pub fn other_build(&self) -> Option<&str> {
-        let other = self.maker.check(&self.path, "run", |_| String::new()).is_err();
+        let other =
+            self.maker.check(self.worlds.build(), &self.path, "run", |_| String::new()).is_err();
         other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
     }
 

@@ -4,7 +4,7 @@ use crate::compare::compare_poses;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::picture::{draw_svg, footnote, write_png};
 use crate::{Error, RecordedRun, Watcher};
-use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::path::Path;
 
 /// The result of computing a run again.

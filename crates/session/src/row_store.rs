@@ -1,7 +1,7 @@
 //! Rows of a run kept in memory: of all tables, or of some.
 
-use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
-use sidestep::kernel::{Cycle, Digest, InputError};
+use sidestep_kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::{Cycle, Digest, InputError};
 use std::collections::BTreeMap;
 
 /// The rows to keep in memory.
@@ -145,7 +145,7 @@ impl Recorder for RowStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::ports::{ColumnSpec, ColumnType};
+    use sidestep_kernel::ports::{ColumnSpec, ColumnType};
 
     /// Rows of three tables of cycles, the second of which is not wanted.
     fn rows() -> RowStore {

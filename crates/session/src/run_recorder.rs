@@ -1,13 +1,12 @@
 //! The folder of a run while it is written.
 
 use crate::Error;
-use crate::identity::build_id;
-use sidestep::VERSION;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{RecordError, Recorder};
-use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::ResolvedScenario;
+use crate::VERSION;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::ports::{RecordError, Recorder};
+use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{IfExists, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder};
+use sidestep_scenario::ResolvedScenario;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -25,7 +24,7 @@ pub struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Creates a new folder at `path`, with the resolved scenario in it.
+    /// Creates a new folder at `path`, with the resolved scenario in it; `build` makes the run.
     ///
     /// # Errors
     /// A folder that may not be used, or an I/O error.
@@ -34,11 +33,12 @@ impl RunRecorder {
         resolved: &ResolvedScenario,
         run: &mut dyn Simulation,
         existing: IfExists,
+        build: &str,
     ) -> Result<Self, Error> {
         let plan = run.config();
         let new = NewRun {
             world: run.world().into(),
-            build: build_id().into(),
+            build: build.into(),
             origin: Provenance {
                 program_version: VERSION.into(),
                 scenario: resolved.text.clone(),

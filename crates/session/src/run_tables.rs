@@ -1,10 +1,10 @@
 //! Tables of a recorded run, also as CSV, the format of logs to learn from.
 
 use serde_json::Value;
-use sidestep::import::table::CsvTable;
-use sidestep::kernel::InputError;
-use sidestep::kernel::view::{Frame, PositionColumns, Scenery, Trail};
 use sidestep_draw::bodies_with_trails;
+use sidestep_import::table::CsvTable;
+use sidestep_kernel::InputError;
+use sidestep_kernel::view::{Frame, PositionColumns, Scenery, Trail};
 use sidestep_record::{Table, read_table};
 use std::path::Path;
 

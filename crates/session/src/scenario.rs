@@ -1,7 +1,8 @@
-//! A scenario file and overrides -> a valid scenario.
+//! A scenario as given and overrides -> a valid scenario.
 
-use sidestep::kernel::InputError;
-use sidestep::scenario::{CompiledScenario, Source, Worlds};
+use sidestep_experiment as experiment;
+use sidestep_kernel::InputError;
+use sidestep_scenario::{CompiledScenario, ImportedScenario, Source, Worlds};
 use std::path::Path;
 
 /// Reads a scenario, applies `key=value` overrides and compiles it.
@@ -9,28 +10,170 @@ use std::path::Path;
 /// # Errors
 /// When the scenario or an override is wrong.
 pub fn read_scenario(
-    worlds: Worlds,
+    worlds: &Worlds,
     file: &Path,
     overrides: &[String],
 ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
-    let (source, is_made) = import_or_read(worlds, file, overrides)?;
-    let told = match worlds.compile(&source) {
-        Ok(compiled) => return Ok((source, compiled)),
-        // An error in another file, e.g. in a profile, has its own place.
-        Err(error) if overrides.is_empty() || error.place() != source.place => error,
-        Err(error) => locate_error(worlds, file, overrides, error),
-    };
-    Err(if is_made { imported_text_error(file, &source, told) } else { told })
+    GivenScenario::read(worlds, file)?.compile(worlds, overrides)
 }
 
-/// Returns an error in a text that was made from a file of another program, without its position: users do not see
-/// the lines of that text.
-fn imported_text_error(file: &Path, source: &Source, error: InputError) -> InputError {
-    if ![source.place.as_str(), source.file_place()].contains(&error.place()) {
-        return error;
+/// Returns all problems of a scenario and its overrides, see [`GivenScenario::problems`].
+///
+/// # Errors
+/// When the scenario cannot be read, or an override does not fit.
+pub fn problems(
+    worlds: &Worlds,
+    file: &Path,
+    overrides: &[String],
+) -> Result<Vec<InputError>, InputError> {
+    GivenScenario::read(worlds, file)?.problems(worlds, overrides)
+}
+
+/// Returns the scenario in a file, or the one that a file of another format represents, with
+/// overrides.
+///
+/// # Errors
+/// When the file cannot be read, or an override does not fit.
+pub(crate) fn read_source(
+    worlds: &Worlds,
+    file: &Path,
+    overrides: &[String],
+) -> Result<Source, InputError> {
+    GivenScenario::read(worlds, file)?.source.with_overrides(overrides)
+}
+
+/// A scenario as it was given: in a file of its own format or another one, or as a text; without overrides.
+#[derive(Debug, Clone)]
+pub struct GivenScenario {
+    source: Source,
+    /// The report about the file of another program that the text was made from.
+    import: Option<ImportedScenario>,
+}
+
+impl From<Source> for GivenScenario {
+    fn from(source: Source) -> Self {
+        Self { source, import: None }
     }
-    let place = format!("the scenario made from {}", file.display());
-    with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
+}
+
+impl GivenScenario {
+    /// Reads the scenario in a file, or the one that a file of another format represents.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or nothing in it can be simulated.
+    pub fn read(worlds: &Worlds, file: &Path) -> Result<Self, InputError> {
+        let Some(import) = worlds.translate(file)? else {
+            return Ok(Source::read(file, &[])?.into());
+        };
+        let text = import.scenario.clone()?;
+        let source = Source::new(file.display().to_string(), text, "");
+        Ok(Self { source, import: Some(import) })
+    }
+
+    /// The text, and the folder that its paths are relative to.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The report about the file of another program that the text was made from.
+    pub fn import_report(&self) -> Option<&ImportedScenario> {
+        self.import.as_ref()
+    }
+
+    /// Compiles the scenario with overrides. An error that an override causes reports it.
+    ///
+    /// # Errors
+    /// When the scenario or an override is wrong.
+    pub fn compile(
+        &self,
+        worlds: &Worlds,
+        overrides: &[String],
+    ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
+        let source = self.source.clone().with_overrides(overrides)?;
+        let error = match worlds.compile(&source) {
+            Ok(compiled) => return Ok((source, compiled)),
+            // An error in another file, e.g. in a profile, has its own place.
+            Err(error) if overrides.is_empty() || error.place() != source.place => error,
+            Err(error) => self.locate_error(worlds, overrides, error),
+        };
+        Err(self.without_imported_lines(&source, error))
+    }
+
+    /// Returns all problems of the scenario and its overrides, see [`sidestep_experiment::problems()`]; none if it is
+    /// right. An error that an override causes reports it. For a file of another program only the first is reported:
+    /// its author cannot edit the text made from it, and the other problems may follow from the first.
+    ///
+    /// # Errors
+    /// When an override does not fit.
+    pub fn problems(
+        &self,
+        worlds: &Worlds,
+        overrides: &[String],
+    ) -> Result<Vec<InputError>, InputError> {
+        if self.import.is_some() {
+            return Ok(self.compile(worlds, overrides).err().into_iter().collect());
+        }
+        let source = self.source.clone().with_overrides(overrides)?;
+        let found = experiment::problems(worlds, &source);
+        if overrides.is_empty() || found.is_empty() {
+            return Ok(found);
+        }
+        let mut earlier = Vec::with_capacity(overrides.len());
+        for count in 0..overrides.len() {
+            let source = self.source.clone().with_overrides(&overrides[..count])?;
+            earlier.push(experiment::problems(worlds, &source));
+        }
+        let explained = |error: InputError| {
+            if error.place() != source.place {
+                return error;
+            }
+            let is_same =
+                |one: &&InputError| (one.cause(), one.key()) == (error.cause(), error.key());
+            let first = earlier.iter().position(|errors| errors.iter().any(|one| is_same(&one)));
+            match first {
+                Some(0) => earlier[0].iter().find(is_same).cloned().unwrap_or(error),
+                Some(count) => self.override_error(&overrides[count - 1], &error),
+                None => self.override_error(&overrides[overrides.len() - 1], &error),
+            }
+        };
+        Ok(found.into_iter().map(explained).collect())
+    }
+
+    /// Returns the same error with its position in the text as given, or with the override that caused it: users
+    /// do not see the lines of the text that overrides have edited.
+    fn locate_error(&self, worlds: &Worlds, overrides: &[String], error: InputError) -> InputError {
+        for count in 0..=overrides.len() {
+            let Ok(source) = self.source.clone().with_overrides(&overrides[..count]) else {
+                continue;
+            };
+            let found = worlds.compile(&source).err();
+            let Some(same) = found.filter(|found| found.cause() == error.cause()) else {
+                continue;
+            };
+            return match count {
+                0 => same,
+                _ => self.override_error(&overrides[count - 1], &error),
+            };
+        }
+        error
+    }
+
+    /// Returns an error with the override that caused it as its place.
+    fn override_error(&self, override_text: &str, error: &InputError) -> InputError {
+        let place = format!("{} with --set {override_text}", self.source.place);
+        with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
+    }
+
+    /// Returns an error in a text that was made from a file of another program without its position: users do not see
+    /// the lines of that text.
+    fn without_imported_lines(&self, source: &Source, error: InputError) -> InputError {
+        let is_in_text = [source.place.as_str(), source.file_place()].contains(&error.place());
+        if self.import.is_none() || !is_in_text {
+            return error;
+        }
+        let place = format!("the scenario made from {}", self.source.place);
+        with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
+    }
 }
 
 fn with_key(error: InputError, key: Option<&str>) -> InputError {
@@ -40,98 +183,10 @@ fn with_key(error: InputError, key: Option<&str>) -> InputError {
     }
 }
 
-/// Returns all problems of a scenario and its overrides, see [`sidestep::problems`]; none if it is right. An error
-/// that an override causes names it. For a file of another program only the first is reported: its author cannot edit
-/// the text made from it, and the other problems may follow from the first.
-///
-/// # Errors
-/// When the scenario cannot be read, or an override does not fit.
-pub fn problems(
-    worlds: Worlds,
-    file: &Path,
-    overrides: &[String],
-) -> Result<Vec<InputError>, InputError> {
-    if worlds.translate(file)?.is_some() {
-        return Ok(read_scenario(worlds, file, overrides).err().into_iter().collect());
-    }
-    let of = |count: usize| {
-        let source = read_source(worlds, file, &overrides[..count])?;
-        Ok((sidestep::problems(worlds, &source), source.place))
-    };
-    let (told, place) = of(overrides.len())?;
-    if overrides.is_empty() || told.is_empty() {
-        return Ok(told);
-    }
-    let earlier: Result<Vec<_>, InputError> = (0..overrides.len()).map(of).collect();
-    let earlier: Vec<Vec<InputError>> = earlier?.into_iter().map(|(told, _)| told).collect();
-    let explained = |error: InputError| {
-        let is_same = |one: &&InputError| (one.cause(), one.key()) == (error.cause(), error.key());
-        let found = |told: &Vec<InputError>| told.iter().find(is_same).cloned();
-        match earlier.iter().position(|told| found(told).is_some()) {
-            _ if error.place() != place => error,
-            Some(0) => found(&earlier[0]).unwrap_or(error),
-            Some(count) => override_error(file, &overrides[count - 1], &error),
-            None => override_error(file, &overrides[overrides.len() - 1], &error),
-        }
-    };
-    Ok(told.into_iter().map(explained).collect())
-}
-
-/// Returns an error with the override that caused it as its place.
-fn override_error(file: &Path, override_text: &str, error: &InputError) -> InputError {
-    let place = format!("{} with --set {override_text}", file.display());
-    with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
-}
-
-/// Returns the scenario in a file, or the one that a file of another format represents, with
-/// overrides.
-///
-/// # Errors
-/// When the file cannot be read, or an override does not fit.
-pub(crate) fn read_source(
-    worlds: Worlds,
-    file: &Path,
-    overrides: &[String],
-) -> Result<Source, InputError> {
-    Ok(import_or_read(worlds, file, overrides)?.0)
-}
-
-/// Returns the same scenario, and whether its text was made from a file of another format.
-fn import_or_read(
-    worlds: Worlds,
-    file: &Path,
-    overrides: &[String],
-) -> Result<(Source, bool), InputError> {
-    let Some(foreign) = worlds.translate(file)? else {
-        return Ok((Source::read(file, overrides)?, false));
-    };
-    let source = Source::new(file.display().to_string(), foreign.scenario?, "");
-    Ok((source.with_overrides(overrides)?, true))
-}
-
-/// Returns the same error with its position in the file, or with the override that caused it: users
-/// do not see the lines of the text that overrides have edited.
-fn locate_error(
-    worlds: Worlds,
-    file: &Path,
-    overrides: &[String],
-    error: InputError,
-) -> InputError {
-    let with = |count: usize| {
-        let source = read_source(worlds, file, &overrides[..count]).ok()?;
-        worlds.compile(&source).err().filter(|found| found.cause() == error.cause())
-    };
-    match (0..=overrides.len()).find_map(|count| Some((count, with(count)?))) {
-        Some((0, plain)) => plain,
-        Some((count, _)) => override_error(file, &overrides[count - 1], &error),
-        None => error,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::worlds::WORLDS;
+    use crate::testing::WORLDS;
 
     #[test]
     fn all_errors_name_their_overrides_or_their_lines() {
@@ -141,7 +196,7 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
         std::fs::write(&file, text).expect("written");
         let overrides = ["airspace.beta=7", "cycles=5", "airspace.generator.n=-3"];
-        let told = problems(WORLDS, &file, &overrides.map(String::from)).expect("read");
+        let told = problems(&WORLDS, &file, &overrides.map(String::from)).expect("read");
         let told: Vec<_> = told.iter().map(|e| (e.key().unwrap_or(""), e.position())).collect();
         assert_eq!(
             told,
@@ -151,7 +206,7 @@ mod tests {
                 ("airspace.generator.n", None)
             ]
         );
-        assert_eq!(problems(WORLDS, &file, &["airspace.dt_s=5".into()]), Ok(vec![]));
+        assert_eq!(problems(&WORLDS, &file, &["airspace.dt_s=5".into()]), Ok(vec![]));
     }
 
     #[test]
@@ -164,15 +219,15 @@ mod tests {
         let text = "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n".to_string()
             + &turns.collect::<String>();
         std::fs::write(&file, text).expect("written");
-        let error = read_scenario(WORLDS, &file, &[]).err().expect("wrong");
+        let error = read_scenario(&WORLDS, &file, &[]).err().expect("wrong");
         let place = format!("the scenario made from {}", file.display());
         assert_eq!((error.place(), error.position()), (place.as_str(), None), "{error}");
         assert!(error.cause().contains("orders") && error.key().is_some(), "{error}");
-        assert_eq!(problems(WORLDS, &file, &[]), Ok(vec![error.clone()]));
-        let other = read_scenario(WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
+        assert_eq!(problems(&WORLDS, &file, &[]), Ok(vec![error.clone()]));
+        let other = read_scenario(&WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
         assert_eq!(other, error, "no override causes it");
         let caused =
-            read_scenario(WORLDS, &file, &["airspace.dt_s=-3".into()]).err().expect("wrong");
+            read_scenario(&WORLDS, &file, &["airspace.dt_s=-3".into()]).err().expect("wrong");
         assert!(caused.place().ends_with("a.scn with --set airspace.dt_s=-3"), "{caused}");
     }
 
@@ -185,7 +240,7 @@ mod tests {
         std::fs::write(&file, text).expect("written");
         let of = |overrides: &[&str]| {
             let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-            read_scenario(WORLDS, &file, &overrides).err().expect("wrong")
+            read_scenario(&WORLDS, &file, &overrides).err().expect("wrong")
         };
         let error = of(&["airspace.dt_s=4", "airspace.generator.n=-3", "airspace.shield=off"]);
         assert!(error.place().ends_with("s.toml with --set airspace.generator.n=-3"), "{error}");

@@ -1,15 +1,15 @@
 //! The summary of a run: the content of `summary.json`, and text for people.
 
+use crate::VERSION;
 use crate::driver::RunTiming;
 use crate::files::display_path;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
-use sidestep::VERSION;
-use sidestep::kernel::Cycle;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::text::KeyValues;
-use sidestep::kernel::world::DecisionMode;
-use sidestep::scenario::ImportedScenario;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::text::KeyValues;
+use sidestep_kernel::world::DecisionMode;
+use sidestep_scenario::ImportedScenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

@@ -1,7 +1,7 @@
 //! Watchers: they observe the progress of work, and may ask it to stop.
 
 use crate::Error;
-use sidestep::kernel::{Cycle, Interrupt};
+use sidestep_kernel::{Cycle, Interrupt};
 
 /// The progress of work.
 #[derive(Debug, Clone, Copy, PartialEq)]

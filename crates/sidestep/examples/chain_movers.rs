@@ -6,13 +6,11 @@
 
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{InputError, Seed, math};
-use sidestep::worlds::chain::geometry::{
-    Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub,
+use sidestep::rods::geometry::{Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub};
+use sidestep::rods::{
+    Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, Rules,
 };
-use sidestep::worlds::chain::{
-    Chain, Connector, EscapeMethod, EscapePlan, EscapeRules, Escaper, Obstacle, Obstacles, Outcome,
-    Propagator, Request, Rod, Rules,
-};
+use sidestep::worlds::chain::{EscapeMethod, EscapePlan, EscapeRules, Escaper};
 use std::f64::consts::TAU;
 
 const DT_S: f64 = 0.02;

@@ -1,12 +1,11 @@
 //! `cargo run -p sidestep --example own_behaviour`: robots that keep to the wall on their left.
 
-use sidestep::kernel::{InputError, Simulation, stream::Draws};
-use sidestep::scenario::Source;
+use sidestep::kernel::stream::Draws;
+use sidestep::worlds::WORLDS;
+use sidestep::worlds::robots::Robots;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Sector};
 use sidestep::worlds::robots::effector::{FORWARD, LEFT, RIGHT};
-use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
-
-use std::sync::Arc;
+use sidestep::{Error, Scenario};
 
 const SCENARIO: &str = r#"format = 1
 world = "robots"
@@ -27,12 +26,10 @@ impl Behaviour for FollowWall {
     }
 }
 
-fn main() -> Result<(), InputError> {
-    let source = Source::new("own_behaviour.rs", SCENARIO, "");
-    let own = Behaviours::from([("wall".into(), Arc::new(FollowWall) as Arc<dyn Behaviour>)]);
-    let compiled = Compiled::new(&source, &own, StorageOrder::Spatial)?;
-    let mut run = compiled.start(&source, 2);
-    run.advance(10_000);
-    println!("{:#}", Simulation::metrics(&run));
+fn main() -> Result<(), Error> {
+    let worlds = WORLDS.clone().with(Robots::new().with_behaviour("wall", FollowWall));
+    let mut run = Scenario::parse(&worlds, SCENARIO).start()?;
+    run.advance(10_000)?;
+    println!("{:#}", run.metrics());
     Ok(())
 }

@@ -1,87 +1,161 @@
 #![deny(clippy::disallowed_methods)]
-//! Simulates and compares decentralized motion coordination, with noisy sensors and slipping
-//! wheels. Results are the same to the bit on any number of threads.
+//! Simulates and compares decentralized motion coordination. Results are the same to the bit on any number of threads.
 //!
-//! A scenario is TOML text. It compiles to an immutable world, and a run advances a state:
+//! There are three worlds: robots with noisy sensors and slipping wheels on a grid, chains of connectors and rods that
+//! creep among obstacles, and airplanes that avoid each other. All are used in one way: a scenario is TOML text, which
+//! is loaded, changed and started; a run is advanced and looked at.
+//!
+//! ```no_run
+//! let mut run = sidestep::load("office.toml")?.set("robots.0.count", 10)?.seed(7).start()?;
+//! run.advance(500)?;
+//! println!("{:#}", run.metrics());
+//! # Ok::<(), sidestep::Error>(())
+//! ```
+//!
+//! Robots that wander in an office, whose metrics the world's own type has with their types:
 //!
 //! ```
-//! use sidestep::kernel::Simulation;
-//! use sidestep::scenario::Source;
-//! use sidestep::worlds::robots::robots_run;
+//! use sidestep::worlds::robots::RobotsRun;
 //!
+//! let office = sidestep::parse(r#"
+//!     format = 1
+//!     world = "robots"
+//!     map = { office = { corridors = 1, rooms_per_side = 2 } }
+//!     robots = { count = 4, size = 2, sensors = ["sonar-8"], effector = "nomad" }
+//! "#);
+//! let mut run = office.start()?;
+//! run.advance(500)?;
+//! assert_eq!(run.metrics()["total"]["actions"], 4 * 500);
+//! assert!(run.downcast::<RobotsRun>().expect("robots").metrics().coverage > 0.0);
+//!
+//! // The number of workers is no part of the result.
+//! let mut serial = office.workers(1).start()?;
+//! serial.advance(500)?;
+//! assert_eq!(serial.digest(), run.digest());
+//! # Ok::<(), sidestep::Error>(())
+//! ```
+//!
+//! A chain whose first connector follows a task, and the rows that the run recorded:
+//!
+//! ```
+//! let chain = sidestep::parse(r#"
+//!     format = 1
+//!     world = "chain"
+//!     record = { events = true }
+//!
+//!     [[chains]]
+//!     connectors = 3
+//!     at_m = [0.0, 0.0]
+//!     tasks = [{ kind = "targets", targets_m = [[-1.0, 1.0]] }]
+//! "#);
+//! let mut run = chain.keep_tables().start()?;
+//! run.advance(100)?;
+//! assert!(!run.tables()?.is_empty());
+//! # Ok::<(), sidestep::Error>(())
+//! ```
+//!
+//! Airplanes on their way to one point, by two methods:
+//!
+//! ```
+//! let flight = sidestep::parse(r#"
+//!     format = 1
+//!     world = "airspace"
+//!     airspace = { method = "pc", generator = { kind = "superconflict", n = 4 } }
+//! "#);
+//! let collective = flight.clone().start()?.finish()?;
+//! let velocity_obstacles = flight.set("airspace.method", "orca")?.start()?.finish()?;
+//! assert_eq!(collective.metrics["arrived"], 4);
+//! assert_ne!(collective.digest, velocity_obstacles.digest);
+//! # Ok::<(), sidestep::Error>(())
+//! ```
+//!
+//! Wrong input is an error that reports its position and a remedy, and [`Scenario::check`] finds all mistakes:
+//!
+//! ```
+//! let text = "format = 1\nworld = \"robots\"\nsede = 7\n[map]\nascii = \"....\"\n[robots]\ncount = -1\n";
+//! let problems = sidestep::parse(text).check().unwrap_err();
+//! assert_eq!(problems.0.len(), 2);
+//! assert_eq!(problems.0[0].position(), Some((3, 1)));
+//! assert_eq!(problems.0[0].remedy(), "did you mean `seed`?");
+//! ```
+//!
+//! # Parts of your own
+//!
+//! A behavior of robots is one trait, [`worlds::robots::decide::Behaviour`]; registered by a name, scenarios call it by
+//! that name. The list of worlds with it is all that the command line needs (`sidestep_cli::main_with`) to run, sweep
+//! and show such scenarios.
+//!
+//! ```
+//! use sidestep::Scenario;
+//! use sidestep::kernel::stream::Draws;
+//! use sidestep::worlds::WORLDS;
+//! use sidestep::worlds::robots::Robots;
+//! use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept};
+//! use sidestep::worlds::robots::effector::FORWARD;
+//!
+//! #[derive(Debug)]
+//! struct Ahead;
+//!
+//! impl Behaviour for Ahead {
+//!     fn decide(&self, _: &Percept<'_>, _: &mut Memory, _: &mut Draws) -> Decision {
+//!         FORWARD.into()
+//!     }
+//! }
+//!
+//! let worlds = WORLDS.clone().with(Robots::new().with_behaviour("ahead", Ahead));
 //! let text = r#"
 //!     format = 1
 //!     world = "robots"
-//!     seed = 7
-//!     map = { office = { corridors = 1, rooms_per_side = 2 } }
-//!     robots = { count = 4, size = 2, sensors = ["sonar-8"], effector = "nomad" }
+//!     map = { ascii = "......" }
+//!     robots = { count = 1, behaviour = { kind = "ahead" } }
 //! "#;
-//! let source = Source::new("four robots", text, "");
-//! let mut run = robots_run(&source, 1)?;
-//! run.advance(500);
-//!
-//! let metrics = run.metrics();
-//! assert_eq!(metrics.total.actions, 4 * 500);
-//! assert!(metrics.coverage > 0.0);
-//!
-//! // The number of workers is no part of the result.
-//! let mut shared = robots_run(&source, 3)?;
-//! shared.advance(500);
-//! assert_eq!(shared.digest(), run.digest());
-//! # Ok::<(), sidestep::kernel::InputError>(())
-//! ```
-//!
-//! Wrong input is an error that reports its position and a remedy:
-//!
-//! ```
-//! use sidestep::scenario::Source;
-//! use sidestep::worlds::robots::robots_run;
-//!
-//! let text = "format = 1\nworld = \"robots\"\nsede = 7\n[map]\nascii = \"....\"\n[robots]\ncount = 1\n";
-//! let error = robots_run(&Source::new("s.toml", text, ""), 1).unwrap_err();
-//! assert_eq!(error.position(), Some((3, 1)));
-//! assert_eq!(error.remedy(), "did you mean `seed`?");
+//! Scenario::parse(&worlds, text).start()?.advance(10)?;
+//! # Ok::<(), sidestep::Error>(())
 //! ```
 //!
 //! # Modules
 //!
 //! ```text
-//! scenario        TOML text + overrides -> typed sections, and errors with positions
-//!    │            map: boxes of a floor      office: a generated building
-//!    │            import: ROS, MovingAI, CARMEN and MRCLAM files
-//!    ▼
-//! worlds          scenario -> world + state; the phases of a cycle; metrics
-//!    │            planning: paths on the static map, for behaviors with a goal
-//!    ▼
-//! kernel          the cycle, workers, random streams, digests, checkpoints, recorder port
-//!
-//! learn           logs of a real robot -> error tables that a scenario loads
-//! experiment      many runs and sweeps, and their results with confidence intervals
-//! statistics      intervals, tests, and when there are enough runs
+//! worlds       the list of worlds, and each of them
+//! experiment   many runs and sweeps, and their results with confidence intervals
+//! session      runs that are recorded, resumed, replayed, filmed, exported and reported
+//! arms         arms: URDF -> joints, inverse kinematics, plans
+//! rods         chains of constraints: one motion through all parts
+//! learn        logs of a real robot -> error tables that a scenario loads
+//! error_models sensors and effectors that err, as plain types
+//! scenario     TOML text + overrides -> typed sections, and errors with positions
+//! import       ROS, MovingAI, CARMEN, MRCLAM and BlueSky files; URDF
+//! map          floors of boxes, generated offices, paths on them
+//! statistics   intervals, tests, and when there are enough runs
+//! collectives  probability collectives for any finite game
+//! document     reports as plain data
+//! kernel       the cycle, workers, random streams, digests, checkpoints, recorder port
 //! ```
 //!
-//! To define a behavior of your own, implement the trait [`worlds::robots::decide::Behaviour`]; the
-//! example `own_behaviour` defines, registers and runs one in less than 40 lines. To record a run,
-//! pass a [`kernel::ports::Recorder`] to [`kernel::Simulation::record`]: the recorder in memory is
-//! part of the kernel, and the crate `sidestep-record` has one that writes Parquet.
+//! Each is a crate of its own. Programs that write no files depend on `sidestep-experiment` and the crates of worlds
+//! instead.
 
-pub mod experiment;
-mod problems;
+mod builder;
+mod run;
 pub mod worlds;
 
-pub use problems::{MAX_PROBLEMS as MOST_PROBLEMS, problems};
+pub use builder::{Problems, Scenario, load, parse};
+pub use run::{Run, Table};
+pub use sidestep_arms as arms;
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
+pub use sidestep_error_models as error_models;
+pub use sidestep_experiment as experiment;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;
+pub use sidestep_learn as learn;
 pub use sidestep_map as map;
 pub use sidestep_map::{Cell, GridMap, office, planning};
-pub use sidestep_robots::learn;
+pub use sidestep_rods as rods;
 pub use sidestep_scenario as scenario;
+pub use sidestep_session as session;
+pub use sidestep_session::{Error, VERSION};
 pub use sidestep_statistics as statistics;
-
-/// The version of this crate.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The build: the version and a digest over what results follow from (sources, `Cargo.lock`, the compiler's
 /// version), as `0.1.0+0123456789ab`. Only the build that started a run or a sweep continues it.
@@ -110,6 +184,9 @@ mod tests {
         assert!(
             text("kernel/Cargo.toml").contains("libm") && !text("kernel/src/math.rs").is_empty()
         );
+        // Experiments use it, and no world does.
+        assert!(text("statistics/src/lib.rs").contains("interval"));
+        assert!(!found.iter().any(|(name, _)| name.starts_with("session/")));
         let digest = build_script::digest(found.clone());
         for name in ["Cargo.lock", "rustc --version", "worlds/chain/src/lib.rs"] {
             let mut changed = found.clone();

@@ -1,7 +1,7 @@
-"""Environments for reinforcement learning from any scenario whose agents take orders.
+"""Environments for reinforcement learning, from any scenario whose agents take orders.
 
-PettingZoo's ``ParallelEnv`` (``Robots``, ``Chain``, ``Airspace``; ``robots_v0`` and so on as modules), many worlds at once as arrays
-(``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` of one agent.
+PettingZoo's ``ParallelEnv`` (``Robots``, ``Chain``, ``Airspace``; also modules such as ``robots_v0``), many worlds at once as
+arrays (``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` for one agent.
 
 Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
 

@@ -11,64 +11,63 @@ import pettingzoo
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .._errors import wrong
+from .._errors import input_error
 from .._native import Scenario, Simulation, Space, Team, rows_by_name
-from ._rewards import DEFAULTS, Reward, earned, rewards
+from ._rewards import DEFAULTS, Reward, combine_rewards, compute_rewards
 
-MOST = np.iinfo(np.int64).max
-# Above the seeds of episodes.
-MOST_SEED = 2**62
-# The order that an action is where none is named: one in which every value within its bounds is right.
+MAX_INT64 = np.iinfo(np.int64).max
+# Seeds of episodes are below this.
+MAX_SEED = 2**62
+# The default order of an action: one in which every value within its bounds is valid.
 ORDERS = {"robots": "action", "chain": "to_m", "airspace": "turn_rate_rad_s"}
 NOUNS = {"robots": "robot", "chain": "chain", "airspace": "airplane"}
 
 
 def space_of(space: Space) -> spaces.Space[Any]:
-    """Returns the Gymnasium space of one agent's share."""
+    """Returns the Gymnasium space of one agent."""
     if space.choices is not None:
         if space.shape == ():
             return spaces.Discrete(len(space.choices))
         return spaces.MultiDiscrete(np.full(space.shape, len(space.choices)))
     if space.dtype == "int64":
-        high = min(space.high, float(MOST - 512))
+        high = min(space.high, float(MAX_INT64 - 512))
         return spaces.Box(np.int64(space.low), np.int64(high), space.shape, np.int64)
     return spaces.Box(np.float32(space.low), np.float32(space.high), space.shape, np.float32)
 
 
-def within(space: Space) -> spaces.Space[Any]:
-    """Returns the Gymnasium space of one agent's order: no value of it is out of bounds as a double."""
-    found = space_of(space)
-    if isinstance(found, spaces.Box) and space.dtype == "float64":
-        least = [np.float32(space.low), np.nextafter(np.float32(space.low), np.float32(np.inf))]
-        most = [np.float32(space.high), np.nextafter(np.float32(space.high), np.float32(-np.inf))]
-        low = next(low for low in least if low >= space.low)
-        high = next(high for high in most if high <= space.high)
+def inside_bounds(space: Space) -> spaces.Space[Any]:
+    """Returns the Gymnasium space of one agent's order: all its float32 values are inside the bounds in double precision."""
+    result = space_of(space)
+    if isinstance(result, spaces.Box) and space.dtype == "float64":
+        lows = [np.float32(space.low), np.nextafter(np.float32(space.low), np.float32(np.inf))]
+        highs = [np.float32(space.high), np.nextafter(np.float32(space.high), np.float32(-np.inf))]
+        low = next(low for low in lows if low >= space.low)
+        high = next(high for high in highs if high <= space.high)
         return spaces.Box(low, high, space.shape, np.float32)
-    return found
+    return result
 
 
 class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     """The agents of a scenario that take orders, as a PettingZoo environment.
 
     Args:
-        scenario: a ``Scenario``, a path or a dict. All agents that take orders act here; the others decide for
-            themselves.
+        scenario: a ``Scenario``, a path or a dict. Agents that take orders are controlled here; the others decide
+            for themselves.
         rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of a team's observations before and
             after a step, which returns a number for each agent.
-        orders: names of the orders that an action gives. One of them makes the action that order alone; several make
-            it a dict. By default the action of a robot, the place toward which a chain goes, the turn rate of an
-            airplane.
-        max_cycles: cycles of an episode; the scenario's own by default. An episode that is cut there is
-            *truncated*; one in which nothing can happen anymore is *terminated*.
+        orders: names of the orders in an action. With one of them the action is that order itself; with several it
+            is a dict. By default the action of a robot, the target position of a chain, the turn rate of an airplane.
+        max_cycles: cycles of an episode; the scenario's own by default. An episode that reaches them is
+            *truncated*; one that has finished early is *terminated*.
         render_mode: ``"rgb_array"`` or None.
-        width: width of pictures in pixels.
-        workers: workers of the simulation.
+        width: width of images in pixels.
+        workers: number of workers of the simulation.
 
-    An episode's seed is that of ``reset``; without one it is drawn from the environment's own generator, so
-    that a sequence of episodes is repeated from its first seed.
+    An episode's seed is drawn from the environment's own generator, which ``reset`` seeds, so that a sequence of
+    episodes is reproducible from its first seed.
     """
 
-    #: The world of its scenarios; None for any.
+    #: The world of its scenarios; None for any world.
     world: str | None = None
     metadata: dict[str, Any] = {"name": "sidestep_v0", "render_modes": ["rgb_array"], "render_fps": 10}
 
@@ -84,11 +83,11 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         workers: int = 1,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise wrong("render_mode", f"there is no `{render_mode}`", 'give "rgb_array" or None')
+            raise input_error("render_mode", f"there is no `{render_mode}`", 'give "rgb_array" or None')
         self.scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
         if self.world not in (None, self.scenario.world):
-            cause = f"its world is `{self.scenario.world}`, and not `{self.world}`"
-            raise wrong("scenario", cause, "use `parallel_env`, which takes any world")
+            cause = f"its world is `{self.scenario.world}`, not `{self.world}`"
+            raise input_error("scenario", cause, "use `parallel_env`, which accepts any world")
         self.render_mode = render_mode
         self._width = width
         self._workers = workers
@@ -101,38 +100,40 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             "workers": workers,
         }
         if max_cycles is not None and max_cycles < 1:
-            raise wrong("max_cycles", f"{max_cycles} cycles are no episode", "give 1 or more")
+            raise input_error("max_cycles", f"{max_cycles} cycles are not an episode", "give 1 or more")
         self.max_cycles = self.scenario.cycles if max_cycles is None else max_cycles
         self.sim = Simulation(self.scenario, workers=workers)
-        self._teams = [(k, t) for k, t in enumerate(self.sim.teams) if t.ordered]
+        self._teams = [(k, t) for k, t in enumerate(self.sim.teams) if t.action_spaces]
         if not self._teams:
-            remedy = "let its agents be decided from outside (`external`)"
-            raise wrong("scenario", "no agent of this scenario takes orders", remedy)
+            remedy = "let its agents be controlled externally (`external`)"
+            raise input_error("scenario", "no agent of this scenario takes orders", remedy)
         world = self.scenario.world
-        wanted = [ORDERS[world]] if orders is None else orders
-        wanted = [wanted] if isinstance(wanted, str) else wanted
-        self._orders = [orders_of(team, wanted) for _, team in self._teams]
+        names = [ORDERS[world]] if orders is None else orders
+        names = [names] if isinstance(names, str) else names
+        self._orders = [orders_of(team, names) for _, team in self._teams]
         self._order_names = [[space.name for space in chosen] for chosen in self._orders]
         self._rewards = [rewards_of(team, world, rewards) for _, team in self._teams]
-        self._columns = [[(space.name, space.dtype == "float64") for space in team.observed] for _, team in self._teams]
+        self._columns = [
+            [(space.name, space.dtype == "float64") for space in team.observation_spaces] for _, team in self._teams
+        ]
         self._names = [[f"{NOUNS[world]}_{agent}" for agent in team.agents] for _, team in self._teams]
         self.possible_agents = [name for names in self._names for name in names]
         self.agents: list[str] = []
-        # While an episode goes on, all of them act.
-        self._playing = frozenset(self.possible_agents)
+        # During an episode all of them act.
+        self._acting = frozenset(self.possible_agents)
         self.observation_spaces: dict[str, spaces.Space[Any]] = {}
         self.action_spaces: dict[str, spaces.Space[Any]] = {}
         for (_, team), names, chosen in zip(self._teams, self._names, self._orders, strict=True):
-            observed = spaces.Dict({space.name: space_of(space) for space in team.observed})
-            acted = action_space(chosen)
+            observation_space = spaces.Dict({space.name: space_of(space) for space in team.observation_spaces})
+            agent_action_space = action_space(chosen)
             for name in names:
-                self.observation_spaces[name] = observed
-                self.action_spaces[name] = acted
+                self.observation_spaces[name] = observation_space
+                self.action_spaces[name] = agent_action_space
         self._rng = np.random.default_rng()
         self._before: list[dict[str, NDArray[Any]]] = []
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """Returns the space of an agent's observations: a dict by the names of its team's observations."""
+        """Returns the space of an agent's observations: a dict by name."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
@@ -142,13 +143,13 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Starts an episode, and returns the observations of all agents; it has no options, and takes any."""
+        """Starts an episode, and returns the observations of all agents; ``options`` are ignored."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
-        # From the generator also with a seed, so that the next episode differs from this one.
-        drawn = int(self._rng.integers(MOST_SEED))
+        # Drawn from the generator even with a seed, so that the next episode differs from this one.
+        episode_seed = int(self._rng.integers(MAX_SEED))
         self.sim.close()
-        self.sim = Simulation(self.scenario, seed=drawn, workers=self._workers)
+        self.sim = Simulation(self.scenario, seed=episode_seed, workers=self._workers)
         self.agents = list(self.possible_agents)
         self._before = self._observed()
         return self._split(self._before), {agent: {} for agent in self.agents}
@@ -162,44 +163,44 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """Orders an action of each agent, and simulates one cycle."""
+        """Applies an action of each agent, and simulates one cycle."""
         if not self.agents:
-            raise wrong("step", "no episode goes on", "call reset first")
-        if len(actions) != len(self.agents) or actions.keys() != self._playing:
-            unknown = sorted(set(actions) - self._playing)
+            raise input_error("step", "no episode is in progress", "call reset first")
+        if len(actions) != len(self.agents) or actions.keys() != self._acting:
+            unknown = sorted(set(actions) - self._acting)
             if unknown:
-                raise wrong("actions", f"there is no agent `{unknown[0]}`", "name those of `agents`")
+                raise input_error("actions", f"there is no agent `{unknown[0]}`", "give those of `agents`")
             missing = next(agent for agent in self.agents if agent not in actions)
-            raise wrong("actions", f"`{missing}` has none", "give one for each agent")
+            raise input_error("actions", f"`{missing}` has no action", "give one for each agent")
         for (k, _), names, chosen in zip(self._teams, self._names, self._order_names, strict=True):
             self._order(k, names, chosen, actions)
         self.sim.step()
         after = self._observed()
-        gains: dict[str, float] = {}
+        earned: dict[str, float] = {}
         for reward, names, old, new in zip(self._rewards, self._names, self._before, after, strict=True):
-            gains.update(zip(names, earned(reward, old, new, len(names)).tolist(), strict=True))
+            earned.update(zip(names, compute_rewards(reward, old, new, len(names)).tolist(), strict=True))
         self._before = after
         is_over = self.sim.is_over
-        is_cut = not is_over and self.sim.cycle >= self.max_cycles
+        is_truncated = not is_over and self.sim.cycle >= self.max_cycles
         agents = self.agents
-        if is_over or is_cut:
+        if is_over or is_truncated:
             self.agents = []
         return (
             self._split(after),
-            gains,
+            earned,
             dict.fromkeys(agents, is_over),
-            dict.fromkeys(agents, is_cut),
+            dict.fromkeys(agents, is_truncated),
             {agent: {} for agent in agents},
         )
 
     def state(self) -> NDArray[np.float32]:
-        """Returns all that all agents observe as one vector."""
+        """Returns the observations of all agents as one vector."""
         parts = [array.ravel() for team in self._before for array in team.values()]
         return np.concatenate(parts).astype(np.float32)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Returns a picture of the present state, (height, width, 3)."""
-        return None if self.render_mode is None else self.sim.picture(self._width)
+        """Returns an image of the present state, (height, width, 3)."""
+        return None if self.render_mode is None else self.sim.render(self._width)
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -270,22 +271,22 @@ def parallel_env(scenario: Scenario | str | PathLike[str] | Mapping[str, Any], *
 
 def orders_of(team: Team, orders: Sequence[str]) -> list[Space]:
     """Returns the spaces of the named orders of a team."""
-    known = {space.name: space for space in team.ordered}
+    known = {space.name: space for space in team.action_spaces}
     unknown = [order for order in orders if order not in known]
     if unknown or not orders:
         cause = f"team `{team.name}` takes no order {unknown}"
-        raise wrong("orders", cause, f"some of {', '.join(known)}")
+        raise input_error("orders", cause, f"some of {', '.join(known)}")
     return [known[order] for order in orders]
 
 
 def rewards_of(team: Team, world: str, given: Mapping[str, float] | Reward | None) -> Reward:
     """Returns the reward of a team; by default that of its world."""
     given = DEFAULTS[world] if given is None else given
-    return rewards(given, {space.name for space in team.observed})
+    return combine_rewards(given, {space.name for space in team.observation_spaces})
 
 
 def action_space(chosen: list[Space]) -> spaces.Space[Any]:
     """Returns the Gymnasium space of an action: of the order alone, or a dict of several."""
     if len(chosen) == 1:
-        return within(chosen[0])
-    return spaces.Dict({space.name: within(space) for space in chosen})
+        return inside_bounds(chosen[0])
+    return spaces.Dict({space.name: inside_bounds(space) for space in chosen})

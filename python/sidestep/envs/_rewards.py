@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import InputError, wrong
+from .._errors import InputError, input_error
 
-#: An airplane's way-point that is farther than this is none.
-NO_WAY_POINT_M = 1e11
+#: An airplane without a way-point reports one beyond this distance.
+MIN_NO_WAY_POINT_M = 1e11
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -42,11 +42,12 @@ def _done(before: Arrays, after: Arrays) -> NDArray[Any]:
 
 
 def _nearer(before: Arrays, after: Arrays) -> NDArray[Any]:
-    was_m, is_m = (np.linalg.norm(seen["way_point_m"], axis=1) for seen in (before, after))
-    # An airplane that has reached a way-point looks at the next one, which is as far as it happens to be.
+    was_m = np.linalg.norm(before["way_point_m"], axis=1)
+    is_m = np.linalg.norm(after["way_point_m"], axis=1)
+    # After reaching a way-point, an airplane observes the next one, at an unrelated distance.
     is_there = after["way_points_left"] < before["way_points_left"]
-    # No way-point lies as far: an airplane that keeps a heading says so.
-    has_one = (was_m < NO_WAY_POINT_M) & (is_m < NO_WAY_POINT_M) & _flies(before, after)
+    # An airplane that keeps a heading has no way-point.
+    has_one = (was_m < MIN_NO_WAY_POINT_M) & (is_m < MIN_NO_WAY_POINT_M) & _flies(before, after)
     return np.where(has_one, np.where(is_there, was_m, was_m - is_m), 0.0)
 
 
@@ -61,7 +62,7 @@ def _delay(before: Arrays, after: Arrays) -> NDArray[Any]:
 
 
 def _flies(before: Arrays, after: Arrays) -> NDArray[Any]:
-    """Returns where observations are no padding, before and after: not those of airplanes to come or landed."""
+    """Returns where observations before and after are real: not the padding of future or landed airplanes."""
     return (before["due"] > 0) & (after["due"] > 0)
 
 
@@ -69,9 +70,9 @@ def _flies(before: Arrays, after: Arrays) -> NDArray[Any]:
 class Term:
     """A named term of a reward."""
 
-    #: The quantity that it counts.
+    #: The quantity that it measures.
     meaning: str
-    #: Functions with the observations that each needs: the first counts for which there are all.
+    #: Functions with their required observations: the first whose observations exist is used.
     forms: tuple[tuple[Reward, frozenset[str]], ...]
 
 
@@ -83,67 +84,67 @@ TERMS: dict[str, Term] = {
     "contact": _term("1 where the last action was stopped", (_contact, "contact")),
     "moved": _term("boxes moved", (_moved, "at_boxes")),
     "turned": _term("1 where the heading changed", (_turned, "heading")),
-    "veto": _term("1 where a part of the chain objected", (_veto, "veto")),
+    "veto": _term("1 where a part of the chain vetoed", (_veto, "veto")),
     "progress": _term(
-        "of a chain the part of the ordered way that was done, of an airplane the meters by which its way-point is nearer",
+        "chain: fraction of the ordered motion that was carried out; airplane: meters closer to its way-point",
         (_done, "done_share"),
         (_nearer, "way_point_m way_points_left due"),
     ),
     "separation": _term(
-        "others, as they are seen, that are nearer than the separation",
+        "number of observed neighbors closer than the separation",
         (_separation, "neighbor_place_m neighbor_id neighbor_separation_m"),
     ),
-    "delay": _term("seconds by which the arrival has become later", (_delay, "delay_s due")),
+    "delay": _term("seconds of additional delay at arrival", (_delay, "delay_s due")),
 }
-"""The terms that have names."""
+"""The named terms."""
 
 DEFAULTS: dict[str, dict[str, float]] = {
     "robots": {"contact": -1.0},
     "chain": {"veto": -1.0, "progress": 0.1},
     "airspace": {"separation": -1.0, "delay": -0.01},
 }
-"""The weights of each world that are used where none are given."""
+"""The default weights of each world."""
 
 
-def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
-    """Returns the sum of terms as one function; ``observed`` has the names of the observations."""
+def combine_rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
+    """Returns the weighted sum of terms as one function; ``observed`` has the names of the observations."""
     if callable(terms):
         return terms
     chosen: list[tuple[Reward, float]] = []
     for name, weight in terms.items():
         if name not in TERMS:
             known = ", ".join(TERMS)
-            raise _wrong(name, f"there is no reward `{name}`", f"one of {known}, or a function")
-        fitting = [form for form, needs in TERMS[name].forms if needs <= observed]
-        if not fitting:
+            raise _reward_error(name, f"there is no reward `{name}`", f"one of {known}, or a function")
+        applicable = [form for form, needs in TERMS[name].forms if needs <= observed]
+        if not applicable:
             missing = " or ".join(f"`{', '.join(sorted(needs - observed))}`" for _, needs in TERMS[name].forms)
-            raise _wrong(name, f"it needs {missing}, which nobody observes", "leave it out")
+            raise _reward_error(name, f"it needs {missing}, which no agent observes", "leave it out")
         if not isinstance(weight, (int, float)) or not math.isfinite(weight):
-            raise _wrong(name, f"its weight is {weight!r}", "give a finite number")
-        chosen.append((fitting[0], float(weight)))
+            raise _reward_error(name, f"its weight is {weight!r}", "give a finite number")
+        chosen.append((applicable[0], float(weight)))
 
     if not chosen:
-        raise wrong("rewards", "no term is named", f"give weights to some of {', '.join(TERMS)}, or a function")
-    (first, its_weight), *others = chosen
+        raise input_error("rewards", "no term is given", f"give weights to some of {', '.join(TERMS)}, or a function")
+    (first, first_weight), *others = chosen
 
     def total(before: Arrays, after: Arrays) -> NDArray[Any]:
-        # One term is the usual case, and a step of ten agents takes as long as some calls of NumPy.
-        gains = its_weight * first(before, after)
+        # One term is the usual case, and a step of ten agents costs no more than a few NumPy calls.
+        total_rewards = first_weight * first(before, after)
         for term, weight in others:
-            gains = gains + weight * term(before, after)
-        return gains
+            total_rewards = total_rewards + weight * term(before, after)
+        return total_rewards
 
     return total
 
 
-def earned(reward: Reward, before: Arrays, after: Arrays, agents: int) -> NDArray[np.float64]:
-    """Returns the reward of each agent of a team; a function of one's own may return the wrong thing."""
+def compute_rewards(reward: Reward, before: Arrays, after: Arrays, agents: int) -> NDArray[np.float64]:
+    """Returns the reward of each agent of a team, after checking the result of a user's function."""
     values = np.array(reward(before, after), dtype=float)
     if values.shape != (agents,):
         cause = f"the function returned an array of the shape {values.shape}"
-        raise _wrong("function", cause, f"return a number for each agent: the shape ({agents},)")
+        raise _reward_error("function", cause, f"return a number for each agent: the shape ({agents},)")
     return values
 
 
-def _wrong(name: str, cause: str, remedy: str) -> InputError:
-    return wrong(f"rewards.{name}", cause, remedy)
+def _reward_error(name: str, cause: str, remedy: str) -> InputError:
+    return input_error(f"rewards.{name}", cause, remedy)

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import wrong
+from .._errors import input_error
 from .._native import Scenario
 from ._parallel import parallel_env
 
@@ -18,8 +18,8 @@ from ._parallel import parallel_env
 class Env(gymnasium.Env[dict[str, Any], Any]):
     """The one agent of a scenario that takes orders, as a Gymnasium environment.
 
-    It takes the arguments of :class:`ParallelEnv`; an episode is that of a ``parallel_env`` that was reset with the
-    same seed. Other agents of the scenario decide for themselves.
+    It takes the arguments of :class:`ParallelEnv`; an episode equals that of a ``parallel_env`` reset with the same
+    seed. Other agents of the scenario decide for themselves.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -29,7 +29,7 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
         agents = self.parallel.possible_agents
         if len(agents) != 1:
             remedy = "use parallel_env for many, or leave one"
-            raise wrong("scenario", f"{len(agents)} agents take orders", remedy)
+            raise input_error("scenario", f"{len(agents)} agents take orders", remedy)
         (self._agent,) = agents
         self.observation_space = self.parallel.observation_space(self._agent)
         self.action_space = self.parallel.action_space(self._agent)
@@ -44,13 +44,13 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
         return observed[self._agent], infos[self._agent]
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Orders an action, and simulates one cycle."""
-        observed, gains, terminations, truncations, infos = self.parallel.step({self._agent: action})
+        """Applies an action, and simulates one cycle."""
+        observed, rewards, terminations, truncations, infos = self.parallel.step({self._agent: action})
         one = self._agent
-        return observed[one], gains[one], terminations[one], truncations[one], infos[one]
+        return observed[one], rewards[one], terminations[one], truncations[one], infos[one]
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Returns a picture of the present state, (height, width, 3)."""
+        """Returns an image of the present state, (height, width, 3)."""
         return self.parallel.render()
 
     def close(self) -> None:

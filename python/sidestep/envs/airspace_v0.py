@@ -1,4 +1,4 @@
-"""The environment :class:`sidestep.envs.Airspace` by the names that PettingZoo's users expect.
+"""The environment :class:`sidestep.envs.Airspace` under the names that PettingZoo users expect.
 
 >>> from sidestep.envs import airspace_v0
 >>> airspace_v0.parallel_env.metadata["name"]
@@ -16,5 +16,5 @@ __all__ = ["env", "parallel_env"]
 
 
 def env(*args: Any, **options: Any) -> AECEnv[str, Any, Any]:
-    """Returns it with one agent after the other (AEC); it takes the arguments of ``parallel_env``."""
+    """Returns the environment in PettingZoo's AEC form; it takes the arguments of ``parallel_env``."""
     return parallel_to_aec(parallel_env(*args, **options))

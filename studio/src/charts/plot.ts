@@ -13,17 +13,17 @@ export interface PlotColors {
 }
 
 export interface PlotHooks {
-  /** Takes the cycle under the pointer; null once it has left. */
-  hover(cycle: number | null): void;
-  /** Takes a clicked cycle. */
-  click(cycle: number): void;
+  /** Receives the cycle under the pointer; null once it has left. */
+  onHover(cycle: number | null): void;
+  /** Receives a clicked cycle. */
+  onClick(cycle: number): void;
 }
 
-/** The range of an axis: round, with zero where it is near, and not empty where nothing changes. */
-function rangeOf(lo: number | null, hi: number | null): uPlot.Range.MinMax {
-  if (lo === null || hi === null) return [0, 1];
-  if (lo === hi) return lo === 0 ? [0, 1] : [lo - 0.5 * Math.abs(lo), hi + 0.5 * Math.abs(hi)];
-  return uPlot.rangeNum(lo, hi, 0.1, true);
+/** The range of an axis: round, with zero if it is near, and not empty for constant values. */
+function rangeOf(low: number | null, high: number | null): uPlot.Range.MinMax {
+  if (low === null || high === null) return [0, 1];
+  if (low === high) return low === 0 ? [0, 1] : [low - 0.5 * Math.abs(low), high + 0.5 * Math.abs(high)];
+  return uPlot.rangeNum(low, high, 0.1, true);
 }
 
 export class Plot {
@@ -45,7 +45,7 @@ export class Plot {
     const options: uPlot.Options = {
       ...size,
       legend: { show: false },
-      scales: { x: { time: false }, y: { range: (_, lo, hi) => rangeOf(lo, hi) } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => rangeOf(low, high) } },
       axes: [
         { ...axis, size: 26, gap: 5 },
         { ...axis, size: 54, gap: 4 },
@@ -53,14 +53,14 @@ export class Plot {
       series: [{}, { stroke: colors.curve, width: 1.5, points: { show: false } }],
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6, fill: colors.curve } },
       hooks: {
-        setCursor: [(plot) => this.#moved(plot)],
+        setCursor: [(plot) => this.#onCursorMove(plot)],
         draw: [(plot) => this.#drawNow(plot, colors.accent)],
       },
     };
     this.#plot = new uPlot(options, [[], []], host);
     this.#plot.over.addEventListener("click", () => {
       const { left } = this.#plot.cursor;
-      if (left !== undefined && left >= 0) this.#hooks.click(Math.round(this.#plot.posToVal(left, "x")));
+      if (left !== undefined && left >= 0) this.#hooks.onClick(Math.round(this.#plot.posToVal(left, "x")));
     });
   }
 
@@ -72,14 +72,14 @@ export class Plot {
     this.#plot.setSize(size);
   }
 
-  /** The cycle that the canvas shows. */
+  /** Sets the cycle that the canvas shows. */
   setNow(cycle: number): void {
     if (cycle === this.#now) return;
     this.#now = cycle;
     this.#plot.redraw(false);
   }
 
-  /** The cycle that the timeline or another chart points at. */
+  /** Sets the cycle under the pointer of the timeline or another chart. */
   setCursor(cycle: number | null): void {
     if (cycle === this.#cursor) return;
     this.#cursor = cycle;
@@ -93,12 +93,12 @@ export class Plot {
     this.#plot.destroy();
   }
 
-  #moved(plot: uPlot): void {
+  #onCursorMove(plot: uPlot): void {
     if (this.#isOurs) return;
     const { left } = plot.cursor;
     const cycle = left === undefined || left < 0 ? null : Math.round(plot.posToVal(left, "x"));
     this.#cursor = cycle;
-    this.#hooks.hover(cycle);
+    this.#hooks.onHover(cycle);
   }
 
   #drawNow(plot: uPlot, color: string): void {

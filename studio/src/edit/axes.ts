@@ -1,55 +1,55 @@
-/** Handles along the axes of space, at the chosen thing: a drag in the picture alone cannot tell its depth. */
+/** Handles along the axes in space, at the selected item: a drag on the screen alone has no depth. */
 
-import type { Place } from "../protocol";
-import type { Eye } from "../scene/camera";
+import type { Point3 } from "../protocol";
+import type { Camera } from "../scene/camera";
 
 export type Axis = 0 | 1 | 2;
 export const AXES: readonly Axis[] = [0, 1, 2];
 export const AXIS_NAMES = ["x", "y", "z"] as const;
 
-/** Length of a handle where it lies across the view. */
+/** Length of a handle that is perpendicular to the view. */
 const LENGTH_PX = 60;
-/** Greatest distance from its tip at which an axis is taken hold of. */
-const NEAR_PX = 11;
-/** An axis that points at the viewer has no length to drag along. */
-const LEAST_PX = 10;
+/** Maximum distance from its tip at which an axis is picked. */
+const PICK_RADIUS_PX = 11;
+/** Minimum visible length: an axis that points at the viewer cannot be dragged. */
+const MIN_LENGTH_PX = 10;
 
 export interface AxisHandle {
   axis: Axis;
-  tip_m: Place;
+  tip_m: Point3;
 }
 
-function pixels(eye: Eye, at: Place): [number, number] {
-  const [x, y] = eye.project(...at);
+function toPixels(camera: Camera, at: Point3): [number, number] {
+  const [x, y] = camera.project(...at);
   return [x, y];
 }
 
-/** The handles of a place that can be dragged from where the eye is. */
-export function handlesAt(eye: Eye, at: Place): AxisHandle[] {
-  const [x, y] = pixels(eye, at);
+/** The handles of a position that can be dragged in this view. */
+export function handlesAt(camera: Camera, at: Point3): AxisHandle[] {
+  const [x, y] = toPixels(camera, at);
   return AXES.flatMap((axis) => {
-    const tip_m: Place = [...at];
-    tip_m[axis] += LENGTH_PX * eye.mPerPx;
-    const [tx, ty] = pixels(eye, tip_m);
-    return Math.hypot(tx - x, ty - y) < LEAST_PX ? [] : [{ axis, tip_m }];
+    const tip_m: Point3 = [...at];
+    tip_m[axis] += LENGTH_PX * camera.mPerPx;
+    const [tx, ty] = toPixels(camera, tip_m);
+    return Math.hypot(tx - x, ty - y) < MIN_LENGTH_PX ? [] : [{ axis, tip_m }];
   });
 }
 
 /** The axis whose handle is at a point of the canvas. */
-export function axisAt(eye: Eye, at: Place, x_px: number, y_px: number): Axis | null {
-  const found = handlesAt(eye, at).find(({ tip_m }) => {
-    const [x, y] = pixels(eye, tip_m);
-    return Math.hypot(x - x_px, y - y_px) <= NEAR_PX;
+export function axisAt(camera: Camera, at: Point3, x_px: number, y_px: number): Axis | null {
+  const found = handlesAt(camera, at).find(({ tip_m }) => {
+    const [x, y] = toPixels(camera, tip_m);
+    return Math.hypot(x - x_px, y - y_px) <= PICK_RADIUS_PX;
   });
   return found?.axis ?? null;
 }
 
-/** Returns the place to which one goes along an axis when the pointer goes by so many pixels. */
-export function along(eye: Eye, at: Place, axis: Axis, dx_px: number, dy_px: number): Place {
-  const handle = handlesAt(eye, at).find((one) => one.axis === axis);
-  const by: Place = [0, 0, 0];
+/** Returns the displacement along an axis for a movement of the pointer. */
+export function dragAlong(camera: Camera, at: Point3, axis: Axis, dx_px: number, dy_px: number): Point3 {
+  const handle = handlesAt(camera, at).find((one) => one.axis === axis);
+  const by: Point3 = [0, 0, 0];
   if (!handle) return by;
-  const [[x, y], [tx, ty]] = [pixels(eye, at), pixels(eye, handle.tip_m)];
+  const [[x, y], [tx, ty]] = [toPixels(camera, at), toPixels(camera, handle.tip_m)];
   const [ax, ay] = [tx - x, ty - y];
   by[axis] = ((dx_px * ax + dy_px * ay) / (ax * ax + ay * ay)) * (handle.tip_m[axis] - at[axis]);
   return by;

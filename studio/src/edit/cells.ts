@@ -1,4 +1,4 @@
-/** Boxes that tools touch: column and row, from the lower-left corner of the map. */
+/** Boxes touched by tools: column and row, from the lower-left corner of the map. */
 
 export type Cell = readonly [column: number, row: number];
 
@@ -52,8 +52,8 @@ export function rectangleCells(from: Cell, to: Cell, isFilled: boolean): Cell[] 
   return cells;
 }
 
-/** A square brush along boxes; each box once. */
-export function brushed(cells: readonly Cell[], side: number): Cell[] {
+/** The boxes of a square brush moved along boxes; each once. */
+export function brushCells(cells: readonly Cell[], side: number): Cell[] {
   const found = new Map<string, Cell>();
   const before = Math.floor((side - 1) / 2);
   for (const [c, r] of cells) {
@@ -65,23 +65,23 @@ export function brushed(cells: readonly Cell[], side: number): Cell[] {
   return [...found.values()];
 }
 
-/** The boxes that hang together with one and have the same mark, over their four sides. */
+/** The connected boxes with the same character, over their four sides. */
 export function floodCells(
   from: Cell,
   width: number,
   height: number,
-  markAt: (cell: Cell) => string | undefined,
+  charAt: (cell: Cell) => string | undefined,
 ): Cell[] {
-  const mark = markAt(from);
-  if (mark === undefined) return [];
-  const seen = new Uint8Array(width * height);
+  const char = charAt(from);
+  if (char === undefined) return [];
+  const visited = new Uint8Array(width * height);
   const found: Cell[] = [];
   const open: Cell[] = [from];
   while (open.length > 0) {
     const cell = open.pop()!;
     const [c, r] = cell;
-    if (c < 0 || r < 0 || c >= width || r >= height || seen[r * width + c] || markAt(cell) !== mark) continue;
-    seen[r * width + c] = 1;
+    if (c < 0 || r < 0 || c >= width || r >= height || visited[r * width + c] || charAt(cell) !== char) continue;
+    visited[r * width + c] = 1;
     found.push(cell);
     open.push([c + 1, r], [c - 1, r], [c, r + 1], [c, r - 1]);
   }

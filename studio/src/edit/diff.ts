@@ -1,30 +1,30 @@
-/** Two texts beside each other, line by line. */
+/** The difference of two texts, line by line. */
 
 export interface DiffLine {
   kind: "same" | "mine" | "theirs";
   words: string;
 }
 
-/** Beyond so many pairs of lines that may match, the middle is reported as replaced in whole. */
-const MOST_PAIRS = 4_000_000;
+/** Maximum number of pairs of lines to match; beyond it the whole middle counts as replaced. */
+const MAX_PAIRS = 4_000_000;
 
-/** Returns the lines that both texts have, those of only the first, and those of only the second. */
-export function differences(mine: string, theirs: string): DiffLine[] {
+/** Returns the lines of both texts, marked as common, only in the first, or only in the second. */
+export function diffLines(mine: string, theirs: string): DiffLine[] {
   const [a, b] = [mine.split("\n"), theirs.split("\n")];
   let head = 0;
   while (head < a.length && head < b.length && a[head] === b[head]) head++;
   let tail = 0;
   while (tail < a.length - head && tail < b.length - head && a.at(-1 - tail) === b.at(-1 - tail)) tail++;
   const same = (lines: string[]): DiffLine[] => lines.map((words) => ({ kind: "same", words }));
-  const middle = between(a.slice(head, a.length - tail), b.slice(head, b.length - tail));
+  const middle = diffMiddle(a.slice(head, a.length - tail), b.slice(head, b.length - tail));
   return [...same(a.slice(0, head)), ...middle, ...same(a.slice(a.length - tail))];
 }
 
-function between(a: string[], b: string[]): DiffLine[] {
+function diffMiddle(a: string[], b: string[]): DiffLine[] {
   const mine = (words: string): DiffLine => ({ kind: "mine", words });
   const theirs = (words: string): DiffLine => ({ kind: "theirs", words });
-  if (a.length * b.length > MOST_PAIRS) return [...a.map(mine), ...b.map(theirs)];
-  const longest = common(a, b);
+  if (a.length * b.length > MAX_PAIRS) return [...a.map(mine), ...b.map(theirs)];
+  const longest = commonLengths(a, b);
   const lines: DiffLine[] = [];
   let [i, j] = [0, 0];
   while (i < a.length || j < b.length) {
@@ -38,8 +38,8 @@ function between(a: string[], b: string[]): DiffLine[] {
   return lines;
 }
 
-/** Length of the longest common sequence of the rests from i and j on. */
-function common(a: string[], b: string[]): Uint32Array[] {
+/** Lengths of the longest common subsequences of the suffixes from i and j. */
+function commonLengths(a: string[], b: string[]): Uint32Array[] {
   const table = Array.from({ length: a.length + 1 }, () => new Uint32Array(b.length + 1));
   for (let i = a.length - 1; i >= 0; i--) {
     for (let j = b.length - 1; j >= 0; j--) {
@@ -49,10 +49,10 @@ function common(a: string[], b: string[]): Uint32Array[] {
   return table;
 }
 
-/** Only the lines that differ, with so many lines around them; null stands for omitted lines. */
-export function condensed(lines: readonly DiffLine[], around = 2): (DiffLine | null)[] {
+/** Only the lines that differ, with some lines of context; null stands for omitted lines. */
+export function condense(lines: readonly DiffLine[], context = 2): (DiffLine | null)[] {
   const isNear = (at: number): boolean =>
-    lines.slice(Math.max(0, at - around), at + around + 1).some(({ kind }) => kind !== "same");
+    lines.slice(Math.max(0, at - context), at + context + 1).some(({ kind }) => kind !== "same");
   const shown: (DiffLine | null)[] = [];
   lines.forEach((line, at) => {
     if (isNear(at)) shown.push(line);

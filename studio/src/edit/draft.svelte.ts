@@ -1,54 +1,54 @@
-/** The one text of a scenario under work: canvas, forms and text view show it and change it. */
+/** The text of an edited scenario: canvas, forms and text view all show and change it. */
 
-import { Refused } from "../connection";
-import type { Answer, Edit, Problem } from "../protocol";
+import { RequestError } from "../connection";
+import type { ReplyBody, Edit, Problem } from "../protocol";
 import type { Session } from "../state/session.svelte";
-import { History } from "./history";
-import { isTable, isWithin, settled, type Path, type Table } from "./keypath";
-import { World } from "./schema";
+import { TextHistory } from "./history";
+import { isTable, isWithin, normalizedPath, type Path, type TomlTable } from "./keypath";
+import { WorldSchema } from "./schema";
 
-/** Pause in typing after which the text is checked. */
-const CHECK_AFTER_MS = 300;
+/** Pause in typing before the text is checked. */
+const CHECK_DELAY_MS = 300;
 
 export type Phase = "loading" | "checking" | "checked" | "failed";
 
 export class Draft {
   readonly session: Session;
   text = $state("");
-  /** The text as it is on the disk, as far as the page knows. */
+  /** The text on the disk, as far as the page knows. */
   saved = $state("");
   place = $state("");
   isLocked = $state(false);
   phase = $state<Phase>("loading");
-  /** The reason why nothing could be asked, if so. */
+  /** The reason why the last check failed, if it did. */
   failure = $state.raw<Problem | null>(null);
   problems = $state.raw<Problem[]>([]);
-  /** The tables of the last text that could be read. */
-  model = $state.raw<Table | null>(null);
-  world = $state.raw<World | null>(null);
+  /** The values of the last text that could be parsed. */
+  model = $state.raw<TomlTable | null>(null);
+  world = $state.raw<WorldSchema | null>(null);
   canUndo = $state(false);
   canRedo = $state(false);
-  /** The item chosen on the canvas and shown in the forms. */
-  chosen = $state.raw<Path | null>(null);
+  /** The item selected on the canvas and shown in the forms. */
+  selected = $state.raw<Path | null>(null);
   /** The text of the file, if another program changed it. */
   theirs = $state<string | null>(null);
   /** The section that the forms show. */
   open = $state.raw<Path>([]);
-  /** A problem that the open view is to bring into sight. */
-  goal = $state.raw<{ problem: Problem } | null>(null);
-  /** Whether the text has a file of its own by now. */
+  /** A problem that the open view should show. */
+  shownProblem = $state.raw<{ problem: Problem } | null>(null);
+  /** Whether the text has been saved to a file. */
   wasSaved = $state(false);
-  /** Whether a canvas shows the draft, which then starts anew with each valid text. */
+  /** Whether a canvas shows the draft; the run then restarts with each valid text. */
   isShown = false;
-  #history = new History("");
-  #asked = 0;
+  #history = new TextHistory("");
+  #checks = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #queue: Promise<unknown> = Promise.resolve();
-  /** The file that it was saved to, if not the one that it came from. */
+  /** The file that it was saved to, if it differs from its source. */
   #file: string | null = null;
-  /** The file of the last refused attempt to save: it holds another text. */
-  #wanted: string | null = null;
-  /** The text that runs now. */
+  /** The file of the last refused attempt to save, which has another text. */
+  #refusedFile: string | null = null;
+  /** The text of the current run. */
   #running = "";
   #checked = "";
 
@@ -64,17 +64,17 @@ export class Draft {
     return this.problems.filter((problem) => !problem.is_warning);
   }
 
-  /** Returns whether another text runs than this one. */
+  /** Returns whether the run has another text. */
   get differsFromRun(): boolean {
     return this.text !== this.#running;
   }
 
-  /** Resolves when the text is here, with the known facts about its keys. */
-  loaded: Promise<void> = Promise.resolve();
+  /** Resolves when the text and the schema are loaded. */
+  whenLoaded: Promise<void> = Promise.resolve();
 
-  /** Fetches the text and the known facts about its keys. */
+  /** Fetches the text and the schema. */
   load(): void {
-    this.loaded = this.#load();
+    this.whenLoaded = this.#load();
   }
 
   async #load(): Promise<void> {
@@ -85,45 +85,45 @@ export class Draft {
       this.isLocked = answer.read_only;
       this.saved = answer.text;
       this.#running = this.session.text ?? answer.text;
-      this.#history = new History(this.#running);
-      this.#took(false);
-      await Promise.all([this.#loadSchema(), this.#settle()]);
+      this.#history = new TextHistory(this.#running);
+      this.#onTextChange(false);
+      await Promise.all([this.#loadSchema(), this.#checkNow()]);
     } catch (error) {
-      this.#failed(error);
+      this.#onFailure(error);
     }
   }
 
   async #loadSchema(): Promise<void> {
     try {
-      const answer = await this.session.ask({ do: "schema", world: this.session.scene.world });
-      if (answer.is === "schema" && isTable(answer.schema)) this.world = new World(answer.schema);
+      const answer = await this.session.request({ do: "schema", world: this.session.scene.world });
+      if (answer.is === "schema" && isTable(answer.schema)) this.world = new WorldSchema(answer.schema);
     } catch (error) {
-      // Without a schema the text can be changed all the same.
-      if (!(error instanceof Refused)) throw error;
+      // Without a schema the text can still be edited.
+      if (!(error instanceof RequestError)) throw error;
     }
   }
 
-  #failed(error: unknown): void {
-    if (!(error instanceof Refused)) throw error;
+  #onFailure(error: unknown): void {
+    if (!(error instanceof RequestError)) throw error;
     this.failure = error.problem;
     this.phase = "failed";
   }
 
-  // Changes: each is one step of the history.
+  // Edits: each is one step of the history.
 
-  /** Takes the text as it is typed. */
+  /** Replaces the text while typing. */
   type(text: string): void {
-    this.#push(text, "typing", CHECK_AFTER_MS);
+    this.#push(text, "typing", CHECK_DELAY_MS);
   }
 
-  /** Takes another text in whole. */
+  /** Replaces the whole text. */
   replace(text: string): void {
     this.#push(text, null, 0);
   }
 
   /**
-   * Has the program change keys of the text; one after the other, all or nothing. The changes may depend on the text
-   * as earlier changes left it. Returns whether it was done.
+   * Lets the server edit keys of the text: in order, all or none. The edits may depend on the text as earlier edits left
+   * it. Returns whether they were applied.
    */
   edit(edits: readonly Edit[] | (() => readonly Edit[])): Promise<boolean> {
     const done = this.#queue.then(() => this.#edit(edits));
@@ -132,50 +132,55 @@ export class Draft {
   }
 
   async #edit(edits: readonly Edit[] | (() => readonly Edit[])): Promise<boolean> {
-    await this.#upToDate();
-    const wanted = typeof edits === "function" ? edits() : edits;
-    if (wanted.length === 0 || this.isLocked) return false;
+    await this.#waitUntilChecked();
+    const list = typeof edits === "function" ? edits() : edits;
+    if (list.length === 0 || this.isLocked) return false;
     const before = this.text;
     try {
-      const answer = await this.session.ask({ do: "edit", session: this.session.id, text: before, edits: [...wanted] });
+      const answer = await this.session.request({
+        do: "edit",
+        session: this.session.id,
+        text: before,
+        edits: [...list],
+      });
       if (answer.is !== "edited") return false;
-      // Text typed meanwhile stays; the edit is then asked for again over it.
+      // Text typed meanwhile is kept: the edit is then repeated on it.
       if (this.text !== before) return await this.#edit(edits);
       this.#push(answer.text, null, 0);
-      await this.settled;
+      await this.whenChecked;
       return true;
     } catch (error) {
-      if (!(error instanceof Refused)) throw error;
-      this.session.complain(error.problem);
+      if (!(error instanceof RequestError)) throw error;
+      this.session.reportProblem(error.problem);
       return false;
     }
   }
 
-  /** Waits until the tables are those of the text, just-typed text included. */
-  async #upToDate(): Promise<void> {
+  /** Waits until the values are those of the current text. */
+  async #waitUntilChecked(): Promise<void> {
     if (this.#timer !== undefined) {
       clearTimeout(this.#timer);
       this.#timer = undefined;
-      this.settled = this.#settle();
+      this.whenChecked = this.#checkNow();
     }
-    await this.settled;
+    await this.whenChecked;
   }
 
   undo(): void {
-    if (this.#history.undo()) this.#took();
+    if (this.#history.undo()) this.#onTextChange();
   }
 
   redo(): void {
-    if (this.#history.redo()) this.#took();
+    if (this.#history.redo()) this.#onTextChange();
   }
 
   #push(text: string, group: string | null, wait_ms: number): void {
     if (this.isLocked || text === this.text) return;
     this.#history.push(text, group, performance.now());
-    this.#took(true, wait_ms);
+    this.#onTextChange(true, wait_ms);
   }
 
-  #took(checks = true, wait_ms = 0): void {
+  #onTextChange(checks = true, wait_ms = 0): void {
     this.text = this.#history.now;
     this.canUndo = this.#history.canUndo;
     this.canRedo = this.#history.canRedo;
@@ -184,39 +189,39 @@ export class Draft {
     this.phase = "checking";
     clearTimeout(this.#timer);
     this.#timer = undefined;
-    if (wait_ms > 0) this.#timer = setTimeout(() => this.#typedOut(), wait_ms);
-    else this.settled = this.#settle();
+    if (wait_ms > 0) this.#timer = setTimeout(() => this.#onTypingPause(), wait_ms);
+    else this.whenChecked = this.#checkNow();
   }
 
-  #typedOut(): void {
+  #onTypingPause(): void {
     this.#timer = undefined;
-    this.settled = this.#settle();
+    this.whenChecked = this.#checkNow();
   }
 
-  /** Resolves when the answers about the newest text are known. */
-  settled: Promise<void> = Promise.resolve();
+  /** Resolves when the newest text is checked. */
+  whenChecked: Promise<void> = Promise.resolve();
 
-  /** Checks the text, reads its tables, and shows it. */
-  async #settle(): Promise<void> {
-    const number = ++this.#asked;
+  /** Checks the text, reads its values, and shows it. */
+  async #checkNow(): Promise<void> {
+    const number = ++this.#checks;
     const text = this.text;
     const { session } = this;
     this.phase = "checking";
     try {
-      const model = session.ask({ do: "model", session: session.id, text }).catch((error: unknown) => {
-        if (!(error instanceof Refused)) throw error;
+      const model = session.request({ do: "model", session: session.id, text }).catch((error: unknown) => {
+        if (!(error instanceof RequestError)) throw error;
         return null;
       });
       const [answer, read] = await Promise.all([session.check(text), model]);
-      if (number !== this.#asked) return;
-      this.#learned(text, answer, read);
-      if (this.isShown) await this.show();
+      if (number !== this.#checks) return;
+      this.#onChecked(text, answer, read);
+      if (this.isShown) await this.runIfValid();
     } catch (error) {
-      if (number === this.#asked) this.#failed(error);
+      if (number === this.#checks) this.#onFailure(error);
     }
   }
 
-  #learned(text: string, answer: Answer, read: Answer | null): void {
+  #onChecked(text: string, answer: ReplyBody, read: ReplyBody | null): void {
     if (answer.is === "problems") this.problems = answer.problems;
     if (read?.is === "model" && isTable(read.value)) this.model = read.value;
     this.failure = null;
@@ -224,45 +229,45 @@ export class Draft {
     this.#checked = text;
   }
 
-  /** Repeats the check if it may have failed for want of a connection. */
+  /** Repeats the check if it failed, as without a connection. */
   recheck(): void {
     if (this.phase !== "failed") return;
     if (this.place === "") this.load();
-    else this.settled = this.#settle();
+    else this.whenChecked = this.#checkNow();
   }
 
-  /** Has the canvas show the text, if it is valid: the run starts anew with it, and waits. */
-  async show(): Promise<void> {
+  /** Restarts the run, paused, with the text if it is valid, so that the canvas shows it. */
+  async runIfValid(): Promise<void> {
     const { text } = this;
     const isValid = this.#checked === text && this.phase === "checked" && this.errors.length === 0;
     if (!isValid || text === this.#running) return;
-    // Set before it is done, so that no caller asks for the same twice.
+    // Set in advance, so that no caller requests the same restart twice.
     const before = this.#running;
     this.#running = text;
     if (!(await this.session.restart(null, text))) this.#running = before;
   }
 
-  /** Starts the run with this text. Returns whether the server agreed. */
+  /** Restarts the run with this text. Returns whether the server accepted. */
   async run(): Promise<boolean> {
     await this.#queue;
     if (this.isLocked) return false;
     const { text } = this;
-    const worked = await this.session.restart(null, text);
-    if (worked) this.#running = text;
-    else if (this.text === text) this.settled = this.#settle();
-    return worked;
+    const isStarted = await this.session.restart(null, text);
+    if (isStarted) this.#running = text;
+    else if (this.text === text) this.whenChecked = this.#checkNow();
+    return isStarted;
   }
 
-  /** Writes the text to its file, or to another, which is its own from then on. Returns whether it is there now. */
-  async save(to: string | null, over: boolean): Promise<boolean> {
-    // A change that is on its way was made before.
+  /** Saves the text to its file, or to another one, which becomes its own. Returns whether it was saved. */
+  async save(to: string | null, overwrite: boolean): Promise<boolean> {
+    // Pending edits come first.
     await this.#queue;
     const { text } = this;
     const file = to ?? this.#file;
-    const answer = await this.session.tell({ do: "save", text, to: file, base: this.saved, over });
+    const answer = await this.session.send({ do: "save", text, to: file, base: this.saved, overwrite });
     if (answer?.is === "differs") {
       this.theirs = answer.text;
-      this.#wanted = file;
+      this.#refusedFile = file;
     }
     if (answer?.is !== "saved") return false;
     this.#file = file;
@@ -274,27 +279,27 @@ export class Draft {
     return true;
   }
 
-  /** Writes the text over that of another program. */
+  /** Overwrites the file that another program has changed. */
   keepMine(): Promise<boolean> {
-    return this.save(this.#wanted, true);
+    return this.save(this.#refusedFile, true);
   }
 
-  /** Takes the file's text, as one more step that can be undone. */
+  /** Takes the file's text as one undoable step. */
   takeTheirs(): void {
     if (this.theirs === null) return;
     const { theirs } = this;
-    this.#file = this.#wanted;
+    this.#file = this.#refusedFile;
     this.saved = theirs;
     this.theirs = null;
     this.replace(theirs);
     this.session.isUnsaved = this.isDirty;
   }
 
-  /** Problems at a path, or also below it. */
+  /** Problems at a path and, if `below`, under it. */
   problemsAt(path: Path, below: boolean): Problem[] {
     return this.problems.filter((problem) => {
       if (problem.key === null || problem.key === undefined) return false;
-      const at = settled(this.model ?? undefined, problem.key);
+      const at = normalizedPath(this.model ?? undefined, problem.key);
       return isWithin(at, path) && (below || at.length === path.length);
     });
   }
@@ -302,7 +307,7 @@ export class Draft {
 
 const drafts = new WeakMap<Session, Draft>();
 
-/** The draft of a session; fetched when it is first asked for. */
+/** The draft of a session; loaded on first use. */
 export function draftOf(session: Session): Draft {
   const known = drafts.get(session);
   if (known) {

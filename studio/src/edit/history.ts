@@ -1,9 +1,9 @@
-/** One history of texts for all three views: every step is a whole text, and none is ever dropped. */
+/** The undo history of the text, shared by all three views: every step is a whole text, and none is dropped. */
 
-/** Steps of one group that follow each other within this time are one. */
+/** Steps of one group within this time count as one. */
 const GROUP_MS = 1000;
 
-export class History {
+export class TextHistory {
   readonly #past: string[] = [];
   #future: string[] = [];
   #now: string;
@@ -26,7 +26,7 @@ export class History {
     return this.#future.length > 0;
   }
 
-  /** Adds a step. Texts that follow quickly in the same group, as in typing, belong to the step before. */
+  /** Adds a step. Quick successive texts of the same group, as in typing, extend the last step. */
   push(text: string, group: string | null, now_ms: number): void {
     if (text === this.#now) return;
     const continues = group !== null && group === this.#group && now_ms - this.#at_ms < GROUP_MS;
@@ -37,16 +37,16 @@ export class History {
     this.#at_ms = now_ms;
   }
 
-  /** Goes one step back. Returns whether there was one. */
+  /** Undoes a step. Returns whether there was one. */
   undo(): boolean {
-    return this.#go(this.#past, this.#future);
+    return this.#move(this.#past, this.#future);
   }
 
   redo(): boolean {
-    return this.#go(this.#future, this.#past);
+    return this.#move(this.#future, this.#past);
   }
 
-  #go(from: string[], to: string[]): boolean {
+  #move(from: string[], to: string[]): boolean {
     const text = from.pop();
     if (text === undefined) return false;
     to.push(this.#now);

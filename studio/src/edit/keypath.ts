@@ -1,8 +1,8 @@
-/** Paths of keys, as `--set` takes them: `robots.1.at.0`; keys that are not bare stand in quotes. */
+/** Paths of keys, as `--set` takes them: `robots.1.at.0`; keys that are not bare are quoted. */
 
 export type Path = readonly (string | number)[];
 export type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
-export type Table = { [key: string]: Json };
+export type TomlTable = { [key: string]: Json };
 
 const BARE = /^[A-Za-z0-9_-]+$/;
 
@@ -18,13 +18,13 @@ export function partsOf(key: string): string[] {
   const parts: string[] = [];
   const part = /"((?:[^"\\]|\\.)*)"|'([^']*)'|([^.]+)/g;
   for (const match of key.matchAll(part)) {
-    if (match[1] !== undefined) parts.push(unquoted(match[1]));
+    if (match[1] !== undefined) parts.push(unquote(match[1]));
     else parts.push(match[2] ?? match[3]!.trim());
   }
   return parts;
 }
 
-function unquoted(inner: string): string {
+function unquote(inner: string): string {
   try {
     return JSON.parse(`"${inner}"`) as string;
   } catch {
@@ -32,7 +32,7 @@ function unquoted(inner: string): string {
   }
 }
 
-export function isTable(value: unknown): value is Table {
+export function isTable(value: unknown): value is TomlTable {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }
 
@@ -47,8 +47,8 @@ export function valueAt(model: Json | undefined, path: Path): Json | undefined {
   return value;
 }
 
-/** A path of the program's without the 0 that it may give to a section that stands alone. */
-export function settled(model: Json | undefined, key: string): string[] {
+/** A path from the server without the index 0 of a section that is a single table. */
+export function normalizedPath(model: Json | undefined, key: string): string[] {
   const kept: string[] = [];
   let value: Json | undefined = model;
   for (const part of partsOf(key)) {
@@ -59,21 +59,21 @@ export function settled(model: Json | undefined, key: string): string[] {
   return kept;
 }
 
-/** Returns whether a path lies at or below another. */
+/** Returns whether a path is at or below another one. */
 export function isWithin(path: Path, of: Path): boolean {
   return path.length >= of.length && of.every((part, i) => String(part) === String(path[i]));
 }
 
 /** Sections under a key: one table counts as a list of one. */
-export function sectionsOf(model: Json | undefined, key: string): { path: Path; value: Table }[] {
+export function sectionsOf(model: Json | undefined, key: string): { path: Path; value: TomlTable }[] {
   const value = valueAt(model, [key]);
   if (isTable(value)) return [{ path: [key], value }];
   if (!Array.isArray(value)) return [];
   return value.flatMap((one, i) => (isTable(one) ? [{ path: [key, i], value: one }] : []));
 }
 
-/** A list of numbers, of at least so many; null for anything else. */
-export function numbersOf(value: Json | undefined, least: number): number[] | null {
-  const isRight = Array.isArray(value) && value.length >= least && value.every((one) => typeof one === "number");
+/** A list of at least `min` numbers; null for anything else. */
+export function numbersOf(value: Json | undefined, min: number): number[] | null {
+  const isRight = Array.isArray(value) && value.length >= min && value.every((one) => typeof one === "number");
   return isRight ? (value as number[]) : null;
 }

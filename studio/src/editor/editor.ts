@@ -1,4 +1,4 @@
-/** The text of a scenario in CodeMirror, in a shadow root, because there its styles need no inline element. */
+/** The text of a scenario in CodeMirror, in a shadow root, because its styles then need no inline element. */
 
 import {
   autocompletion,
@@ -14,8 +14,8 @@ import { Annotation, Compartment, EditorState } from "@codemirror/state";
 import { EditorView, highlightActiveLine, keymap, lineNumbers } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { completionAt } from "../edit/complete";
-import type { Table } from "../edit/keypath";
-import type { World } from "../edit/schema";
+import type { TomlTable } from "../edit/keypath";
+import type { WorldSchema } from "../edit/schema";
 import type { Problem } from "../protocol";
 
 const COLORS = EditorView.theme({
@@ -49,20 +49,20 @@ const HIGHLIGHT = HighlightStyle.define([
 ]);
 
 export interface EditorHooks {
-  changed(text: string): void;
-  undo(): void;
-  redo(): void;
-  /** The world's keys, once they are known. */
-  knows(): { world: World; model: Table | null } | null;
+  onChange(text: string): void;
+  onUndo(): void;
+  onRedo(): void;
+  /** The world's schema and the values of the text, once they are known. */
+  schema(): { world: WorldSchema; model: TomlTable | null } | null;
 }
 
-/** Marks changes that come from elsewhere than this view. */
-const FROM_OUTSIDE = Annotation.define<boolean>();
+/** Marks changes from outside this view. */
+const EXTERNAL_CHANGE = Annotation.define<boolean>();
 
-/** Options from the schema; descriptions stand beside them. */
+/** Completions from the schema, with descriptions. */
 function completions(hooks: EditorHooks): (context: CompletionContext) => CompletionResult | null {
   return (context) => {
-    const known = hooks.knows();
+    const known = hooks.schema();
     const found = known && completionAt(context.state.doc.toString(), context.pos, known.world, known.model);
     if (!found || (found.from === context.pos && !context.explicit)) return null;
     const options = found.options.map(({ label, words, kind }) => ({
@@ -86,10 +86,10 @@ export class Editor {
     frame.style.height = "100%";
     root.replaceChildren(frame);
     const steps = keymap.of([
-      { key: "Mod-z", run: () => (hooks.undo(), true), preventDefault: true },
-      { key: "Mod-Shift-z", run: () => (hooks.redo(), true), preventDefault: true },
-      { key: "Mod-y", run: () => (hooks.redo(), true), preventDefault: true },
-      // Left to the page, which runs the text.
+      { key: "Mod-z", run: () => (hooks.onUndo(), true), preventDefault: true },
+      { key: "Mod-Shift-z", run: () => (hooks.onRedo(), true), preventDefault: true },
+      { key: "Mod-y", run: () => (hooks.onRedo(), true), preventDefault: true },
+      // Handled by the page, which runs the text.
       { key: "Mod-Enter", run: () => true },
     ]);
     const state = EditorState.create({
@@ -105,8 +105,8 @@ export class Editor {
         keymap.of([...completionKeymap, ...defaultKeymap, indentWithTab]),
         EditorView.contentAttributes.of({ "aria-label": "Text of the scenario", tabindex: "0" }),
         EditorView.updateListener.of((update) => {
-          const isOurs = update.transactions.some((one) => one.docChanged && !one.annotation(FROM_OUTSIDE));
-          if (isOurs) hooks.changed(update.state.doc.toString());
+          const isOurs = update.transactions.some((one) => one.docChanged && !one.annotation(EXTERNAL_CHANGE));
+          if (isOurs) hooks.onChange(update.state.doc.toString());
         }),
         this.#locked.of([]),
         COLORS,
@@ -119,7 +119,7 @@ export class Editor {
     return this.#view.state.doc.toString();
   }
 
-  /** Takes a text from elsewhere; only the lines that differ are replaced, and shown if it is not the first. */
+  /** Sets the text; only the part that differs is replaced, and shown unless it is the first text. */
   setText(text: string, isLocked: boolean): void {
     const before = this.text;
     const effects = [this.#locked.reconfigure(isLocked ? [EditorState.readOnly.of(true)] : [])];
@@ -130,10 +130,10 @@ export class Editor {
     while (tail < Math.min(text.length, before.length) - from && text.at(-1 - tail) === before.at(-1 - tail)) tail++;
     const changes = { from, to: before.length - tail, insert: text.slice(from, text.length - tail) };
     const shows = before === "" ? {} : { selection: { anchor: text.length - tail }, scrollIntoView: true };
-    this.#view.dispatch({ changes, effects, ...shows, annotations: FROM_OUTSIDE.of(true) });
+    this.#view.dispatch({ changes, effects, ...shows, annotations: EXTERNAL_CHANGE.of(true) });
   }
 
-  /** Marks problems over all that they are about; those without a line stand at the first. */
+  /** Marks problems over their ranges; those without a line are marked on the first one. */
   mark(problems: readonly Problem[]): void {
     const { doc } = this.#view.state;
     const found = problems.map((problem): Diagnostic => {
@@ -149,7 +149,7 @@ export class Editor {
     this.#view.dispatch(setDiagnostics(this.#view.state, found));
   }
 
-  /** Returns the offset of a line and a column; both count from 1, columns in letters. */
+  /** Returns the offset of a line and a column; both count from 1, columns in characters. */
   #offset(line: number, column: number): number {
     const { doc } = this.#view.state;
     const at = doc.line(Math.min(doc.lines, Math.max(1, line)));
@@ -157,7 +157,7 @@ export class Editor {
     return Math.min(at.to, at.from + units);
   }
 
-  /** Puts the cursor at a line and shows it. */
+  /** Moves the cursor to a line and shows it. */
   goTo(line: number, column: number): void {
     const anchor = this.#offset(line, column);
     this.#view.dispatch({ selection: { anchor }, effects: EditorView.scrollIntoView(anchor, { y: "center" }) });

@@ -1,22 +1,22 @@
 /** Links of a fleet: pairs that hear each other. */
 
-import { whoKey } from "../format";
-import type { Fleet, Node, Who } from "../protocol";
+import { bodyKey } from "../format";
+import type { Fleet, FleetNode, BodyId } from "../protocol";
 
-/** Two agents by their numbers on the network, of which the second hears the first; where both hear each other there is one link. */
+/** Two agents by network number: the second hears the first. A mutual pair is one link. */
 export interface Link {
   from: number;
   to: number;
   isMutual: boolean;
 }
 
-/** The node of the agent that a body is, if it is one's. */
-export function nodeOf(fleet: Fleet, who: Who): Node | undefined {
-  const key = whoKey(who);
-  return fleet.nodes.find((node) => whoKey(node.who) === key);
+/** The node of a body's agent, if there is one. */
+export function nodeOf(fleet: Fleet, body: BodyId): FleetNode | undefined {
+  const key = bodyKey(body);
+  return fleet.nodes.find((node) => bodyKey(node.body) === key);
 }
 
-/** The links of a fleet, or of one agent of it; of all where `selected` is none. */
+/** The links of a fleet, or of its selected agent. */
 export function linksOf(fleet: Fleet, selected: number | null): Link[] {
   const hears = new Map(fleet.nodes.map((node) => [node.agent, new Set(node.heard)]));
   const links: Link[] = [];
@@ -30,19 +30,19 @@ export function linksOf(fleet: Fleet, selected: number | null): Link[] {
   return links;
 }
 
-/** People's words for the state of a node: it is there, late, or not. */
+/** Condition of a node: heard, late, or not connected. */
 export type Health = "well" | "late" | "away";
 
-/** Seconds without a sign of a node after which it is reported as late. */
-const LATE_S = 2;
+/** Seconds without a message after which a node counts as late. */
+const LATE_AFTER_S = 2;
 
-export function healthOf(node: Node): Health {
+export function healthOf(node: FleetNode): Health {
   if (node.state === "gone" || node.state === "awaited") return "away";
-  return (node.silent_s ?? 0) > LATE_S ? "late" : "well";
+  return (node.silent_s ?? 0) > LATE_AFTER_S ? "late" : "well";
 }
 
-/** A few words for a fleet as a whole. */
-export function fleetWords(fleet: Fleet): string {
+/** A short summary of a fleet. */
+export function fleetSummary(fleet: Fleet): string {
   const count = (health: Health): number => fleet.nodes.filter((node) => healthOf(node) === health).length;
   const [away, late] = [count("away"), count("late")];
   const all = `${fleet.nodes.length} ${fleet.nodes.length === 1 ? "node" : "nodes"}`;

@@ -1,9 +1,9 @@
-/** Tables of an inspection, made narrow. */
+/** Narrower tables of an inspection. */
 
 import type { Fact, Table } from "../protocol";
 
-/** Returns columns of one value as facts, and the table without them. A table of one row stays as it is. */
-export function lifted({ columns, rows }: Table): Table & { same: Fact[] } {
+/** Returns constant columns as facts, and the table without them. A table of one row stays unchanged. */
+export function hoistConstantColumns({ columns, rows }: Table): Table & { same: Fact[] } {
   const [first, ...others] = rows;
   if (!first || others.length === 0) return { same: [], columns, rows };
   const words = first.map((value) => JSON.stringify(value));

@@ -2,4 +2,4 @@
 export * from "./types";
 
 /** x, y and z in meters. */
-export type Place = [number, number, number];
+export type Point3 = [number, number, number];

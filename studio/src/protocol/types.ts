@@ -1,34 +1,34 @@
 // Written from crates/server/src/protocol by
 // `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
 
-/** Version of requests, replies, notices and frames together. */
-export const VERSION = 1;
+/** Version of requests, replies, notifications and frames together. */
+export const VERSION = 2;
 
 /**
  * A request; its reply has the same number.
  */
-export type Request = {
+export type ClientRequest = {
 /**
  * Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
  */
 id: number,
 /**
- * The question.
+ * What is asked.
  */
-call: Call, };
+call: Method, };
 
 /**
- * A question or an order of a page.
+ * A query or a command of a page.
  */
-export type Call = { "do": "files",
+export type Method = { "do": "files",
 /**
  * Its path, as a listing gave it.
  */
 folder: string | null, } | { "do": "open",
 /**
- * The thing to open.
+ * What to open.
  */
-what: Subject,
+target: OpenTarget,
 /**
  * Another seed than the scenario's.
  */
@@ -76,7 +76,7 @@ seed: number | null,
 /**
  * Another text for the scenario, which is not saved.
  */
-text: string | null, } | { "do": "look",
+text: string | null, } | { "do": "select-scans",
 /**
  * The session.
  */
@@ -84,7 +84,7 @@ session: number,
 /**
  * The bodies.
  */
-scans_of: Array<Who>, } | { "do": "credit",
+bodies: Array<BodyId>, } | { "do": "credit",
 /**
  * The session.
  */
@@ -100,7 +100,7 @@ session: number,
 /**
  * The body.
  */
-who: Who, } | { "do": "metrics",
+body: BodyId, } | { "do": "metrics",
 /**
  * The session.
  */
@@ -128,7 +128,7 @@ skip: number | null,
 /**
  * The largest number of events.
  */
-most: number, } | { "do": "source",
+limit: number, } | { "do": "source",
 /**
  * The session.
  */
@@ -189,7 +189,7 @@ base: string | null,
 /**
  * Whether a file is replaced even if it holds something else.
  */
-over: boolean, } | { "do": "schema",
+overwrite: boolean, } | { "do": "schema",
 /**
  * The world's name.
  */
@@ -253,7 +253,7 @@ cells: Array<[number, number, string]>, };
 /**
  * A thing that can be opened.
  */
-export type Subject = { "kind": "scenario",
+export type OpenTarget = { "kind": "scenario",
 /**
  * Its path, as a listing gave it.
  */
@@ -277,9 +277,9 @@ path: string, };
 export type Speed = { "times": number } | "fastest";
 
 /**
- * The name of a body: kind, number, and, for things that have parts, the part.
+ * The identity of a body: kind, number, and, for things that have parts, the part.
  */
-export type Who = {
+export type BodyId = {
 /**
  * Its kind, e.g. `robot`.
  */
@@ -300,17 +300,17 @@ export type Reply = {
 /**
  * The request's number; 0 for a request that could not be read.
  */
-id: number, } & ({ "answer": Answer } | { "problem": Problem });
+id: number, } & ({ "answer": ReplyBody } | { "problem": Problem });
 
 /**
  * The outcome of a request.
  */
-export type Outcome = { "answer": Answer } | { "problem": Problem };
+export type ReplyResult = { "answer": ReplyBody } | { "problem": Problem };
 
 /**
  * The answer to a request.
  */
-export type Answer = { "is": "done" } | { "is": "files",
+export type ReplyBody = { "is": "done" } | { "is": "files",
 /**
  * Its entries that can be opened, by name.
  */
@@ -326,7 +326,7 @@ scene: Scene,
 /**
  * Its state.
  */
-status: Status, } | { "is": "inspection" } & Inspection | { "is": "metrics",
+status: SessionStatus, } | { "is": "inspection" } & Inspection | { "is": "metrics",
 /**
  * The metrics.
  */
@@ -351,7 +351,7 @@ values: Array<Array<number | null>>, } | { "is": "events",
 /**
  * The events.
  */
-entries: Array<Event>,
+entries: Array<RunEvent>,
 /**
  * Number of events of these cycles that are not here: beyond the requested number, or never kept.
  */
@@ -498,9 +498,9 @@ export type MetricName = {
  */
 key: string,
 /**
- * A few words for it.
+ * A short label.
  */
-words: string,
+label: string,
 /**
  * Its unit; may be empty.
  */
@@ -509,7 +509,7 @@ unit: string, };
 /**
  * A message of the server without a request.
  */
-export type Notice = { "notice": "hello",
+export type ServerNotification = { "notice": "hello",
 /**
  * See [`VERSION`](super::VERSION).
  */
@@ -529,7 +529,7 @@ read_only: boolean,
 /**
  * The things that the command line asked to open.
  */
-open: Array<Named>, } | { "notice": "cast" } & Cast | { "notice": "status" } & Status | { "notice": "ended",
+open: Array<TargetRef>, } | { "notice": "bodies" } & BodyTable | { "notice": "status" } & SessionStatus | { "notice": "ended",
 /**
  * The session.
  */
@@ -540,9 +540,9 @@ session: number,
 problem: Problem, };
 
 /**
- * A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
+ * Something that the command line asked to open: a kind as in [`OpenTarget`](super::OpenTarget), with its path.
  */
-export type Named = {
+export type TargetRef = {
 /**
  * `scenario`, `recording`, `sweep` or `fleet`.
  */
@@ -555,7 +555,7 @@ path: string, };
 /**
  * The state of a session.
  */
-export type Status = {
+export type SessionStatus = {
 /**
  * The session.
  */
@@ -563,7 +563,7 @@ session: number,
 /**
  * Its activity.
  */
-state: State,
+state: SessionState,
 /**
  * Cycles done.
  */
@@ -604,7 +604,7 @@ fleet: Fleet | null, };
 /**
  * The activity of a session.
  */
-export type State = "playing" | "paused" | "seeking" | "watched" | "over" | "failed";
+export type SessionState = "playing" | "paused" | "seeking" | "watched" | "over" | "failed";
 
 /**
  * A fleet at one moment.
@@ -633,20 +633,20 @@ talk_p99_ms: number | null,
 /**
  * The nodes, by rising number of the agent.
  */
-nodes: Array<Node>, };
+nodes: Array<FleetNode>, };
 
 /**
  * The node of an agent.
  */
-export type Node = {
+export type FleetNode = {
 /**
  * The agent's number on the network.
  */
 agent: number,
 /**
- * The body by which the agent is seen.
+ * The body that shows the agent.
  */
-who: Who,
+body: BodyId,
 /**
  * A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
  */
@@ -715,11 +715,11 @@ cycle_s: number,
 /**
  * The floor, where it is known box by box.
  */
-floor: Floor | null,
+floor: OccupancyGrid | null,
 /**
  * Walls, obstacles that stand still, starts and goals.
  */
-bodies: Array<StillBody>,
+bodies: Array<StaticBody>,
 /**
  * Whether a recorded run is computed again.
  */
@@ -728,7 +728,7 @@ is_recording: boolean, };
 /**
  * A floor of square boxes, along the axes of its own plane.
  */
-export type Floor = {
+export type OccupancyGrid = {
 /**
  * Boxes along the first axis.
  */
@@ -757,11 +757,11 @@ runs: Array<number>, };
 /**
  * A body that stands still.
  */
-export type StillBody = {
+export type StaticBody = {
 /**
  * The body.
  */
-who: Who,
+id: BodyId,
 /**
  * Its own name, if it has one.
  */
@@ -773,15 +773,15 @@ at_m: [number, number, number],
 /**
  * Its orientation: a unit quaternion x, y, z, w.
  */
-turn: [number, number, number, number],
+orientation: [number, number, number, number],
 /**
  * Its shape.
  */
 shape: Shape,
 /**
- * Its look.
+ * Its appearance.
  */
-look: Look, };
+appearance: Appearance, };
 
 /**
  * The shape of a body, around its pose.
@@ -821,9 +821,9 @@ length_m: number,
 width_m: number, };
 
 /**
- * The look of a body, apart from its shape. Color per condition comes from the kernel's one table of appearance.
+ * The appearance of a body, apart from its shape. Colors per condition come from the one table of the kernel.
  */
-export type Look = {
+export type Appearance = {
 /**
  * Red, green and blue.
  */
@@ -839,17 +839,17 @@ layer: number, };
 
 /**
  * Bodies that move, in columns: body i is `kinds[kind[i]]`, `number[i]`, `part[i]` (-1: none), `shapes[shape[i]]`,
- * `looks[look[i]]`.
+ * `appearances[appearance[i]]`.
  */
-export type Cast = {
+export type BodyTable = {
 /**
  * The session.
  */
 session: number,
 /**
- * Its number, which frames name.
+ * Its number, to which frames refer.
  */
-cast: number,
+id: number,
 /**
  * The names of kinds.
  */
@@ -875,13 +875,13 @@ shapes: Array<Shape>,
  */
 shape: Array<number>,
 /**
- * Looks, each for the five conditions.
+ * Appearances, each for the five conditions.
  */
-looks: Array<[Look, Look, Look, Look, Look]>,
+appearances: Array<[Appearance, Appearance, Appearance, Appearance, Appearance]>,
 /**
- * The look of each body.
+ * The appearance of each body.
  */
-look: Array<number>,
+appearance: Array<number>,
 /**
  * Names of the bodies that have one: index of the body, name.
  */
@@ -910,7 +910,7 @@ failure: string,
 /**
  * Its recording; or its variant's scenario, which needs the seed.
  */
-replay: Named, };
+replay: TargetRef, };
 
 /**
  * The text at the end of a frame.
@@ -923,7 +923,7 @@ scans: Array<Scan>,
 /**
  * The last events since the frame before.
  */
-events: Array<Event>,
+events: Array<RunEvent>,
 /**
  * Number of events since the frame before that are not here.
  */
@@ -936,7 +936,7 @@ export type Scan = {
 /**
  * The body with the sensor.
  */
-of: Who,
+body: BodyId,
 /**
  * The sensor's name.
  */
@@ -948,7 +948,7 @@ at_m: [number, number, number],
 /**
  * The direction of its bearing 0: a unit quaternion x, y, z, w.
  */
-turn: [number, number, number, number],
+orientation: [number, number, number, number],
 /**
  * Bearing of each beam, in radians.
  */
@@ -967,9 +967,9 @@ true_m: Array<number | null>,
 range_m: number, };
 
 /**
- * An event.
+ * An event of a run.
  */
-export type Event = {
+export type RunEvent = {
 /**
  * The cycle in which it happened.
  */
@@ -985,11 +985,11 @@ kind: string,
 /**
  * The body concerned.
  */
-who: Who | null,
+body: BodyId | null,
 /**
  * The other body or thing that took part, if any.
  */
-with: Who | null,
+other: BodyId | null,
 /**
  * Its place, in meters.
  */
@@ -1003,9 +1003,9 @@ value: number | null,
  */
 unit: string,
 /**
- * The event in words.
+ * The event as text.
  */
-words: string, };
+text: string, };
 
 /**
  * Facts and marks of a body: its percepts, decisions and deeds.
@@ -1014,7 +1014,7 @@ export type Inspection = {
 /**
  * The body.
  */
-who: Who,
+body: BodyId,
 /**
  * Cycles done.
  */
@@ -1073,7 +1073,7 @@ value: number,
 /**
  * Its unit; may be empty.
  */
-unit: string, } } | { "share": number } | { "text": string } | { "who": Who } | { "place": [number, number, number] } | { "yes": boolean } | "none";
+unit: string, } } | { "share": number } | { "text": string } | { "body": BodyId } | { "place": [number, number, number] } | { "flag": boolean } | "none";
 
 /**
  * Facts in rows.

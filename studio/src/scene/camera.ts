@@ -1,36 +1,36 @@
-/** Two cameras with one face: straight down on the plane, and around a point in space. */
+/** Two cameras with one interface: straight down on the plane, and in orbit around a point in space. */
 
-import { Matrix4, OrthographicCamera, PerspectiveCamera, Vector3, type Camera } from "three";
-import type { Place } from "../protocol";
+import { Matrix4, OrthographicCamera, PerspectiveCamera, Vector3, type Camera as ThreeCamera } from "three";
+import type { Point3 } from "../protocol";
 
 /** A box that holds a scene, in meters. */
 export interface Extent {
-  lo: Place;
-  hi: Place;
+  low: Point3;
+  high: Point3;
 }
 
-export interface Eye {
-  readonly camera: Camera;
+export interface Camera {
+  readonly threeCamera: ThreeCamera;
   resize(width_px: number, height_px: number): void;
   fit(extent: Extent): void;
   pan(dx_px: number, dy_px: number): void;
-  /** Brings nearer by a factor, and keeps the place at this point of the canvas. */
+  /** Zooms in by a factor; the position under this point of the canvas stays. */
   zoom(factor: number, x_px: number, y_px: number): void;
   rotate(dx_px: number, dy_px: number): void;
-  /** Moves so that a place is in the middle. */
-  center(at: Place): void;
-  /** Meters of a pixel at the point that is looked at. */
+  /** Centers a position. */
+  center(at: Point3): void;
+  /** Meters per pixel at the target point. */
   readonly mPerPx: number;
-  /** The point that is looked at. */
-  readonly middle: Place;
-  /** The place at a point of the canvas; in space that one of them which is as far away as another place. */
-  under(x_px: number, y_px: number, as: Place): Place;
-  /** Returns the x and y in pixels at which a place appears, and whether it is in front. */
+  /** The target point. */
+  readonly middle: Point3;
+  /** The position under a point of the canvas; in space, at the same depth as a reference position. */
+  unproject(x_px: number, y_px: number, as: Point3): Point3;
+  /** Returns x and y in pixels of a position, and whether it is in front of the camera. */
   project(x: number, y: number, z: number): [number, number, boolean];
 }
 
-export class PlaneEye implements Eye {
-  readonly camera = new OrthographicCamera(-1, 1, 1, -1, 0, 2000);
+export class PlaneCamera implements Camera {
+  readonly threeCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 2000);
   mPerPx = 0.05;
   x = 0;
   y = 0;
@@ -38,7 +38,7 @@ export class PlaneEye implements Eye {
   #height = 1;
 
   constructor() {
-    this.camera.position.z = 1000;
+    this.threeCamera.position.z = 1000;
   }
 
   resize(width_px: number, height_px: number): void {
@@ -47,7 +47,7 @@ export class PlaneEye implements Eye {
     this.#update();
   }
 
-  fit({ lo, hi }: Extent): void {
+  fit({ low: lo, high: hi }: Extent): void {
     this.x = (lo[0] + hi[0]) / 2;
     this.y = (lo[1] + hi[1]) / 2;
     const wide = (hi[0] - lo[0]) / Math.max(40, this.#width - 90);
@@ -75,22 +75,22 @@ export class PlaneEye implements Eye {
     this.pan(dx_px, dy_px);
   }
 
-  center([x, y]: Place): void {
+  center([x, y]: Point3): void {
     this.x = x;
     this.y = y;
     this.#update();
   }
 
-  /** The place at a point of the canvas. */
+  /** The position under a point of the canvas. */
   at(x_px: number, y_px: number): [number, number] {
     return [this.x + (x_px - this.#width / 2) * this.mPerPx, this.y - (y_px - this.#height / 2) * this.mPerPx];
   }
 
-  get middle(): Place {
+  get middle(): Point3 {
     return [this.x, this.y, 0];
   }
 
-  under(x_px: number, y_px: number): Place {
+  unproject(x_px: number, y_px: number): Point3 {
     return [...this.at(x_px, y_px), 0];
   }
 
@@ -101,7 +101,7 @@ export class PlaneEye implements Eye {
 
   #update(): void {
     const [halfW, halfH] = [(this.#width / 2) * this.mPerPx, (this.#height / 2) * this.mPerPx];
-    const camera = this.camera;
+    const camera = this.threeCamera;
     [camera.left, camera.right, camera.top, camera.bottom] = [-halfW, halfW, halfH, -halfH];
     camera.position.set(this.x, this.y, 1000);
     camera.updateProjectionMatrix();
@@ -111,8 +111,8 @@ export class PlaneEye implements Eye {
 
 const FIELD_OF_VIEW_DEG = 40;
 
-export class SpaceEye implements Eye {
-  readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
+export class SpaceCamera implements Camera {
+  readonly threeCamera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
   readonly target = new Vector3();
   #distance = 10;
   #azimuth = -0.9;
@@ -123,7 +123,7 @@ export class SpaceEye implements Eye {
   readonly #point = new Vector3();
 
   constructor() {
-    this.camera.up.set(0, 0, 1);
+    this.threeCamera.up.set(0, 0, 1);
   }
 
   get mPerPx(): number {
@@ -133,22 +133,22 @@ export class SpaceEye implements Eye {
   resize(width_px: number, height_px: number): void {
     this.#width = Math.max(1, width_px);
     this.#height = Math.max(1, height_px);
-    this.camera.aspect = this.#width / this.#height;
+    this.threeCamera.aspect = this.#width / this.#height;
     this.#update();
   }
 
-  fit({ lo, hi }: Extent): void {
+  fit({ low: lo, high: hi }: Extent): void {
     this.target.set((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2);
     const radius = 0.5 * Math.hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]);
-    const narrow = Math.min(1, this.camera.aspect);
-    // Room for the names of the axes, which stand beyond the box.
+    const narrow = Math.min(1, this.threeCamera.aspect);
+    // Margin for the axis labels, which lie outside the box.
     this.#distance = Math.max(1e-4, (1.1 * radius) / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360) / narrow);
     this.#update();
   }
 
   pan(dx_px: number, dy_px: number): void {
-    const side = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
-    const up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
+    const side = new Vector3().setFromMatrixColumn(this.threeCamera.matrixWorld, 0);
+    const up = new Vector3().setFromMatrixColumn(this.threeCamera.matrixWorld, 1);
     this.target.addScaledVector(side, -dx_px * this.mPerPx).addScaledVector(up, dy_px * this.mPerPx);
     this.#update();
   }
@@ -164,23 +164,23 @@ export class SpaceEye implements Eye {
     this.#update();
   }
 
-  center(at: Place): void {
+  center(at: Point3): void {
     this.target.set(...at);
     this.#update();
   }
 
-  get middle(): Place {
+  get middle(): Point3 {
     return this.target.toArray();
   }
 
-  under(x_px: number, y_px: number, as: Place): Place {
-    const from = this.camera.position;
-    const way = new Vector3((2 * x_px) / this.#width - 1, 1 - (2 * y_px) / this.#height, 0.5)
-      .unproject(this.camera)
+  unproject(x_px: number, y_px: number, as: Point3): Point3 {
+    const from = this.threeCamera.position;
+    const ray = new Vector3((2 * x_px) / this.#width - 1, 1 - (2 * y_px) / this.#height, 0.5)
+      .unproject(this.threeCamera)
       .sub(from);
-    const ahead = this.camera.getWorldDirection(new Vector3());
-    const far = ahead.dot(new Vector3(...as).sub(from)) / ahead.dot(way);
-    return way.multiplyScalar(far).add(from).toArray();
+    const ahead = this.threeCamera.getWorldDirection(new Vector3());
+    const far = ahead.dot(new Vector3(...as).sub(from)) / ahead.dot(ray);
+    return ray.multiplyScalar(far).add(from).toArray();
   }
 
   project(x: number, y: number, z: number): [number, number, boolean] {
@@ -189,7 +189,7 @@ export class SpaceEye implements Eye {
   }
 
   #update(): void {
-    const camera = this.camera;
+    const camera = this.threeCamera;
     const flat = Math.cos(this.#elevation) * this.#distance;
     camera.position.set(
       this.target.x + flat * Math.cos(this.#azimuth),

@@ -1,21 +1,21 @@
-/** Pointer, wheel and fingers on a canvas. */
+/** Pointer, wheel and touch input of a canvas. */
 
-import { PlaneEye, type Eye } from "./camera";
+import { PlaneCamera, type Camera } from "./camera";
 
-export interface Hand {
-  eye(): Eye | null;
-  moved(): void;
-  hover(x_px: number, y_px: number): void;
-  left(): void;
-  click(x_px: number, y_px: number): void;
+export interface PointerHandlers {
+  camera(): Camera | null;
+  onMove(): void;
+  onHover(x_px: number, y_px: number): void;
+  onLeave(): void;
+  onClick(x_px: number, y_px: number): void;
 }
 
-/** A press that moves less than this is a click. */
+/** A press that moves less than this counts as a click. */
 const CLICK_PX = 4;
 
-export function attach(canvas: HTMLElement, hand: Hand): () => void {
+export function attachPointer(canvas: HTMLElement, handlers: PointerHandlers): () => void {
   const fingers = new Map<number, [number, number]>();
-  let traveled = 0;
+  let traveled_px = 0;
   const at = (event: MouseEvent): [number, number] => {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -23,50 +23,51 @@ export function attach(canvas: HTMLElement, hand: Hand): () => void {
 
   const down = (event: PointerEvent): void => {
     canvas.setPointerCapture(event.pointerId);
-    if (fingers.size === 0) traveled = 0;
+    if (fingers.size === 0) traveled_px = 0;
     fingers.set(event.pointerId, at(event));
   };
   const move = (event: PointerEvent): void => {
     const now = at(event);
     const before = fingers.get(event.pointerId);
-    if (!before) return hand.hover(...now);
+    if (!before) return handlers.onHover(...now);
     const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
-    traveled += Math.hypot(dx, dy);
+    traveled_px += Math.hypot(dx, dy);
     if (fingers.size === 2) pinch(event.pointerId, before, now);
-    else if (traveled >= CLICK_PX) drag(event, dx, dy);
+    else if (traveled_px >= CLICK_PX) drag(event, dx, dy);
     fingers.set(event.pointerId, now);
   };
   const drag = (event: PointerEvent, dx: number, dy: number): void => {
-    const eye = hand.eye();
-    if (!eye) return;
-    const pans = eye instanceof PlaneEye || event.shiftKey || (event.buttons & 6) !== 0;
-    if (pans) eye.pan(dx, dy);
-    else eye.rotate(dx, dy);
-    hand.moved();
+    const camera = handlers.camera();
+    if (!camera) return;
+    const pans = camera instanceof PlaneCamera || event.shiftKey || (event.buttons & 6) !== 0;
+    if (pans) camera.pan(dx, dy);
+    else camera.rotate(dx, dy);
+    handlers.onMove();
   };
   const pinch = (id: number, before: [number, number], now: [number, number]): void => {
     const other = [...fingers].find(([key]) => key !== id)?.[1];
-    const eye = hand.eye();
-    if (!other || !eye) return;
+    const camera = handlers.camera();
+    if (!other || !camera) return;
     const span = (p: [number, number]): number => Math.max(10, Math.hypot(p[0] - other[0], p[1] - other[1]));
-    eye.zoom(span(now) / span(before), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
-    eye.pan((now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
-    hand.moved();
+    camera.zoom(span(now) / span(before), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
+    camera.pan((now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
+    handlers.onMove();
   };
   const up = (event: PointerEvent): void => {
     const wasDown = fingers.delete(event.pointerId);
-    if (wasDown && event.type === "pointerup" && traveled < CLICK_PX && event.button === 0) hand.click(...at(event));
+    if (wasDown && event.type === "pointerup" && traveled_px < CLICK_PX && event.button === 0)
+      handlers.onClick(...at(event));
   };
   const wheel = (event: WheelEvent): void => {
     event.preventDefault();
-    const eye = hand.eye();
-    if (!eye) return;
+    const camera = handlers.camera();
+    if (!camera) return;
     const lines = event.deltaMode === 1 ? 30 : 1;
-    eye.zoom(Math.exp(-event.deltaY * lines * 0.0015), ...at(event));
-    hand.moved();
+    camera.zoom(Math.exp(-event.deltaY * lines * 0.0015), ...at(event));
+    handlers.onMove();
   };
   const noMenu = (event: Event): void => event.preventDefault();
-  const leave = (): void => hand.left();
+  const leave = (): void => handlers.onLeave();
 
   canvas.addEventListener("pointerdown", down);
   canvas.addEventListener("pointermove", move);

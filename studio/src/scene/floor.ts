@@ -1,4 +1,4 @@
-/** The floor of boxes: its runs, and one texture that shows them. */
+/** The occupancy grid: its run-length code, and the texture that shows it. */
 
 import {
   DataTexture,
@@ -8,12 +8,12 @@ import {
   PlaneGeometry,
   type RawShaderMaterial,
 } from "three";
-import type { Floor } from "../protocol";
+import type { OccupancyGrid } from "../protocol";
 import { material } from "./material";
 import type { Palette, Rgb } from "./palette";
 
-/** Unrolls the runs of a floor: a code for each box. Boxes that no run reaches are unknown (2). */
-export function boxesOf(floor: Pick<Floor, "width" | "height" | "runs">): Uint8Array {
+/** Decodes the runs of a floor to one code per box. Boxes without a run are unknown (2). */
+export function boxesOf(floor: Pick<OccupancyGrid, "width" | "height" | "runs">): Uint8Array {
   const boxes = new Uint8Array(floor.width * floor.height).fill(2);
   let at = 0;
   for (let i = 0; i + 1 < floor.runs.length && at < boxes.length; i += 2) {
@@ -48,12 +48,12 @@ export class FloorLayer {
   readonly #boxes: Uint8Array;
   readonly #texture: DataTexture;
 
-  constructor(floor: Floor) {
+  constructor(floor: OccupancyGrid) {
     this.#boxes = boxesOf(floor);
     const pixels = new Uint8Array(4 * this.#boxes.length);
     const texture = new DataTexture(pixels, floor.width, floor.height);
     texture.magFilter = NearestFilter;
-    // From afar single boxes would be picked at random; one sample of a smaller picture is cheap in software too.
+    // From far away, sampling single boxes would flicker; one sample of a mipmap is cheap in software renderers too.
     texture.minFilter = NearestMipmapNearestFilter;
     texture.generateMipmaps = true;
     this.#texture = texture;

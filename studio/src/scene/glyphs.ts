@@ -12,7 +12,7 @@ export const ROD = 3;
 
 const VERTEX = `
 in vec3 pose;      // x, y, heading
-in vec4 form;      // half length, half width, kind, least half length in pixels
+in vec4 form;      // half length, half width, kind, minimum half length in pixels
 in vec4 tint;
 uniform float pxPerM;
 out vec2 at;
@@ -60,7 +60,7 @@ float dart(vec2 p) {
   return max(dot(q - tip, a), dot(q - notch, b));
 }
 void main() {
-  // A body of a few pixels needs no form: a crowd is drawn as squares, whose corners the rasterizer cuts.
+  // A body of a few pixels needs no shape: a crowd is drawn as squares, which the rasterizer clips.
   if (max(extent.x, extent.y) < 2.0) {
     color = ink;
     return;
@@ -72,14 +72,14 @@ void main() {
   else d = length(vec2(max(abs(at.x) - extent.x + extent.y, 0.0), at.y)) - extent.y;
   float inside = clamp(0.5 - d, 0.0, 1.0);
   if (inside <= 0.0) discard;
-  float least = min(extent.x, extent.y);
+  float minHalf = min(extent.x, extent.y);
   vec3 body = ink.rgb;
   // A rim where there is room for one, and a tick toward the front of agents.
-  float rim = clamp(d + 1.6, 0.0, 1.0) * smoothstep(3.0, 5.0, least);
+  float rim = clamp(d + 1.6, 0.0, 1.0) * smoothstep(3.0, 5.0, minHalf);
   body = mix(body, edge, rim * 0.6);
   if (agent > 0.5 && kind < 1.5) {
-    float tick = 1.0 - clamp(abs(at.y) - max(0.6, 0.12 * least) + 0.5, 0.0, 1.0);
-    tick *= step(0.0, at.x) * smoothstep(3.0, 5.0, least) * (1.0 - rim);
+    float tick = 1.0 - clamp(abs(at.y) - max(0.6, 0.12 * minHalf) + 0.5, 0.0, 1.0);
+    tick *= step(0.0, at.x) * smoothstep(3.0, 5.0, minHalf) * (1.0 - rim);
     float light = dot(ink.rgb, vec3(0.2126, 0.7152, 0.0722));
     body = mix(body, light > 0.55 ? vec3(0.0) : vec3(1.0), tick * 0.9);
   }
@@ -115,10 +115,10 @@ export class Glyphs {
     this.#uniforms.edge.value = palette.isDark ? [1, 1, 1] : [0, 0, 0];
   }
 
-  /** Begins anew, with room for so many. */
-  begin(most: number): void {
+  /** Starts over, with room for this many glyphs. */
+  begin(capacity: number): void {
     this.#count = 0;
-    this.quads.reserve(most);
+    this.quads.reserve(capacity);
     this.#pose = this.quads.floats("pose");
     this.#form = this.quads.floats("form");
     this.#tint = this.quads.words("tint");
@@ -131,7 +131,7 @@ export class Glyphs {
     halfLength: number,
     halfWidth: number,
     kind: number,
-    leastPx: number,
+    minPx: number,
     tint: number,
   ): void {
     const i = this.#count++;
@@ -143,11 +143,11 @@ export class Glyphs {
     this.#form[f] = halfLength;
     this.#form[f + 1] = halfWidth;
     this.#form[f + 2] = kind;
-    this.#form[f + 3] = leastPx;
+    this.#form[f + 3] = minPx;
     this.#tint[i] = tint;
   }
 
-  /** A rod between two places. */
+  /** A rod between two positions. */
   rod(x0: number, y0: number, x1: number, y1: number, thickness: number, tint: number): void {
     const [dx, dy] = [x1 - x0, y1 - y0];
     const half = 0.5 * Math.hypot(dx, dy) + 0.5 * thickness;

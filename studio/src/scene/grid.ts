@@ -1,8 +1,8 @@
-/** Lines at round distances, so that a scene has a measure. */
+/** Grid lines at round distances, to show the scale of a scene. */
 
-import type { Extent, Eye } from "./camera";
-import { PlaneEye } from "./camera";
-import { word, type Palette } from "./palette";
+import type { Extent, Camera } from "./camera";
+import { PlaneCamera } from "./camera";
+import { packColor, type Palette } from "./palette";
 import type { Strokes } from "./strokes";
 
 /** The smallest of 1, 2 and 5 times a power of ten that is not less. */
@@ -19,20 +19,20 @@ export function multiples(lo: number, hi: number, step: number): number[] {
   return found;
 }
 
-/** The part of the plane that is seen, with the step of its grid. */
+/** The grid of the visible part of the plane, with its step. */
 export function planeGrid(
-  eye: PlaneEye,
+  camera: PlaneCamera,
   width_px: number,
   height_px: number,
 ): { xs: number[]; ys: number[]; step: number } {
-  const step = roundUp(90 * eye.mPerPx);
-  const [x0, y1] = eye.at(0, 0);
-  const [x1, y0] = eye.at(width_px, height_px);
+  const step = roundUp(90 * camera.mPerPx);
+  const [x0, y1] = camera.at(0, 0);
+  const [x1, y0] = camera.at(width_px, height_px);
   return { xs: multiples(x0, x1, step), ys: multiples(y0, y1, step), step };
 }
 
 /** The floor of a scene in space, with the step of its grid. */
-export function spaceGrid({ lo, hi }: Extent): { xs: number[]; ys: number[]; step: number; z: number } {
+export function spaceGrid({ low: lo, high: hi }: Extent): { xs: number[]; ys: number[]; step: number; z: number } {
   const size = Math.max(hi[0] - lo[0], hi[1] - lo[1], 1e-6);
   const step = roundUp(size / 14);
   const out = (k: 0 | 1): [number, number] => [Math.floor(lo[k] / step) * step, Math.ceil(hi[k] / step) * step];
@@ -42,17 +42,17 @@ export function spaceGrid({ lo, hi }: Extent): { xs: number[]; ys: number[]; ste
 /** Draws the grid of the visible part. */
 export function drawGrid(
   strokes: Strokes,
-  eye: Eye,
+  camera: Camera,
   extent: Extent,
   size_px: [number, number],
   palette: Palette,
 ): void {
-  const tint = word(palette.faint, palette.isDark ? 0.22 : 0.25);
+  const tint = packColor(palette.faint, palette.isDark ? 0.22 : 0.25);
   strokes.begin();
-  if (eye instanceof PlaneEye) {
-    const { xs, ys } = planeGrid(eye, ...size_px);
-    const [x0, y1] = eye.at(0, 0);
-    const [x1, y0] = eye.at(...size_px);
+  if (camera instanceof PlaneCamera) {
+    const { xs, ys } = planeGrid(camera, ...size_px);
+    const [x0, y1] = camera.at(0, 0);
+    const [x1, y0] = camera.at(...size_px);
     for (const x of xs) strokes.piece([x, y0, 0], [x, y1, 0], 1, 0, tint);
     for (const y of ys) strokes.piece([x0, y, 0], [x1, y, 0], 1, 0, tint);
   } else {

@@ -42,7 +42,7 @@ export class Instances {
     const geometry = this.mesh.geometry;
     const drawn = geometry.instanceCount;
     const old = { ...geometry.attributes };
-    // Buffers of another size need new names at the driver: the geometry lets go of the old ones.
+    // Resized buffers need new handles in the driver: dispose() releases the old ones.
     geometry.dispose();
     for (const [name, { size, bytes }] of Object.entries(this.#columns)) {
       const length = size * this.#capacity;

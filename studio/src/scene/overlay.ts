@@ -1,6 +1,6 @@
-/** Words and rings over the picture: axes in meters, a scale bar, names, the selected body. */
+/** Text and rings over the scene: axes in meters, a scale bar, labels, the selected body. */
 
-import { PlaneEye, type Eye, type Extent } from "./camera";
+import { PlaneCamera, type Camera, type Extent } from "./camera";
 import { number } from "../format";
 import { planeGrid, roundUp, spaceGrid } from "./grid";
 import { css, type Palette } from "./palette";
@@ -8,10 +8,10 @@ import { css, type Palette } from "./palette";
 export interface Label {
   x_px: number;
   y_px: number;
-  /** Radius of the body, so that the words stand beside it. */
+  /** Radius of the body, so that the label does not cover it. */
   radius_px: number;
   words: string;
-  /** Selected and hovered bodies are ringed. */
+  /** The ring around selected and hovered bodies. */
   ring: "selected" | "hovered" | null;
 }
 
@@ -37,12 +37,12 @@ export class Overlay {
     this.#pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
-  /** Draws the changes since the last time: a canvas that stays costs the browser nothing. */
-  draw(eye: Eye, extent: Extent, labels: readonly Label[], palette: Palette): void {
+  /** Draws only after a change: an unchanged canvas costs the browser nothing. */
+  draw(camera: Camera, extent: Extent, labels: readonly Label[], palette: Palette): void {
     const state = JSON.stringify([
-      eye.project(0, 0, 0),
-      eye.project(1, 2, 3),
-      eye.mPerPx,
+      camera.project(0, 0, 0),
+      camera.project(1, 2, 3),
+      camera.mPerPx,
       extent,
       labels,
       palette.isDark,
@@ -53,13 +53,13 @@ export class Overlay {
     pen.clearRect(0, 0, this.#width, this.#height);
     pen.font = FONT;
     pen.textBaseline = "middle";
-    if (eye instanceof PlaneEye) this.#planeAxes(eye, palette);
-    else this.#spaceAxes(eye, extent, palette);
-    this.#scaleBar(eye, palette);
+    if (camera instanceof PlaneCamera) this.#planeAxes(camera, palette);
+    else this.#spaceAxes(camera, extent, palette);
+    this.#scaleBar(camera, palette);
     for (const label of labels) this.#label(label, palette);
   }
 
-  #words(text: string, x: number, y: number, palette: Palette, ink = palette.ink): void {
+  #text(text: string, x: number, y: number, palette: Palette, ink = palette.ink): void {
     const pen = this.#pen;
     pen.lineWidth = 3.5;
     pen.lineJoin = "round";
@@ -69,44 +69,45 @@ export class Overlay {
     pen.fillText(text, x, y);
   }
 
-  #planeAxes(eye: PlaneEye, palette: Palette): void {
+  #planeAxes(camera: PlaneCamera, palette: Palette): void {
     const pen = this.#pen;
-    const { xs, ys } = planeGrid(eye, this.#width, this.#height);
+    const { xs, ys } = planeGrid(camera, this.#width, this.#height);
     pen.textAlign = "center";
     for (const x of xs) {
-      const [px] = eye.project(x, 0);
-      if (px > 34 && px < this.#width - 150) this.#words(number(tidy(x)), px, this.#height - 9, palette, palette.faint);
+      const [px] = camera.project(x, 0);
+      if (px > 34 && px < this.#width - 150)
+        this.#text(number(withoutNoise(x)), px, this.#height - 9, palette, palette.faint);
     }
     pen.textAlign = "left";
     for (const y of ys) {
-      const [, py] = eye.project(0, y);
-      if (py > 48 && py < this.#height - 26) this.#words(number(tidy(y)), 5, py, palette, palette.faint);
+      const [, py] = camera.project(0, y);
+      if (py > 48 && py < this.#height - 26) this.#text(number(withoutNoise(y)), 5, py, palette, palette.faint);
     }
   }
 
-  #spaceAxes(eye: Eye, extent: Extent, palette: Palette): void {
+  #spaceAxes(camera: Camera, extent: Extent, palette: Palette): void {
     const { xs, ys, z, step } = spaceGrid(extent);
     this.#pen.textAlign = "center";
-    // Round ones only, and none where the letter of the axis stands.
+    // Round values only, and none at the end where the axis letter is drawn.
     const every = (list: number[]): number[] => {
       const stride = Math.ceil(list.length / 6);
       return list.slice(1, -1).filter((value) => Math.round(value / step) % stride === 0);
     };
-    for (const x of every(xs)) this.#at(eye, [x, ys[0]!, z], number(tidy(x)), palette);
-    for (const y of every(ys)) this.#at(eye, [xs[0]!, y, z], number(tidy(y)), palette);
-    this.#at(eye, [xs.at(-1)!, ys[0]!, z], "x", palette);
-    this.#at(eye, [xs[0]!, ys.at(-1)!, z], "y", palette);
+    for (const x of every(xs)) this.#at(camera, [x, ys[0]!, z], number(withoutNoise(x)), palette);
+    for (const y of every(ys)) this.#at(camera, [xs[0]!, y, z], number(withoutNoise(y)), palette);
+    this.#at(camera, [xs.at(-1)!, ys[0]!, z], "x", palette);
+    this.#at(camera, [xs[0]!, ys.at(-1)!, z], "y", palette);
   }
 
-  #at(eye: Eye, [x, y, z]: [number, number, number], text: string, palette: Palette): void {
-    const [px, py, inFront] = eye.project(x, y, z);
-    if (inFront) this.#words(text, px, py + 9, palette, palette.faint);
+  #at(camera: Camera, [x, y, z]: [number, number, number], text: string, palette: Palette): void {
+    const [px, py, inFront] = camera.project(x, y, z);
+    if (inFront) this.#text(text, px, py + 9, palette, palette.faint);
   }
 
-  #scaleBar(eye: Eye, palette: Palette): void {
+  #scaleBar(camera: Camera, palette: Palette): void {
     const pen = this.#pen;
-    const length_m = roundUp(60 * eye.mPerPx);
-    const length_px = length_m / eye.mPerPx;
+    const length_m = roundUp(60 * camera.mPerPx);
+    const length_px = length_m / camera.mPerPx;
     const [x1, y] = [this.#width - 14, this.#height - 12];
     const x0 = x1 - length_px;
     for (const [width, color] of [
@@ -123,8 +124,8 @@ export class Overlay {
       pen.stroke();
     }
     pen.textAlign = "center";
-    const words = length_m >= 1000 ? `${number(length_m / 1000)} km` : `${number(tidy(length_m))} m`;
-    this.#words(words, (x0 + x1) / 2, y - 12, palette);
+    const words = length_m >= 1000 ? `${number(length_m / 1000)} km` : `${number(withoutNoise(length_m))} m`;
+    this.#text(words, (x0 + x1) / 2, y - 12, palette);
   }
 
   #label({ x_px, y_px, radius_px, words, ring }: Label, palette: Palette): void {
@@ -146,11 +147,11 @@ export class Overlay {
     }
     pen.textAlign = "left";
     const away = 0.75 * (ring ? radius : Math.max(6, radius_px)) + 3;
-    this.#words(words, x_px + away, y_px - away, palette);
+    this.#text(words, x_px + away, y_px - away, palette);
   }
 }
 
 /** A multiple of a round step without the noise of binary fractions. */
-function tidy(value: number): number {
+function withoutNoise(value: number): number {
   return Number(value.toPrecision(10));
 }

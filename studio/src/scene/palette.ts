@@ -1,6 +1,6 @@
-/** Colors of the canvas: the page's own by theme, and the server's looks made visible on them. */
+/** Colors of the canvas: the page's own by theme, and the server's appearances adjusted to them. */
 
-import type { Look, Role } from "../protocol";
+import type { Appearance, Role } from "../protocol";
 
 export type Rgb = [number, number, number];
 
@@ -46,45 +46,45 @@ export function css([r, g, b]: Rgb, alpha = 1): string {
   return `rgb(${r} ${g} ${b} / ${alpha})`;
 }
 
-export function mixed(a: Rgb, b: Rgb, share: number): Rgb {
+export function mix(a: Rgb, b: Rgb, share: number): Rgb {
   return [0, 1, 2].map((i) => Math.round(a[i]! + (b[i]! - a[i]!) * share)) as Rgb;
 }
 
-/** Luminance from 0 to 1, near enough to tell dark from light. */
+/** Approximate luminance from 0 to 1, to distinguish dark from light. */
 function lightness([r, g, b]: Rgb): number {
   return (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255;
 }
 
-/** The color of a look: colors that would drown in a dark floor are lifted. */
-export function visible(color: Rgb, palette: Palette): Rgb {
+/** The color as drawn: colors too dark for a dark floor are brightened. */
+export function visibleColor(color: Rgb, palette: Palette): Rgb {
   if (!palette.isDark || lightness(color) > 0.3) return color;
-  return mixed(color, [255, 255, 255], 0.42);
+  return mix(color, [255, 255, 255], 0.42);
 }
 
 /** Red, green, blue and opacity in the bytes of one word, in the order in which they lie in memory. */
-export function packed(look: Look, palette: Palette): number {
-  const [r, g, b] = visible(look.color, palette);
-  return word([r, g, b], look.opacity);
+export function packAppearance(appearance: Appearance, palette: Palette): number {
+  const [r, g, b] = visibleColor(appearance.color, palette);
+  return packColor([r, g, b], appearance.opacity);
 }
 
-/** Looks of all groups one after the other, packed: five to a group, one for each condition. */
-export function tintsOf(groups: readonly (readonly Look[])[], palette: Palette): Uint32Array {
-  return Uint32Array.from(groups.flatMap((group) => group.map((look) => packed(look, palette))));
+/** Packed appearances of all groups in order: five per group, one for each condition. */
+export function tintsOf(groups: readonly (readonly Appearance[])[], palette: Palette): Uint32Array {
+  return Uint32Array.from(groups.flatMap((group) => group.map((appearance) => packAppearance(appearance, palette))));
 }
 
-export function word([r, g, b]: Rgb, alpha: number): number {
+export function packColor([r, g, b]: Rgb, alpha: number): number {
   return ((Math.round(alpha * 255) << 24) | (b << 16) | (g << 8) | r) >>> 0;
 }
 
-/** The look of a mark of each role. Colors are Okabe and Ito's; roles that share one differ by dashes. */
+/** The style of marks by role. Colors are Okabe and Ito's; roles that share a color differ by dashes. */
 export const ROLES: Record<Role, { words: string; color: Rgb; dashed: boolean }> = {
-  true: { words: "as it is", color: [0, 158, 115], dashed: false },
+  true: { words: "true", color: [0, 158, 115], dashed: false },
   reported: { words: "as reported", color: [230, 159, 0], dashed: true },
-  wish: { words: "wished", color: [86, 180, 233], dashed: true },
+  wish: { words: "intended", color: [86, 180, 233], dashed: true },
   done: { words: "done", color: [0, 114, 178], dashed: false },
   refused: { words: "refused", color: [213, 94, 0], dashed: false },
   claim: { words: "claimed", color: [204, 121, 167], dashed: false },
-  group: { words: "its group", color: [230, 159, 0], dashed: false },
+  group: { words: "group", color: [230, 159, 0], dashed: false },
   predicted: { words: "predicted", color: [86, 180, 233], dashed: false },
   chosen: { words: "chosen", color: [0, 158, 115], dashed: false },
   known: { words: "known", color: [204, 121, 167], dashed: true },

@@ -1,6 +1,6 @@
 /**
  * Many small quads in one draw call, with columns that say where and how each is drawn. They are not instanced: software
- * renderers take each instance for a call of its own, which makes ten thousand of them ten times slower.
+ * renderers treat each instance as a draw call of its own, which makes ten thousand of them ten times slower.
  */
 
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, type RawShaderMaterial } from "three";
@@ -18,7 +18,7 @@ export class Quads {
   readonly #columns: Record<string, Column>;
   /** One entry for each quad; the attributes have four. */
   readonly #entries: Record<string, Numbers> = {};
-  /** The entries as the renderer has them: most columns stay from one picture to the next. */
+  /** The entries last uploaded: most columns do not change from one frame to the next. */
   readonly #sent: Record<string, Numbers> = {};
   #capacity = 0;
 
@@ -36,7 +36,7 @@ export class Quads {
     if (count <= this.#capacity) return;
     this.#capacity = Math.max(count, 2 * this.#capacity);
     const geometry = this.mesh.geometry;
-    // Buffers of another size need new names at the driver: the geometry lets go of the old ones.
+    // Resized buffers need new handles in the driver: dispose() releases the old ones.
     geometry.dispose();
     for (const [name, { size, bytes }] of Object.entries(this.#columns)) {
       const entries = bytes ? new Uint32Array(this.#capacity) : new Float32Array(size * this.#capacity);
@@ -72,7 +72,7 @@ export class Quads {
       const attribute = geometry.getAttribute(name) as BufferAttribute;
       const { array } = attribute;
       const corners = bytes ? new Uint32Array(array.buffer) : (array as Float32Array);
-      spread(entries, corners, bytes ? 1 : size, count);
+      repeatEntries(entries, corners, bytes ? 1 : size, count);
       attribute.clearUpdateRanges();
       attribute.addUpdateRange(0, 4 * count * size);
       attribute.needsUpdate = true;
@@ -98,7 +98,7 @@ function isSame(a: Numbers, b: Numbers, count: number): boolean {
 }
 
 /** Writes each entry four times. */
-function spread(entries: Numbers, corners: Numbers, size: number, count: number): void {
+function repeatEntries(entries: Numbers, corners: Numbers, size: number, count: number): void {
   let to = 0;
   for (let i = 0; i < count; i++) {
     for (let corner = 0; corner < 4; corner++) {

@@ -14,7 +14,7 @@ vec3 lit(vec3 base, vec3 normal) {
 const BALL_VERTEX = `
 in vec4 ball;      // center, radius
 in vec4 tint;
-uniform float leastOfDistance;
+uniform float minOfDistance;
 out vec2 at;
 flat out vec3 center;
 flat out float radius;
@@ -22,7 +22,7 @@ flat out vec4 ink;
 ${CORNER}
 void main() {
   center = (modelViewMatrix * vec4(ball.xyz, 1.0)).xyz;
-  radius = max(ball.w, -center.z * leastOfDistance);
+  radius = max(ball.w, -center.z * minOfDistance);
   at = corner() * 2.0;
   ink = tint;
   gl_Position = projectionMatrix * vec4(center + vec3(at * radius, 0.0), 1.0);
@@ -40,7 +40,7 @@ void main() {
   float r2 = dot(at, at);
   if (r2 > 1.0) discard;
   vec3 normal = vec3(at, sqrt(1.0 - r2));
-  // Glass: a rim shows the outline, the middle lets through.
+  // Glass: an opaque rim shows the outline, the middle is clear.
   float alpha = ink.a < 0.99 ? ink.a * veil * mix(0.45, 2.2, r2 * r2) : 1.0;
   color = vec4(lit(ink.rgb, normal), min(1.0, alpha));
   ${deep ? "vec4 clip = projectionMatrix * vec4(center + radius * normal, 1.0); gl_FragDepth = 0.5 + 0.5 * clip.z / clip.w;" : ""}
@@ -82,7 +82,7 @@ function unit(kind: Exclude<SolidKind, "ball">): BufferGeometry {
 export class Solids {
   readonly instances: Instances | Quads;
   readonly #isBall: boolean;
-  readonly #uniforms = { veil: { value: 1 }, leastOfDistance: { value: 0 } };
+  readonly #uniforms = { veil: { value: 1 }, minOfDistance: { value: 0 } };
   #count = 0;
 
   constructor(kind: SolidKind, transparent: boolean) {
@@ -130,9 +130,9 @@ export class Solids {
     this.instances.words("tint")[i] = tint;
   }
 
-  /** Balls are at least this large, as a share of their distance: far ones stay visible. */
-  least(ofDistance: number): void {
-    this.#uniforms.leastOfDistance.value = ofDistance;
+  /** Sets the minimum radius of balls, as a fraction of their distance: far ones stay visible. */
+  setMinRadius(ofDistance: number): void {
+    this.#uniforms.minOfDistance.value = ofDistance;
   }
 
   end(): void {
@@ -142,8 +142,8 @@ export class Solids {
   }
 }
 
-/** The shortest turn that brings the third axis to a direction. */
-export function turnTo(dx: number, dy: number, dz: number): [number, number, number, number] {
+/** The shortest rotation of the third axis to a direction. */
+export function rotationTo(dx: number, dy: number, dz: number): [number, number, number, number] {
   const length = Math.hypot(dx, dy, dz);
   if (length === 0) return [0, 0, 0, 1];
   const w = 1 + dz / length;

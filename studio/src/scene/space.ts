@@ -1,23 +1,23 @@
-/** Bodies of space, from a frame into solids. */
+/** Draws the bodies of a 3-D frame as solids. */
 
 import { Group } from "three";
 import type { Frame } from "../decode";
 import type { Scene, Shape } from "../protocol";
-import type { Bodies } from "../state/cast";
-import { packed, tintsOf, type Palette } from "./palette";
-import { Solids, turnTo, type SolidKind } from "./solids";
-import type { Painter } from "./stage";
+import type { Bodies } from "../state/bodies";
+import { packAppearance, tintsOf, type Palette } from "./palette";
+import { Solids, rotationTo, type SolidKind } from "./solids";
+import type { Painter } from "./viewport";
 
 const KINDS: readonly SolidKind[] = ["ball", "box", "cylinder", "dart"];
 
-/** The thinnest rod that is drawn, beside the length of its piece. */
-const LEAST_OF_LENGTH = 0.02;
+/** Minimum ratio of the drawn width of a rod to its length. */
+const MIN_WIDTH_TO_LENGTH = 0.02;
 
-/** The least radius of moving balls. */
-const LEAST_PX = 1.6;
+/** Minimum radius of moving balls. */
+const MIN_BALL_PX = 1.6;
 
 /** Opaque and transparent solids of each kind. */
-class Pair {
+class SolidLayers {
   readonly #solids: Record<SolidKind, [Solids, Solids]>;
 
   constructor(group: Group) {
@@ -30,8 +30,8 @@ class Pair {
     return KINDS.flatMap((kind) => this.#solids[kind]);
   }
 
-  least(ofDistance: number): void {
-    for (const solids of this.#solids.ball) solids.least(ofDistance);
+  setMinRadius(ofDistance: number): void {
+    for (const solids of this.#solids.ball) solids.setMinRadius(ofDistance);
   }
 
   begin(): void {
@@ -62,16 +62,16 @@ class Pair {
   rod(a: ArrayLike<number>, b: ArrayLike<number>, thickness_m: number, tint: number): void {
     const [dx, dy, dz] = [b[0]! - a[0]!, b[1]! - a[1]!, b[2]! - a[2]!];
     const length = Math.hypot(dx, dy, dz);
-    const wide = Math.max(thickness_m, LEAST_OF_LENGTH * length);
+    const wide = Math.max(thickness_m, MIN_WIDTH_TO_LENGTH * length);
     const middle = [0, 1, 2].map((k) => 0.5 * (a[k]! + b[k]!));
-    this.of("cylinder", tint).mesh(middle, turnTo(dx, dy, dz), [wide, wide, length], tint);
+    this.of("cylinder", tint).mesh(middle, rotationTo(dx, dy, dz), [wide, wide, length], tint);
   }
 }
 
 export class SpacePainter implements Painter {
   readonly group = new Group();
-  readonly #still = new Pair(this.group);
-  readonly #moving = new Pair(this.group);
+  readonly #static = new SolidLayers(this.group);
+  readonly #moving = new SolidLayers(this.group);
   readonly #scene: Scene;
   #bodies: Bodies | null = null;
   #tints: Uint32Array = new Uint32Array(0);
@@ -81,35 +81,35 @@ export class SpacePainter implements Painter {
   }
 
   paint(palette: Palette): void {
-    this.#still.begin();
-    for (const { shape, at_m, turn, look } of this.#scene.bodies) {
-      const tint = packed(look, palette);
-      if (shape.type !== "line") this.#still.body(shape, at_m, turn, tint);
-      else shape.points_m.slice(1).forEach((b, i) => this.#still.rod(shape.points_m[i]!, b, shape.thickness_m, tint));
+    this.#static.begin();
+    for (const { shape, at_m, orientation: turn, appearance: look } of this.#scene.bodies) {
+      const tint = packAppearance(look, palette);
+      if (shape.type !== "line") this.#static.body(shape, at_m, turn, tint);
+      else shape.points_m.slice(1).forEach((b, i) => this.#static.rod(shape.points_m[i]!, b, shape.thickness_m, tint));
     }
-    this.#still.end();
+    this.#static.end();
     this.#colors(palette);
   }
 
-  cast(bodies: Bodies, palette: Palette): void {
+  setBodies(bodies: Bodies, palette: Palette): void {
     this.#bodies = bodies;
     this.#colors(palette);
   }
 
   #colors(palette: Palette): void {
-    this.#tints = tintsOf(this.#bodies?.cast.looks ?? [], palette);
+    this.#tints = tintsOf(this.#bodies?.table.appearances ?? [], palette);
   }
 
   frame(frame: Frame): void {
     const bodies = this.#bodies;
     if (!bodies) return;
-    const { cast } = bodies;
-    const { places_m, turns, points_m, lineStarts } = frame;
+    const { table } = bodies;
+    const { positions_m, orientations, points_m, lineStarts } = frame;
     this.#moving.begin();
     let line = 0;
     for (let i = 0; i < frame.bodies; i++) {
-      const shape = cast.shapes[cast.shape[i]!]!;
-      const tint = this.#tints[5 * cast.look[i]! + frame.conditions[i]!]!;
+      const shape = table.shapes[table.shape[i]!]!;
+      const tint = this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
       if (shape.type === "line") {
         for (let p = lineStarts[line]! + 1; p < lineStarts[line + 1]!; p++) {
           const a = points_m.subarray(3 * p - 3, 3 * p);
@@ -117,7 +117,7 @@ export class SpacePainter implements Painter {
         }
         line++;
       } else {
-        this.#moving.body(shape, places_m.subarray(3 * i, 3 * i + 3), turns.subarray(4 * i, 4 * i + 4), tint);
+        this.#moving.body(shape, positions_m.subarray(3 * i, 3 * i + 3), orientations.subarray(4 * i, 4 * i + 4), tint);
       }
     }
     this.#moving.end();
@@ -125,7 +125,7 @@ export class SpacePainter implements Painter {
 
   scale(_pxPerM: number, _palette: Palette, height_px: number): void {
     // Half a field of view of 20 degrees reaches over half the height.
-    this.#moving.least((LEAST_PX * 2 * Math.tan(Math.PI / 9)) / Math.max(1, height_px));
+    this.#moving.setMinRadius((MIN_BALL_PX * 2 * Math.tan(Math.PI / 9)) / Math.max(1, height_px));
   }
 
   dispose(): void {

@@ -21,16 +21,16 @@ void main() {
   vec2 position = corner();
   vec4 a = projectionMatrix * modelViewMatrix * vec4(from, 1.0);
   vec4 b = projectionMatrix * modelViewMatrix * vec4(to, 1.0);
-  // A point behind the eye has no place on the canvas: cut the piece there.
+  // A point behind the camera has no position on the canvas: clip the piece there.
   float near = 1e-4;
   if (a.w < near && b.w < near) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   if (a.w < near) a = mix(b, a, (b.w - near) / (b.w - a.w));
   if (b.w < near) b = mix(a, b, (a.w - near) / (a.w - b.w));
   vec2 pa = a.xy / a.w * canvas * 0.5, pb = b.xy / b.w * canvas * 0.5;
   float width = max(form.x, form.y * pxPerM);
-  vec2 way = pb - pa;
-  length_ = length(way);
-  vec2 dir = length_ > 1e-6 ? way / length_ : vec2(1.0, 0.0);
+  vec2 path = pb - pa;
+  length_ = length(path);
+  vec2 dir = length_ > 1e-6 ? path / length_ : vec2(1.0, 0.0);
   vec2 side = vec2(-dir.y, dir.x);
   halfWidth = 0.5 * width;
   float reach = halfWidth + 1.0;
@@ -88,7 +88,7 @@ export class Strokes {
     this.#count = 0;
   }
 
-  /** One straight piece; `before_m` carries dashes on from the piece before. */
+  /** One straight piece; `before_m` continues the dashes of the previous piece. */
   piece(
     a: ArrayLike<number>,
     b: ArrayLike<number>,

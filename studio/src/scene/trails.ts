@@ -1,30 +1,30 @@
-/** Trails of bodies: a ring of past places for each, kept by the page. */
+/** Trails of bodies: a ring buffer of past positions for each, kept by the page. */
 
-/** Places that are kept of all bodies together, and of one. */
-const MOST_PLACES = 240_000;
-const MOST_OF_ONE = 600;
-/** A jump of more cycles than this is no way that was seen. */
-const GAP_CYCLES = 200;
-/** Unless the run goes so fast that frames are far from each other: then it may be so much more than the last one. */
-const GAP_GROWTH = 4;
+/** Maximum number of stored points, of all bodies together and of one. */
+const MAX_POINTS = 240_000;
+const MAX_POINTS_PER_BODY = 600;
+/** A longer gap than this, in cycles, breaks a trail: the motion in between is unknown. */
+const MAX_GAP_CYCLES = 200;
+/** In a fast run, where frames are far apart, a gap may also exceed the last one by this factor. */
+const MAX_GAP_GROWTH = 4;
 
 export class Trails {
   readonly dimensions: 2 | 3;
   readonly bodies: number;
-  /** Places that fit into each ring. */
+  /** Capacity of each ring. */
   readonly length: number;
   readonly #places: Float32Array;
   readonly #cycles: Float64Array;
   readonly #begins: Int32Array;
   readonly #counts: Int32Array;
   #last = -Infinity;
-  /** The distance of frames, in cycles; shrinks slowly, because a run that is paused ends on a shorter one. */
+  /** The interval of frames in cycles; shrinks slowly, because a pause ends on a shorter one. */
   #stride = 0;
 
   constructor(bodies: number, dimensions: 2 | 3) {
     this.bodies = bodies;
     this.dimensions = dimensions;
-    this.length = Math.max(8, Math.min(MOST_OF_ONE, Math.floor(MOST_PLACES / Math.max(1, bodies))));
+    this.length = Math.max(8, Math.min(MAX_POINTS_PER_BODY, Math.floor(MAX_POINTS / Math.max(1, bodies))));
     this.#places = new Float32Array(bodies * this.length * dimensions);
     this.#cycles = new Float64Array(bodies * this.length);
     this.#begins = new Int32Array(bodies);
@@ -32,14 +32,14 @@ export class Trails {
   }
 
   /**
-   * Takes the places of a frame. Going back shortens trails; a jump forward begins new ones, if it was sought or is much
-   * wider than the last one: a run that goes faster makes wider ones, too.
+   * Adds the positions of a frame. Going back shortens trails; a jump forward clears them if it was a seek, or if it is
+   * much wider than the last interval: a faster run makes wider intervals, too.
    */
   push(cycle: number, places: Float32Array, isSought = false): void {
     const gap = cycle - this.#last;
-    const widest = isSought ? GAP_CYCLES : Math.max(GAP_CYCLES, GAP_GROWTH * this.#stride);
+    const maxGap = isSought ? MAX_GAP_CYCLES : Math.max(MAX_GAP_CYCLES, MAX_GAP_GROWTH * this.#stride);
     if (gap < 0) this.#cut(cycle);
-    else if (gap > widest) this.clear();
+    else if (gap > maxGap) this.clear();
     if (!isSought && Number.isFinite(gap)) this.#stride = Math.max(gap, this.#stride / 2);
     this.#last = cycle;
     for (let body = 0; body < this.bodies; body++) this.#push(body, cycle, places);
@@ -84,15 +84,15 @@ export class Trails {
     }
   }
 
-  /** The places of a body, from the oldest to the newest, as columns of x y (z). */
-  of(body: number): number[][] {
+  /** The points of a body, from the oldest to the newest, as x y (z). */
+  points(body: number): number[][] {
     const d = this.dimensions;
     const first = body * this.length;
-    const way: number[][] = [];
+    const points: number[][] = [];
     for (let i = 0; i < this.#counts[body]!; i++) {
       const slot = first + ((this.#begins[body]! + i) % this.length);
-      way.push(Array.from(this.#places.subarray(slot * d, slot * d + d)));
+      points.push(Array.from(this.#places.subarray(slot * d, slot * d + d)));
     }
-    return way;
+    return points;
   }
 }

@@ -10,7 +10,7 @@ export function centersOf({ isFleet, folder }: Pick<Session, "isFleet" | "folder
   return folder === null ? ["view", "forms", "text"] : ["view", "forms", "text", "report"];
 }
 
-/** The panel that is shown of a session where the page is to show this one: the picture, if the session has no such panel. */
+/** The panel to show for a session: the requested one, or the view if the session does not have it. */
 export function centerOf(session: Pick<Session, "isFleet" | "folder">, wanted: Center): Center {
   return centersOf(session).includes(wanted) ? wanted : "view";
 }

@@ -2,7 +2,7 @@
 
 import type { MetricName } from "../protocol";
 
-/** Those that no other chart shows: each is shown once. */
-export function offered(names: readonly MetricName[], shown: readonly string[], own: string): MetricName[] {
+/** The metrics that no other chart shows: each is shown once. */
+export function availableMetrics(names: readonly MetricName[], shown: readonly string[], own: string): MetricName[] {
   return names.filter(({ key }) => key === own || !shown.includes(key));
 }

@@ -1,26 +1,28 @@
-/** The search for the first difference of two runs that go in step. */
+/** The search for the first difference between two synchronized runs. */
 
 import { withUnit } from "../format";
-import { differing, firstDifference, type Differing } from "./difference";
+import { bodyDifferences, firstDifference, type BodyDifference } from "./difference";
 import type { Session } from "./session.svelte";
 
-/** Bodies that are named. */
-const MOST_NAMED = 5;
+/** Maximum number of listed bodies. */
+const MAX_LISTED = 5;
 
-/** Ends a search that is no longer wanted, or that cannot go on. */
-class GivenUp extends Error {
-  constructor(words = "The comparison was given up.") {
+/** Ends a search that was canceled, or that cannot continue. */
+class ComparisonError extends Error {
+  constructor(words = "The comparison was canceled.") {
     super(words);
   }
 }
 
-/** The reason why a run cannot be compared. */
-function noDigest({ scene, status }: Session): GivenUp {
-  return new GivenUp(`${scene.name} cannot be compared, as its states have no digests. ${status.banner ?? ""}`.trim());
+/** The error of a run that cannot be compared. */
+function digestMissing({ scene, status }: Session): ComparisonError {
+  return new ComparisonError(
+    `${scene.name} cannot be compared, as its states have no digests. ${status.banner ?? ""}`.trim(),
+  );
 }
 
 export class Comparison {
-  /** Words on its progress or its finding; empty before. */
+  /** Text on its progress or result; empty before. */
   words = $state("");
   isRunning = $state(false);
   #round = 0;
@@ -31,23 +33,23 @@ export class Comparison {
     this.isRunning = true;
     const last = Math.min(a.lastCycle, b.lastCycle);
     const differs = async (cycle: number): Promise<boolean> => {
-      if (round !== this.#round) throw new GivenUp();
+      if (round !== this.#round) throw new ComparisonError();
       this.words = `Comparing ${a.scene.name} and ${b.scene.name} at cycle ${cycle}…`;
       const [one, other] = await Promise.all([a.digestAt(cycle), b.digestAt(cycle)]);
-      if (!one || !other) throw new GivenUp();
+      if (!one || !other) throw new ComparisonError();
       for (const [session, { digest }] of [
         [a, one],
         [b, other],
       ] as const)
-        if (digest === null) throw noDigest(session);
+        if (digest === null) throw digestMissing(session);
       return one.digest !== other.digest || one.cycle !== other.cycle;
     };
     try {
       const cycle = await firstDifference(last, differs);
       if (cycle !== null) await differs(cycle);
-      this.words = cycle === null ? `No difference up to cycle ${last}.` : await this.#told(a, b, cycle);
+      this.words = cycle === null ? `No difference up to cycle ${last}.` : await this.#describe(a, b, cycle);
     } catch (error) {
-      if (!(error instanceof GivenUp)) throw error;
+      if (!(error instanceof ComparisonError)) throw error;
       if (round === this.#round) this.words = error.message;
     } finally {
       if (round === this.#round) this.isRunning = false;
@@ -60,28 +62,28 @@ export class Comparison {
     this.words = "";
   }
 
-  async #told(a: Session, b: Session, cycle: number): Promise<string> {
+  async #describe(a: Session, b: Session, cycle: number): Promise<string> {
     const [one, other] = await Promise.all([a.frameAt(a.status.cycle), b.frameAt(b.status.cycle)]);
     const where = cycle === 0 ? "They differ from the start" : `They differ from cycle ${cycle} on`;
     if (!one || !other || !a.bodies || !b.bodies) return `${where}.`;
-    const found = differing({ bodies: a.bodies, frame: one }, { bodies: b.bodies, frame: other }, (m) =>
+    const differences = bodyDifferences({ bodies: a.bodies, frame: one }, { bodies: b.bodies, frame: other }, (m) =>
       withUnit(m, "m"),
     );
-    if (found.length === 0) return `${where}: in what is not seen, such as memory or counters.`;
-    select(found, a, b);
-    const named = found
-      .slice(0, MOST_NAMED)
+    if (differences.length === 0) return `${where}: in state that is not visible, such as memory or counters.`;
+    select(differences, a, b);
+    const listed = differences
+      .slice(0, MAX_LISTED)
       .map(({ who, words }) => `${(a.bodies!.find(who) === undefined ? b : a).bodies!.nameOf(who)} ${words}`);
-    const more = found.length > MOST_NAMED ? `, and ${found.length - MOST_NAMED} more` : "";
-    return `${where}: ${named.join(", ")}${more}.`;
+    const more = differences.length > MAX_LISTED ? `, and ${differences.length - MAX_LISTED} more` : "";
+    return `${where}: ${listed.join(", ")}${more}.`;
   }
 }
 
 /** Selects the first agent that differs, in both. */
-function select(found: Differing[], a: Session, b: Session): void {
-  const agent = found.find(({ who }) => {
+function select(differences: BodyDifference[], a: Session, b: Session): void {
+  const agent = differences.find(({ who }) => {
     const index = a.bodies?.find(who);
-    return index !== undefined && a.bodies?.cast.is_agent[index];
+    return index !== undefined && a.bodies?.table.is_agent[index];
   });
   if (!agent) return;
   a.select(agent.who);

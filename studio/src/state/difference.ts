@@ -1,12 +1,12 @@
 /** The difference of two runs: the first cycle in which their states differ, and the bodies that differ then. */
 
 import type { Frame } from "../decode";
-import type { Who } from "../protocol";
-import type { Bodies } from "./cast";
+import type { BodyId } from "../protocol";
+import type { Bodies } from "./bodies";
 
 /**
- * Returns the first cycle in which two runs differ, if those that have parted stay apart; `null` where the last cycle is
- * the same. Goes ahead in steps that double before it halves them, so that little is computed beyond the cycle.
+ * Returns the first cycle in which two runs differ, assuming that they differ from then on; `null` if the last cycle is
+ * the same. Doubles its steps before it bisects, so that little is computed beyond that cycle.
  */
 export async function firstDifference(
   last: number,
@@ -28,42 +28,49 @@ export async function firstDifference(
   return other;
 }
 
-/** One run as it is shown. */
-export interface Shown {
+/** The shown frame of a run, with its bodies. */
+export interface RunFrame {
   bodies: Bodies;
   frame: Frame;
 }
 
-/** A body that is not alike in both, and how. */
-export interface Differing {
-  who: Who;
+/** A body that differs between two runs, and how. */
+export interface BodyDifference {
+  who: BodyId;
   words: string;
 }
 
-/** The bodies whose data in the frames differ; those that only one run has come last. */
-export function differing(a: Shown, b: Shown, lengthWords: (meters: number) => string): Differing[] {
-  const found: Differing[] = [];
-  const lonely: Differing[] = [];
+/** The bodies whose data differ between two frames; those that exist in only one run come last. */
+export function bodyDifferences(a: RunFrame, b: RunFrame, lengthWords: (meters: number) => string): BodyDifference[] {
+  const found: BodyDifference[] = [];
+  const unmatched: BodyDifference[] = [];
   for (let i = 0; i < a.bodies.count; i++) {
-    const who = a.bodies.who(i);
+    const who = a.bodies.bodyId(i);
     const k = b.bodies.find(who);
-    const words = k === undefined ? "is in one of them only" : comparison(a.frame, i, b.frame, k, lengthWords);
-    if (words !== null) (k === undefined ? lonely : found).push({ who, words });
+    const words =
+      k === undefined ? "exists in only one of them" : describeDifference(a.frame, i, b.frame, k, lengthWords);
+    if (words !== null) (k === undefined ? unmatched : found).push({ who, words });
   }
   for (let k = 0; k < b.bodies.count; k++) {
-    const who = b.bodies.who(k);
-    if (a.bodies.find(who) === undefined) lonely.push({ who, words: "is in one of them only" });
+    const who = b.bodies.bodyId(k);
+    if (a.bodies.find(who) === undefined) unmatched.push({ who, words: "exists in only one of them" });
   }
-  return [...found, ...lonely];
+  return [...found, ...unmatched];
 }
 
-function comparison(a: Frame, i: number, b: Frame, k: number, lengthWords: (meters: number) => string): string | null {
+function describeDifference(
+  a: Frame,
+  i: number,
+  b: Frame,
+  k: number,
+  lengthWords: (meters: number) => string,
+): string | null {
   const d = a.dimensions;
-  if (d !== b.dimensions) return "moves in another space";
+  if (d !== b.dimensions) return "has another number of dimensions";
   let square = 0;
-  for (let n = 0; n < d; n++) square += (a.places_m[d * i + n]! - b.places_m[d * k + n]!) ** 2;
-  if (square > 0) return `is ${lengthWords(Math.sqrt(square))} away`;
+  for (let n = 0; n < d; n++) square += (a.positions_m[d * i + n]! - b.positions_m[d * k + n]!) ** 2;
+  if (square > 0) return `is ${lengthWords(Math.sqrt(square))} apart`;
   const t = d === 2 ? 1 : 4;
-  for (let n = 0; n < t; n++) if (a.turns[t * i + n] !== b.turns[t * k + n]) return "heads elsewhere";
-  return a.conditions[i] === b.conditions[k] ? null : "is in another condition";
+  for (let n = 0; n < t; n++) if (a.orientations[t * i + n] !== b.orientations[t * k + n]) return "has another heading";
+  return a.conditions[i] === b.conditions[k] ? null : "has another condition";
 }

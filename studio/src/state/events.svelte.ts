@@ -1,86 +1,85 @@
-/** Events of a session: fetched as the run goes on, kept when it goes back, because a run repeats itself. */
+/** Events of a session: fetched as the run advances, kept when it goes back, because a run is deterministic. */
 
-import type { Answer, Event } from "../protocol";
-import { whoKey } from "../format";
+import type { ReplyBody, RunEvent } from "../protocol";
+import { bodyKey } from "../format";
 
-/** Events that the page keeps at most. */
-const MOST_KEPT = 20_000;
-/** Events that one question asks for at most; the server would give some more. */
-const MOST_ASKED = 2000;
+/** Maximum number of events that the page keeps. */
+const MAX_EVENTS = 20_000;
+/** Maximum number of events per request; the server's own limit is higher. */
+const MAX_EVENTS_PER_REQUEST = 2000;
 
-/** Asks for the events from a cycle to before another one, without the first so many of them. */
-type Ask = (from: number, until: number, skip: number, most: number) => Promise<Answer>;
+/** Requests the events of the cycles `from` to before `until`, without the first `skip` ones. */
+type FetchEvents = (from: number, until: number, skip: number, limit: number) => Promise<ReplyBody>;
 
-function keyOf(event: Event): string {
-  const who = event.who ? whoKey(event.who) : "";
-  const other = event.with ? whoKey(event.with) : "";
-  return `${event.cycle}|${event.kind}|${who}|${other}|${event.words}`;
+function keyOf(event: RunEvent): string {
+  const body = event.body ? bodyKey(event.body) : "";
+  const other = event.other ? bodyKey(event.other) : "";
+  return `${event.cycle}|${event.kind}|${body}|${other}|${event.text}`;
 }
 
 export class Events {
   /** Events in the order of cycles. */
-  list = $state.raw<Event[]>([]);
-  /** Kinds that have occurred, with how often. */
+  list = $state.raw<RunEvent[]>([]);
+  /** Kinds that have occurred, with their counts. */
   kinds = $state.raw<Map<string, number>>(new Map());
   leftOut = $state(0);
-  /** All events before this cycle were asked for. */
-  #asked = 0;
-  #isAsking = false;
+  /** All events before this cycle were fetched. */
+  #fetchedUntil = 0;
+  #isFetching = false;
   #age = 0;
 
   clear(): void {
     this.list = [];
     this.kinds = new Map();
     this.leftOut = 0;
-    this.#asked = 0;
+    this.#fetchedUntil = 0;
     this.#age++;
-    this.#isAsking = false;
+    this.#isFetching = false;
   }
 
-  /** Fetches the events before this cycle; one question at a time. */
-  async fetch(until: number, ask: Ask): Promise<void> {
-    if (this.#isAsking || until <= this.#asked) return;
+  /** Fetches the events before this cycle; one request at a time. */
+  async fetch(until: number, ask: FetchEvents): Promise<void> {
+    if (this.#isFetching || until <= this.#fetchedUntil) return;
     const age = this.#age;
-    this.#isAsking = true;
+    this.#isFetching = true;
     try {
       await this.#fetchAll(age, until, ask);
     } finally {
-      if (age === this.#age) this.#isAsking = false;
+      if (age === this.#age) this.#isFetching = false;
     }
   }
 
-  /** The server answers with the oldest: goes on from the last of them until none is left. */
-  async #fetchAll(age: number, until: number, ask: Ask): Promise<void> {
-    // Those of the first cycle that earlier answers had no more room for: together, because equal ones are told apart
-    // by number.
-    let begun: Event[] = [];
+  /** The server returns the oldest events first: continues after the last of them until none is left. */
+  async #fetchAll(age: number, until: number, ask: FetchEvents): Promise<void> {
+    // Events of the first cycle that earlier replies cut off: collected, because equal events are distinguished by count.
+    let partial: RunEvent[] = [];
     while (true) {
-      const from = this.#asked;
-      const answer = await ask(from, until, begun.length, MOST_ASKED);
+      const from = this.#fetchedUntil;
+      const answer = await ask(from, until, partial.length, MAX_EVENTS_PER_REQUEST);
       if (age !== this.#age || answer.is !== "events") return;
-      const told = [...begun, ...answer.entries];
-      const last = told.at(-1);
-      if (!last || answer.entries.length < MOST_ASKED || answer.left_out === 0) {
-        this.add(told);
-        // Events left out now are not at the server either: it never kept them.
+      const entries = [...partial, ...answer.entries];
+      const last = entries.at(-1);
+      if (!last || answer.entries.length < MAX_EVENTS_PER_REQUEST || answer.left_out === 0) {
+        this.add(entries);
+        // Events left out now are not on the server either: it never kept them.
         this.leftOut += answer.left_out;
-        this.#asked = Math.max(from, Math.min(until, answer.known_until));
+        this.#fetchedUntil = Math.max(from, Math.min(until, answer.known_until));
         return;
       }
-      // The last cycle may be cut.
-      begun = told.filter(({ cycle }) => cycle === last.cycle);
-      this.add(told.filter(({ cycle }) => cycle < last.cycle));
-      this.#asked = last.cycle;
+      // The last cycle may be incomplete.
+      partial = entries.filter(({ cycle }) => cycle === last.cycle);
+      this.add(entries.filter(({ cycle }) => cycle < last.cycle));
+      this.#fetchedUntil = last.cycle;
     }
   }
 
   /** Adds events that are not known yet. */
-  add(entries: Event[]): void {
+  add(entries: RunEvent[]): void {
     if (entries.length === 0) return;
     const from = Math.min(...entries.map((event) => event.cycle));
-    // Where the world tells no kind, its level says at least how bad it is.
+    // Where the world gives no kind, the level at least shows the severity.
     entries = entries.map((event) => (event.kind === "" ? { ...event, kind: event.level } : event));
-    // Events may be equal: of each sort there are as many as one answer has, however often it is told.
+    // Events may be equal: each key occurs as often as in one reply, however often it is fetched.
     const known = new Map<string, number>();
     for (let i = this.list.length - 1; i >= 0 && this.list[i]!.cycle >= from; i--) {
       const key = keyOf(this.list[i]!);
@@ -94,15 +93,15 @@ export class Events {
     });
     if (fresh.length === 0) return;
     const all = [...this.list, ...fresh].sort((a, b) => a.cycle - b.cycle);
-    this.list = all.slice(-MOST_KEPT);
+    this.list = all.slice(-MAX_EVENTS);
     const kinds = new Map<string, number>();
     for (const event of this.list) kinds.set(event.kind, (kinds.get(event.kind) ?? 0) + 1);
     this.kinds = kinds;
   }
 
-  /** The first event after a cycle, or the last before it, of those that pass. */
-  neighbor(cycle: number, direction: 1 | -1, passes: (event: Event) => boolean): Event | undefined {
-    const found = (event: Event): boolean => passes(event) && direction * (event.cycle - cycle) > 0;
+  /** The first event after a cycle, or the last one before it, that passes a filter. */
+  neighbor(cycle: number, direction: 1 | -1, passes: (event: RunEvent) => boolean): RunEvent | undefined {
+    const found = (event: RunEvent): boolean => passes(event) && direction * (event.cycle - cycle) > 0;
     return direction > 0 ? this.list.find(found) : this.list.findLast(found);
   }
 }

@@ -1,15 +1,15 @@
-/** A walk through the folders that the server names. */
+/** Navigation through the folders that the server offers. */
 
-import { Refused } from "../connection";
+import { RequestError } from "../connection";
 import type { FileEntry, Problem } from "../protocol";
 import type { Studio } from "./studio.svelte";
 
 export class Folders {
   entries = $state.raw<FileEntry[]>([]);
   problem = $state.raw<Problem | null>(null);
-  /** The first folder that was named at start, relative to which new scenarios name files. */
+  /** The first folder given at start: new scenarios refer to files relative to it. */
   first = "";
-  /** The folders down to this one; null is the list of those that were named at start. */
+  /** The path of folders down to this one; null is the list of those given at start. */
   #trail = $state.raw<(string | null)[]>([null]);
   readonly folder = $derived(this.#trail.at(-1) ?? null);
   readonly canLeave = $derived(this.#trail.length > 1);
@@ -19,8 +19,8 @@ export class Folders {
     this.#studio = studio;
   }
 
-  /** Begins anew, with the folders that were named at start. */
-  begin(): Promise<void> {
+  /** Starts over, with the folders given at start. */
+  start(): Promise<void> {
     this.#trail = [null];
     return this.#list(null);
   }
@@ -35,22 +35,22 @@ export class Folders {
     void this.#list(this.folder);
   }
 
-  async #list(wanted: string | null): Promise<void> {
+  async #list(folder: string | null): Promise<void> {
     this.problem = null;
     try {
-      const answer = await this.#studio.ask({ do: "files", folder: wanted });
+      const answer = await this.#studio.request({ do: "files", folder });
       if (answer.is !== "files") return;
       this.entries = answer.entries;
       const [only] = answer.entries;
-      if (wanted !== null) return;
+      if (folder !== null) return;
       this.first = only?.kind === "folder" ? only.path : (only?.path ?? "").replace(/[^/]*$/, "");
-      // One folder with nothing beside it is no choice.
+      // A single folder is no choice.
       if (answer.entries.length === 1 && only?.kind === "folder") {
         this.#trail = [only.path];
         await this.#list(only.path);
       }
     } catch (error) {
-      if (!(error instanceof Refused)) throw error;
+      if (!(error instanceof RequestError)) throw error;
       this.problem = error.problem;
       this.entries = [];
     }

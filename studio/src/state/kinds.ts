@@ -1,14 +1,14 @@
-/** Colors of kinds of events: Okabe and Ito's, chosen by name, so that a kind looks alike in every session. */
+/** Colors of kinds of events: Okabe and Ito's, chosen by name, so that a kind has the same color in every session. */
 
 const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const DARK = ["#56b4e9", "#f0803c", "#2fc79b", "#e39cc4", "#f0b849", "#8fd0f7"];
-/** Levels stand in where a world tells no kind. */
-const LEVELS: Record<string, readonly [string, string]> = {
+/** The level is used where a world gives no kind. */
+const LEVEL_COLORS: Record<string, readonly [string, string]> = {
   info: ["#0072b2", "#56b4e9"],
   warning: ["#d55e00", "#f0803c"],
   error: ["#d01010", "#ff6b60"],
 };
-/** Kinds that should not occur have the color of alarm. */
+/** Kinds that should not occur have the alarm color. */
 const ALARMS = /contact|collision|loss|separation|fail|veto|violat/;
 
 /** Returns whether a kind should not occur. */
@@ -17,7 +17,7 @@ export function isAlarm(kind: string): boolean {
 }
 
 export function eventColor(kind: string, isDark: boolean): string {
-  const level = LEVELS[kind];
+  const level = LEVEL_COLORS[kind];
   if (level) return level[isDark ? 1 : 0];
   if (ALARMS.test(kind)) return isDark ? "#ff6b60" : "#d01010";
   let sum = 0;

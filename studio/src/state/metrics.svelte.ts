@@ -1,6 +1,6 @@
 /** Samples of a session's metrics. */
 
-import type { Answer, MetricName } from "../protocol";
+import type { ReplyBody, MetricName } from "../protocol";
 
 export class Metrics {
   names = $state.raw<MetricName[]>([]);
@@ -9,7 +9,7 @@ export class Metrics {
   columns = $state.raw<(number | null)[][]>([]);
   /** The number of times that the server halved the number of samples, which renumbers them. */
   #thinned = 0;
-  #isAsking = false;
+  #isFetching = false;
   #age = 0;
 
   clear(): void {
@@ -17,11 +17,11 @@ export class Metrics {
     this.columns = [];
     this.#thinned = 0;
     this.#age++;
-    this.#isAsking = false;
+    this.#isFetching = false;
   }
 
-  /** Keys of the metrics: those that changed first come first, those that never did last. */
-  get lively(): string[] {
+  /** Keys of the metrics in the order of their first change; constant ones last. */
+  get keysByFirstChange(): string[] {
     const since = this.columns.map((column) => {
       const at = column.findIndex((value) => value !== null && value !== column[0]);
       return at < 0 ? Infinity : at;
@@ -31,34 +31,34 @@ export class Metrics {
   }
 
   /** Fetches the samples since the last known one. */
-  async fetch(ask: (from: number) => Promise<Answer>): Promise<void> {
-    if (this.#isAsking) return;
+  async fetch(ask: (from: number) => Promise<ReplyBody>): Promise<void> {
+    if (this.#isFetching) return;
     const age = this.#age;
-    this.#isAsking = true;
+    this.#isFetching = true;
     try {
       const answer = await ask(this.cycles.length);
       if (age !== this.#age || answer.is !== "metrics") return;
-      if (answer.thinned !== this.#thinned) this.#begin(answer.thinned);
-      else this.#take(answer);
+      if (answer.thinned !== this.#thinned) this.#restart(answer.thinned);
+      else this.#append(answer);
     } finally {
-      if (age === this.#age) this.#isAsking = false;
+      if (age === this.#age) this.#isFetching = false;
     }
   }
 
-  /** Begins anew with the numbers of samples: the next question is for all of them. */
-  #begin(thinned: number): void {
+  /** Starts over after a renumbering: the next request is for all samples. */
+  #restart(thinned: number): void {
     this.#thinned = thinned;
     this.cycles = [];
     this.columns = [];
   }
 
-  #take(answer: Extract<Answer, { is: "metrics" }>): void {
+  #append(answer: Extract<ReplyBody, { is: "metrics" }>): void {
     const isSame = sameNames(this.names, answer.names);
     if (isSame && answer.cycles.length === 0 && answer.first === this.cycles.length) return;
     const known = new Map(this.names.map(({ key }, i) => [key, this.columns[i] ?? []]));
     this.cycles = [...this.cycles.slice(0, answer.first), ...answer.cycles];
     this.columns = answer.names.map(({ key }, i) => [
-      ...padded(known.get(key) ?? [], answer.first),
+      ...padColumn(known.get(key) ?? [], answer.first),
       ...(answer.values[i] ?? []),
     ]);
     if (!isSame) this.names = answer.names;
@@ -66,14 +66,14 @@ export class Metrics {
 }
 
 /** The first samples of a column; a metric that appeared later had no value before. */
-function padded(column: (number | null)[], length: number): (number | null)[] {
+function padColumn(column: (number | null)[], length: number): (number | null)[] {
   const missing = Math.max(0, length - column.length);
   return [...column.slice(0, length), ...Array<null>(missing).fill(null)];
 }
 
-/** A metric's name with its unit. */
-export function metricWords({ words, unit }: MetricName): string {
-  return unit ? `${words}, ${unit}` : words;
+/** A metric's label with its unit. */
+export function metricLabel({ label, unit }: MetricName): string {
+  return unit ? `${label}, ${unit}` : label;
 }
 
 function sameNames(a: MetricName[], b: MetricName[]): boolean {

@@ -1,10 +1,10 @@
-/** Choices of the page as such: theme, width, open panels. */
+/** Settings of the page itself: theme, width, open panels. */
 
 import type { Center } from "./center";
 
 export type ThemeChoice = "auto" | "light" | "dark";
 
-function kept(key: string): string | null {
+function readStored(key: string): string | null {
   try {
     return localStorage.getItem(`sidestep.${key}`);
   } catch {
@@ -12,41 +12,41 @@ function kept(key: string): string | null {
   }
 }
 
-function keep(key: string, value: string): void {
+function store(key: string, value: string): void {
   try {
     localStorage.setItem(`sidestep.${key}`, value);
   } catch {
-    // A browser that keeps nothing begins anew each time.
+    // A browser without storage starts with defaults each time.
   }
 }
 
 /** Below this width panels become tabs below the canvas. */
-const NARROW = "(max-width: 899px)";
+const NARROW_QUERY = "(max-width: 899px)";
 
 class Page {
-  theme = $state<ThemeChoice>((kept("theme") as ThemeChoice | null) ?? "auto");
-  isNarrow = $state(matchMedia(NARROW).matches);
-  showsCharts = $state(kept("charts") !== "no");
-  /** Single letters act on the page, unless switched off. */
-  hasKeys = $state(kept("keys") !== "no");
+  theme = $state<ThemeChoice>((readStored("theme") as ThemeChoice | null) ?? "auto");
+  isNarrow = $state(matchMedia(NARROW_QUERY).matches);
+  showsCharts = $state(readStored("charts") !== "no");
+  /** Whether single letters act on the page. */
+  hasKeys = $state(readStored("keys") !== "no");
   showsHelp = $state(false);
   showsOpen = $state(false);
   showsExports = $state(false);
   /** Width of the inspector. */
-  inspector_px = $state(Math.min(720, Math.max(220, Number(kept("inspector") ?? 330))));
+  inspector_px = $state(Math.min(720, Math.max(220, Number(readStored("inspector") ?? 330))));
   /** The panel below the canvas on narrow screens. */
   tab = $state<"agents" | "events" | "inspector" | "charts">("agents");
-  /** The view that the center is to show, of sessions that have it (`centerOf`). */
+  /** The panel that the center shows, for sessions that have it (`centerOf`). */
   center = $state<Center>("view");
-  /** Whether the picture is drawn upon. */
+  /** Whether the canvas is being edited. */
   edits = $state(false);
   showsNew = $state(false);
-  /** Requests by keys, counted; the panels listen. */
-  wantsFilter = $state(0);
+  /** Counts requests by keys to focus the filter; the panel reacts to changes. */
+  filterRequests = $state(0);
   #systemIsDark = $state(matchMedia("(prefers-color-scheme: dark)").matches);
 
   constructor() {
-    matchMedia(NARROW).addEventListener("change", (event) => (this.isNarrow = event.matches));
+    matchMedia(NARROW_QUERY).addEventListener("change", (event) => (this.isNarrow = event.matches));
     matchMedia("(prefers-color-scheme: dark)").addEventListener(
       "change",
       (event) => (this.#systemIsDark = event.matches),
@@ -59,22 +59,22 @@ class Page {
 
   switchTheme(): void {
     this.theme = this.isDark ? "light" : "dark";
-    keep("theme", this.theme);
+    store("theme", this.theme);
   }
 
   widenInspector(by_px: number): void {
     this.inspector_px = Math.min(720, Math.max(220, this.inspector_px + by_px));
-    keep("inspector", String(this.inspector_px));
+    store("inspector", String(this.inspector_px));
   }
 
   toggleCharts(): void {
     this.showsCharts = !this.showsCharts;
-    keep("charts", this.showsCharts ? "yes" : "no");
+    store("charts", this.showsCharts ? "yes" : "no");
   }
 
   toggleKeys(): void {
     this.hasKeys = !this.hasKeys;
-    keep("keys", this.hasKeys ? "yes" : "no");
+    store("keys", this.hasKeys ? "yes" : "no");
   }
 }
 

@@ -1,30 +1,31 @@
-/** Subjects opened before, kept by the browser. */
+/** Targets opened before, stored by the browser. */
 
-import type { Subject } from "../protocol";
+import type { OpenTarget } from "../protocol";
 
 const KEY = "sidestep.recent";
-const MOST = 8;
+const MAX_RECENTS = 8;
 
 export interface Recent {
-  subject: Subject;
+  target: OpenTarget;
   name: string;
 }
 
 export function recents(): Recent[] {
   try {
-    const kept: unknown = JSON.parse(localStorage.getItem(KEY) ?? "[]");
-    return Array.isArray(kept) ? (kept as Recent[]).slice(0, MOST) : [];
+    const stored: unknown = JSON.parse(localStorage.getItem(KEY) ?? "[]");
+    // Entries of an earlier version of the page have no target.
+    return Array.isArray(stored) ? (stored as Recent[]).filter((one) => one.target).slice(0, MAX_RECENTS) : [];
   } catch {
     return [];
   }
 }
 
-export function remember(subject: Subject, name: string): void {
-  const same = JSON.stringify(subject);
-  const others = recents().filter((one) => JSON.stringify(one.subject) !== same);
+export function remember(target: OpenTarget, name: string): void {
+  const same = JSON.stringify(target);
+  const others = recents().filter((one) => JSON.stringify(one.target) !== same);
   try {
-    localStorage.setItem(KEY, JSON.stringify([{ subject, name }, ...others].slice(0, MOST)));
+    localStorage.setItem(KEY, JSON.stringify([{ target, name }, ...others].slice(0, MAX_RECENTS)));
   } catch {
-    // A browser that keeps nothing still opens everything.
+    // A browser without storage still opens everything.
   }
 }

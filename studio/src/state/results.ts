@@ -1,6 +1,6 @@
-/** Addresses at which the server makes results of recordings and sweeps: reports and exports. */
+/** Addresses of results that the server makes of recordings and sweeps: reports and exports. */
 
-import { problemOf } from "../connection";
+import { makeProblem } from "../connection";
 import type { Problem, SweepRun } from "../protocol";
 
 function address(route: string, fields: Record<string, string | number | undefined>): string {
@@ -13,29 +13,29 @@ export function reportAddress(path: string, part?: string): string {
   return address("report", { path, as: part });
 }
 
-/** The reason why there is no result, as the server has said it: place, cause, and help on a line of its own. */
-export function failureOf(path: string, said: string): Problem {
-  const [, place, cause, help] = /^(.*?): ([^]*?)(?:\nhelp: ([^]*))?$/.exec(said.trim()) ?? [];
+/** Parses the server's error: place, cause, and help on a line of its own. */
+export function parseFailure(path: string, text: string): Problem {
+  const [, place, cause, help] = /^(.*?): ([^]*?)(?:\nhelp: ([^]*))?$/.exec(text.trim()) ?? [];
   if (cause === undefined || help === undefined)
-    return problemOf(path, said.trim() || "the server gives no report", "try it again");
-  return problemOf(place || path, cause, help);
+    return makeProblem(path, text.trim() || "the server returned no report", "try again");
+  return makeProblem(place || path, cause, help);
 }
 
-/** A run that was asked for in the page of a report: a variant by its name or its number, and a seed or none. */
-export interface WantedRun {
+/** A run requested in the page of a report: a variant by name or number, and a seed or none. */
+export interface RunRequest {
   variant: string;
   seed: string | null;
 }
 
-/** The run that a message of a report's page asks for; anything else is no concern of ours. */
-export function wantedRun(data: unknown): WantedRun | null {
-  const { opens } = (data ?? {}) as { opens?: Partial<WantedRun> };
+/** Parses the message of a report's page that requests a run; null for any other message. */
+export function parseRunRequest(data: unknown): RunRequest | null {
+  const { opens } = (data ?? {}) as { opens?: Partial<RunRequest> };
   if (typeof opens !== "object" || opens === null || typeof opens.variant !== "string") return null;
   return { variant: opens.variant, seed: typeof opens.seed === "string" ? opens.seed : null };
 }
 
-/** The run that is asked for: of a variant's name, or of its number among the names; the first if no seed is named. */
-export function foundRun(runs: readonly SweepRun[], { variant, seed }: WantedRun): SweepRun | undefined {
+/** Finds the requested run, by the variant's name or its number among the names; the first one if no seed is given. */
+export function findRun(runs: readonly SweepRun[], { variant, seed }: RunRequest): SweepRun | undefined {
   const names = [...new Set(runs.map((run) => run.variant))];
   const name = names.includes(variant) ? variant : /^\d+$/.test(variant) ? names[Number(variant)] : undefined;
   return runs.find((run) => run.variant === name && (seed === null || run.seed === seed));
@@ -52,8 +52,8 @@ export function exportAddress(path: string, { form, table, cycle }: Export): str
   return address("export", { path, as: form, table, cycle });
 }
 
-/** Keeps data made here as a file. */
-export function keepFile(blob: Blob, name: string): void {
+/** Downloads data made by the page. */
+export function saveFile(blob: Blob, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;
@@ -61,7 +61,7 @@ export function keepFile(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** A name of a file that needs no quoting anywhere. */
-export function plainName(name: string): string {
+/** A file name that needs no quoting anywhere. */
+export function safeFileName(name: string): string {
   return name.replace(/[^\w.-]+/g, "-").replace(/^[-.]+|-+$/g, "") || "sidestep";
 }

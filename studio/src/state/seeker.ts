@@ -1,52 +1,52 @@
-/** The way to cycles that were asked for: one at a time, and of further wishes the latest only. */
+/** Seeks to requested cycles: one at a time; of further requests only the latest is kept. */
 
 export class Seeker {
-  #wish: number | null = null;
-  #going: number | null = null;
-  #way: Promise<boolean> | null = null;
+  #requested: number | null = null;
+  #current: number | null = null;
+  #seeking: Promise<boolean> | null = null;
   #isSought = false;
-  readonly #go: (cycle: number) => Promise<boolean>;
+  readonly #seek: (cycle: number) => Promise<boolean>;
 
-  /** `go` asks the server, and tells whether it came there. */
-  constructor(go: (cycle: number) => Promise<boolean>) {
-    this.#go = go;
+  /** `seek` asks the server, and returns whether it reached the cycle. */
+  constructor(seek: (cycle: number) => Promise<boolean>) {
+    this.#seek = seek;
   }
 
-  /** The cycle to which it is on its way, if it is. */
-  get goal(): number | null {
-    return this.#way === null ? null : (this.#wish ?? this.#going);
+  /** The cycle of the seek in progress, if there is one. */
+  get target(): number | null {
+    return this.#seeking === null ? null : (this.#requested ?? this.#current);
   }
 
-  /** Goes to a cycle, after the one that is on its way. Tells whether the last wish came true. */
-  to(cycle: number): Promise<boolean> {
-    this.#wish = cycle;
+  /** Seeks to a cycle, after the seek in progress. Returns whether the last requested cycle was reached. */
+  seekTo(cycle: number): Promise<boolean> {
+    this.#requested = cycle;
     this.#isSought = true;
-    this.#way ??= this.#goOn();
-    return this.#way;
+    this.#seeking ??= this.#run();
+    return this.#seeking;
   }
 
-  /** Notes that the server starts anew: its next frame follows from none before. */
-  jumped(): void {
+  /** The server has restarted the run: its next frame follows no earlier one. */
+  onRestart(): void {
     this.#isSought = true;
   }
 
-  /** Notes a frame that has come; returns whether it was sought, and does not just follow the one before. */
-  arrived(): boolean {
+  /** Registers a frame; returns whether it results from a seek and does not just follow the previous one. */
+  onFrame(): boolean {
     const isSought = this.#isSought;
-    // The one that comes after the answer is the last of a way.
-    if (this.#way === null) this.#isSought = false;
+    // The frame after the reply is the last one of a seek.
+    if (this.#seeking === null) this.#isSought = false;
     return isSought;
   }
 
-  async #goOn(): Promise<boolean> {
+  async #run(): Promise<boolean> {
     let isThere = false;
-    while (this.#wish !== null) {
-      const cycle = this.#wish;
-      this.#wish = null;
-      this.#going = cycle;
-      isThere = await this.#go(cycle);
+    while (this.#requested !== null) {
+      const cycle = this.#requested;
+      this.#requested = null;
+      this.#current = cycle;
+      isThere = await this.#seek(cycle);
     }
-    this.#way = null;
+    this.#seeking = null;
     return isThere;
   }
 }

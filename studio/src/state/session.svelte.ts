@@ -1,60 +1,72 @@
-/** One open run: the server's data of it, and the page's choices in it. */
+/** One open run: the server's data of it, and the page's settings for it. */
 
 import { Credit } from "../credit";
 import { decodeFrame, FrameError, type Frame } from "../decode";
 import { linksOf, nodeOf, type Link } from "../fleet/links";
-import { LOST, Refused, problemOf } from "../connection";
-import { firstSpeed, SPEEDS, whoKey } from "../format";
-import type { Answer, Call, Cast, Event, Inspection, Problem, Scene, Speed, Status, Subject, Who } from "../protocol";
-import { Bodies } from "./cast";
+import { CONNECTION_LOST, RequestError, makeProblem } from "../connection";
+import { initialSpeed, SPEEDS, bodyKey } from "../format";
+import type {
+  ReplyBody,
+  Method,
+  BodyTable,
+  RunEvent,
+  Inspection,
+  Problem,
+  Scene,
+  Speed,
+  SessionStatus,
+  OpenTarget,
+  BodyId,
+} from "../protocol";
+import { Bodies } from "./bodies";
 import { Events } from "./events.svelte";
 import { Metrics } from "./metrics.svelte";
-import { Missed } from "./missed";
+import { DroppedFrames } from "./dropped-frames";
 import { cyclesBack_per_s, Rewind } from "./rewind.svelte";
 import { Seeker } from "./seeker";
-import { Waiting } from "./waiting";
+import { Waiters } from "./waiters";
 
 type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
-/** A call to a session, which adds its own number. */
-type OwnCall = DistributiveOmit<Extract<Call, { session: number }>, "session">;
+/** A method of a session, which adds its own number. */
+type SessionCall = DistributiveOmit<Extract<Method, { session: number }>, "session">;
 
-/** The session's line to its surroundings. */
-export interface Line {
-  ask(call: Call): Promise<Answer>;
-  problem(problem: Problem): void;
+/** What a session needs from the page: requests and a sink of problems. */
+export interface SessionHost {
+  request(call: Method): Promise<ReplyBody>;
+  onProblem(problem: Problem): void;
 }
 
-export type TrailChoice = "none" | "selected" | "all";
+export type TrailMode = "none" | "selected" | "all";
 
-/** Least time between two questions about the selected body while the run goes on. */
-const INSPECT_EVERY_MS = 200;
+/** Minimum time between two inspections of the selected body. */
+const MIN_INSPECT_INTERVAL_MS = 200;
 
-const NO_SESSION = problemOf("session", "it is not open at the server", "wait until the page is connected again");
+const SESSION_NOT_OPEN = makeProblem("session", "it is not open on the server", "wait until the page has reconnected");
 
-/** Wait before credit is granted again for frames that could not be shown. */
-const REGRANT_AFTER_MS = 1000;
+/** Delay before credit is granted again for frames that could not be shown. */
+const CREDIT_RETRY_DELAY_MS = 1000;
 
 let keys = 0;
 
 export class Session {
-  /** The page's own number, which stays when the server gives another. */
+  /** The page's own number, which stays when the server assigns another id. */
   readonly key = ++keys;
-  readonly subject: Subject;
+  readonly target: OpenTarget;
   readonly events = new Events();
   readonly metrics = new Metrics();
   id = $state(0);
   scene = $state.raw<Scene>() as Scene;
-  status = $state.raw<Status>() as Status;
+  status = $state.raw<SessionStatus>() as SessionStatus;
   bodies = $state.raw<Bodies | null>(null);
-  /** Its speed when it plays. */
+  /** Its playback speed. */
   speed = $state.raw<Speed>({ times: 1 });
-  /** Cycle, time and count of left-out frames of the shown picture. */
-  shown = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
-  selected = $state.raw<Who | null>(null);
+  /** Cycle, time and count of dropped frames of the shown frame. */
+  displayed = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
+  selected = $state.raw<BodyId | null>(null);
   inspection = $state.raw<Inspection | null>(null);
   inspectProblem = $state.raw<Problem | null>(null);
   ended = $state.raw<Problem | null>(null);
-  trails = $state<TrailChoice>("selected");
+  trails = $state<TrailMode>("selected");
   widthIsTrue = $state(false);
   eventKinds = $state.raw<ReadonlySet<string>>(new Set());
   /** The text that this run was started with instead of the file's. */
@@ -63,98 +75,98 @@ export class Session {
   isUnsaved = $state(false);
   /** Cycle under the pointer in the timeline or a chart. */
   cursor = $state<number | null>(null);
-  /** Counts starts, so that views begin anew. */
+  /** Counts starts, so that views reset. */
   starts = $state(0);
   /** The newest frame. */
   frame: Frame | null = null;
-  /** Whether the newest frame was asked for, and does not just follow the one before. */
-  isSought = false;
+  /** Whether the newest frame results from a seek and does not just follow the previous one. */
+  isAfterSeek = false;
   readonly credit: Credit;
-  readonly #line: Line;
-  readonly #early = new Map<number, Frame>();
-  readonly #onFrame = new Set<() => void>();
+  readonly #host: SessionHost;
+  readonly #framesWithoutTable = new Map<number, Frame>();
+  readonly #frameListeners = new Set<() => void>();
   #inspectTimer: ReturnType<typeof setTimeout> | null = null;
   #inspectedAt_ms = 0;
   #isInspecting = false;
   readonly #rewind = new Rewind();
   readonly #seeker = new Seeker((cycle) => this.#seekNow(cycle));
-  /** The last step that is under way. */
-  #stepping: { goal: number } | null = null;
-  readonly #missed = new Missed();
-  /** Counts the page's orders to the run: a way that was given up for a newer order is no problem. */
-  #orders = 0;
-  /** Promises that wait for a state or a frame. */
-  readonly #waiting = new Waiting();
-  #regrantTimer: ReturnType<typeof setTimeout> | null = null;
-  /** The state at which the connection was lost, until it is there again. */
-  #kept: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
+  /** The last step in progress. */
+  #pendingStep: { target: number } | null = null;
+  readonly #dropped = new DroppedFrames();
+  /** Counts the page's commands: a seek abandoned for a newer command is no problem. */
+  #commands = 0;
+  /** Promises waiting for a status or a frame. */
+  readonly #waiters = new Waiters();
+  #creditTimer: ReturnType<typeof setTimeout> | null = null;
+  /** The state when the connection was lost, until it is restored. */
+  #resumeState: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
 
-  constructor(subject: Subject, line: Line) {
-    this.subject = subject;
-    this.#line = line;
-    this.credit = new Credit((frames) => this.quietly({ do: "credit", frames }));
+  constructor(target: OpenTarget, line: SessionHost) {
+    this.target = target;
+    this.#host = line;
+    this.credit = new Credit((frames) => this.sendQuietly({ do: "credit", frames }));
   }
 
-  /** Notes that the server has opened it (again). */
-  opened(answer: Extract<Answer, { is: "opened" }>): void {
+  /** The server has opened it (again). */
+  onOpened(answer: Extract<ReplyBody, { is: "opened" }>): void {
     this.id = answer.session;
-    if (this.starts === 0) this.speed = { times: firstSpeed(answer.scene.cycle_s) };
-    this.#begun(answer);
+    if (this.starts === 0) this.speed = { times: initialSpeed(answer.scene.cycle_s) };
+    this.#reset(answer);
     this.credit.reset();
-    this.credit.drawn();
-    this.#look();
+    this.credit.refill();
+    this.#selectScans();
   }
 
-  /** Notes that the connection was lost; numbers of sessions are the server's, and a new one counts anew. */
-  cutOff(): void {
+  /** The connection was lost; session ids belong to the server, and a new one assigns them anew. */
+  onConnectionLost(): void {
     this.id = 0;
     this.#rewind.stop();
-    this.#waiting.over();
-    const { cycle } = this.shown;
-    // Lost once more on the way back: where it was in the end is where it was in the beginning.
-    this.#kept ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
+    this.#waiters.cancelAll();
+    const { cycle } = this.displayed;
+    // Lost again while resuming: the state before the first loss is still the one to restore.
+    this.#resumeState ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
   }
 
-  /** Goes back to where it was, once opened again, and on if it played. Returns the cycle. */
+  /** Seeks to the cycle where it was, once reopened, and plays if it was playing. Returns the cycle. */
   async resume(): Promise<number> {
-    const { cycle, isPlaying, seed } = this.#kept ?? { cycle: 0, isPlaying: false, seed: null };
+    const { cycle, isPlaying, seed } = this.#resumeState ?? { cycle: 0, isPlaying: false, seed: null };
     const { id } = this;
     if (this.isFleet) {
-      this.#kept = null;
-      return this.shown.cycle;
+      this.#resumeState = null;
+      return this.displayed.cycle;
     }
     if (this.text !== null) await this.restart(seed, this.text);
-    if (cycle > 0) await this.#seeker.to(cycle);
+    if (cycle > 0) await this.#seeker.seekTo(cycle);
     if (id !== this.id) return cycle;
-    this.#kept = null;
+    this.#resumeState = null;
     if (isPlaying) this.play();
     return cycle;
   }
 
-  #begun(answer: Extract<Answer, { is: "opened" }>): void {
+  #reset(answer: Extract<ReplyBody, { is: "opened" }>): void {
     this.scene = answer.scene;
     this.status = answer.status;
     this.ended = null;
     this.events.clear();
     this.metrics.clear();
     this.inspection = null;
-    this.#missed.reset();
-    this.#seeker.jumped();
+    this.#dropped.reset();
+    this.#seeker.onRestart();
     this.starts++;
   }
 
-  /** Returns whether it is a fleet that flies elsewhere: it is watched, and nothing is asked of it. */
+  /** Returns whether it is a fleet that runs elsewhere: it is watched and not controlled. */
   get isFleet(): boolean {
-    return this.subject.kind === "fleet";
+    return this.target.kind === "fleet";
   }
 
-  /** The seed, where a number of the page can hold it; a recording has none but its own. */
+  /** The seed, if a JavaScript number can hold it; null for a recording, which has its own. */
   get seed(): number | null {
-    return this.#kept ? this.#kept.seed : this.#ownSeed;
+    return this.#resumeState ? this.#resumeState.seed : this.#ownSeed;
   }
 
   get #ownSeed(): number | null {
-    if (this.subject.kind === "recording" || this.isFleet) return null;
+    if (this.target.kind === "recording" || this.isFleet) return null;
     const seed = Number(this.status.seed);
     return this.status.seed !== "" && Number.isSafeInteger(seed) ? seed : null;
   }
@@ -163,7 +175,7 @@ export class Session {
     return this.status.state === "playing";
   }
 
-  /** Returns whether it goes on or back by itself. */
+  /** Returns whether it plays forward or backward. */
   get isMoving(): boolean {
     return this.isPlaying || this.#rewind.isOn;
   }
@@ -183,9 +195,9 @@ export class Session {
     const { bodies, selected } = this;
     const { fleet } = this.status;
     if (!fleet || !bodies) return [];
-    const bodyOf = new Map(fleet.nodes.map((node) => [node.agent, bodies.find(node.who)]));
+    const bodyOf = new Map(fleet.nodes.map((node) => [node.agent, bodies.find(node.body)]));
     const index = (agent: number): number | undefined => bodyOf.get(agent);
-    // A body that is no agent, such as an obstacle, hears no other: all links stay.
+    // A body that is no agent, such as an obstacle, has no links: all links stay visible.
     const chosen = selected ? nodeOf(fleet, selected) : undefined;
     return linksOf(fleet, chosen?.agent ?? null).flatMap(({ from, to, isMutual }) => {
       const [a, b] = [index(from), index(to)];
@@ -194,161 +206,162 @@ export class Session {
   }
 
   subscribe(onFrame: () => void): () => void {
-    this.#onFrame.add(onFrame);
-    return () => this.#onFrame.delete(onFrame);
+    this.#frameListeners.add(onFrame);
+    return () => this.#frameListeners.delete(onFrame);
   }
 
-  /** Called regularly: a session out of sight needs few frames, so that it is ready when it is looked at. */
-  grantUnseen(): void {
-    if (!this.#isWatched && this.id !== 0 && !this.ended) this.credit.drawn();
+  /** Called regularly: a hidden session gets few frames, so that it is current when it is shown. */
+  grantHidden(): void {
+    if (!this.#isWatched && this.id !== 0 && !this.ended) this.credit.refill();
   }
 
   get #isWatched(): boolean {
-    return this.#onFrame.size > 0 && !globalThis.document?.hidden;
+    return this.#frameListeners.size > 0 && !globalThis.document?.hidden;
   }
 
-  takeCast(cast: Cast): void {
-    this.bodies = new Bodies(cast);
-    const early = this.#early.get(cast.cast);
-    this.#early.clear();
-    if (early) this.#show(early);
+  onBodyTable(table: BodyTable): void {
+    this.bodies = new Bodies(table);
+    const frame = this.#framesWithoutTable.get(table.id);
+    this.#framesWithoutTable.clear();
+    if (frame) this.#show(frame);
   }
 
-  takeFrame(bytes: ArrayBuffer): void {
-    this.credit.arrived();
+  onFrame(bytes: ArrayBuffer): void {
+    this.credit.onFrame();
     try {
       const frame = decodeFrame(bytes);
-      if (frame.cast === this.bodies?.cast.cast) this.#show(frame);
-      else this.#early.set(frame.cast, frame);
+      if (frame.tableId === this.bodies?.table.id) this.#show(frame);
+      else this.#framesWithoutTable.set(frame.tableId, frame);
     } catch (error) {
       if (!(error instanceof FrameError)) throw error;
-      this.#line.problem(problemOf("frame", error.message, "reload the page; if it stays so, report it"));
-      this.#regrantSoon();
+      this.#host.onProblem(makeProblem("frame", error.message, "reload the page; if it persists, report it"));
+      this.#retryCredit();
     }
   }
 
-  /** Nothing is drawn of a frame that cannot be shown, which would end the credit, and the picture stood still. */
-  #regrantSoon(): void {
-    this.#regrantTimer ??= setTimeout(() => {
-      this.#regrantTimer = null;
-      if (this.id !== 0 && !this.ended) this.credit.drawn();
-    }, REGRANT_AFTER_MS);
+  /** A frame that cannot be shown is never drawn, so its credit must be granted again or the view would freeze. */
+  #retryCredit(): void {
+    this.#creditTimer ??= setTimeout(() => {
+      this.#creditTimer = null;
+      if (this.id !== 0 && !this.ended) this.credit.refill();
+    }, CREDIT_RETRY_DELAY_MS);
   }
 
   #show(frame: Frame): void {
     if (frame.bodies !== this.bodies?.count || frame.lineStarts.length !== this.bodies.lines.length + 1) {
-      this.#line.problem(problemOf("frame", "a frame does not fit its cast", "reload the page"));
-      this.#regrantSoon();
+      this.#host.onProblem(makeProblem("frame", "a frame does not match its body table", "reload the page"));
+      this.#retryCredit();
       return;
     }
     this.frame = frame;
-    this.isSought = this.#seeker.arrived();
-    this.shown = {
+    this.isAfterSeek = this.#seeker.onFrame();
+    this.displayed = {
       cycle: frame.cycle,
       time_s: frame.time_s,
-      leftOut: this.#missed.count(frame.leftOut, this.#isWatched),
+      leftOut: this.#dropped.count(frame.leftOut, this.#isWatched),
     };
     if (frame.text.events.length > 0) this.events.add(frame.text.events);
-    for (const tell of this.#onFrame) tell();
-    this.#waiting.changed();
-    this.#inspectSoon();
+    for (const send of this.#frameListeners) send();
+    this.#waiters.check();
+    this.#scheduleInspection();
   }
 
-  takeStatus(status: Status): void {
+  onStatus(status: SessionStatus): void {
     this.status = status;
-    this.#waiting.changed();
+    this.#waiters.check();
   }
 
   /**
-   * Goes to a cycle; returns the digest of the state there, and the cycle, which is less where the run is over before.
-   * There is no digest of a recording that is shown from its tables.
+   * Seeks to a cycle; returns the digest of the state there, and the cycle, which is lower where the run ends earlier.
+   * A recording that is shown from its tables has no digest.
    */
   async digestAt(cycle: number): Promise<{ cycle: number; digest: string | null } | null> {
     this.#rewind.stop();
-    if (!(await this.#seeker.to(cycle))) return null;
-    return this.#waiting.for(() => {
+    if (!(await this.#seeker.seekTo(cycle))) return null;
+    return this.#waiters.waitFor(() => {
       const { state, digest, cycle: at } = this.status;
       const isThere = (state === "paused" && at === cycle) || (state === "over" && at <= cycle);
       return isThere ? { cycle: at, digest } : null;
     });
   }
 
-  /** The frame of a cycle where the run stands, once it has come. */
+  /** The frame of the run's current cycle, once it arrives. */
   frameAt(cycle: number): Promise<Frame | null> {
     if (this.id === 0 || this.ended) return Promise.resolve(null);
-    return this.#waiting.for(() => (this.frame?.cycle === cycle ? this.frame : null));
+    return this.#waiters.waitFor(() => (this.frame?.cycle === cycle ? this.frame : null));
   }
 
-  takeEnd(problem: Problem): void {
+  onEnded(problem: Problem): void {
     this.ended = problem;
     this.status = { ...this.status, state: "failed" };
     this.#rewind.stop();
-    this.#waiting.over();
+    this.#waiters.cancelAll();
   }
 
   /** Fetches events and samples; called regularly while the session is shown. */
   refresh(withMetrics: boolean): void {
     if (this.ended) return;
-    const cycle = 1 + (this.scene.is_recording ? this.lastCycle : Math.max(this.status.cycle, this.shown.cycle));
-    const quiet = (): void => undefined;
+    const cycle = 1 + (this.scene.is_recording ? this.lastCycle : Math.max(this.status.cycle, this.displayed.cycle));
+    const ignore = (): void => undefined;
     this.events
-      .fetch(cycle, (from, until, skip, most) => this.#ask({ do: "events", from, until, skip, most }))
-      .catch(quiet);
-    if (withMetrics && !this.isFleet) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
+      .fetch(cycle, (from, until, skip, limit) => this.#request({ do: "events", from, until, skip, limit }))
+      .catch(ignore);
+    if (withMetrics && !this.isFleet)
+      this.metrics.fetch((from) => this.#request({ do: "metrics", from })).catch(ignore);
   }
 
-  // The page's orders to the run.
+  // Commands of the page.
 
   play(): void {
-    this.#order();
-    void this.tell({ do: "play", speed: this.speed });
+    this.#onCommand();
+    void this.send({ do: "play", speed: this.speed });
   }
 
   pause(): void {
-    this.#order();
-    void this.tell({ do: "pause" });
+    this.#onCommand();
+    void this.send({ do: "pause" });
   }
 
   /** Plays backwards. */
   rewind(): void {
-    this.#order();
-    const { cycle } = this.shown;
+    this.#onCommand();
+    const { cycle } = this.displayed;
     const times = this.speed === "fastest" ? this.speed : this.speed.times;
-    void this.#rewind.start(cycle, cyclesBack_per_s(times, this.scene.cycle_s, cycle), (to) => this.#seeker.to(to));
+    void this.#rewind.start(cycle, cyclesBack_per_s(times, this.scene.cycle_s, cycle), (to) => this.#seeker.seekTo(to));
   }
 
   step(cycles: number): void {
-    const from = this.#seeker.goal ?? this.#stepping?.goal ?? this.shown.cycle;
-    if (cycles < 0 || this.#seeker.goal !== null) return this.seek(from + cycles);
-    this.#order();
+    const from = this.#seeker.target ?? this.#pendingStep?.target ?? this.displayed.cycle;
+    if (cycles < 0 || this.#seeker.target !== null) return this.seek(from + cycles);
+    this.#onCommand();
     void this.#stepNow(from + cycles, cycles);
   }
 
-  /** Steps that follow each other faster than they are gone add up, here and at the server. */
-  async #stepNow(goal: number, cycles: number): Promise<void> {
-    const orders = this.#orders;
-    const step = (this.#stepping = { goal });
+  /** Steps requested faster than they complete add up, here and on the server. */
+  async #stepNow(target: number, cycles: number): Promise<void> {
+    const orders = this.#commands;
+    const step = (this.#pendingStep = { target });
     try {
-      await this.#ask({ do: "step", cycles });
+      await this.#request({ do: "step", cycles });
     } catch (error) {
-      if (orders === this.#orders) this.#told(error);
+      if (orders === this.#commands) this.#report(error);
     } finally {
-      if (this.#stepping === step) this.#stepping = null;
+      if (this.#pendingStep === step) this.#pendingStep = null;
     }
   }
 
-  /** Notes that the page has closed it: pending calls no longer matter. */
+  /** The page has closed it: pending requests no longer matter. */
   dispose(): void {
-    this.quietly({ do: "close" });
-    this.#order();
+    this.sendQuietly({ do: "close" });
+    this.#onCommand();
     this.id = 0;
-    this.#waiting.over();
-    for (const timer of [this.#inspectTimer, this.#regrantTimer]) if (timer !== null) clearTimeout(timer);
+    this.#waiters.cancelAll();
+    for (const timer of [this.#inspectTimer, this.#creditTimer]) if (timer !== null) clearTimeout(timer);
   }
 
-  /** Notes a new order, which ends everything that it does by itself. */
-  #order(): void {
-    this.#orders++;
+  /** Registers a new command, which ends automatic playback backwards. */
+  #onCommand(): void {
+    this.#commands++;
     this.#rewind.stop();
   }
 
@@ -359,7 +372,7 @@ export class Session {
     else if (isRewinding) this.rewind();
   }
 
-  /** Goes to the next or the previous of the usual speeds. */
+  /** Switches to the next or previous standard speed. */
   changeSpeed(direction: 1 | -1): void {
     const now = this.speed === "fastest" ? Infinity : this.speed.times;
     const sizes = SPEEDS.map((speed) => (speed === "fastest" ? Infinity : speed));
@@ -367,128 +380,128 @@ export class Session {
     if (wanted !== undefined) this.setSpeed(wanted === Infinity ? "fastest" : { times: wanted });
   }
 
-  /** Goes to a cycle; while one is under way only the latest wish is kept. */
+  /** Seeks to a cycle; during a seek only the latest request is kept. */
   seek(cycle: number): void {
     if (this.isFleet) return;
-    this.#order();
-    void this.#seeker.to(Math.round(Math.min(Math.max(0, cycle), this.lastCycle)));
+    this.#onCommand();
+    void this.#seeker.seekTo(Math.round(Math.min(Math.max(0, cycle), this.lastCycle)));
   }
 
   async #seekNow(cycle: number): Promise<boolean> {
-    const orders = this.#orders;
+    const orders = this.#commands;
     try {
-      await this.#ask({ do: "seek", cycle });
+      await this.#request({ do: "seek", cycle });
       return true;
     } catch (error) {
-      if (orders === this.#orders) this.#told(error);
+      if (orders === this.#commands) this.#report(error);
       return false;
     }
   }
 
-  /** Starts anew. Returns whether the server agreed. */
+  /** Restarts the run. Returns whether the server accepted. */
   async restart(seed: number | null, text: string | null): Promise<boolean> {
-    this.#order();
-    const answer = await this.tell({ do: "restart", seed, text });
+    this.#onCommand();
+    const answer = await this.send({ do: "restart", seed, text });
     if (answer === null) return false;
     if (text !== null) this.text = text;
-    if (answer.is === "opened") this.#begun(answer);
-    else this.#begun({ is: "opened", session: this.id, scene: this.scene, status: { ...this.status, cycle: 0 } });
-    this.credit.drawn();
-    this.#look();
+    if (answer.is === "opened") this.#reset(answer);
+    else this.#reset({ is: "opened", session: this.id, scene: this.scene, status: { ...this.status, cycle: 0 } });
+    this.credit.refill();
+    this.#selectScans();
     return true;
   }
 
-  select(who: Who | null): void {
-    const same = who && this.selected && whoKey(who) === whoKey(this.selected);
+  select(body: BodyId | null): void {
+    const same = body && this.selected && bodyKey(body) === bodyKey(this.selected);
     if (same) return;
-    this.selected = who;
+    this.selected = body;
     this.inspection = null;
     this.inspectProblem = null;
-    this.#look();
+    this.#selectScans();
     this.#inspectedAt_ms = 0;
-    this.#inspectSoon();
+    this.#scheduleInspection();
   }
 
-  /** Goes to an event, and selects the agent that it is about. */
-  visit(event: Event): void {
-    const agent = [event.who, event.with].find((who) => {
-      const index = who ? this.bodies?.find(who) : undefined;
-      return index !== undefined && this.bodies?.cast.is_agent[index];
+  /** Seeks to an event, and selects its agent. */
+  visit(event: RunEvent): void {
+    const agent = [event.body, event.other].find((body) => {
+      const index = body ? this.bodies?.find(body) : undefined;
+      return index !== undefined && this.bodies?.table.is_agent[index];
     });
     if (agent) this.select(agent);
     this.seek(event.cycle);
   }
 
-  /** Jumps to the next or the previous event of the kinds that are shown. */
+  /** Jumps to the next or previous visible event. */
   jump(direction: 1 | -1): void {
     const kinds = this.eventKinds;
-    const event = this.events.neighbor(this.shown.cycle, direction, (e) => !kinds.has(e.kind));
+    const event = this.events.neighbor(this.displayed.cycle, direction, (e) => !kinds.has(e.kind));
     if (event) this.visit(event);
   }
 
-  source(): Promise<Answer> {
-    return this.#ask({ do: "source" });
+  source(): Promise<ReplyBody> {
+    return this.#request({ do: "source" });
   }
 
-  /** The folder of the recording, where it is one: of such there are reports. */
+  /** The folder of the recording, if it is one: only folders have reports. */
   get folder(): string | null {
-    const { subject } = this;
-    return subject.kind === "recording" && !/\.mcap$/i.test(subject.path) ? subject.path : null;
+    const { target } = this;
+    return target.kind === "recording" && !/\.mcap$/i.test(target.path) ? target.path : null;
   }
 
   /** The names of the recorded tables. */
   async tables(): Promise<string[]> {
-    const answer = await this.tell({ do: "tables" });
+    const answer = await this.send({ do: "tables" });
     return answer?.is === "tables" ? answer.names : [];
   }
 
-  check(text: string): Promise<Answer> {
-    return this.#ask({ do: "check", text });
+  check(text: string): Promise<ReplyBody> {
+    return this.#request({ do: "check", text });
   }
 
-  /** Sends a call of the editor's. */
-  ask(call: Call): Promise<Answer> {
-    return this.id === 0 ? Promise.reject(new Refused(NO_SESSION)) : this.#line.ask(call);
+  /** Sends a request of the editor. */
+  request(call: Method): Promise<ReplyBody> {
+    return this.id === 0 ? Promise.reject(new RequestError(SESSION_NOT_OPEN)) : this.#host.request(call);
   }
 
-  complain(problem: Problem): void {
-    this.#line.problem(problem);
+  reportProblem(problem: Problem): void {
+    this.#host.onProblem(problem);
   }
 
-  /** Sends a call and shows its problem, if there is one. */
-  async tell(call: OwnCall): Promise<Answer | null> {
+  /** Sends a request and reports its problem, if there is one. */
+  async send(call: SessionCall): Promise<ReplyBody | null> {
     try {
-      return await this.#ask(call);
+      return await this.#request(call);
     } catch (error) {
-      this.#told(error);
+      this.#report(error);
       return null;
     }
   }
 
-  /** Shows a problem, but for that of the connection, which the banner tells for all calls. */
-  #told(error: unknown): void {
-    if (!(error instanceof Refused)) throw error;
-    if (error.problem !== LOST && error.problem !== NO_SESSION) this.#line.problem(error.problem);
+  /** Reports a problem, except for a lost connection, which one banner reports for all requests. */
+  #report(error: unknown): void {
+    if (!(error instanceof RequestError)) throw error;
+    if (error.problem !== CONNECTION_LOST && error.problem !== SESSION_NOT_OPEN) this.#host.onProblem(error.problem);
   }
 
-  /** Sends a call whose failure is ignored. */
-  quietly(call: OwnCall): void {
-    this.#ask(call).catch(() => undefined);
+  /** Sends a request whose failure is ignored. */
+  sendQuietly(call: SessionCall): void {
+    this.#request(call).catch(() => undefined);
   }
 
-  #ask(call: OwnCall): Promise<Answer> {
-    // Between two connections the session has no number at the server.
-    if (this.id === 0) return Promise.reject(new Refused(NO_SESSION));
-    return this.#line.ask({ ...call, session: this.id } as Call);
+  #request(call: SessionCall): Promise<ReplyBody> {
+    // Between two connections the session has no id on the server.
+    if (this.id === 0) return Promise.reject(new RequestError(SESSION_NOT_OPEN));
+    return this.#host.request({ ...call, session: this.id } as Method);
   }
 
-  #look(): void {
-    this.quietly({ do: "look", scans_of: this.selected ? [this.selected] : [] });
+  #selectScans(): void {
+    this.sendQuietly({ do: "select-scans", bodies: this.selected ? [this.selected] : [] });
   }
 
-  #inspectSoon(): void {
+  #scheduleInspection(): void {
     if (!this.selected || this.isFleet || this.#isInspecting || this.#inspectTimer !== null) return;
-    const wait_ms = Math.max(0, this.#inspectedAt_ms + INSPECT_EVERY_MS - performance.now());
+    const wait_ms = Math.max(0, this.#inspectedAt_ms + MIN_INSPECT_INTERVAL_MS - performance.now());
     this.#inspectTimer = setTimeout(() => {
       this.#inspectTimer = null;
       void this.#inspect();
@@ -496,24 +509,24 @@ export class Session {
   }
 
   async #inspect(): Promise<void> {
-    const who = this.selected;
+    const body = this.selected;
     const frame = this.frame;
-    if (!who) return;
+    if (!body) return;
     this.#isInspecting = true;
     this.#inspectedAt_ms = performance.now();
     try {
-      const answer = await this.#ask({ do: "inspect", who });
-      if (this.selected === who && answer.is === "inspection") {
+      const answer = await this.#request({ do: "inspect", body });
+      if (this.selected === body && answer.is === "inspection") {
         this.inspection = answer;
         this.inspectProblem = null;
       }
     } catch (error) {
-      if (!(error instanceof Refused)) throw error;
-      if (this.selected === who) this.inspectProblem = error.problem;
+      if (!(error instanceof RequestError)) throw error;
+      if (this.selected === body) this.inspectProblem = error.problem;
     } finally {
       this.#isInspecting = false;
-      for (const tell of this.#onFrame) tell();
-      if (this.selected !== who || this.frame !== frame) this.#inspectSoon();
+      for (const listener of this.#frameListeners) listener();
+      if (this.selected !== body || this.frame !== frame) this.#scheduleInspection();
     }
   }
 }

@@ -1,27 +1,27 @@
-/** All open sessions, the connection that they share, and the choices of the page as a whole. */
+/** All open sessions, their shared connection, and the settings of the page as a whole. */
 
-import { Connection, LOST, Refused, problemOf, type Listener, type Surroundings } from "../connection";
-import { STANDING_WORDS, type Standing } from "../enter";
+import { Connection, CONNECTION_LOST, RequestError, makeProblem, type Listener, type Environment } from "../connection";
+import { ACCESS_TEXTS, type AccessStatus } from "../auth";
 import { HEADER_BYTES } from "../decode";
-import { VERSION, type Named, type Notice, type Problem, type Subject } from "../protocol";
+import { VERSION, type TargetRef, type ServerNotification, type Problem, type OpenTarget } from "../protocol";
 import { Comparison } from "./comparison.svelte";
 import { remember } from "./recents";
 import { Session } from "./session.svelte";
 
-/** Sessions side by side at most. */
-export const MOST_SESSIONS = 4;
+/** Maximum number of open sessions. */
+export const MAX_SESSIONS = 4;
 
-/** Milliseconds after which the page looks again whether a fleet flies where one was lost. */
-export const FIND_AGAIN_MS = 2000;
+/** Delay before the page tries to reopen a lost fleet. */
+export const FLEET_RETRY_DELAY_MS = 2000;
 
 export interface Banner {
   words: string;
   isBad: boolean;
 }
 
-/** The surroundings that a studio needs besides sockets: its standing with the server. */
-export interface Around extends Surroundings {
-  standing(): Promise<Standing>;
+/** The environment of a studio: sockets, timers, and the access status. */
+export interface StudioEnvironment extends Environment {
+  accessStatus(): Promise<AccessStatus>;
 }
 
 /** A sweep, by its folder. */
@@ -30,7 +30,7 @@ export interface Sweep {
   name: string;
 }
 
-type Hello = Extract<Notice, { notice: "hello" }>;
+type Hello = Extract<ServerNotification, { notice: "hello" }>;
 
 export class Studio {
   hello = $state.raw<Hello | null>(null);
@@ -38,29 +38,29 @@ export class Studio {
   banner = $state.raw<Banner | null>(null);
   problems = $state.raw<{ key: number; problem: Problem }[]>([]);
   sessions = $state.raw<Session[]>([]);
-  /** The sweep that is shown in the place of sessions, and the one that was last. */
+  /** The sweep shown instead of sessions, and the last one. */
   sweep = $state.raw<Sweep | null>(null);
   lastSweep = $state.raw<Sweep | null>(null);
   #activeKey = $state(0);
-  /** All sessions beside each other, or the active one only. */
+  /** Whether all sessions are shown side by side, or only the active one. */
   sideBySide = $state(false);
-  /** Transport commands go to all sessions. */
+  /** Whether transport commands apply to all sessions. */
   inStep = $state(false);
   readonly comparison = new Comparison();
   readonly #connection: Connection;
-  readonly #around: Around;
-  /** Counts greetings and losses: work begun before one of them is of no more use. */
+  readonly #environment: StudioEnvironment;
+  /** Counts connections and losses: results of earlier generations are obsolete. */
   #generation = 0;
   #problemKeys = 0;
 
-  constructor(around: Around) {
+  constructor(around: StudioEnvironment) {
     const listener: Listener = {
-      notice: (notice) => this.#notice(notice),
-      frame: (bytes) => this.#frame(bytes),
-      problem: (problem) => this.problem(problem),
-      lost: (attempt, wait_ms) => this.#lost(attempt, wait_ms),
+      onNotification: (notice) => this.#onNotification(notice),
+      onFrame: (bytes) => this.#onFrame(bytes),
+      onProblem: (problem) => this.onProblem(problem),
+      onLost: (attempt, wait_ms) => this.#onConnectionLost(attempt, wait_ms),
     };
-    this.#around = around;
+    this.#environment = around;
     this.#connection = new Connection(listener, around);
   }
 
@@ -87,13 +87,13 @@ export class Studio {
     return this.sessions.find((session) => session.key === this.activeKey) ?? null;
   }
 
-  /** The sessions that a transport command is meant for. */
-  get led(): Session[] {
-    const meant = this.inStep ? this.sessions : this.sessions.filter((session) => session === this.active);
-    return meant.filter((session) => !session.isFleet);
+  /** The sessions that transport commands apply to. */
+  get controlled(): Session[] {
+    const targets = this.inStep ? this.sessions : this.sessions.filter((session) => session === this.active);
+    return targets.filter((session) => !session.isFleet);
   }
 
-  /** The sessions that are to be seen. */
+  /** The visible sessions. */
   get visible(): Session[] {
     if (this.sideBySide) return this.sessions;
     return this.active ? [this.active] : [];
@@ -103,9 +103,9 @@ export class Studio {
     this.#connection.connect();
   }
 
-  readonly ask: Connection["ask"] = (call) => this.#connection.ask(call);
+  readonly request: Connection["request"] = (call) => this.#connection.request(call);
 
-  problem(problem: Problem): void {
+  onProblem(problem: Problem): void {
     const same = this.problems.some(({ problem: p }) => p.place === problem.place && p.cause === problem.cause);
     if (same) return;
     this.problems = [...this.problems.slice(-3), { key: ++this.#problemKeys, problem }];
@@ -115,33 +115,35 @@ export class Studio {
     this.problems = this.problems.filter((one) => one.key !== key);
   }
 
-  /** Opens a subject in a new session and shows it. Returns whether that worked. */
-  async open(subject: Subject, seed: number | null = null): Promise<boolean> {
-    if (this.sessions.length >= MOST_SESSIONS) {
-      this.problem(problemOf("sessions", `${MOST_SESSIONS} sessions are open, which is the most`, "close one first"));
+  /** Opens a target in a new session and shows it. Returns whether that succeeded. */
+  async open(target: OpenTarget, seed: number | null = null): Promise<boolean> {
+    if (this.sessions.length >= MAX_SESSIONS) {
+      this.onProblem(
+        makeProblem("sessions", `${MAX_SESSIONS} sessions are open, which is the maximum`, "close one first"),
+      );
       return false;
     }
-    const session = new Session(subject, { ask: this.ask, problem: (problem) => this.problem(problem) });
+    const session = new Session(target, { request: this.request, onProblem: (problem) => this.onProblem(problem) });
     if (!(await this.#openAt(session, seed))) return false;
-    // The studio knows a fleet only as long as its command line names it.
-    if (!session.isFleet) remember(subject, session.scene.name);
+    // A fleet is known only as long as it is on the studio's command line.
+    if (!session.isFleet) remember(target, session.scene.name);
     this.sessions = [...this.sessions, session];
     this.activeKey = session.key;
     this.#deliver(session);
     return true;
   }
 
-  /** Opens the subject of a session; a refusal is told unless `quiet`. Returns whether it is open. */
+  /** Opens the target of a session; reports a refusal unless `quiet`. Returns whether it is open. */
   async #openAt(session: Session, seed: number | null, quiet = false): Promise<boolean> {
     try {
-      const answer = await this.ask({ do: "open", what: session.subject, seed });
+      const answer = await this.request({ do: "open", target: session.target, seed });
       if (answer.is !== "opened") return false;
-      session.opened(answer);
+      session.onOpened(answer);
       return true;
     } catch (error) {
-      if (!(error instanceof Refused)) throw error;
-      // The banner tells of a lost connection, for all sessions at once.
-      if (error.problem !== LOST && !quiet) this.problem(error.problem);
+      if (!(error instanceof RequestError)) throw error;
+      // One banner reports a lost connection for all sessions.
+      if (error.problem !== CONNECTION_LOST && !quiet) this.onProblem(error.problem);
       return false;
     }
   }
@@ -149,10 +151,10 @@ export class Studio {
   // Transport, of all sessions or of the active one.
 
   play(): void {
-    for (const session of this.led) session.play();
+    for (const session of this.controlled) session.play();
   }
 
-  /** Pauses if the active session moves, and plays otherwise. */
+  /** Pauses if the active session plays, and plays otherwise. */
   toggle(): void {
     if (this.active?.isMoving) this.pause();
     else this.play();
@@ -161,19 +163,19 @@ export class Studio {
   /** Plays backwards, or pauses if the active session already does. */
   toggleBack(): void {
     if (this.active?.isRewinding) return this.pause();
-    for (const session of this.led) session.rewind();
+    for (const session of this.controlled) session.rewind();
   }
 
   pause(): void {
-    for (const session of this.led) session.pause();
+    for (const session of this.controlled) session.pause();
   }
 
   step(cycles: number): void {
-    for (const session of this.led) session.step(cycles);
+    for (const session of this.controlled) session.step(cycles);
   }
 
   seek(cycle: number): void {
-    for (const session of this.led) session.seek(cycle);
+    for (const session of this.controlled) session.seek(cycle);
   }
 
   close(session: Session): void {
@@ -185,7 +187,7 @@ export class Studio {
     this.comparison.stop();
   }
 
-  /** The two runs that can be compared: those in step, the active one and the first other. */
+  /** The two runs to compare: of synchronized sessions, the active one and the first other. */
   get pair(): [Session, Session] | null {
     const active = this.active;
     const other = this.sessions.find((one) => one !== active);
@@ -193,7 +195,7 @@ export class Studio {
     return this.sessions.indexOf(other) < this.sessions.indexOf(active) ? [other, active] : [active, other];
   }
 
-  /** Looks for the first difference of the two, or gives the search up. */
+  /** Starts or stops the search for the first difference of the two. */
   toggleComparison(): void {
     if (this.comparison.isRunning) return this.comparison.stop();
     if (this.pair) void this.comparison.find(...this.pair);
@@ -203,66 +205,66 @@ export class Studio {
     return this.sessions.find((session) => session.id === id);
   }
 
-  /** Notices and frames of sessions that came before the page knew their numbers. */
-  readonly #early = new Map<number, (Notice | ArrayBuffer)[]>();
+  /** Notifications and frames of sessions whose ids the page does not know yet. */
+  readonly #undelivered = new Map<number, (ServerNotification | ArrayBuffer)[]>();
 
-  #notice(notice: Notice): void {
-    if (notice.notice === "hello") return void this.#greeted(notice);
+  #onNotification(notice: ServerNotification): void {
+    if (notice.notice === "hello") return void this.#onHello(notice);
     const session = this.#byId(notice.session);
-    if (!session) return this.#keep(notice.session, notice);
-    if (notice.notice === "cast") session.takeCast(notice);
-    else if (notice.notice === "status") session.takeStatus(notice);
-    else this.#ended(session, notice.problem);
+    if (!session) return this.#keepUndelivered(notice.session, notice);
+    if (notice.notice === "bodies") session.onBodyTable(notice);
+    else if (notice.notice === "status") session.onStatus(notice);
+    else this.#onEnded(session, notice.problem);
   }
 
-  /** Notes the end of a session; where a fleet flew, another one may fly. */
-  #ended(session: Session, problem: Problem): void {
-    session.takeEnd(problem);
-    if (session.isFleet) this.#findAgain(session);
+  /** A session has ended; at the address of a fleet another one may start. */
+  #onEnded(session: Session, problem: Problem): void {
+    session.onEnded(problem);
+    if (session.isFleet) this.#retryFleet(session);
   }
 
-  /** Looks now and then whether a fleet flies where one has ended or was lost, until the session is closed. */
-  #findAgain(session: Session): void {
+  /** Tries at intervals to reopen a fleet that has ended or was lost, until the session is closed. */
+  #retryFleet(session: Session): void {
     const generation = this.#generation;
-    this.#around.after(FIND_AGAIN_MS, () => void this.#look(session, generation));
+    this.#environment.after(FLEET_RETRY_DELAY_MS, () => void this.#reopenFleet(session, generation));
   }
 
-  async #look(session: Session, generation: number): Promise<void> {
-    // A new connection opens all sessions again by itself.
-    const isWanted = (): boolean =>
+  async #reopenFleet(session: Session, generation: number): Promise<void> {
+    // A new connection reopens all sessions anyway.
+    const isCurrent = (): boolean =>
       generation === this.#generation && this.sessions.includes(session) && session.ended !== null;
-    if (!isWanted()) return;
+    if (!isCurrent()) return;
     if (await this.#openAt(session, null, true)) this.#deliver(session);
-    else if (isWanted()) this.#findAgain(session);
+    else if (isCurrent()) this.#retryFleet(session);
   }
 
-  #frame(bytes: ArrayBuffer): void {
+  #onFrame(bytes: ArrayBuffer): void {
     if (bytes.byteLength < HEADER_BYTES) return;
     const id = new DataView(bytes).getUint32(8, true);
     const session = this.#byId(id);
-    if (session) session.takeFrame(bytes);
-    else this.#keep(id, bytes);
+    if (session) session.onFrame(bytes);
+    else this.#keepUndelivered(id, bytes);
   }
 
-  #keep(id: number, what: Notice | ArrayBuffer): void {
-    if (this.#early.size > 8) this.#early.clear();
-    const kept = this.#early.get(id) ?? [];
-    this.#early.set(id, [...kept.slice(-8), what]);
+  #keepUndelivered(id: number, message: ServerNotification | ArrayBuffer): void {
+    if (this.#undelivered.size > 8) this.#undelivered.clear();
+    const kept = this.#undelivered.get(id) ?? [];
+    this.#undelivered.set(id, [...kept.slice(-8), message]);
   }
 
-  /** Hands over the messages that came before the page knew the session. */
+  /** Delivers the messages that arrived before the page knew the session. */
   #deliver(session: Session): void {
-    const kept = this.#early.get(session.id) ?? [];
-    this.#early.delete(session.id);
-    for (const what of kept) {
-      if (what instanceof ArrayBuffer) this.#frame(what);
-      else this.#notice(what);
+    const kept = this.#undelivered.get(session.id) ?? [];
+    this.#undelivered.delete(session.id);
+    for (const message of kept) {
+      if (message instanceof ArrayBuffer) this.#onFrame(message);
+      else this.#onNotification(message);
     }
   }
 
-  async #greeted(hello: Hello): Promise<void> {
+  async #onHello(hello: Hello): Promise<void> {
     if (hello.version !== VERSION) {
-      const words = `The server speaks version ${hello.version} of the protocol, this page ${VERSION}: reload the page.`;
+      const words = `The server uses version ${hello.version} of the protocol, this page ${VERSION}: reload the page.`;
       this.banner = { words, isBad: true };
       return;
     }
@@ -272,50 +274,50 @@ export class Studio {
     this.isConnected = true;
     this.banner = null;
     if (this.sessions.length > 0) await this.#reopen(generation);
-    else if (isFirst) for (const named of hello.open) await this.#openNamed(named);
+    else if (isFirst) for (const target of hello.open) await this.#openTarget(target);
   }
 
-  /** Opens the subjects that the command line named. */
-  async #openNamed({ kind, path }: Named): Promise<void> {
+  /** Opens a target of the command line. */
+  async #openTarget({ kind, path }: TargetRef): Promise<void> {
     if (kind === "sweep") this.openSweep(path, path.split("/").at(-1) ?? path);
-    else await this.open({ kind, path } as Subject);
+    else await this.open({ kind, path } as OpenTarget);
   }
 
-  #lost(attempt: number, wait_ms: number): void {
+  #onConnectionLost(attempt: number, wait_ms: number): void {
     const generation = ++this.#generation;
     this.isConnected = false;
-    this.#early.clear();
-    for (const session of this.sessions) session.cutOff();
-    const wait = wait_ms < 1000 ? "at once" : `in ${Math.round(wait_ms / 1000)} s`;
-    const say = (standing: Standing): void => {
+    this.#undelivered.clear();
+    for (const session of this.sessions) session.onConnectionLost();
+    const wait = wait_ms < 1000 ? "now" : `in ${Math.round(wait_ms / 1000)} s`;
+    const report = (status: AccessStatus): void => {
       this.banner = {
-        words: `${STANDING_WORDS[standing]} Attempt ${attempt} to connect again comes ${wait}.`,
+        words: `${ACCESS_TEXTS[status]} Attempt ${attempt} to reconnect ${wait}.`,
         isBad: true,
       };
     };
-    // The last known standing stays until the server has given the new one.
-    say(this.#standing);
-    void this.#around.standing().then((standing) => {
+    // The last known status is shown until the new one arrives.
+    report(this.#accessStatus);
+    void this.#environment.accessStatus().then((status) => {
       if (generation !== this.#generation) return;
-      this.#standing = standing;
-      say(standing);
+      this.#accessStatus = status;
+      report(status);
     });
   }
 
-  /** The page's standing with the server when it was asked last. */
-  #standing: Standing = "silent";
+  /** The last known access status. */
+  #accessStatus: AccessStatus = "silent";
 
-  /** Opens all sessions again, brings each to the cycle where it was, and plays those that played. */
+  /** Reopens all sessions, seeks each to the cycle where it was, and plays those that were playing. */
   async #reopen(generation: number): Promise<void> {
-    const told: string[] = [];
+    const reopened: string[] = [];
     let missing = 0;
     for (const session of this.sessions) {
       const isOpen = await this.#openAt(session, session.seed);
       if (generation !== this.#generation) return;
       if (!isOpen) {
-        this.#ended(
+        this.#onEnded(
           session,
-          problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"),
+          makeProblem(session.scene.name, "it could not be reopened", "open it again, or close it"),
         );
         missing++;
         continue;
@@ -323,10 +325,10 @@ export class Studio {
       this.#deliver(session);
       const cycle = await session.resume();
       if (generation !== this.#generation) return;
-      told.push(`${session.scene.name} at cycle ${cycle}`);
+      reopened.push(`${session.scene.name} at cycle ${cycle}`);
     }
-    const words = told.length > 0 ? `Connected again; reopened ${told.join(", ")}.` : "Connected again.";
-    const more = missing > 0 ? ` ${missing} could not be opened again.` : "";
+    const words = reopened.length > 0 ? `Reconnected; reopened ${reopened.join(", ")}.` : "Reconnected.";
+    const more = missing > 0 ? ` ${missing} could not be reopened.` : "";
     this.banner = { words: words + more, isBad: false };
   }
 }

@@ -81,7 +81,7 @@ for (const [width, isDark] of [
     await page.getByRole("button", { name: "Edit", exact: true }).click();
     await page.locator("canvas.layer").focus();
     await page.keyboard.press("n");
-    await page.getByRole("button", { name: "Turn" }).waitFor();
+    await page.getByRole("button", { name: "Rotate" }).waitFor();
     expect(await findings(page)).toEqual([]);
     await page.keyboard.press("2");
     await page.getByLabel("Draws").waitFor();

@@ -3,14 +3,14 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import type { Edit } from "../../src/protocol";
-import { launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
-import { Hand } from "../drawing";
+import { launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
+import { PointerDriver } from "../drawing";
 import { FakeServer } from "../fake/server";
 
 const server = new FakeServer("dist");
 let browser: Browser;
 let page: Page;
-let hand: Hand;
+let hand: PointerDriver;
 let complaints: string[];
 
 beforeAll(async () => {
@@ -29,13 +29,13 @@ afterEach(async () => {
   await page.context().close();
 });
 
-async function visit(world: string, look: Look = {}): Promise<void> {
+async function visit(world: string, look: PageOptions = {}): Promise<void> {
   ({ page, complaints } = await openPage(browser, server.url, look));
   await openNew(page, world);
-  hand = new Hand(page);
+  hand = new PointerDriver(page);
 }
 
-async function draws(world: string, look: Look = {}): Promise<void> {
+async function draws(world: string, look: PageOptions = {}): Promise<void> {
   await visit(world, look);
   await page.getByRole("button", { name: "Edit", exact: true }).click();
   await page.locator("canvas.layer").waitFor();
@@ -245,7 +245,7 @@ describe("the canvas", () => {
 describe("a new drawing", () => {
   test("begins with walls around, one robot and a brush", async () => {
     ({ page, complaints } = await openPage(browser, server.url));
-    hand = new Hand(page);
+    hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Draw a new one…" }).click();
     const dialog = page.getByRole("dialog", { name: "Draw a new scenario of robots" });
     await dialog.getByLabel("Columns").fill("3");
@@ -329,7 +329,7 @@ describe("forms", () => {
     await page.getByRole("tab", { name: "View" }).click();
     await page.getByRole("button", { name: "Edit", exact: true }).click();
     const mPerPx = (): Promise<number> =>
-      page.locator("canvas.layer").evaluate((canvas: HTMLElement) => Number(canvas.dataset.eye?.split(" ")[2] ?? 0));
+      page.locator("canvas.layer").evaluate((canvas: HTMLElement) => Number(canvas.dataset.camera?.split(" ")[2] ?? 0));
     await expect.poll(mPerPx, { timeout: WAIT_MS }).toBeGreaterThan(0);
     const wide = await mPerPx();
     await page.setViewportSize({ width: 400, height: 800 });
@@ -397,13 +397,16 @@ describe("saving", () => {
     await dialog.getByRole("button", { name: "Save", exact: true }).click();
     await expect
       .poll(() => server.calls.findLast((call) => call.do === "save"))
-      .toMatchObject({ to: "more/mine.toml", over: false });
+      .toMatchObject({ to: "more/mine.toml", overwrite: false });
     await dialog.waitFor({ state: "detached" });
     await hand.click(2.25, 2.25);
     await edited(2);
     await page.keyboard.press("Control+s");
     await expect.poll(() => server.calls.filter((call) => call.do === "save").length).toBe(2);
-    expect(server.calls.findLast((call) => call.do === "save")).toMatchObject({ to: "more/mine.toml", over: false });
+    expect(server.calls.findLast((call) => call.do === "save")).toMatchObject({
+      to: "more/mine.toml",
+      overwrite: false,
+    });
     await hand.click(1.25, 2.25);
     await edited(3);
     const asked = new Promise<string>((told) =>
@@ -421,7 +424,7 @@ describe("saving", () => {
 
   test("a file that was changed meanwhile is shown, and mine or theirs stays", async () => {
     ({ page, complaints } = await openPage(browser, server.url));
-    hand = new Hand(page);
+    hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Open…", exact: true }).click();
     await page.getByRole("button", { name: /^robots\.toml/ }).click();
     await page.locator(".view").waitFor();
@@ -442,7 +445,7 @@ describe("saving", () => {
     await page.locator(".cm-line", { hasText: "# mine" }).waitFor();
     await page.keyboard.press("Control+s");
     await dialog.getByRole("button", { name: "Keep mine" }).click();
-    await expect.poll(() => server.calls.findLast((call) => call.do === "save")).toMatchObject({ over: true });
+    await expect.poll(() => server.calls.findLast((call) => call.do === "save")).toMatchObject({ overwrite: true });
     await dialog.waitFor({ state: "detached" });
   });
 });

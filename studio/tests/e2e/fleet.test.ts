@@ -3,7 +3,7 @@
 import { mkdirSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from "vitest";
-import { drawn, launch, openPage, WAIT_MS, type Look } from "../browser";
+import { drawn, launch, openPage, WAIT_MS, type PageOptions } from "../browser";
 import { FakeServer } from "../fake/server";
 
 const server = new FakeServer("dist");
@@ -28,7 +28,7 @@ afterEach(async () => {
   await page.context().close();
 });
 
-async function visit(look: Look = {}): Promise<void> {
+async function visit(look: PageOptions = {}): Promise<void> {
   ({ page, complaints } = await openPage(browser, server.url, look));
   await drawn(page);
 }
@@ -44,7 +44,9 @@ test("a fleet is shown as it flies, and nothing steers it", async () => {
   for (const name of ["Play", "Restart", "Edit", "Forms", "Export…"])
     expect(await page.getByRole("button", { name, exact: true }).count()).toBe(0);
   for (const key of [" ", "ArrowRight", "ArrowLeft", "b", "j", "e"]) await page.keyboard.press(key);
-  const steered = server.calls.filter((call) => !["open", "credit", "look", "events", "files"].includes(call.do));
+  const steered = server.calls.filter(
+    (call) => !["open", "credit", "select-scans", "events", "files"].includes(call.do),
+  );
   expect(steered).toEqual([]);
   expect(complaints).toEqual([]);
 });
@@ -53,12 +55,12 @@ test("a node that is selected tells whom it hears and who hears it", async () =>
   await visit();
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
   const facts = page.getByTestId("node");
-  await facts.getByText("nobody").waitFor();
+  await facts.getByText("none").waitFor();
   await expect
     .poll(() => facts.textContent(), { timeout: WAIT_MS })
-    .toMatch(/HearsONE11, ONE12, ONE14.*Is heard bynobody/);
+    .toMatch(/HearsONE11, ONE12, ONE14.*Is heard bynone/);
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
-  await page.getByText("Select one to see whom it hears.").waitFor();
+  await page.getByText("Select a node to see its links.").waitFor();
 });
 
 for (const [width, isDark] of [

@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
-import { drawn, launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
+import { drawn, launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
 import { FakeServer, PARTING } from "../fake/server";
 
 const server = new FakeServer("dist");
@@ -26,7 +26,7 @@ afterEach(async () => {
   await page.context().close();
 });
 
-async function visit(world: string | null, look: Look = {}): Promise<void> {
+async function visit(world: string | null, look: PageOptions = {}): Promise<void> {
   ({ page, complaints } = await openPage(browser, server.url, look));
   if (world) await openNew(page, world);
 }
@@ -54,7 +54,7 @@ describe("transport", () => {
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
     const stopped = await cycle();
-    await page.getByRole("button", { name: "One cycle on" }).click();
+    await page.getByRole("button", { name: "One cycle forward" }).click();
     await cycleIs(stopped + 1);
     await page.getByRole("button", { name: "One cycle back" }).click();
     await cycleIs(stopped);
@@ -100,7 +100,7 @@ describe("transport", () => {
     await page.getByRole("slider", { name: "Cycle" }).fill("600");
     await cycleIs(600);
     const seeks = asked("seek");
-    await page.getByRole("button", { name: "One cycle on" }).click();
+    await page.getByRole("button", { name: "One cycle forward" }).click();
     await cycleIs(601);
     expect(asked("seek")).toBe(seeks);
     await page.getByRole("button", { name: "Play backwards" }).click();
@@ -179,7 +179,7 @@ describe("agents", () => {
     await visit("robots");
     await page.getByRole("option", { name: "robot 5" }).click();
     await page.getByRole("list", { name: "Marks" }).getByText("as reported").waitFor();
-    expect(server.calls.some((call) => call.do === "look" && call.scans_of[0]?.number === 5)).toBe(true);
+    expect(server.calls.some((call) => call.do === "select-scans" && call.bodies[0]?.number === 5)).toBe(true);
   });
 });
 
@@ -375,7 +375,7 @@ describe("results", () => {
     await page.getByRole("button", { name: "Export…" }).click();
     const dialog = page.getByRole("dialog", { name: /^Export/ });
     const picture = page.waitForEvent("download");
-    await dialog.getByRole("button", { name: "Picture (PNG)" }).click();
+    await dialog.getByRole("button", { name: "Image (PNG)" }).click();
     const file = await picture;
     expect(file.suggestedFilename()).toBe("Made-up-hall-50.png");
     const bytes = readFileSync((await file.path())!);
@@ -406,7 +406,7 @@ describe("results", () => {
     await openFile(/^sweep/);
     await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
     await page.frameLocator("iframe").getByRole("heading", { name: "Report of sweep" }).waitFor();
-    await page.getByText("The sweep is not done.").waitFor();
+    await page.getByText("The sweep is not complete.").waitFor();
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("= 8");
     await page.getByTestId("run-count").filter({ hasText: "1" }).waitFor();
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("");
@@ -429,7 +429,7 @@ describe("results", () => {
     await report.getByRole("button", { name: "0001" }).click();
     await drawn(page);
     const opened = (): unknown => server.calls.filter((call) => call.do === "open").at(-1);
-    expect(opened()).toEqual({ do: "open", what: { kind: "scenario", path: "robots.toml" }, seed: 1 });
+    expect(opened()).toEqual({ do: "open", target: { kind: "scenario", path: "robots.toml" }, seed: 1 });
     await page.getByRole("button", { name: /sweep · sweep/ }).click();
     await report.getByRole("button", { name: "count = 4" }).click();
     await drawn(page);
@@ -468,7 +468,7 @@ describe("sessions", () => {
     await page.getByRole("button", { name: "First difference" }).click();
     await page
       .getByTestId("difference")
-      .filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm away.` })
+      .filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm apart.` })
       .waitFor();
     await cycleIs(PARTING);
     await page.getByRole("heading", { name: "robot 3" }).waitFor();
@@ -476,9 +476,9 @@ describe("sessions", () => {
   });
 
   for (const [status, words] of [
-    [503, "is full"],
+    [503, "Too many pages"],
     [401, "Open the whole address"],
-    [421, "does not take this address"],
+    [421, "does not accept this address"],
   ] as const) {
     test(`a server that answers ${status} is told as that, and found again`, async () => {
       await visit("robots");
@@ -531,7 +531,7 @@ describe("sessions", () => {
     await server.start();
     await page.getByTestId("banner").filter({ hasText: "reopened Made-up hall at cycle 345" }).waitFor();
     await cycleIs(345);
-    await page.getByRole("button", { name: "One cycle on" }).click();
+    await page.getByRole("button", { name: "One cycle forward" }).click();
     await cycleIs(346);
   });
 });

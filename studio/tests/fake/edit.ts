@@ -1,7 +1,7 @@
 /** A server's part of the editor: a little of it, on tables instead of the text, so comments go. */
 
 import { parse, stringify } from "smol-toml";
-import { isTable, partsOf, type Json, type Table } from "../../src/edit/keypath";
+import { isTable, partsOf, type Json, type TomlTable } from "../../src/edit/keypath";
 import type { Edit, Problem } from "../../src/protocol";
 
 export const TEXT = `# A made-up scenario.
@@ -66,7 +66,7 @@ export function textOf(world: string): string {
   return world === "chain" ? CHAIN : world === "airspace" ? AIRSPACE : TEXT;
 }
 
-export const SCHEMA: Table = {
+export const SCHEMA: TomlTable = {
   type: "object",
   description: "A made-up world.",
   properties: {
@@ -185,7 +185,7 @@ export function check(text: string): Problem[] {
   return [...unknown, ...rows];
 }
 
-function sensorsOf(text: string): Table {
+function sensorsOf(text: string): TomlTable {
   try {
     const { sensors } = modelOf(text);
     return isTable(sensors) ? sensors : {};
@@ -194,8 +194,8 @@ function sensorsOf(text: string): Table {
   }
 }
 
-export function modelOf(text: string): Table {
-  return parse(text) as unknown as Table;
+export function modelOf(text: string): TomlTable {
+  return parse(text) as unknown as TomlTable;
 }
 
 /** The text with all edits. */
@@ -205,22 +205,22 @@ export function edited(text: string, edits: readonly Edit[]): string {
   return stringify(model);
 }
 
-function inside(value: Json, part: string): [Json[] | Table, string] {
+function inside(value: Json, part: string): [Json[] | TomlTable, string] {
   if (isTable(value) || Array.isArray(value)) return [value, part];
   throw problem(`there is nothing at ${part}`, "name another key", null, null);
 }
 
-function get(of: Json[] | Table, key: string): Json | undefined {
+function get(of: Json[] | TomlTable, key: string): Json | undefined {
   return Array.isArray(of) ? of[Number(key)] : of[key];
 }
 
-function put(of: Json[] | Table, key: string, value: Json): void {
+function put(of: Json[] | TomlTable, key: string, value: Json): void {
   if (Array.isArray(of)) of[Number(key)] = value;
   else of[key] = value;
 }
 
 /** The table or list that a path ends in, and its last key. */
-function ending(model: Table, key: string): [Json[] | Table, string] {
+function ending(model: TomlTable, key: string): [Json[] | TomlTable, string] {
   const parts = partsOf(key);
   let at: Json = model;
   for (const part of parts.slice(0, -1)) {
@@ -231,7 +231,7 @@ function ending(model: Table, key: string): [Json[] | Table, string] {
   return inside(at, parts.at(-1)!);
 }
 
-function apply(model: Table, edit: Edit): void {
+function apply(model: TomlTable, edit: Edit): void {
   const [of, name] = ending(model, edit.key);
   const now = get(of, name);
   if (edit.op === "set") put(of, name, edit.value as Json);

@@ -4,12 +4,12 @@ import type { FrameText } from "../../src/protocol";
 
 export interface Columns {
   session: number;
-  cast: number;
+  tableId: number;
   dimensions: 2 | 3;
   cycle: number;
   time_s: number;
-  places_m: number[];
-  turns: number[];
+  positions_m: number[];
+  orientations: number[];
   lines: number[][];
   conditions: number[];
   leftOut?: number;
@@ -22,15 +22,15 @@ export function encodeFrame(columns: Columns): ArrayBuffer {
   const text = columns.text ? new TextEncoder().encode(JSON.stringify(columns.text)) : new Uint8Array(0);
   const points = columns.lines.flat();
   const padded = 4 * Math.ceil(n / 4);
-  const words = columns.places_m.length + columns.turns.length + columns.lines.length + 1 + points.length;
+  const words = columns.positions_m.length + columns.orientations.length + columns.lines.length + 1 + points.length;
   const bytes = new ArrayBuffer(56 + 4 * words + padded + text.length);
   const view = new DataView(bytes);
   const u32 = (at: number, value: number): void => view.setUint32(at, value, true);
   u32(0, 0x46545353);
-  view.setUint16(4, 1, true);
+  view.setUint16(4, 2, true);
   view.setUint8(6, d);
   u32(8, columns.session);
-  u32(12, columns.cast);
+  u32(12, columns.tableId);
   view.setFloat64(16, columns.cycle, true);
   view.setFloat64(24, columns.time_s, true);
   [n, columns.lines.length, points.length / d, text.length, columns.leftOut ?? 0].forEach((v, i) => u32(32 + 4 * i, v));
@@ -39,8 +39,8 @@ export function encodeFrame(columns: Columns): ArrayBuffer {
     new Float32Array(bytes, at, values.length).set(values);
     at += 4 * values.length;
   };
-  floats(columns.places_m);
-  floats(columns.turns);
+  floats(columns.positions_m);
+  floats(columns.orientations);
   let first = 0;
   for (const line of [[], ...columns.lines]) {
     first += line.length / d;

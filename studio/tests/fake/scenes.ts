@@ -1,16 +1,16 @@
 /** Three made-up worlds: closed formulas of the cycle, so that going to and fro shows the same. */
 
-import type { Cast, Event, Inspection, Look, Scan, Scene, Shape, Who } from "../../src/protocol";
+import type { BodyTable, RunEvent, Inspection, Appearance, Scan, Scene, Shape, BodyId } from "../../src/protocol";
 import type { Columns } from "./encode";
 
 export interface FakeWorld {
   scene: Scene;
   cyclesPlanned: number;
-  cast: Omit<Cast, "session" | "cast">;
-  columns(cycle: number): Pick<Columns, "places_m" | "turns" | "lines" | "conditions">;
-  events(from: number, until: number): Event[];
-  inspect(who: Who, cycle: number): Inspection;
-  scans(who: Who, cycle: number): Scan[];
+  table: Omit<BodyTable, "session" | "id">;
+  columns(cycle: number): Pick<Columns, "positions_m" | "orientations" | "lines" | "conditions">;
+  events(from: number, until: number): RunEvent[];
+  inspect(who: BodyId, cycle: number): Inspection;
+  scans(who: BodyId, cycle: number): Scan[];
 }
 
 const COLORS: [number, number, number][] = [
@@ -22,9 +22,13 @@ const COLORS: [number, number, number][] = [
   [0x56, 0xb4, 0xe9],
 ];
 
-function looks(color: [number, number, number], opacity: number, layer: number): [Look, Look, Look, Look, Look] {
-  const plain: Look = { color, opacity, layer };
-  const alert: Look = { color: [0xd0, 0x10, 0x10], opacity: Math.max(opacity, 0.4), layer };
+function looks(
+  color: [number, number, number],
+  opacity: number,
+  layer: number,
+): [Appearance, Appearance, Appearance, Appearance, Appearance] {
+  const plain: Appearance = { color, opacity, layer };
+  const alert: Appearance = { color: [0xd0, 0x10, 0x10], opacity: Math.max(opacity, 0.4), layer };
   return [plain, plain, { ...plain, opacity: 0.25 }, alert, alert];
 }
 
@@ -36,8 +40,8 @@ function chance(a: number, b: number): number {
   return x - Math.floor(x);
 }
 
-function every(period: number, from: number, until: number, make: (cycle: number) => Event): Event[] {
-  const found: Event[] = [];
+function every(period: number, from: number, until: number, make: (cycle: number) => RunEvent): RunEvent[] {
+  const found: RunEvent[] = [];
   for (let c = Math.ceil(Math.max(1, from) / period) * period; c <= until; c += period) found.push(make(c));
   return found;
 }
@@ -65,7 +69,7 @@ export function robots(count: number): FakeWorld {
     if (x === 0 || y === 0 || x === side - 1 || y === side - 1) return CODES.wall;
     return (x % 30 === 0 && y % 15 > 5) || (y % 30 === 0 && x % 15 > 5) ? CODES.wall : CODES.free;
   };
-  const who = (number: number): Who => ({ kind: "robot", number, part: null });
+  const who = (number: number): BodyId => ({ kind: "robot", number, part: null });
   const at = (i: number, cycle: number): [number, number, number] => {
     const angle = cycle * 0.05 * (0.5 + chance(i, 1)) + 6.28 * chance(i, 2);
     const r = 0.32 * pitch;
@@ -89,24 +93,24 @@ export function robots(count: number): FakeWorld {
       floor: { width: side, height: side, box_m: box, origin_m: [0, 0], yaw_rad: 0, runs: runsOf(side, side, wall) },
       bodies: [
         {
-          who: { kind: "obstacle", number: 0, part: null },
+          id: { kind: "obstacle", number: 0, part: null },
           name: null,
           at_m: [2, 2, 0],
-          turn: [0, 0, 0.3, 0.95],
+          orientation: [0, 0, 0.3, 0.95],
           shape: { type: "cuboid", size_m: [1.2, 0.4, 1] },
-          look: { color: [60, 60, 60], opacity: 1, layer: 1 },
+          appearance: { color: [60, 60, 60], opacity: 1, layer: 1 },
         },
       ],
     },
-    cast: {
+    table: {
       kinds: ["robot"],
       kind: Array.from({ length: count }, () => 0),
       number: Array.from({ length: count }, (_, i) => i),
       part: Array.from({ length: count }, () => -1),
       shapes,
       shape: Array.from({ length: count }, (_, i) => (i % 5 === 0 ? 1 : 0)),
-      looks: ALL_COLORS,
-      look: Array.from({ length: count }, (_, i) => i % 6),
+      appearances: ALL_COLORS,
+      appearance: Array.from({ length: count }, (_, i) => i % 6),
       names: [
         [0, "courier Anna"],
         [1, "courier Bert"],
@@ -114,16 +118,16 @@ export function robots(count: number): FakeWorld {
       is_agent: Array.from({ length: count }, () => true),
     },
     columns(cycle) {
-      const places_m: number[] = [];
-      const turns: number[] = [];
+      const positions_m: number[] = [];
+      const orientations: number[] = [];
       const conditions: number[] = [];
       for (let i = 0; i < count; i++) {
         const [x, y, heading] = at(i, cycle);
-        places_m.push(x, y);
-        turns.push(heading);
+        positions_m.push(x, y);
+        orientations.push(heading);
         conditions.push(touches(i, cycle) ? 3 : 0);
       }
-      return { places_m, turns, lines: [], conditions };
+      return { positions_m, orientations, lines: [], conditions };
     },
     events(from, until) {
       const bump = every(40, from, until, (cycle) => {
@@ -133,31 +137,31 @@ export function robots(count: number): FakeWorld {
           cycle,
           level: "warning",
           kind: "contact",
-          who: who(i),
-          with: who((i + 1) % count),
+          body: who(i),
+          other: who((i + 1) % count),
           at_m: [x, y, 0],
           value: 0.02,
           unit: "m",
-          words: `robot ${i} touched its neighbor`,
+          text: `robot ${i} touched its neighbor`,
         };
       });
       const trip = every(110, from, until, (cycle) => ({
         cycle,
         level: "info",
         kind: "trip",
-        who: who(cycle % Math.min(count, 9)),
-        with: null,
+        body: who(cycle % Math.min(count, 9)),
+        other: null,
         at_m: null,
         value: 31.5,
         unit: "s",
-        words: "a trip from the southern corridor to the northern one has ended",
+        text: "a trip from the southern corridor to the northern one has ended",
       }));
       return [...bump, ...trip].sort((a, b) => a.cycle - b.cycle);
     },
     inspect(body, cycle) {
       const [x, y] = at(body.number, cycle);
       return {
-        who: body,
+        body: body,
         cycle,
         title: `robot ${body.number} of the southern couriers`,
         sections: [
@@ -166,7 +170,7 @@ export function robots(count: number): FakeWorld {
             facts: [
               { label: "place", value: { place: [x, y, 0] } },
               { label: "nearest wall", value: { number: { value: 1.25, unit: "m" } } },
-              { label: "in contact", value: { yes: touches(body.number, cycle) } },
+              { label: "in contact", value: { flag: touches(body.number, cycle) } },
             ],
             table: {
               columns: ["beam", "as it is", "as reported", "class"],
@@ -183,7 +187,7 @@ export function robots(count: number): FakeWorld {
             facts: [
               { label: "action", value: { text: "forward" } },
               { label: "drawn with", value: { share: 0.815 } },
-              { label: "group with", value: { who: who((body.number + 1) % count) } },
+              { label: "group with", value: { body: who((body.number + 1) % count) } },
               { label: "message", value: "none" },
             ],
             table: null,
@@ -230,10 +234,10 @@ export function robots(count: number): FakeWorld {
       const beams = Array.from({ length: 8 }, (_, i) => i);
       return [
         {
-          of: body,
+          body: body,
           sensor: "sonar",
           at_m: [x, y, 0],
-          turn: [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)],
+          orientation: [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)],
           bearings_rad: beams.map((i) => (i * Math.PI) / 4),
           ranges_m: beams.map((i) => (i === 3 ? null : 1 + 2 * chance(i, cycle))),
           true_m: beams.map((i) => (i === 3 ? null : 1.1 + 2 * chance(i, cycle))),
@@ -251,15 +255,15 @@ export function chain(): FakeWorld {
     const s = 0.25 * i + 0.02 * cycle;
     return [4 * Math.cos(0.4 * s), 4 * Math.sin(0.4 * s), 1.5 * Math.sin(0.7 * s)];
   };
-  const who = (part: number): Who => ({ kind: "connector", number: 0, part });
+  const who = (part: number): BodyId => ({ kind: "connector", number: 0, part });
   const ball = (i: number): Scene["bodies"][number] => ({
-    who: { kind: "obstacle", number: i, part: null },
+    id: { kind: "obstacle", number: i, part: null },
     name: null,
     at_m: [10 * (chance(i, 1) - 0.5), 10 * (chance(i, 2) - 0.5), 5 * (chance(i, 3) - 0.5)],
-    turn: [0, 0, 0, 1],
+    orientation: [0, 0, 0, 1],
     shape:
       i % 4 === 0 ? { type: "cuboid", size_m: [0.8, 0.6, 1] } : { type: "sphere", radius_m: 0.2 + 0.4 * chance(i, 4) },
-    look: { color: [60, 60, 60], opacity: 0.22, layer: 1 },
+    appearance: { color: [60, 60, 60], opacity: 0.22, layer: 1 },
   });
   const fill = <T>(value: T): T[] => Array.from({ length: n }, () => value);
   return {
@@ -274,7 +278,7 @@ export function chain(): FakeWorld {
       floor: null,
       bodies: Array.from({ length: 80 }, (_, i) => ball(i)),
     },
-    cast: {
+    table: {
       kinds: ["connector", "rods"],
       kind: [...fill(0), 1],
       number: [...fill(0), 0],
@@ -284,8 +288,8 @@ export function chain(): FakeWorld {
         { type: "line", points_m: [], thickness_m: 0.06 },
       ],
       shape: [...fill(0), 1],
-      looks: ALL_COLORS,
-      look: [...fill(1), 0],
+      appearances: ALL_COLORS,
+      appearance: [...fill(1), 0],
       names: [],
       is_agent: [...fill(true), false],
     },
@@ -295,8 +299,8 @@ export function chain(): FakeWorld {
         i < n && cycle % 200 > 150 && i === 20 ? 3 : i === 0 ? 1 : 0,
       );
       return {
-        places_m: [...points, 0, 0, 0],
-        turns: Array.from({ length: 4 * (n + 1) }, (_, i) => (i % 4 === 3 ? 1 : 0)),
+        positions_m: [...points, 0, 0, 0],
+        orientations: Array.from({ length: 4 * (n + 1) }, (_, i) => (i % 4 === 3 ? 1 : 0)),
         lines: [points],
         conditions,
       };
@@ -306,17 +310,17 @@ export function chain(): FakeWorld {
         cycle,
         level: "info",
         kind: cycle % 100 === 0 ? "veto" : "layer",
-        who: who((cycle / 50) % n),
-        with: null,
+        body: who((cycle / 50) % n),
+        other: null,
         at_m: at((cycle / 50) % n, cycle),
         value: 0.1,
         unit: "m",
-        words: "could have gone 0.1 m before obstacle 3",
+        text: "could have gone 0.1 m before obstacle 3",
       })),
     inspect(body, cycle) {
       const p = at(body.part ?? 0, cycle);
       return {
-        who: body,
+        body: body,
         cycle,
         title: `connector ${body.part} of the snake`,
         sections: [
@@ -325,7 +329,7 @@ export function chain(): FakeWorld {
             facts: [
               { label: "turn", value: { number: { value: -12.5, unit: "°" } } },
               { label: "place", value: { place: p } },
-              { label: "vetoed by", value: { who: who(7) } },
+              { label: "vetoed by", value: { body: who(7) } },
             ],
             table: null,
           },
@@ -353,7 +357,7 @@ export function airplanes(): FakeWorld {
     ...Array.from({ length: n }, (_, i) => airplane(i)),
     ...Array.from({ length: n }, (_, i) => zone(i)),
   ];
-  const who = (number: number): Who => ({ kind: "airplane", number, part: null });
+  const who = (number: number): BodyId => ({ kind: "airplane", number, part: null });
   return {
     cyclesPlanned: 75,
     scene: {
@@ -367,16 +371,16 @@ export function airplanes(): FakeWorld {
       bodies: Array.from({ length: n }, (_, i) => {
         const [x, y] = at((i + n / 2) % n, 0);
         return {
-          who: { kind: "goal", number: i, part: null },
+          id: { kind: "goal", number: i, part: null },
           name: null,
           at_m: [x, y, 0],
-          turn: [0, 0, 0, 1],
+          orientation: [0, 0, 0, 1],
           shape: { type: "cylinder", radius_m: 100, height_m: 1 },
-          look: { color: COLORS[i % 6]!, opacity: 0.45, layer: 2 },
+          appearance: { color: COLORS[i % 6]!, opacity: 0.45, layer: 2 },
         };
       }),
     },
-    cast: {
+    table: {
       kinds: ["airplane", "zone"],
       kind: two(
         () => 0,
@@ -398,8 +402,8 @@ export function airplanes(): FakeWorld {
         () => 0,
         () => 1,
       ),
-      looks: [...ALL_COLORS, ...COLORS.map((color) => looks(color, 0.15, 3))],
-      look: two(
+      appearances: [...ALL_COLORS, ...COLORS.map((color) => looks(color, 0.15, 3))],
+      appearance: two(
         (i) => i % 6,
         (i) => 6 + (i % 6),
       ),
@@ -412,8 +416,8 @@ export function airplanes(): FakeWorld {
     columns(cycle) {
       const all = Array.from({ length: 2 * n }, (_, i) => at(i % n, cycle));
       return {
-        places_m: all.flatMap(([x, y]) => [x, y]),
-        turns: all.map(([, , h]) => h),
+        positions_m: all.flatMap(([x, y]) => [x, y]),
+        orientations: all.map(([, , h]) => h),
         lines: [],
         conditions: all.map((_, i) => (i === 8 && cycle > 30 && cycle < 34 ? 3 : 0)),
       };
@@ -423,12 +427,12 @@ export function airplanes(): FakeWorld {
         cycle,
         level: "info",
         kind: cycle === 30 ? "separation" : "agreement",
-        who: who((cycle / 15) % n),
-        with: who((cycle / 15 + 1) % n),
+        body: who((cycle / 15) % n),
+        other: who((cycle / 15 + 1) % n),
         at_m: null,
         value: 480,
         unit: "m",
-        words: cycle === 30 ? "separation lost: 480 m of 500 m" : "agreed after 4 rounds",
+        text: cycle === 30 ? "separation lost: 480 m of 500 m" : "agreed after 4 rounds",
       })),
     inspect(body, cycle) {
       const way = (shift: number): [number, number, number][] =>
@@ -437,7 +441,7 @@ export function airplanes(): FakeWorld {
           return [x + shift * k, y - shift * k, 0];
         });
       return {
-        who: body,
+        body: body,
         cycle,
         title: `ONE${11 + body.number}`,
         sections: [

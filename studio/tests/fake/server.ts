@@ -5,7 +5,17 @@ import { createServer, type Server, type ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
-import type { Answer, Call, Fleet, Notice, Problem, Request, Status, Subject, SweepRun } from "../../src/protocol";
+import type {
+  ReplyBody,
+  Method,
+  Fleet,
+  ServerNotification,
+  Problem,
+  ClientRequest,
+  SessionStatus,
+  OpenTarget,
+  SweepRun,
+} from "../../src/protocol";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
@@ -48,7 +58,7 @@ function fleetAt(cycle: number): Fleet {
     const isLost = agent === 2;
     return {
       agent,
-      who: { kind: "airplane", number: agent, part: null },
+      body: { kind: "airplane", number: agent, part: null },
       state: isLost ? "gone" : "decide",
       epoch: 1,
       round: 3,
@@ -76,7 +86,7 @@ class Run {
   credit = 0;
   cycle = 0;
   playing = false;
-  speed: Status["speed"] = { times: 1 };
+  speed: SessionStatus["speed"] = { times: 1 };
   seed: string;
   leftOut = 0;
   scansOf: { kind: string; number: number; part: number | null }[] = [];
@@ -95,7 +105,7 @@ class Run {
     this.text = textOf(world.scene.world);
   }
 
-  status(): Status {
+  status(): SessionStatus {
     const { cyclesPlanned: planned, scene } = this.world;
     const isOver = this.cycle >= planned;
     if (this.isFleet) {
@@ -137,8 +147,8 @@ class Run {
     return `a1b2c3d4${this.cycle.toString(16).padStart(6, "0")}${this.hasParted ? "ff" : "00"}`;
   }
 
-  cast(): Notice {
-    return { notice: "cast", session: this.id, cast: 1, ...this.world.cast };
+  bodyTable(): ServerNotification {
+    return { notice: "bodies", session: this.id, id: 1, ...this.world.table };
   }
 
   tick(seconds: number): void {
@@ -165,7 +175,7 @@ class Run {
     const { scene } = this.world;
     const columns = this.world.columns(this.cycle);
     // The fourth body stands elsewhere.
-    if (this.hasParted) columns.places_m[3 * scene.dimensions]! += 0.25;
+    if (this.hasParted) columns.positions_m[3 * scene.dimensions]! += 0.25;
     const text = {
       scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)),
       events: [],
@@ -174,7 +184,7 @@ class Run {
     this.#socket.send(
       encodeFrame({
         session: this.id,
-        cast: 1,
+        tableId: 1,
         dimensions: scene.dimensions as 2 | 3,
         cycle: this.cycle,
         time_s: this.cycle * scene.cycle_s,
@@ -187,10 +197,10 @@ class Run {
 }
 
 export class FakeServer {
-  readonly calls: Call[] = [];
+  readonly calls: Method[] = [];
   port = 0;
   /** Subjects that the command line would have asked to open. */
-  open: Subject[] = [];
+  open: OpenTarget[] = [];
   /** The text that a file would have by now, if another program had changed it. */
   theirs: string | null = null;
   /** The answer of the way in; anything but 204 refuses sockets, too. */
@@ -249,7 +259,7 @@ export class FakeServer {
   /** Ends all sessions by themselves, and says why. */
   endAll(): void {
     for (const session of this.#runs.keys()) {
-      const notice: Notice = {
+      const notice: ServerNotification = {
         notice: "ended",
         session,
         problem: problemOf("the disk is full", "make room and start again"),
@@ -269,7 +279,7 @@ export class FakeServer {
     const say = (words: unknown): void => socket.send(JSON.stringify(words));
     say({
       notice: "hello",
-      version: 1,
+      version: 2,
       program: "sidestep 0.0.0 (made up)",
       worlds: Object.keys(WORLDS),
       read_only: false,
@@ -277,13 +287,13 @@ export class FakeServer {
     });
     const mine = new Set<number>();
     socket.on("message", (data) => {
-      const { id, call } = JSON.parse(String(data)) as Request;
+      const { id, call } = JSON.parse(String(data)) as ClientRequest;
       this.calls.push(call);
       try {
         const answer = this.#answer(call, socket, say);
         if (answer.is === "opened") mine.add(answer.session);
         say({ id, answer });
-        if (answer.is === "opened") say(this.#runs.get(answer.session)!.cast());
+        if (answer.is === "opened") say(this.#runs.get(answer.session)!.bodyTable());
       } catch (problem) {
         say({ id, problem });
       }
@@ -291,8 +301,8 @@ export class FakeServer {
     socket.on("close", () => mine.forEach((id) => this.#runs.delete(id)));
   }
 
-  #save(to: string | null, over: boolean): Answer {
-    if (this.theirs !== null && !over) return { is: "differs", text: this.theirs };
+  #save(to: string | null, overwrite: boolean): ReplyBody {
+    if (this.theirs !== null && !overwrite) return { is: "differs", text: this.theirs };
     this.theirs = null;
     return { is: "saved", place: to ?? "made-up.toml" };
   }
@@ -310,11 +320,11 @@ export class FakeServer {
     for (const socket of this.#sockets?.clients ?? []) socket.send(text);
   }
 
-  #answer(call: Call, socket: WebSocket, say: (words: unknown) => void): Answer {
+  #answer(call: Method, socket: WebSocket, say: (words: unknown) => void): ReplyBody {
     if (call.do === "files") return files(call.folder);
     if (call.do === "runs") return runs();
     if (call.do === "open") {
-      const { what } = call;
+      const { target: what } = call;
       const key =
         what.kind === "fleet"
           ? "airspace"
@@ -335,10 +345,10 @@ export class FakeServer {
     if (call.do === "schema") return { is: "schema", schema: SCHEMA };
     const run = this.#runs.get(call.session);
     if (!run) throw problemOf("no such session", "open it again");
-    if (run.isFleet && !["close", "credit", "look", "events", "tables"].includes(call.do)) {
+    if (run.isFleet && !["close", "credit", "select-scans", "events", "tables"].includes(call.do)) {
       throw problemOf("a fleet is only watched here", "steer it where it was started");
     }
-    const answer = call.do === "save" ? this.#save(call.to, call.over) : act(call, run);
+    const answer = call.do === "save" ? this.#save(call.to, call.overwrite) : act(call, run);
     if (call.do === "close") this.#runs.delete(run.id);
     if (answer.is === "done") say({ notice: "status", ...run.status() });
     return answer;
@@ -380,7 +390,7 @@ const VARIANTS = `<div class="wide"><div class="scrolled"><table class="sortable
   <thead><tr><th scope="col">variant</th><th scope="col">mean</th></tr></thead>
   <tbody><tr><th scope="row">count = 4</th><td>1</td></tr><tr><th scope="row">0001</th><td>2</td></tr></tbody></table></div></div>`;
 
-function files(folder: string | null): Answer {
+function files(folder: string | null): ReplyBody {
   if (folder !== null)
     return {
       is: "files",
@@ -405,7 +415,7 @@ function files(folder: string | null): Answer {
   };
 }
 
-function runs(): Answer {
+function runs(): ReplyBody {
   const run = (variant: string, seed: number, failure = ""): SweepRun => ({
     variant,
     seed: String(seed),
@@ -421,7 +431,7 @@ function runs(): Answer {
   };
 }
 
-function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): Answer {
+function act(call: Exclude<Method, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): ReplyBody {
   switch (call.do) {
     case "play":
       run.playing = true;
@@ -437,8 +447,8 @@ function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "s
     case "seek":
       run.goTo(call.cycle);
       return { is: "done" };
-    case "look":
-      run.scansOf = call.scans_of;
+    case "select-scans":
+      run.scansOf = call.bodies;
       run.goTo(run.cycle);
       return { is: "done" };
     case "credit":
@@ -450,15 +460,15 @@ function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "s
     case "restart":
       return restart(run, call.seed, call.text);
     case "inspect":
-      return { is: "inspection", ...run.world.inspect(call.who, run.cycle) };
+      return { is: "inspection", ...run.world.inspect(call.body, run.cycle) };
     case "metrics":
       return metrics(run, call.from);
     case "events": {
       const all = run.world.events(call.from, call.until).slice(call.skip ?? 0);
       return {
         is: "events",
-        entries: all.slice(0, call.most),
-        left_out: Math.max(0, all.length - call.most),
+        entries: all.slice(0, call.limit),
+        left_out: Math.max(0, all.length - call.limit),
         known_until: call.until,
       };
     }
@@ -475,7 +485,7 @@ function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "s
   }
 }
 
-function restart(run: Run, seed: number | null, text: string | null): Answer {
+function restart(run: Run, seed: number | null, text: string | null): ReplyBody {
   const [problem] = check(text ?? run.text).filter((one) => !one.is_warning);
   if (problem) throw problem;
   run.text = text ?? run.text;
@@ -485,7 +495,7 @@ function restart(run: Run, seed: number | null, text: string | null): Answer {
   return { is: "opened", session: run.id, scene: run.world.scene, status: run.status() };
 }
 
-function model(text: string): Answer {
+function model(text: string): ReplyBody {
   try {
     return { is: "model", value: modelOf(text), files: [] };
   } catch (error) {
@@ -493,7 +503,7 @@ function model(text: string): Answer {
   }
 }
 
-function metrics(run: Run, from: number): Answer {
+function metrics(run: Run, from: number): ReplyBody {
   const samples = Array.from({ length: Math.floor(run.cycle / 10) + 1 }, (_, i) => 10 * i).slice(from);
   const names = [
     ["contacts", "contacts per cycle", ""],
@@ -503,7 +513,7 @@ function metrics(run: Run, from: number): Answer {
   ];
   return {
     is: "metrics",
-    names: names.map(([key, words, unit]) => ({ key: key!, words: words!, unit: unit! })),
+    names: names.map(([key, label, unit]) => ({ key: key!, label: label!, unit: unit! })),
     first: from,
     thinned: 0,
     cycles: samples,

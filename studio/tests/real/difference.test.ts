@@ -13,11 +13,11 @@ async function connected(program: Program): Promise<Studio> {
     open: () => new WebSocket(`${program.url.replace(/^http/, "ws")}socket`) as unknown as Socket,
     after: (ms, then) => setTimeout(then, ms),
     cancel: (timer) => clearTimeout(timer as NodeJS.Timeout),
-    standing: () => Promise.resolve("in"),
+    accessStatus: () => Promise.resolve("in"),
   });
   studio.connect();
   await vi.waitUntil(() => studio.isConnected, { timeout: 20_000 });
-  timers.push(setInterval(() => studio.sessions.forEach((one) => one.grantUnseen()), 50));
+  timers.push(setInterval(() => studio.sessions.forEach((one) => one.grantHidden()), 50));
   return studio;
 }
 
@@ -42,7 +42,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await studio.comparison.find(a, b);
     const cycle = Number(/from cycle (\d+) on/.exec(studio.comparison.words)?.[1]);
     expect(cycle).toBeGreaterThan(0);
-    expect([a.shown.cycle, b.shown.cycle]).toEqual([cycle, cycle]);
+    expect([a.displayed.cycle, b.displayed.cycle]).toEqual([cycle, cycle]);
     const digests = async (at: number): Promise<(string | null | undefined)[]> => [
       (await a.digestAt(at))?.digest,
       (await b.digestAt(at))?.digest,

@@ -6,7 +6,7 @@ import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { drawn, launch, openPage, WAIT_MS } from "../browser";
-import { Hand } from "../drawing";
+import { PointerDriver } from "../drawing";
 import { BINARY, Program, SCENARIOS } from "./program";
 
 const HALL = `# A hall with one robot that goes east.
@@ -50,7 +50,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
   let program: Program;
   let folder: string;
   let page: Page;
-  let hand: Hand;
+  let hand: PointerDriver;
   let complaints: string[];
   const file = (): string => join(folder, "hall.toml");
 
@@ -71,7 +71,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
 
   async function open(name = "hall.toml"): Promise<void> {
     ({ page, complaints } = await openPage(browser, program.url));
-    hand = new Hand(page);
+    hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Open…", exact: true }).click();
     await page.getByRole("button", { name: new RegExp(`^${name}`) }).click();
     await drawn(page);
@@ -235,7 +235,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
   test("from nothing to a corridor with a door and five robots that are watched, within two minutes", async () => {
     const begun = performance.now();
     ({ page, complaints } = await openPage(browser, program.url));
-    hand = new Hand(page);
+    hand = new PointerDriver(page);
     await page.getByRole("button", { name: "New…" }).click();
     await page
       .getByRole("dialog", { name: /^Draw a new/ })
@@ -271,12 +271,12 @@ describe.skipIf(BINARY === "")("the real program", () => {
 
   test("the walls of a generated office become walls that can be drawn upon", async () => {
     ({ page, complaints } = await openPage(browser, program.url));
-    hand = new Hand(page);
+    hand = new PointerDriver(page);
     await page.getByRole("button", { name: "robots", exact: true }).first().click();
     await drawn(page);
     const free = await page.getByTestId("agent-count").textContent();
     await page.getByRole("button", { name: "Edit", exact: true }).click();
-    await page.getByRole("button", { name: "Take the walls into the text" }).click();
+    await page.getByRole("button", { name: "Copy the walls into the text" }).click();
     await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
     await checked();
     expect(await page.getByTestId("agent-count").textContent()).toBe(free);
@@ -328,7 +328,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
       const before = await digest();
       expect(before).toMatch(/^[0-9a-f]{32}$/);
       await page.getByRole("button", { name: "Edit", exact: true }).click();
-      await page.getByRole("button", { name: "Take the walls into the text" }).click();
+      await page.getByRole("button", { name: "Copy the walls into the text" }).click();
       await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
       await checked();
       await page.getByRole("button", { name: "Run", exact: true }).click();

@@ -142,7 +142,7 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     await land(fleet);
     await page
       .getByTestId("state")
-      .filter({ hasText: /over|ended|failed/ })
+      .filter({ hasText: /finished|ended|failed/ })
       .waitFor();
     fleets.push(await fly(CHAINS, "--speed", "0.2", "--cycles", "1000000", "--listen", fleet.endpoint));
     await page.getByTestId("state").filter({ hasText: "flying" }).waitFor();

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
-import { blank, Board, cellOf, placeOf, type Ground } from "../../src/edit/board";
+import { emptyScenario, AsciiMap, cellOf, cornerPosition, type GridPlacement } from "../../src/edit/ascii-map";
 import { changedCells } from "../../src/edit/paint";
-import { brushed, floodCells, lineCells, rectangleCells, type Cell } from "../../src/edit/cells";
+import { brushCells, floodCells, lineCells, rectangleCells, type Cell } from "../../src/edit/cells";
 
 const sorted = (cells: Cell[]): string[] => cells.map((cell) => cell.join()).sort();
 
@@ -35,9 +35,9 @@ describe("boxes", () => {
   });
 
   test("a wide brush names each box once", () => {
-    expect(sorted(brushed([[5, 5]], 2))).toEqual(["5,5", "5,6", "6,5", "6,6"]);
+    expect(sorted(brushCells([[5, 5]], 2))).toEqual(["5,5", "5,6", "6,5", "6,6"]);
     expect(
-      brushed(
+      brushCells(
         [
           [5, 5],
           [6, 5],
@@ -45,32 +45,31 @@ describe("boxes", () => {
         3,
       ).length,
     ).toBe(12);
-    expect(brushed([[5, 5]], 1)).toEqual([[5, 5]]);
+    expect(brushCells([[5, 5]], 1)).toEqual([[5, 5]]);
   });
 
   test("filling stays within walls, and does not slip through corners", () => {
-    const board = new Board("#####\n#.#.#\n##.##\n#...#\n#####\n", 1);
-    const fill = (from: Cell): string[] =>
-      sorted(floodCells(from, board.width, board.height, (cell) => board.markAt(cell)));
+    const map = new AsciiMap("#####\n#.#.#\n##.##\n#...#\n#####\n", 1);
+    const fill = (from: Cell): string[] => sorted(floodCells(from, map.width, map.height, (cell) => map.charAt(cell)));
     expect(fill([1, 3])).toEqual(["1,3"]);
     expect(fill([2, 1])).toEqual(["1,1", "2,1", "2,2", "3,1"]);
-    expect(floodCells([9, 9], 5, 5, (cell) => board.markAt(cell))).toEqual([]);
+    expect(floodCells([9, 9], 5, 5, (cell) => map.charAt(cell))).toEqual([]);
   });
 });
 
 describe("a drawn map", () => {
   test("its first line is north: row 0 is the last line", () => {
-    const board = new Board("##\n.#\n", 0.5);
-    expect([board.width, board.height]).toEqual([2, 2]);
-    expect(board.markAt([0, 0])).toBe(".");
-    expect(board.markAt([0, 1])).toBe("#");
-    expect(board.markAt([5, 0])).toBe(undefined);
+    const map = new AsciiMap("##\n.#\n", 0.5);
+    expect([map.width, map.height]).toEqual([2, 2]);
+    expect(map.charAt([0, 0])).toBe(".");
+    expect(map.charAt([0, 1])).toBe("#");
+    expect(map.charAt([5, 0])).toBe(undefined);
   });
 
   test("an edit names lines from the top, and only what changes", () => {
-    const board = new Board("...\n.#.\n...\n", 1);
+    const map = new AsciiMap("...\n.#.\n...\n", 1);
     expect(
-      board.paint(
+      map.paint(
         [
           [0, 0],
           [1, 1],
@@ -87,11 +86,11 @@ describe("a drawn map", () => {
         [0, 2, "#"],
       ],
     });
-    expect(board.paint([[1, 1]], "#")).toBe(null);
+    expect(map.paint([[1, 1]], "#")).toBe(null);
   });
 
   test("an empty first line, which the program skips, is counted in an edit", () => {
-    expect(new Board("\n..\n..", 1).paint([[0, 0]], "#")).toEqual({
+    expect(new AsciiMap("\n..\n..", 1).paint([[0, 0]], "#")).toEqual({
       op: "paint",
       key: "map.ascii",
       cells: [[2, 0, "#"]],
@@ -99,35 +98,35 @@ describe("a drawn map", () => {
   });
 
   test("boxes and meters agree, on a turned ground too", () => {
-    const turned: Ground = { box_m: 0.25, width: 10, height: 10, origin_m: [3, -2], yaw_rad: 0.7 };
+    const turned: GridPlacement = { box_m: 0.25, width: 10, height: 10, origin_m: [3, -2], yaw_rad: 0.7 };
     for (const ground of [turned, { ...turned, yaw_rad: 0, origin_m: [0, 0] as const }]) {
       for (const cell of [
         [0, 0],
         [3, 7],
         [9, 9],
       ] as const) {
-        const [x, y] = placeOf(ground, cell[0] + 0.5, cell[1] + 0.5);
+        const [x, y] = cornerPosition(ground, cell[0] + 0.5, cell[1] + 0.5);
         expect(cellOf(ground, x, y)).toEqual([...cell]);
       }
     }
-    expect(placeOf({ ...turned, yaw_rad: 0, origin_m: [0, 0] }, 4, 2)).toEqual([1, 0.5, 0]);
+    expect(cornerPosition({ ...turned, yaw_rad: 0, origin_m: [0, 0] }, 4, 2)).toEqual([1, 0.5, 0]);
   });
 
   test("boxes that the picture does not show yet are told, and all where it has another floor", () => {
-    const board = new Board("#.?\n..#\n", 1);
-    expect(changedCells(board, Uint8Array.from([0, 0, 1, 1, 0, 1]))).toEqual([]);
-    expect(changedCells(board, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([
+    const map = new AsciiMap("#.?\n..#\n", 1);
+    expect(changedCells(map, Uint8Array.from([0, 0, 1, 1, 0, 1]))).toEqual([]);
+    expect(changedCells(map, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([
       [0, 0],
       [0, 1],
     ]);
-    expect(changedCells(board, null).length).toBe(6);
+    expect(changedCells(map, null).length).toBe(6);
   });
 
-  test("an empty board is as large as asked for", () => {
-    const art = /"""\n([^"]*)"""/.exec(blank("x", 8, 6, 0.25))![1]!;
-    const board = new Board(art, 0.25);
-    expect([board.width, board.height]).toEqual([8, 6]);
-    expect(board.markAt([0, 3])).toBe("#");
-    expect(board.markAt([3, 2])).toBe(".");
+  test("an empty map is as large as asked for", () => {
+    const art = /"""\n([^"]*)"""/.exec(emptyScenario("x", 8, 6, 0.25))![1]!;
+    const map = new AsciiMap(art, 0.25);
+    expect([map.width, map.height]).toEqual([8, 6]);
+    expect(map.charAt([0, 3])).toBe("#");
+    expect(map.charAt([3, 2])).toBe(".");
   });
 });

@@ -1,9 +1,9 @@
 /** Each metric is shown by one chart at most. */
 
 import { expect, test } from "vitest";
-import { offered } from "../../src/state/charts";
+import { availableMetrics } from "../../src/state/charts";
 
 test("a chart offers what no other chart shows, and its own", () => {
-  const names = ["a", "b", "c", "d"].map((key) => ({ key, words: key, unit: "" }));
-  expect(offered(names, ["a", "c"], "c").map(({ key }) => key)).toEqual(["b", "c", "d"]);
+  const names = ["a", "b", "c", "d"].map((key) => ({ key, label: key, unit: "" }));
+  expect(availableMetrics(names, ["a", "c"], "c").map(({ key }) => key)).toEqual(["b", "c", "d"]);
 });

@@ -1,9 +1,9 @@
 import { describe, expect, test } from "vitest";
 import { completionAt } from "../../src/edit/complete";
-import { World } from "../../src/edit/schema";
+import { WorldSchema } from "../../src/edit/schema";
 import { modelOf, SCHEMA, TEXT } from "../fake/edit";
 
-const world = new World(SCHEMA);
+const world = new WorldSchema(SCHEMA);
 
 /** Labels at the mark `|` of a text. */
 function labels(text: string): string[] | null {

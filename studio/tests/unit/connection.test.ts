@@ -1,9 +1,9 @@
 /** A connection that breaks is made again, later and later; calls that were open fail and say why. */
 
 import { beforeEach, expect, test } from "vitest";
-import { waitBefore_ms } from "../../src/backoff";
-import { Connection, Refused, type Socket } from "../../src/connection";
-import type { Notice } from "../../src/protocol";
+import { delayBefore_ms } from "../../src/backoff";
+import { Connection, RequestError, type Socket } from "../../src/connection";
+import type { ServerNotification } from "../../src/protocol";
 
 class FakeSocket implements Socket {
   binaryType = "";
@@ -24,7 +24,7 @@ let sockets: FakeSocket[];
 /** Timers that were not canceled, without those that wait for a greeting. */
 let timers: { ms: number; then: () => void }[];
 let greetings: { ms: number; then: () => void }[];
-let heard: (Notice | string)[];
+let heard: (ServerNotification | string)[];
 let connection: Connection;
 
 beforeEach(() => {
@@ -34,10 +34,10 @@ beforeEach(() => {
   heard = [];
   connection = new Connection(
     {
-      notice: (notice) => heard.push(notice),
-      frame: (bytes) => heard.push(`frame ${bytes.byteLength}`),
-      lost: (n) => heard.push(`lost ${n}`),
-      problem: ({ cause }) => heard.push(`problem ${cause}`),
+      onNotification: (notice) => heard.push(notice),
+      onFrame: (bytes) => heard.push(`frame ${bytes.byteLength}`),
+      onLost: (n) => heard.push(`lost ${n}`),
+      onProblem: ({ cause }) => heard.push(`problem ${cause}`),
     },
     {
       open: () => {
@@ -51,10 +51,10 @@ beforeEach(() => {
   connection.connect();
 });
 
-const HELLO = JSON.stringify({ notice: "hello", version: 1, program: "x", worlds: [], read_only: false, open: [] });
+const HELLO = JSON.stringify({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
 
 test("waits double from a quarter of a second up to eight seconds", () => {
-  expect([0, 1, 2, 3, 4, 5, 6, 50].map(waitBefore_ms)).toEqual([250, 500, 1000, 2000, 4000, 8000, 8000, 8000]);
+  expect([0, 1, 2, 3, 4, 5, 6, 50].map(delayBefore_ms)).toEqual([250, 500, 1000, 2000, 4000, 8000, 8000, 8000]);
 });
 
 test("each attempt waits longer, and a greeting begins anew", () => {
@@ -81,8 +81,8 @@ test("a socket that stays silent is given up", () => {
 test("replies find their calls, also out of order", async () => {
   const socket = sockets[0]!;
   socket.onopen!();
-  const first = connection.ask({ do: "pause", session: 1 });
-  const second = connection.ask({ do: "source", session: 1 });
+  const first = connection.request({ do: "pause", session: 1 });
+  const second = connection.request({ do: "source", session: 1 });
   expect(JSON.parse(socket.sent[1]!)).toEqual({ id: 2, call: { do: "source", session: 1 } });
   socket.onmessage!({
     data: JSON.stringify({ id: 2, answer: { is: "source", place: "p", text: "t", read_only: false } }),
@@ -94,7 +94,7 @@ test("replies find their calls, also out of order", async () => {
 
 test("a refusal carries place, cause and remedy", async () => {
   sockets[0]!.onopen!();
-  const call = connection.ask({ do: "pause", session: 9 });
+  const call = connection.request({ do: "pause", session: 9 });
   const problem = {
     place: "session 9",
     line: null,
@@ -112,10 +112,10 @@ test("a refusal carries place, cause and remedy", async () => {
 
 test("calls that are open when the socket dies are refused, as are those without one", async () => {
   sockets[0]!.onopen!();
-  const call = connection.ask({ do: "pause", session: 1 });
+  const call = connection.request({ do: "pause", session: 1 });
   sockets[0]!.onclose!();
-  await expect(call).rejects.toBeInstanceOf(Refused);
-  await expect(connection.ask({ do: "pause", session: 1 })).rejects.toBeInstanceOf(Refused);
+  await expect(call).rejects.toBeInstanceOf(RequestError);
+  await expect(connection.request({ do: "pause", session: 1 })).rejects.toBeInstanceOf(RequestError);
 });
 
 test("connecting now gives up the old socket, whose end is then nobody's loss", () => {

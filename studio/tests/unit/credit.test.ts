@@ -10,34 +10,34 @@ function counted(): { credit: Credit; granted: number[] } {
 
 test("a session begins with two frames, and each drawn one is granted again", () => {
   const { credit, granted } = counted();
-  credit.drawn();
+  credit.refill();
   for (let i = 0; i < 5; i++) {
-    credit.arrived();
-    credit.drawn();
+    credit.onFrame();
+    credit.refill();
   }
   expect(granted).toEqual([2, 1, 1, 1, 1, 1]);
 });
 
 test("pictures without a new frame grant nothing", () => {
   const { credit, granted } = counted();
-  for (let i = 0; i < 5; i++) credit.drawn();
+  for (let i = 0; i < 5; i++) credit.refill();
   expect(granted).toEqual([2]);
 });
 
 test("two frames that come before one picture are both granted again", () => {
   const { credit, granted } = counted();
-  credit.drawn();
-  credit.arrived();
-  credit.arrived();
+  credit.refill();
+  credit.onFrame();
+  credit.onFrame();
   expect(credit.outstanding).toBe(0);
-  credit.drawn();
+  credit.refill();
   expect(granted).toEqual([2, 2]);
 });
 
 test("a server that starts anew is granted anew", () => {
   const { credit, granted } = counted();
-  credit.drawn();
+  credit.refill();
   credit.reset();
-  credit.drawn();
+  credit.refill();
   expect(granted).toEqual([2, 2]);
 });

@@ -7,11 +7,11 @@ import { encodeFrame, type Columns } from "../fake/encode";
 /** A frame of two bodies of the plane and one line of two points, written out by hand. */
 const HEX = [
   "53535446", // "SSTF"
-  "0100",
+  "0200",
   "02",
-  "00", // version 1, two dimensions
+  "00", // version 2, two dimensions
   "07000000",
-  "03000000", // session 7, cast 3
+  "03000000", // session 7, table 3
   "0000000000001440",
   "000000000000e03f", // cycle 5, 0.5 s
   "02000000",
@@ -42,12 +42,12 @@ function bytesOf(hex: string): ArrayBuffer {
 
 const SPACE: Columns = {
   session: 1,
-  cast: 2,
+  tableId: 2,
   dimensions: 3,
   cycle: 1e15,
   time_s: 0.02,
-  places_m: [1, 2, 3],
-  turns: [0, 0, 0, 1],
+  positions_m: [1, 2, 3],
+  orientations: [0, 0, 0, 1],
   lines: [],
   conditions: [4],
   leftOut: 9,
@@ -57,13 +57,13 @@ describe("a frame of the plane", () => {
   const frame = decodeFrame(bytesOf(HEX));
 
   test("has its numbers", () => {
-    expect([frame.session, frame.cast, frame.dimensions, frame.cycle, frame.time_s]).toEqual([7, 3, 2, 5, 0.5]);
+    expect([frame.session, frame.tableId, frame.dimensions, frame.cycle, frame.time_s]).toEqual([7, 3, 2, 5, 0.5]);
     expect([frame.bodies, frame.leftOut]).toEqual([2, 4]);
   });
 
   test("has its columns", () => {
-    expect([...frame.places_m]).toEqual([1, 2, 3, 4]);
-    expect([...frame.turns]).toEqual([0.5, -0.5]);
+    expect([...frame.positions_m]).toEqual([1, 2, 3, 4]);
+    expect([...frame.orientations]).toEqual([0.5, -0.5]);
     expect([...frame.lineStarts]).toEqual([0, 2]);
     expect([...frame.points_m]).toEqual([5, 6, 7, 8]);
     expect([...frame.conditions]).toEqual([3, 0]);
@@ -72,14 +72,14 @@ describe("a frame of the plane", () => {
 
   test("is looked at without a copy", () => {
     const bytes = bytesOf(HEX);
-    expect(decodeFrame(bytes).places_m.buffer).toBe(bytes);
+    expect(decodeFrame(bytes).positions_m.buffer).toBe(bytes);
   });
 });
 
 test("a frame of space has quaternions, and cycles beyond 32 bits", () => {
   const frame = decodeFrame(encodeFrame(SPACE));
-  expect([...frame.turns]).toEqual([0, 0, 0, 1]);
-  expect([...frame.places_m]).toEqual([1, 2, 3]);
+  expect([...frame.orientations]).toEqual([0, 0, 0, 1]);
+  expect([...frame.positions_m]).toEqual([1, 2, 3]);
   expect([frame.cycle, frame.leftOut, frame.conditions[0]]).toEqual([1e15, 9, 4]);
   expect(frame.text.scans).toEqual([]);
 });
@@ -88,10 +88,10 @@ describe("bytes that are no frame are refused", () => {
   test.each([
     ["shorter than a header", HEX.slice(0, 100), /shorter than its header/],
     ["with other magic", `00${HEX.slice(2)}`, /not a frame/],
-    ["of another version", HEX.replace("0100", "0200"), /version 2/],
-    ["with four dimensions", HEX.replace("010002", "010004"), /4 dimensions/],
-    ["cut off at the end", HEX.slice(0, -2), /promises/],
-    ["with bytes too many", `${HEX}00`, /promises/],
+    ["of another version", HEX.replace("0200", "0300"), /version 3/],
+    ["with four dimensions", HEX.replace("020002", "020004"), /4 dimensions/],
+    ["cut off at the end", HEX.slice(0, -2), /its header says/],
+    ["with bytes too many", `${HEX}00`, /its header says/],
     ["whose text is not JSON", HEX.slice(0, -4) + "ffff", /not JSON/],
     [
       "whose lines do not hold its points",

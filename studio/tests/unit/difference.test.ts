@@ -1,10 +1,10 @@
 /** The first difference of two runs is found, and little is computed beyond it. */
 
 import { expect, test } from "vitest";
-import { differing, firstDifference } from "../../src/state/difference";
-import { Bodies } from "../../src/state/cast";
+import { bodyDifferences, firstDifference } from "../../src/state/difference";
+import { Bodies } from "../../src/state/bodies";
 import { decodeFrame, type Frame } from "../../src/decode";
-import type { Cast } from "../../src/protocol";
+import type { BodyTable } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
 
 /** Asks for the first difference of runs that part at a cycle; returns the questions, too. */
@@ -33,7 +33,7 @@ function bodies(numbers: number[]): Bodies {
   const zeros = numbers.map(() => 0);
   return new Bodies({
     session: 1,
-    cast: 1,
+    tableId: 1,
     kinds: ["robot"],
     kind: zeros,
     number: numbers,
@@ -42,31 +42,41 @@ function bodies(numbers: number[]): Bodies {
     names: [],
     shapes: [{ type: "sphere", radius_m: 1 }],
     shape: zeros,
-    looks: [],
-    look: zeros,
-  } as unknown as Cast);
+    appearances: [],
+    appearance: zeros,
+  } as unknown as BodyTable);
 }
 
-function frame(places_m: number[], turns: number[], conditions: number[]): Frame {
+function frame(positions_m: number[], orientations: number[], conditions: number[]): Frame {
   return decodeFrame(
-    encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle: 1, time_s: 0, places_m, turns, lines: [], conditions }),
+    encodeFrame({
+      session: 1,
+      tableId: 1,
+      dimensions: 2,
+      cycle: 1,
+      time_s: 0,
+      positions_m,
+      orientations,
+      lines: [],
+      conditions,
+    }),
   );
 }
 
 test("bodies that differ are found by who they are, whatever their order", () => {
   const a = { bodies: bodies([1, 2, 3, 4]), frame: frame([0, 0, 1, 1, 2, 2, 3, 3], [0, 0, 0, 0], [0, 0, 0, 0]) };
   const b = { bodies: bodies([3, 2, 1, 5]), frame: frame([2, 2, 1, 1, 0, 3, 9, 9], [1, 0, 0, 0], [0, 2, 0, 0]) };
-  const told = differing(a, b, (m) => `${m} m`).map(({ who, words }) => `${who.number} ${words}`);
+  const told = bodyDifferences(a, b, (m) => `${m} m`).map(({ who, words }) => `${who.number} ${words}`);
   expect(told).toEqual([
-    "1 is 3 m away",
-    "2 is in another condition",
-    "3 heads elsewhere",
-    "4 is in one of them only",
-    "5 is in one of them only",
+    "1 is 3 m apart",
+    "2 has another condition",
+    "3 has another heading",
+    "4 exists in only one of them",
+    "5 exists in only one of them",
   ]);
 });
 
 test("runs that look alike have no body to name", () => {
   const one = { bodies: bodies([1]), frame: frame([0, 0], [0], [0]) };
-  expect(differing(one, one, String)).toEqual([]);
+  expect(bodyDifferences(one, one, String)).toEqual([]);
 });

@@ -1,24 +1,27 @@
 /** All events are asked for, however many there are, and each that is missing is counted once. */
 
 import { expect, test } from "vitest";
-import type { Answer, Event } from "../../src/protocol";
+import type { ReplyBody, RunEvent } from "../../src/protocol";
 import { Events } from "../../src/state/events.svelte";
 
-function event(cycle: number, number: number): Event {
+function event(cycle: number, number: number): RunEvent {
   return {
     cycle,
     level: "info",
     kind: "contact",
-    who: { kind: "robot", number, part: null },
-    with: null,
+    body: { kind: "robot", number, part: null },
+    other: null,
     at_m: null,
     value: null,
-    words: "",
-  } as Event;
+    text: "",
+  } as RunEvent;
 }
 
 /** The server's answers: of not more than 5000 events, however many are asked for. */
-function server(all: Event[], lost = 0): (from: number, until: number, skip: number, most: number) => Promise<Answer> {
+function server(
+  all: RunEvent[],
+  lost = 0,
+): (from: number, until: number, skip: number, most: number) => Promise<ReplyBody> {
   return (from, until, skip, most) => {
     const there = all.filter(({ cycle }) => cycle >= from && cycle < until).slice(skip);
     const entries = there.slice(0, Math.min(most, 5000));

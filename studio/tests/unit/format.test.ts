@@ -1,7 +1,7 @@
 /** Numbers are short, have their units, and are never wrong by rounding of whole ones. */
 
 import { expect, test } from "vitest";
-import { number, place, share, short, time, valueWords, whoWords, withUnit } from "../../src/format";
+import { number, place, share, short, time, valueText, bodyLabel, withUnit } from "../../src/format";
 
 const S = "\u202f";
 
@@ -61,9 +61,9 @@ test("places have as many coordinates as the world", () => {
 });
 
 test("values of all kinds have words", () => {
-  expect(valueWords("none", 2)).toBe("–");
-  expect(valueWords({ yes: false }, 2)).toBe("no");
-  expect(valueWords({ number: { value: -12.5, unit: "°" } }, 2)).toBe(`−12.5${S}°`);
-  expect(valueWords({ who: { kind: "connector", number: 0, part: 7 } }, 3)).toBe("connector 0/7");
-  expect(whoWords({ kind: "robot", number: 3, part: null })).toBe("robot 3");
+  expect(valueText("none", 2)).toBe("–");
+  expect(valueText({ flag: false }, 2)).toBe("no");
+  expect(valueText({ number: { value: -12.5, unit: "°" } }, 2)).toBe(`−12.5${S}°`);
+  expect(valueText({ body: { kind: "connector", number: 0, part: 7 } }, 3)).toBe("connector 0/7");
+  expect(bodyLabel({ kind: "robot", number: 3, part: null })).toBe("robot 3");
 });

@@ -1,24 +1,24 @@
 import { describe, expect, test } from "vitest";
-import { differences, condensed } from "../../src/edit/diff";
-import { keyOf, partsOf, sectionsOf, settled, type Table } from "../../src/edit/keypath";
-import { World, unitOf } from "../../src/edit/schema";
+import { diffLines, condense } from "../../src/edit/diff";
+import { keyOf, partsOf, sectionsOf, normalizedPath, type TomlTable } from "../../src/edit/keypath";
+import { WorldSchema, unitOf } from "../../src/edit/schema";
 import {
-  chancesOf,
+  probabilitiesOf,
   columnsOf,
   entriesOf,
-  freeName,
-  parted,
+  unusedName,
+  splitKeys,
   readAny,
   readNumber,
   readNumbers,
   rowsOf,
-  scaled,
+  normalize,
   sumOf,
   valueEdits,
 } from "../../src/edit/values";
 import { modelOf, SCHEMA, TEXT } from "../fake/edit";
 
-const world = new World(SCHEMA);
+const world = new WorldSchema(SCHEMA);
 const model = modelOf(TEXT);
 
 describe("paths of keys", () => {
@@ -37,9 +37,9 @@ describe("paths of keys", () => {
 
   test("a section that stands alone may be told as the first", () => {
     const alone = { robots: { size: 2 }, doors: [{ at: [[1, 2]] }] };
-    expect(settled(alone, "robots.0.size")).toEqual(["robots", "size"]);
-    expect(settled(alone, "robots.size")).toEqual(["robots", "size"]);
-    expect(settled(alone, "doors.0.at.0.1")).toEqual(["doors", "0", "at", "0", "1"]);
+    expect(normalizedPath(alone, "robots.0.size")).toEqual(["robots", "size"]);
+    expect(normalizedPath(alone, "robots.size")).toEqual(["robots", "size"]);
+    expect(normalizedPath(alone, "doors.0.at.0.1")).toEqual(["doors", "0", "at", "0", "1"]);
   });
 
   test("one table counts as a list of one section", () => {
@@ -50,9 +50,9 @@ describe("paths of keys", () => {
 
 describe("fields", () => {
   test("types, limits, choices and sections come from the schema", () => {
-    const shape = (path: string[], value?: never): unknown => world.shapeOf(world.at(path)!, value);
-    expect(shape(["seed"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
-    expect(shape(["robots", "0", "count"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
+    const shape = (path: string[], value?: never): unknown => world.typeOf(world.at(path)!, value);
+    expect(shape(["seed"])).toEqual({ kind: "number", isWhole: true, min: 0, max: null });
+    expect(shape(["robots", "0", "count"])).toEqual({ kind: "number", isWhole: true, min: 0, max: null });
     expect(shape(["robots", "regime"])).toEqual({
       kind: "choice",
       choices: [
@@ -61,9 +61,9 @@ describe("fields", () => {
       ],
     });
     expect(shape(["record", "events"])).toEqual({ kind: "switch" });
-    expect(world.shapeOf(world.at(["robots"])!, undefined).kind).toBe("sections");
-    expect(world.shapeOf(world.at(["sensors"])!, undefined).kind).toBe("named");
-    expect(world.shapeOf(world.at(["map"])!, undefined)).toEqual({ kind: "table", keys: ["box_size_m", "ascii"] });
+    expect(world.typeOf(world.at(["robots"])!, undefined).kind).toBe("sections");
+    expect(world.typeOf(world.at(["sensors"])!, undefined).kind).toBe("named");
+    expect(world.typeOf(world.at(["map"])!, undefined)).toEqual({ kind: "table", keys: ["box_size_m", "ascii"] });
     expect(world.at(["sensors", "echo", "confusion", "wall", "1"])).toEqual({ type: "number" });
     expect(world.at(["nowhere"])).toBe(null);
   });
@@ -84,14 +84,14 @@ describe("fields", () => {
   test("what cannot be read is told, and sends nothing", () => {
     expect(readNumber("2.5", false)).toEqual({ value: 2.5 });
     expect(readNumber("", false)).toEqual({ value: undefined });
-    expect(readNumber("2.5", true)).toEqual({ wrong: "write a whole number" });
-    expect(readNumber("inf", false)).toEqual({ wrong: "inf can be written in the text only" });
+    expect(readNumber("2.5", true)).toEqual({ error: "write a whole number" });
+    expect(readNumber("inf", false)).toEqual({ error: "inf can only be entered in the text" });
     expect(readNumbers("0, 22.5 45")).toEqual({ value: [0, 22.5, 45] });
-    expect(readNumbers("a, b")).toHaveProperty("wrong");
+    expect(readNumbers("a, b")).toHaveProperty("error");
     expect(readAny("[0.4, 0.5]")).toEqual({ value: [0.4, 0.5] });
     expect(readAny("fixed")).toEqual({ value: "fixed" });
-    expect(readAny("{ a = 1 }")).toHaveProperty("wrong");
-    expect(readAny("null")).toHaveProperty("wrong");
+    expect(readAny("{ a = 1 }")).toHaveProperty("error");
+    expect(readAny("null")).toHaveProperty("error");
   });
 
   test("sections are listed, plain keys told from tables", () => {
@@ -101,18 +101,18 @@ describe("fields", () => {
       "sensors: echo",
       "robots 1: couriers",
     ]);
-    const sensor = (model["sensors"] as Table)["echo"] as Table;
-    expect(parted(world, world.at(["sensors", "echo"]), sensor)).toEqual({
+    const sensor = (model["sensors"] as TomlTable)["echo"] as TomlTable;
+    expect(splitKeys(world, world.at(["sensors", "echo"]), sensor)).toEqual({
       plain: ["observations"],
       tables: ["confusion"],
     });
     const robots = world.at(["robots", "0"]);
-    expect(parted(world, robots, {}).tables).toEqual([]);
+    expect(splitKeys(world, robots, {}).tables).toEqual([]);
   });
 
   test("a new name is one that nobody has", () => {
-    expect(freeName(["new", "new-2"], "new")).toBe("new-3");
-    expect(freeName([], "new")).toBe("new");
+    expect(unusedName(["new", "new-2"], "new")).toBe("new-3");
+    expect(unusedName([], "new")).toBe("new");
   });
 });
 
@@ -130,22 +130,22 @@ describe("rows of numbers", () => {
     ).toEqual(["1", "2"]);
     expect(rowsOf([1, 2], ["at"])).toBe(null);
     expect(rowsOf({ a: "b" }, [])).toBe(null);
-    expect(chancesOf([{ p: 0.9, path: "F" }, { p: 0.1 }])).toEqual([
+    expect(probabilitiesOf([{ p: 0.9, path: "F" }, { p: 0.1 }])).toEqual([
       { p: 0.9, rest: { path: "F" } },
       { p: 0.1, rest: {} },
     ]);
-    expect(chancesOf([{ path: "F" }])).toBe(null);
+    expect(probabilitiesOf([{ path: "F" }])).toBe(null);
     expect(columnsOf(model, ["sensors", "echo", "confusion"], 3)).toEqual(["nothing", "wall", "robot"]);
     expect(columnsOf(model, ["sensors", "echo", "confusion"], 2)).toEqual(["1", "2"]);
   });
 
   test("a scaled row sums to exactly 1 and keeps its shares", () => {
-    expect(scaled([0.3, 0.3, 0.3])).toEqual([0.333334, 0.333333, 0.333333]);
-    expect(scaled([2, 1, 1])).toEqual([0.5, 0.25, 0.25]);
-    expect(scaled([0, 0])).toBe(null);
-    expect(scaled([1, -0.5])).toBe(null);
+    expect(normalize([0.3, 0.3, 0.3])).toEqual([0.333334, 0.333333, 0.333333]);
+    expect(normalize([2, 1, 1])).toEqual([0.5, 0.25, 0.25]);
+    expect(normalize([0, 0])).toBe(null);
+    expect(normalize([1, -0.5])).toBe(null);
     for (let n = 2; n < 40; n++) {
-      const row = scaled(Array.from({ length: n }, (_, i) => 1 + ((7 * i) % 5)))!;
+      const row = normalize(Array.from({ length: n }, (_, i) => 1 + ((7 * i) % 5)))!;
       expect(sumOf(row)).toBe(1);
     }
   });
@@ -157,17 +157,17 @@ describe("differences", () => {
     const theirs = [...mine];
     theirs[10] = "changed";
     theirs.splice(12, 0, "added");
-    const lines = differences(mine.join("\n"), theirs.join("\n"));
+    const lines = diffLines(mine.join("\n"), theirs.join("\n"));
     expect(lines.filter(({ kind }) => kind === "mine").map(({ words }) => words)).toEqual(["line 10"]);
     expect(lines.filter(({ kind }) => kind === "theirs").map(({ words }) => words)).toEqual(["changed", "added"]);
     expect(lines.filter(({ kind }) => kind !== "theirs").map(({ words }) => words)).toEqual(mine);
-    const shown = condensed(lines);
+    const shown = condense(lines);
     expect(shown[0]).toBe(null);
     expect(shown.length).toBeLessThan(12);
   });
 
   test("equal texts have none", () => {
-    expect(differences("a\nb", "a\nb").every(({ kind }) => kind === "same")).toBe(true);
-    expect(condensed(differences("a\nb", "a\nb"))).toEqual([null]);
+    expect(diffLines("a\nb", "a\nb").every(({ kind }) => kind === "same")).toBe(true);
+    expect(condense(diffLines("a\nb", "a\nb"))).toEqual([null]);
   });
 });

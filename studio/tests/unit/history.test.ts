@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import { History } from "../../src/edit/history";
+import { TextHistory } from "../../src/edit/history";
 
 test("steps are undone one by one, to the first, and done again", () => {
-  const history = new History("a");
+  const history = new TextHistory("a");
   for (let i = 0; i < 5000; i++) history.push(`a${i}`, null, i);
   for (let i = 4998; i >= 0; i--) {
     history.undo();
@@ -15,7 +15,7 @@ test("steps are undone one by one, to the first, and done again", () => {
 });
 
 test("typing without a pause is one step, and an edit between is its own", () => {
-  const history = new History("");
+  const history = new TextHistory("");
   history.push("w", "typing", 0);
   history.push("wo", "typing", 300);
   history.push("wor", "typing", 1200);
@@ -27,7 +27,7 @@ test("typing without a pause is one step, and an edit between is its own", () =>
 });
 
 test("a pause in typing ends a step", () => {
-  const history = new History("");
+  const history = new TextHistory("");
   history.push("a", "typing", 0);
   history.push("ab", "typing", 5000);
   history.undo();
@@ -35,7 +35,7 @@ test("a pause in typing ends a step", () => {
 });
 
 test("a new step drops those that were undone, and no step changes nothing", () => {
-  const history = new History("a");
+  const history = new TextHistory("a");
   history.push("b", null, 0);
   history.push("b", null, 1);
   history.undo();

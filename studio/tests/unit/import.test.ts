@@ -1,7 +1,7 @@
 /** Foreign files are named as the scenario's own folder sees them, in place of those before. */
 
 import { expect, test } from "vitest";
-import { folderOf, importEdits, isNameable, relativePath } from "../../src/edit/import";
+import { folderOf, importEdits, canImport, relativePath } from "../../src/edit/import";
 import type { FileEntry } from "../../src/protocol";
 
 const entry = (kind: FileEntry["kind"], name: string): FileEntry => ({ kind, name, path: name, about: "" });
@@ -24,7 +24,7 @@ test("worlds name what they read", () => {
       entry("profile", "d.toml"),
       entry("scenario", "e.toml"),
     ]
-      .filter((one) => isNameable(world, one))
+      .filter((one) => canImport(world, one))
       .map(({ name }) => name);
   expect(names("robots")).toEqual(["a.yaml", "b.png", "d.toml"]);
   expect(names("chain")).toEqual(["a.yaml", "c.world"]);

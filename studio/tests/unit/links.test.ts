@@ -1,13 +1,13 @@
 /** Links and health of a fleet's nodes. */
 
 import { describe, expect, test } from "vitest";
-import { fleetWords, healthOf, linksOf, nodeOf } from "../../src/fleet/links";
-import type { Fleet, Node } from "../../src/protocol";
+import { fleetSummary, healthOf, linksOf, nodeOf } from "../../src/fleet/links";
+import type { Fleet, FleetNode } from "../../src/protocol";
 
-function node(agent: number, heard: number[], more: Partial<Node> = {}): Node {
+function node(agent: number, heard: number[], more: Partial<FleetNode> = {}): FleetNode {
   return {
     agent,
-    who: { kind: "airplane", number: agent, part: null },
+    body: { kind: "airplane", number: agent, part: null },
     heard,
     state: "done",
     epoch: 1,
@@ -22,7 +22,7 @@ function node(agent: number, heard: number[], more: Partial<Node> = {}): Node {
   };
 }
 
-function fleet(nodes: Node[], has_begun = true): Fleet {
+function fleet(nodes: FleetNode[], has_begun = true): Fleet {
   return { has_begun, silent_s: 0, late_cycles: 0, talk_p50_ms: null, talk_p99_ms: null, nodes };
 }
 
@@ -40,8 +40,8 @@ describe("links", () => {
 
 describe("nodes", () => {
   test("are found by the bodies of their agents, also where these are parts", () => {
-    const connector = (agent: number, number: number, part: number): Node =>
-      node(agent, [], { who: { kind: "connector", number, part } });
+    const connector = (agent: number, number: number, part: number): FleetNode =>
+      node(agent, [], { body: { kind: "connector", number, part } });
     const all = fleet([connector(0, 0, 0), connector(1, 0, 1), connector(2, 1, 0)]);
     expect(nodeOf(all, { kind: "connector", number: 1, part: 0 })?.agent).toBe(2);
     expect(nodeOf(all, { kind: "connector", number: 0, part: 1 })?.agent).toBe(1);
@@ -60,10 +60,10 @@ describe("nodes", () => {
   });
 
   test("are told in a few words", () => {
-    expect(fleetWords(fleet([node(0, [])]))).toBe("1 node");
-    expect(fleetWords(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe(
+    expect(fleetSummary(fleet([node(0, [])]))).toBe("1 node");
+    expect(fleetSummary(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe(
       "3 nodes, 1 late, 1 lost",
     );
-    expect(fleetWords(fleet([node(0, [], { state: "awaited" })], false))).toBe("1 node, 1 awaited");
+    expect(fleetSummary(fleet([node(0, [], { state: "awaited" })], false))).toBe("1 node, 1 awaited");
   });
 });

@@ -1,11 +1,16 @@
 /** Samples stand at the cycles at which they were taken, also of metrics that appear later. */
 
 import { expect, test } from "vitest";
-import type { Answer } from "../../src/protocol";
+import type { ReplyBody } from "../../src/protocol";
 import { Metrics } from "../../src/state/metrics.svelte";
 
-function answered(keys: string[], first: number, cycles: number[], values: (number | null)[][]): () => Promise<Answer> {
-  const names = keys.map((key) => ({ key, words: key, unit: "" }));
+function answered(
+  keys: string[],
+  first: number,
+  cycles: number[],
+  values: (number | null)[][],
+): () => Promise<ReplyBody> {
+  const names = keys.map((key) => ({ key, label: key, unit: "" }));
   return () => Promise.resolve({ is: "metrics", names, first, thinned: 0, cycles, values });
 }
 
@@ -34,5 +39,5 @@ test("a new name without a new sample has a column all the same", async () => {
   await metrics.fetch(answered(["a"], 0, [0], [[1]]));
   await metrics.fetch(answered(["a", "b"], 1, [], [[], []]));
   expect(metrics.columns).toEqual([[1], [null]]);
-  expect(metrics.lively.length).toBe(2);
+  expect(metrics.keysByFirstChange.length).toBe(2);
 });

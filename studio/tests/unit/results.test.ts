@@ -1,7 +1,14 @@
 /** Addresses and names of results hold for all names of folders and scenarios. */
 
 import { expect, test } from "vitest";
-import { exportAddress, failureOf, foundRun, plainName, reportAddress, wantedRun } from "../../src/state/results";
+import {
+  exportAddress,
+  parseFailure,
+  findRun,
+  safeFileName,
+  reportAddress,
+  parseRunRequest,
+} from "../../src/state/results";
 
 test("paths are written so that the server reads them as they are", () => {
   expect(reportAddress("runs/a & b/ü%")).toBe("/report?path=runs%2Fa%20%26%20b%2F%C3%BC%25");
@@ -11,7 +18,7 @@ test("paths are written so that the server reads them as they are", () => {
 });
 
 test("names of files are plain", () => {
-  expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(plainName)).toEqual([
+  expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(safeFileName)).toEqual([
     "Made-up-hall",
     "a-b",
     "sidestep",
@@ -28,8 +35,8 @@ test("what a report's page asks for is read with care, and found by name or numb
   });
   const runs = [run("n=1", "7"), run("n=1", "8"), run("n=2", "7")];
   const found = (data: unknown) => {
-    const wanted = wantedRun(data);
-    return wanted && foundRun(runs, wanted);
+    const wanted = parseRunRequest(data);
+    return wanted && findRun(runs, wanted);
   };
   expect(found({ opens: { variant: "n=2", seed: null } })).toBe(runs[2]);
   expect(found({ opens: { variant: "n=1", seed: "8" } })).toBe(runs[1]);
@@ -39,12 +46,12 @@ test("what a report's page asks for is read with care, and found by name or numb
 });
 
 test("why there is no result is read from what the server has said", () => {
-  expect(failureOf("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({
+  expect(parseFailure("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({
     place: "r/run.json",
     cause: "it is cut off: 3 bytes",
     remedy: "record it again",
   });
-  expect(failureOf("r", "Only the studio's own page may ask.\n")).toMatchObject({
+  expect(parseFailure("r", "Only the studio's own page may ask.\n")).toMatchObject({
     place: "r",
     cause: "Only the studio's own page may ask.",
   });

@@ -1,18 +1,18 @@
 /** A session goes on after frames that cannot be read. */
 
 import { expect, test, vi } from "vitest";
-import type { Call, Cast } from "../../src/protocol";
+import type { Method, BodyTable } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
 import { Session } from "../../src/state/session.svelte";
 
 test("frames that cannot be read are granted again, at most once a second", () => {
   vi.useFakeTimers();
-  const calls: Call[] = [];
-  const ask = (call: Call): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
-  const session = new Session({ kind: "new", world: "robots" }, { ask, problem: () => undefined });
+  const calls: Method[] = [];
+  const ask = (call: Method): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
+  const session = new Session({ kind: "new", world: "robots" }, { request: ask, onProblem: () => undefined });
   session.id = 1;
-  session.credit.drawn();
-  for (let i = 0; i < 2; i++) session.takeFrame(new ArrayBuffer(60));
+  session.credit.refill();
+  for (let i = 0; i < 2; i++) session.onFrame(new ArrayBuffer(60));
   vi.advanceTimersByTime(900);
   expect(calls.length).toBe(1);
   vi.advanceTimersByTime(5000);
@@ -24,28 +24,28 @@ test("frames that cannot be read are granted again, at most once a second", () =
 });
 
 test("a session that nobody sees is granted frames slowly, and tells none of them as lost", () => {
-  const calls: Call[] = [];
-  const ask = (call: Call): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
-  const session = new Session({ kind: "new", world: "robots" }, { ask, problem: () => undefined });
+  const calls: Method[] = [];
+  const ask = (call: Method): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
+  const session = new Session({ kind: "new", world: "robots" }, { request: ask, onProblem: () => undefined });
   session.id = 1;
   const frame = (cycle: number, leftOut: number): void =>
-    session.takeFrame(
+    session.onFrame(
       encodeFrame({
         session: 1,
-        cast: 1,
+        tableId: 1,
         dimensions: 2,
         cycle,
         time_s: 0,
-        places_m: [],
-        turns: [],
+        positions_m: [],
+        orientations: [],
         lines: [],
         conditions: [],
         leftOut,
       }),
     );
-  session.takeCast({
+  session.onBodyTable({
     session: 1,
-    cast: 1,
+    id: 1,
     kinds: [],
     kind: [],
     number: [],
@@ -54,19 +54,19 @@ test("a session that nobody sees is granted frames slowly, and tells none of the
     names: [],
     shapes: [],
     shape: [],
-    looks: [],
-    look: [],
-  } as unknown as Cast);
-  session.grantUnseen();
+    appearances: [],
+    appearance: [],
+  } as unknown as BodyTable);
+  session.grantHidden();
   frame(1, 0);
   frame(2, 20);
-  session.grantUnseen();
+  session.grantHidden();
   expect(calls.filter((call) => call.do === "credit").length).toBe(2);
-  expect(session.shown).toMatchObject({ cycle: 2, leftOut: 0 });
+  expect(session.displayed).toMatchObject({ cycle: 2, leftOut: 0 });
   session.subscribe(() => undefined);
   frame(3, 40);
-  session.grantUnseen();
+  session.grantHidden();
   expect(calls.filter((call) => call.do === "credit").length).toBe(2);
   frame(4, 41);
-  expect(session.shown.leftOut).toBe(1);
+  expect(session.displayed.leftOut).toBe(1);
 });

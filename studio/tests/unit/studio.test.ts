@@ -2,8 +2,8 @@
 
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Socket } from "../../src/connection";
-import type { Standing } from "../../src/enter";
-import type { Call, Notice, Scene, Status } from "../../src/protocol";
+import type { AccessStatus } from "../../src/auth";
+import type { Method, ServerNotification, Scene, SessionStatus } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
 import { draftOf } from "../../src/edit/draft.svelte";
 import { Studio } from "../../src/state/studio.svelte";
@@ -18,7 +18,7 @@ const SCENE = {
   bodies: [],
 } as unknown as Scene;
 
-function status(more: Partial<Status> = {}): Status {
+function status(more: Partial<SessionStatus> = {}): SessionStatus {
   return {
     session: 1,
     state: "paused",
@@ -41,20 +41,20 @@ class Line implements Socket {
   onopen: (() => void) | null = null;
   onclose: (() => void) | null = null;
   onmessage: ((event: { data: unknown }) => void) | null = null;
-  readonly asked: { id: number; call: Call }[] = [];
+  readonly asked: { id: number; call: Method }[] = [];
   send(text: string): void {
-    this.asked.push(JSON.parse(text) as { id: number; call: Call });
+    this.asked.push(JSON.parse(text) as { id: number; call: Method });
   }
   close(): void {}
 
   greet(): void {
     this.onopen!();
-    this.say({ notice: "hello", version: 1, program: "x", worlds: [], read_only: false, open: [] });
+    this.say({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
   }
   say(words: unknown): void {
     this.onmessage?.({ data: JSON.stringify(words) });
   }
-  calls(what: string): Call[] {
+  calls(what: string): Method[] {
     return this.asked.map(({ call }) => call).filter((call) => call.do === what);
   }
   /** Answers all questions of a kind that are open. */
@@ -81,7 +81,7 @@ const OPENED = { is: "opened", session: 1, scene: SCENE, status: status() };
 
 let lines: Line[];
 let retries: (() => void)[];
-let standing: Standing;
+let standing: AccessStatus;
 let studio: Studio;
 
 beforeEach(async () => {
@@ -92,7 +92,7 @@ beforeEach(async () => {
     open: () => (lines.push(new Line()), lines.at(-1)!),
     after: (ms, then) => (ms === 6000 ? 0 : retries.push(then)),
     cancel: () => undefined,
-    standing: () => Promise.resolve(standing),
+    accessStatus: () => Promise.resolve(standing),
   });
   studio.connect();
   line().greet();
@@ -103,13 +103,14 @@ beforeEach(async () => {
 
 const line = (): Line => lines.at(-1)!;
 const session = () => studio.sessions[0]!;
-const tell = (more: Partial<Status>): void => line().say({ notice: "status", ...status(more) } satisfies Notice);
+const tell = (more: Partial<SessionStatus>): void =>
+  line().say({ notice: "status", ...status(more) } satisfies ServerNotification);
 
 function show(cycle: number): void {
   line().say({
-    notice: "cast",
+    notice: "bodies",
     session: 1,
-    cast: 1,
+    id: 1,
     kinds: ["robot"],
     kind: [0],
     number: [0],
@@ -118,17 +119,17 @@ function show(cycle: number): void {
     names: [],
     shapes: [{ type: "sphere", radius_m: 1 }],
     shape: [0],
-    looks: [],
-    look: [0],
+    appearances: [],
+    appearance: [0],
   });
   const frame = encodeFrame({
     session: 1,
-    cast: 1,
+    tableId: 1,
     dimensions: 2,
     cycle,
     time_s: 0,
-    places_m: [0, 0],
-    turns: [0],
+    positions_m: [0, 0],
+    orientations: [0],
     lines: [],
     conditions: [0],
   });
@@ -149,8 +150,8 @@ async function back(): Promise<void> {
 for (const [how, words] of [
   ["silent", /does not answer/],
   ["token", /Open the whole address/],
-  ["full", /is full.*Close one/],
-  ["name", /does not take this address/],
+  ["full", /Too many pages.*Close another/],
+  ["name", /does not accept this address/],
   ["in", /connection was lost/],
 ] as const) {
   test(`a loss where the server is "${how}" is told as that`, async () => {
@@ -170,7 +171,7 @@ test("a run that played goes to its cycle and plays on", async () => {
   expect(line().calls("play")).toEqual([]);
   await line().answer("seek", { is: "done" });
   expect(line().calls("play").length).toBe(1);
-  expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
+  expect(studio.banner).toEqual({ words: "Reconnected; reopened Hall at cycle 345.", isBad: false });
 });
 
 test("a fleet that was lost is looked for until one flies there again, or its session is closed", async () => {
@@ -234,7 +235,7 @@ test("a server that dies while sessions are reopened is not told to be connected
   await back();
   await line().answer("open", OPENED);
   await line().answer("seek", { is: "done" });
-  expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
+  expect(studio.banner).toEqual({ words: "Reconnected; reopened Hall at cycle 345.", isBad: false });
   expect([line().calls("play").length, session().ended]).toEqual([1, null]);
 });
 
@@ -299,7 +300,7 @@ test("what is saved after a loss names the text that the page knows, not that of
   void draft.save(null, false);
   await settled();
   expect(line().calls("save")).toEqual([
-    { do: "save", session: 1, text: "a = 1", to: null, base: "a = 1", over: false },
+    { do: "save", session: 1, text: "a = 1", to: null, base: "a = 1", overwrite: false },
   ]);
 });
 
@@ -310,7 +311,7 @@ test("what cannot be opened again is told, and opened the next time", async () =
   const { id } = line().asked.shift()!;
   line().say({ id, problem: { place: "p", line: null, column: null, cause: "gone", remedy: "", is_warning: false } });
   await settled();
-  expect(studio.banner!.words).toContain("1 could not be opened again");
+  expect(studio.banner!.words).toContain("1 could not be reopened");
   expect(session().ended).not.toBeNull();
   await lose();
   await back();

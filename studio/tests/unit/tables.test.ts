@@ -1,7 +1,7 @@
 /** Columns that are the same in every row stand above a table, so that it is narrow; nothing is lost. */
 
 import { expect, test } from "vitest";
-import { lifted } from "../../src/panels/tables";
+import { hoistConstantColumns } from "../../src/panels/tables";
 import type { Value } from "../../src/protocol";
 
 const text = (words: string): Value => ({ text: words });
@@ -11,7 +11,7 @@ test("what is the same in all rows becomes a fact", () => {
     [text("sonar"), text("0°")],
     [text("sonar"), text("90°")],
   ];
-  expect(lifted({ columns: ["sensor", "beam"], rows })).toEqual({
+  expect(hoistConstantColumns({ columns: ["sensor", "beam"], rows })).toEqual({
     same: [{ label: "sensor", value: text("sonar") }],
     columns: ["beam"],
     rows: [[text("0°")], [text("90°")]],
@@ -20,8 +20,8 @@ test("what is the same in all rows becomes a fact", () => {
 
 test("a single row, no row, and rows that are all the same stay a table", () => {
   const one = { columns: ["a"], rows: [[text("x")]] };
-  expect(lifted(one)).toEqual({ same: [], ...one });
-  expect(lifted({ columns: ["a"], rows: [] })).toEqual({ same: [], columns: ["a"], rows: [] });
+  expect(hoistConstantColumns(one)).toEqual({ same: [], ...one });
+  expect(hoistConstantColumns({ columns: ["a"], rows: [] })).toEqual({ same: [], columns: ["a"], rows: [] });
   const alike = { columns: ["a"], rows: [[text("x")], [text("x")]] };
-  expect(lifted(alike)).toEqual({ same: [], ...alike });
+  expect(hoistConstantColumns(alike)).toEqual({ same: [], ...alike });
 });

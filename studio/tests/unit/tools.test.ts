@@ -1,17 +1,17 @@
 import { describe, expect, test } from "vitest";
-import { along, axisAt, handlesAt } from "../../src/edit/axes";
-import { Board, groundOf } from "../../src/edit/board";
-import type { Table } from "../../src/edit/keypath";
+import { dragAlong, axisAt, handlesAt } from "../../src/edit/axes";
+import { AsciiMap, placementOf } from "../../src/edit/ascii-map";
+import type { TomlTable } from "../../src/edit/keypath";
 import { airplaneItems, headingTo, putAirplane, putWayPoint } from "../../src/edit/tools/airspace";
 import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "../../src/edit/tools/chain";
-import { SpaceEye } from "../../src/scene/camera";
-import { around, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
+import { SpaceCamera } from "../../src/scene/camera";
+import { lowerLeftAround, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
 
-const board = new Board("######\n#....#\n#....#\n######\n", 0.5);
-const ground = groundOf(board, null)!;
+const map = new AsciiMap("######\n#....#\n#....#\n######\n", 0.5);
+const ground = placementOf(map, null)!;
 
 describe("robots", () => {
-  const model: Table = {
+  const model: TomlTable = {
     robots: [
       {
         at: [
@@ -66,13 +66,13 @@ describe("robots", () => {
     ]);
     const [first] = putBody({ robots: { count: 4 } }, "robots", [2, 2], null);
     expect(first).toMatchObject({ op: "insert", key: "robots", value: { at: [[2, 2]], size: 2 } });
-    expect(around([5, 5], 2)).toEqual([5, 5]);
-    expect(around([5, 5], 3)).toEqual([4, 4]);
+    expect(lowerLeftAround([5, 5], 2)).toEqual([5, 5]);
+    expect(lowerLeftAround([5, 5], 3)).toEqual([4, 4]);
   });
 
   test("a door takes the wall away that it stands in, and joins those of its size", () => {
     const rect = { column: 5, row: 1, width: 1, height: 2 };
-    const [way, door] = putDoor(model, board, rect);
+    const [way, door] = putDoor(model, map, rect);
     expect(way).toEqual({
       op: "paint",
       key: "map.ascii",
@@ -82,7 +82,7 @@ describe("robots", () => {
       ],
     });
     expect(door).toMatchObject({ op: "insert", key: "doors", value: { at: [[5, 1]], size: [1, 2] } });
-    const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, board, rect);
+    const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, map, rect);
     expect(more[1]).toEqual({ op: "insert", key: "doors.at", at: null, value: [5, 1] });
   });
 
@@ -97,7 +97,7 @@ describe("robots", () => {
 });
 
 describe("chains", () => {
-  const model: Table = {
+  const model: TomlTable = {
     obstacles: [
       { at_m: [4, 1.5], radius_m: 0.5 },
       {
@@ -204,7 +204,7 @@ describe("chains", () => {
       },
       { op: "set", key: "obstacles.0.speed_m_s", value: 0.5 },
     ]);
-    const moving: Table = {
+    const moving: TomlTable = {
       obstacles: {
         at_m: [1, 1],
         radius_m: 1,
@@ -217,7 +217,7 @@ describe("chains", () => {
     expect(putPatrol(moving, [3, 3, 0], null, 0.01)).toEqual([
       { op: "insert", key: "obstacles.patrol_m", at: null, value: [3, 3] },
     ]);
-    const straight: Table = {
+    const straight: TomlTable = {
       obstacles: [
         { at_m: [1, 1], velocity_m_s: [1, 0] },
         {
@@ -252,7 +252,7 @@ describe("chains", () => {
 });
 
 describe("chains in space", () => {
-  const model: Table = {
+  const model: TomlTable = {
     obstacles: [
       { at_m: [1, 2, 3], radius_m: 0.5 },
       { at_m: [0, 0, 1], size_m: [2, 4, 6], turn_deg: 90 },
@@ -309,27 +309,27 @@ describe("chains in space", () => {
   });
 
   test("a handle moves its own number alone, as far as the pointer goes along it", () => {
-    const eye = new SpaceEye();
-    eye.resize(800, 600);
-    eye.fit({ lo: [-2, -2, -2], hi: [2, 2, 2] });
+    const camera = new SpaceCamera();
+    camera.resize(800, 600);
+    camera.fit({ low: [-2, -2, -2], high: [2, 2, 2] });
     const at = [0.5, 0.25, 0] as [number, number, number];
-    const handles = handlesAt(eye, at);
+    const handles = handlesAt(camera, at);
     expect(handles.map(({ axis }) => axis)).toEqual([0, 1, 2]);
     for (const { axis, tip_m } of handles) {
-      const [[x, y], [tx, ty]] = [eye.project(...at), eye.project(...tip_m)];
-      expect(axisAt(eye, at, tx, ty)).toBe(axis);
-      const by = along(eye, at, axis, tx - x, ty - y);
+      const [[x, y], [tx, ty]] = [camera.project(...at), camera.project(...tip_m)];
+      expect(axisAt(camera, at, tx, ty)).toBe(axis);
+      const by = dragAlong(camera, at, axis, tx - x, ty - y);
       expect(by[axis]).toBeCloseTo(tip_m[axis] - at[axis], 9);
       expect(by.filter((part) => part !== 0)).toHaveLength(1);
-      const [px, py] = eye.project(...tip_m);
-      eye.under(px, py, tip_m).forEach((part, k) => expect(part).toBeCloseTo(tip_m[k]!, 4));
+      const [px, py] = camera.project(...tip_m);
+      camera.unproject(px, py, tip_m).forEach((part, k) => expect(part).toBeCloseTo(tip_m[k]!, 4));
     }
-    expect(axisAt(eye, at, 0, 0)).toBeNull();
+    expect(axisAt(camera, at, 0, 0)).toBeNull();
   });
 });
 
 describe("airplanes", () => {
-  const model: Table = {
+  const model: TomlTable = {
     airplanes: [
       {
         callsign: "ONE1",

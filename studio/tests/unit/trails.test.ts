@@ -10,18 +10,18 @@ test("places follow each other, and standing still adds none", () => {
   trails.push(0, at(0, 0, 9, 9));
   trails.push(1, at(1, 0, 9, 9));
   trails.push(2, at(2, 0, 9, 9));
-  expect(trails.of(0)).toEqual([
+  expect(trails.points(0)).toEqual([
     [0, 0],
     [1, 0],
     [2, 0],
   ]);
-  expect(trails.of(1)).toEqual([[9, 9]]);
+  expect(trails.points(1)).toEqual([[9, 9]]);
 });
 
 test("a ring forgets the oldest place", () => {
   const trails = new Trails(1, 3);
   for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0, 0));
-  const way = trails.of(0);
+  const way = trails.points(0);
   expect(way.length).toBe(trails.length);
   expect([way[0]![0], way.at(-1)![0]]).toEqual([5, trails.length + 4]);
 });
@@ -30,20 +30,20 @@ test("going back takes away what is later, also where the ring has turned", () =
   const trails = new Trails(1, 2);
   for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0));
   trails.push(7, at(7, 0));
-  expect(trails.of(0)).toEqual([
+  expect(trails.points(0)).toEqual([
     [5, 0],
     [6, 0],
     [7, 0],
   ]);
   trails.push(8, at(8, 1));
-  expect(trails.of(0).at(-1)).toEqual([8, 1]);
+  expect(trails.points(0).at(-1)).toEqual([8, 1]);
 });
 
 test("a jump ahead begins anew, since nobody saw the way", () => {
   const trails = new Trails(1, 2);
   trails.push(0, at(0, 0));
   trails.push(5000, at(50, 0));
-  expect(trails.of(0)).toEqual([[50, 0]]);
+  expect(trails.points(0)).toEqual([[50, 0]]);
 });
 
 test("a run that goes so fast that frames are far from each other has a trail", () => {
@@ -52,14 +52,14 @@ test("a run that goes so fast that frames are far from each other has a trail", 
   for (let k = 1; k <= 6; k++) trails.push(75 * 2 ** k, at(k, 0));
   trails.push(4900, at(7, 0));
   trails.push(7000, at(8, 0));
-  expect(trails.of(0).length).toBe(9);
+  expect(trails.points(0).length).toBe(9);
 });
 
 test("a jump that was sought begins anew, also in a run that went fast", () => {
   const trails = new Trails(1, 2);
   for (let k = 0; k < 5; k++) trails.push(190 * k, at(k, 0));
   trails.push(1400, at(9, 0), true);
-  expect(trails.of(0)).toEqual([[9, 0]]);
+  expect(trails.points(0)).toEqual([[9, 0]]);
 });
 
 test("many bodies have short trails, so that memory is bounded", () => {

@@ -4,10 +4,10 @@ use super::arm_picture::ArmPicture;
 use crate::console::{align_pairs, format_fixed};
 use clap::Args;
 use serde::Serialize;
-use sidestep::kernel::InputError;
-use sidestep::worlds::chain::kinematics::{
+use sidestep::arms::kinematics::{
     ArmFiles, ArmSelection, Dof, SkeletonRod, Sphere, Transform, Vector,
 };
+use sidestep::kernel::InputError;
 use std::path::PathBuf;
 
 /// The options that choose an arm and its posture.

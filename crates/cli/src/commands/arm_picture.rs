@@ -1,8 +1,8 @@
 //! An arm in a posture as a picture.
 
 use crate::exit::Failure;
+use sidestep::arms::kinematics::{Sphere, Vector};
 use sidestep::kernel::view::{Body, BodyKind, Frame, Pose, Scenery, Shape};
-use sidestep::worlds::chain::kinematics::{Sphere, Vector};
 use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::Path;

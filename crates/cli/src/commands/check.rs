@@ -6,7 +6,7 @@ use crate::scenario_args::ScenarioArgs;
 use crate::worlds;
 use clap::Args;
 use serde_json::Value;
-use sidestep::MOST_PROBLEMS;
+use sidestep::experiment::MAX_PROBLEMS;
 use sidestep::kernel::InputError;
 use sidestep::kernel::text::Description;
 use sidestep::scenario::{CompiledScenario, ImportedScenario, Remark, Source};
@@ -76,7 +76,7 @@ fn print_all_errors(
         return Err(all.into_iter().next().unwrap_or(first).into());
     }
     all.iter().for_each(|error| console.error(error));
-    let more = if all.len() == MOST_PROBLEMS { " at least" } else { "" };
+    let more = if all.len() == MAX_PROBLEMS { " at least" } else { "" };
     console.error(format!("{}:{more} {} errors", args.scenario.file.display(), all.len()));
     Ok(ExitCode::WrongInput)
 }

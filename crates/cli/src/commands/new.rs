@@ -33,8 +33,8 @@ pub(crate) struct NewArgs {
 
 /// The names of the worlds, each with a description.
 pub(crate) fn world_names() -> PossibleValuesParser {
-    let named = |kind: &&dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
-    PossibleValuesParser::new(worlds().0.iter().map(named))
+    let named = |kind: &dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
+    PossibleValuesParser::new(worlds().iter().map(named))
 }
 
 /// Runs the command.

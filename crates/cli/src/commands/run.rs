@@ -101,7 +101,8 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     interrupt::listen()?;
     // Before anything is written.
     let viewers = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
-    let mut journey = ManagedRun::start(compiled.as_ref(), &source, workers, keep, told)?;
+    let mut journey = ManagedRun::start(worlds(), compiled.as_ref(), &source, workers, keep)?
+        .with_import_report(told);
     if let Some(at) = &viewers {
         serve_viewers(&mut journey, at, console)?;
     }

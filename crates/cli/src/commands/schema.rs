@@ -39,18 +39,18 @@ const SWEEP_NAME: &str = "sweep";
 
 /// Returns files beside scenarios, each with a word for it and its schema.
 fn other_files() -> Vec<(&'static str, Value)> {
-    let own = worlds().0.iter().flat_map(|kind| kind.other_files());
+    let own = worlds().iter().flat_map(|kind| kind.other_files());
     own.chain([(SWEEP_NAME, sidestep::experiment::sweep::file::schema())]).collect()
 }
 
 /// The names of the worlds, and the words for other files.
 fn schema_names() -> PossibleValuesParser {
-    let world = |kind: &&dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
+    let world = |kind: &dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
     let other = |(word, schema): &(&'static str, Value)| {
         PossibleValue::new(*word).help(schema["title"].as_str().unwrap_or_default().to_string())
     };
     let others = other_files();
-    PossibleValuesParser::new(worlds().0.iter().map(world).chain(others.iter().map(other)))
+    PossibleValuesParser::new(worlds().iter().map(world).chain(others.iter().map(other)))
 }
 
 /// Runs the command.

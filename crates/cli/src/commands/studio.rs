@@ -78,17 +78,17 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     let foxglove = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
     let (named, fleets) = fleet_watch::split_endpoints(&args.named);
     let watch = |endpoint: &String| fleet_watch::start_watching(endpoint, args.tls.files());
-    let screens = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
+    let fleets = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
     let studio = Studio::start(Options {
-        worlds: worlds(),
-        program: format!("sidestep {}", sidestep_session::build_id()),
+        worlds: worlds().clone(),
+        program: format!("sidestep {}", worlds().build()),
         named,
         host: args.addr.clone(),
         port: args.port,
         read_only: args.read_only,
         workers: args.workers.count(),
         foxglove: foxglove.clone(),
-        screens,
+        fleets,
     })?;
     if let Some(at) = &foxglove {
         foxglove::print_address(at, console);

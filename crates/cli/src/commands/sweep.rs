@@ -174,7 +174,7 @@ fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
 
 fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    let ended = sweep::collect(&folder, &ConsoleWatcher::new(console))?;
+    let ended = sweep::collect(worlds(), &folder, &ConsoleWatcher::new(console))?;
     let told = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
     print_results(told, ended, "The runs are collected already.")
 }

@@ -5,6 +5,7 @@ use crate::console::{
 };
 use crate::exit::{ExitCode, Failure};
 use crate::progress::StageProgress;
+use crate::worlds;
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep::experiment::sweep::{OmittedMetric, Plan, RunTable, Shard, Summary};
@@ -55,7 +56,8 @@ pub(crate) fn print_results(
     }
     let table = &done.table;
     let stages = StageProgress::new(console);
-    let summary = plan.summary_with_progress(table, &mut |share| stages.set("intervals", share));
+    let summary =
+        plan.summary_with_progress(worlds(), table, &mut |share| stages.set("intervals", share));
     stages.clear();
     let summary = summary?;
     let failed = print_failures(told, table);

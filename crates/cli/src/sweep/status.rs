@@ -1,4 +1,4 @@
-//! The state of a sweep that other processes run, as text and as JSON.
+//! The progress of a sweep that other processes run, as text and as JSON.
 
 use super::output::format_count;
 use crate::console::{Console, align_pairs, format_duration, group_thousands};
@@ -10,7 +10,7 @@ use sidestep_session::sweep::{Folder, ShareStatus, SweepStatus};
 /// Largest number of failed runs that are listed.
 const MAX_LISTED_FAILURES: usize = 5;
 
-/// Prints how far a sweep is.
+/// Prints the progress of a sweep.
 ///
 /// # Errors
 /// When that cannot be written.
@@ -22,16 +22,16 @@ pub(crate) fn print_status(
     let plan = folder.plan();
     let mut json =
         json!({ "folder": display_path(folder.path()), "name": plan.name, "world": plan.world });
-    if let (Some(all), Ok(serde_json::Value::Object(told))) =
-        (json.as_object_mut(), serde_json::to_value(status))
+    if let (Some(all), serde_json::Value::Object(fields)) = (json.as_object_mut(), status.to_json())
     {
-        all.extend(told);
+        all.extend(fields);
     }
     let of = if status.until_precise && !status.is_complete { "of at most" } else { "of" };
-    let short = || format!("{} {of} {}\n", status.runs, status.of);
+    let short = || format!("{} {of} {}\n", status.runs, status.total);
     console.print_result_or_short(&json, short, || {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
-        let (runs, all) = (group_thousands(status.runs), format_count(status.of as usize, "run"));
+        let (runs, all) =
+            (group_thousands(status.runs), format_count(status.total as usize, "run"));
         format!("# {name}: {runs} {of} {all}\n\n{}", align_pairs(&lines(folder, status)))
     })
 }
@@ -44,22 +44,22 @@ fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
         line(&format!("share {}", share.share), share_text(share));
     }
     if let Some(rate) = status.runs_per_s.filter(|_| !status.is_complete) {
-        line("rate", format!("{rate:.3} runs a second of late"));
+        line("rate", format!("{rate:.3} runs per second recently"));
     }
-    if let Some(left_s) = status.left_s.filter(|_| !status.is_complete) {
-        line("time left", format_duration(left_s));
+    if let Some(eta_s) = status.eta_s.filter(|_| !status.is_complete) {
+        line("time left", format_duration(eta_s));
     }
     line("failed", group_thousands(status.failed as u64));
     for failure in status.failures.iter().take(MAX_LISTED_FAILURES) {
         line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
     }
-    let is_all = status.runs == status.of;
+    let is_all = status.runs == status.total;
     let next = match status.is_complete {
-        true => Some(("look at it", format!("sidestep report {path}"))),
-        // Two processes that do the same only get in each other's way.
-        false if status.is_worked_on => None,
+        true => Some(("view it", format!("sidestep report {path}"))),
+        // Two processes that run the same trials only slow each other down.
+        false if status.is_active => None,
         false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
-        false => Some(("go on", format!("sidestep resume {path}"))),
+        false => Some(("continue", format!("sidestep resume {path}"))),
     };
     lines.extend(next.map(|(name, words)| (name.to_string(), words)));
     lines

@@ -127,6 +127,7 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("corridor of no length", "[chain]", "[ground]\ncorridor = { width_m = 3.0, legs = [{ straight_m = nan }] }\n[chain]", "leg 0"),
     ("field of too much", "[chain]", "[[fields]]\nlo_m = [0, 0]\nhi_m = [9, 9]\npart = 0.5\nradius_m = 1e-6\n[chain]", "obstacles of radius"),
     ("field of nothing", "[chain]", "[[fields]]\nlo_m = [0, 0]\nhi_m = [9, 9]\npart = nan\nradius_m = 1.0\n[chain]", "obstacles of radius"),
+    ("two names of a key", "[chain]", "[[fields]]\nlo_m = [0, 0]\nhi_m = [9, 9]\npart = 0.1\nfill_fraction = 0.1\nradius_m = 1.0\n[chain]", "earlier name of `fill_fraction`"),
     ("crowd too large", "[chain]", "[[fields]]\nlo_m = [0, 0]\nhi_m = [9, 9]\nn = 4000000000\nradius_m = 0.1\nspeed_m_s = 1.0\n[chain]", "moving obstacles"),
     ("starts inside", "at_m = [5.0, 5.0]", "at_m = [-2.2, 0.3]", "deep in obstacle 0, with connector 2"),
     ("a mover starts inside", "at_m = [5.0, 5.0]", "at_m = [-2.0, 0.3]\nvelocity_m_s = [0.0, 1.0]", "deep in obstacle 0, with connector 2"),

@@ -125,7 +125,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     let mut page = studio.page();
     assert_eq!(page.read()["open"], json!([{ "kind": "fleet", "path": at }]));
     let what = json!({ "kind": "fleet", "path": at });
-    let opened = page.ask(json!({ "do": "open", "what": what, "seed": null }));
+    let opened = page.ask(json!({ "do": "open", "target": what, "seed": null }));
     let session = opened["session"].clone();
     assert_eq!(
         (&opened["scene"]["agent"], &opened["status"]["state"]),
@@ -139,10 +139,12 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
             "restart" => json!({ "do": call, "session": session, "seed": 1, "text": null }),
             "inspect" => {
                 let who = json!({ "kind": "airplane", "number": 0, "part": null });
-                json!({ "do": call, "session": session, "who": who })
+                json!({ "do": call, "session": session, "body": who })
             }
             "edit" => json!({ "do": call, "session": session, "text": "", "edits": [] }),
-            _ => json!({ "do": call, "session": session, "text": "", "to": null, "over": true }),
+            _ => {
+                json!({ "do": call, "session": session, "text": "", "to": null, "overwrite": true })
+            }
         };
         assert!(page.reply(request)["problem"].is_object(), "{call}");
     }

@@ -135,7 +135,7 @@ impl Page {
 
     pub(crate) fn open(&mut self, path: &str) -> Value {
         self.ask(
-            json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }),
+            json!({ "do": "open", "target": { "kind": "scenario", "path": path }, "seed": null }),
         )
     }
 
@@ -195,7 +195,7 @@ fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
     let over = page.play_to_the_end();
     assert_eq!((&over["digest"], &over["cycle"]), (&digest, &3000.0.into()));
     assert!(!page.frames.is_empty() && page.frames.iter().all(|frame| frame.starts_with(b"SSTF")));
-    assert_eq!(page.notices.iter().filter(|notice| notice["notice"] == "cast").count(), 1);
+    assert_eq!(page.notices.iter().filter(|notice| notice["notice"] == "bodies").count(), 1);
     page.ask(json!({ "do": "seek", "session": 1, "cycle": 10 }));
     assert_eq!(page.play_to_the_end()["digest"], digest, "and again from an earlier cycle");
 }
@@ -223,8 +223,8 @@ fn noise_is_answered_with_problems_and_the_session_goes_on() {
         json!({ "do": "close", "session": 77 }),
         json!({ "do": "check", "session": 77, "text": "" }),
         json!({ "do": "files", "folder": "/" }),
-        json!({ "do": "open", "what": { "kind": "recording", "path": "s.toml" }, "seed": null }),
-        json!({ "do": "open", "what": { "kind": "new", "world": "mars" }, "seed": null }),
+        json!({ "do": "open", "target": { "kind": "recording", "path": "s.toml" }, "seed": null }),
+        json!({ "do": "open", "target": { "kind": "new", "world": "mars" }, "seed": null }),
     ] {
         assert!(page.reply(call.clone())["problem"].is_object(), "{call}");
     }
@@ -248,7 +248,8 @@ fn a_page_has_so_many_sessions_and_closes_them_one_by_one() {
     let mut page = studio.page();
     let numbers: Vec<Value> = (0..4).map(|_| page.open("s.toml")["session"].clone()).collect();
     assert_eq!(numbers, [1, 2, 3, 4]);
-    let open = json!({ "do": "open", "what": { "kind": "scenario", "path": "s.toml" }, "seed": 7 });
+    let open =
+        json!({ "do": "open", "target": { "kind": "scenario", "path": "s.toml" }, "seed": 7 });
     assert!(page.reply(open.clone())["problem"].is_object());
     page.ask(json!({ "do": "close", "session": 2 }));
     assert_eq!(page.ask(open)["status"]["seed"], "7");
@@ -405,8 +406,7 @@ fn recordings_are_replayed_and_a_damaged_one_is_a_problem() {
     let kinds: Vec<Value> =
         page.read()["open"].as_array().expect("a list").iter().map(|o| o["kind"].clone()).collect();
     assert_eq!(kinds, ["recording"; 3]);
-    let open =
-        |path| json!({ "do": "open", "what": { "kind": "recording", "path": path }, "seed": null });
+    let open = |path| json!({ "do": "open", "target": { "kind": "recording", "path": path }, "seed": null });
     let problem = page.reply(open("cut.mcap"))["problem"].clone();
     assert!(
         !problem["cause"].as_str().expect("a cause").is_empty()
@@ -549,11 +549,12 @@ fn runs_of_a_sweep_are_listed_with_what_opens_them() {
     assert_eq!(run["replay"]["kind"], "scenario");
     let what = json!({ "kind": "scenario", "path": path });
     let seed: u64 = seed.parse().expect("a number");
-    let opened = page.ask(json!({ "do": "open", "what": what, "seed": seed }));
+    let opened = page.ask(json!({ "do": "open", "target": what, "seed": seed }));
     assert_eq!(opened["status"]["seed"], seed.to_string());
     assert!(page.reply(json!({ "do": "runs", "folder": "." }))["problem"].is_object());
-    let named = page
-        .ask(json!({ "do": "open", "what": { "kind": "scenario", "path": "s.toml" }, "seed": 1 }));
+    let named = page.ask(
+        json!({ "do": "open", "target": { "kind": "scenario", "path": "s.toml" }, "seed": 1 }),
+    );
     let tables = page.ask(json!({ "do": "tables", "session": named["session"] }));
     assert_eq!(tables["names"], json!([]));
 }

@@ -17,7 +17,7 @@ impl Page {
 }
 
 fn save(text: &Value, to: Option<&str>, over: bool) -> Value {
-    json!({ "do": "save", "session": 1, "text": text, "to": to, "over": over })
+    json!({ "do": "save", "session": 1, "text": text, "to": to, "overwrite": over })
 }
 
 fn cause(reply: &Value) -> String {
@@ -113,7 +113,7 @@ fn a_scenario_is_saved_under_another_name_and_stays_there() {
     place.write("traffic.scn", "00:00:00.00>CRE A,B738,52,4,90,FL200,250\n");
     let studio = Studio::start(&place, &["s.toml", "."]);
     let mut page = studio.page();
-    let open = |what: Value| json!({ "do": "open", "what": what, "seed": null });
+    let open = |what: Value| json!({ "do": "open", "target": what, "seed": null });
     page.ask(open(json!({ "kind": "new", "world": "robots" })));
     let text = page.text();
     assert!(cause(&page.reply(save(&text, None, false))).contains("in no file yet"));
@@ -172,7 +172,7 @@ fn a_recording_is_not_saved() {
     place.json(&["run", "s.toml", "--cycles", "10", "--out", "r"]);
     let studio = Studio::start(&place, &["r"]);
     let mut page = studio.page();
-    page.ask(json!({ "do": "open", "what": { "kind": "recording", "path": "r" }, "seed": null }));
+    page.ask(json!({ "do": "open", "target": { "kind": "recording", "path": "r" }, "seed": null }));
     let text = page.text();
     for to in [None, Some("r/new.toml")] {
         assert!(cause(&page.reply(save(&text, to, true))).contains("recording"));

@@ -219,7 +219,7 @@ const RARE: [&str; 10] = [
     "--replicate",
     "8",
     "--set",
-    "fields.0.part=0.05",
+    "fields.0.fill_fraction=0.05",
     "--set",
     "chains.0.connectors=60",
 ];

@@ -42,6 +42,7 @@ mod tests {
     fn each_box_is_new_once_even_to_two_threads() {
         let marks = AtomicBitSet::empty(1000);
         let new = |from: usize| (from..1000).filter(|&i| marks.insert(i)).count();
+        #[expect(clippy::disallowed_methods, reason = "tested from several threads")]
         let total: usize = std::thread::scope(|scope| {
             let workers = [scope.spawn(|| new(0)), scope.spawn(|| new(500))];
             workers.into_iter().map(|w| w.join().expect("no panic")).sum()

@@ -10,29 +10,35 @@ use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// The course of time within a cycle.
+/// Duration of a tick where the scenario has no network, in seconds: the default latency of one, which is the unit in
+/// which networks count time.
+const DEFAULT_TICK_S: f64 = 1e-3;
+
+/// How time passes within a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TimeMode {
-    /// None passes: packets arrive as they come, and none is requested again.
+    /// Not at all: packets are processed as they arrive, and no timer ends.
     Untimed,
-    /// Ticks that the server counts.
-    Counted,
-    /// A clock that runs this many times as fast as the real one.
-    Running(f64),
+    /// In ticks that the server counts.
+    Ticks,
+    /// By a clock that runs `speed` times as fast as the real one.
+    RealTime { speed: f64 },
 }
 
-/// The two ends of a turn: the agent's program, and the links to others.
+/// What a cycle works with: the agent's program, and its connection to others.
 pub(super) struct AgentIo<'a> {
     pub(super) program: &'a mut dyn AgentProgram,
     pub(super) channel: Option<&'a mut (dyn Channel + 'static)>,
-    pub(super) mail: &'a mut Messenger,
+    pub(super) messenger: &'a mut Messenger,
 }
 
 /// A cycle of an agent.
 pub(super) struct AgentCycle {
-    begin: CycleStart,
+    number: Cycle,
+    /// Agents out of range of the agent's radio, in ascending order.
+    out_of_range: Vec<EntityId>,
     time: TimeMode,
-    began: Instant,
+    started: Instant,
     first_tick: u64,
     /// Tick of the last step.
     tick: u64,
@@ -40,19 +46,21 @@ pub(super) struct AgentCycle {
     tick_s: f64,
     /// Number of its next packet.
     sequence: u32,
-    /// Packets that have come, by the tick of their arrival.
+    /// Packets that the program has not received yet, by the tick of their arrival.
     arrived: BTreeMap<u64, Vec<(EntityId, Packet)>>,
-    /// Number of packets that the program has taken.
-    taken: u64,
-    /// The tick that it may go on to.
-    granted: Option<AdvanceGrant>,
+    /// Number of packets that the program has received.
+    processed: u64,
+    /// The tick to which it may advance.
+    grant: Option<AdvanceGrant>,
     /// Delayed packets, by the time at which they leave, and in their order.
-    leaving: BTreeMap<(Instant, EntityId, u32), Packet>,
+    delayed: BTreeMap<(Instant, EntityId, u32), Packet>,
     /// Packets that leave at the end of the step, by receiver.
     outgoing: BTreeMap<EntityId, Vec<Packet>>,
-    has_begun: bool,
+    /// Whether the first step was done, where time is counted in ticks.
+    has_stepped: bool,
+    /// Whether the server has closed the conversations.
     is_closed: bool,
-    has_told: bool,
+    has_sent_control: bool,
     sent: TrafficCounters,
     /// Packets that it has sent, where all are recorded.
     log: Option<Vec<PacketRecord>>,
@@ -66,53 +74,56 @@ pub(super) struct TrafficCounters {
 }
 
 impl AgentCycle {
-    /// Returns the turn that begins now; `tick_s` is the duration of a tick of the network, if there is one.
+    /// Returns the cycle that starts now; `tick_s` is the duration of a tick of the network, if there is one.
     pub(super) fn new(
-        begin: CycleStart,
+        start: CycleStart,
         clock: ClockMode,
         tick_s: Option<f64>,
         first_tick: u64,
     ) -> Self {
         let time = match clock {
-            ClockMode::Lockstep if tick_s.is_some() => TimeMode::Counted,
-            ClockMode::Lockstep => TimeMode::Untimed,
-            ClockMode::Realtime { speed } => TimeMode::Running(speed),
+            // Without a network nothing is lost, so nothing is ever repeated and results depend on no timer.
+            ClockMode::Lockstep if tick_s.is_none() => TimeMode::Untimed,
+            ClockMode::Lockstep => TimeMode::Ticks,
+            ClockMode::Realtime { speed } => TimeMode::RealTime { speed },
         };
         Self {
-            begin,
+            number: start.cycle,
+            out_of_range: start.out_of_range,
             time,
-            began: Instant::now(),
+            started: Instant::now(),
             first_tick,
             tick: first_tick,
-            tick_s: tick_s.unwrap_or(1e-3),
+            tick_s: tick_s.unwrap_or(DEFAULT_TICK_S),
             sequence: 0,
             arrived: BTreeMap::new(),
-            taken: 0,
-            granted: None,
-            leaving: BTreeMap::new(),
+            processed: 0,
+            grant: None,
+            delayed: BTreeMap::new(),
             outgoing: BTreeMap::new(),
-            has_begun: false,
+            has_stepped: false,
             is_closed: false,
-            has_told: false,
+            has_sent_control: false,
             sent: TrafficCounters::default(),
             log: None,
         }
     }
 
-    /// Returns the turn, set to keep a log of its packets.
+    /// Returns the cycle with a log of its packets.
     pub(super) fn with_log(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
 
-    /// Hands over the packets sent since the last call.
-    pub(super) fn send_log(&mut self, mail: &mut Messenger) {
+    /// Sends the server the records of packets sent since the last call.
+    pub(super) fn send_log(&mut self, messenger: &mut Messenger) {
         if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
-            mail.send_reliable(Peer::Server, Message::Log(std::mem::take(log)));
+            messenger.send_reliable(Peer::Server, Message::PacketLog(std::mem::take(log)));
         }
     }
 
-    pub(super) fn cycle(&self) -> Cycle {
-        self.begin.cycle
+    /// Returns the number of the cycle.
+    pub(super) fn number(&self) -> Cycle {
+        self.number
     }
 
     /// Takes the count of packets and bytes sent since the last call.
@@ -120,8 +131,11 @@ impl AgentCycle {
         std::mem::take(&mut self.sent)
     }
 
-    pub(super) fn on_grant(&mut self, tick: AdvanceGrant) {
-        self.granted = Some(tick).filter(|tick| tick.cycle == self.begin.cycle).or(self.granted);
+    pub(super) fn on_grant(&mut self, grant: AdvanceGrant) {
+        // One of the cycle before may arrive late.
+        if grant.cycle == self.number {
+            self.grant = Some(grant);
+        }
     }
 
     pub(super) fn close(&mut self) {
@@ -129,110 +143,119 @@ impl AgentCycle {
     }
 
     pub(super) fn on_packet(&mut self, from: EntityId, packet: Packet) {
-        // Where time is not counted, a packet arrives when it comes.
-        let arrives = if self.time == TimeMode::Counted { packet.arrives } else { 0 };
+        // Where time is not counted in ticks, a packet arrives when it arrives.
+        let arrives = if self.time == TimeMode::Ticks { packet.arrives } else { 0 };
         self.arrived.entry(arrives).or_default().push((from, packet));
     }
 
-    /// Returns the time that the node may wait, unless something comes; none if that may be forever.
+    /// Returns the time that the node may wait unless a message arrives; none if nothing happens before one does.
     pub(super) fn max_wait(&self, program: &dyn AgentProgram) -> Option<Duration> {
-        let TimeMode::Running(speed) = self.time else { return None };
-        let leaves = self.leaving.keys().next().map(|&(at, ..)| at);
-        let timer = program.next_timer().and_then(|tick| self.instant_of(tick, speed));
-        let next = leaves.into_iter().chain(timer).min()?;
+        let TimeMode::RealTime { speed } = self.time else { return None };
+        let next_delayed = self.delayed.keys().next().map(|&(at, ..)| at);
+        let next_timer = program.next_timer().and_then(|tick| self.instant_of(tick, speed));
+        let next = next_delayed.into_iter().chain(next_timer).min()?;
         Some(next.saturating_duration_since(Instant::now()))
     }
 
-    /// Returns the time of a tick, if a clock gets there.
+    /// Returns the time of a tick; none if it is too far away for a clock.
     fn instant_of(&self, tick: u64, speed: f64) -> Option<Instant> {
         let ticks = tick.saturating_sub(self.first_tick) as f64;
         let wait = Duration::try_from_secs_f64(ticks * self.tick_s / speed).ok()?;
-        self.began.checked_add(wait)
+        self.started.checked_add(wait)
     }
 
     fn current_tick(&self, speed: f64) -> u64 {
-        let passed_s = self.began.elapsed().as_secs_f64() * speed;
-        // A little more, so that a wait for a tick ends with the tick reached.
+        let passed_s = self.started.elapsed().as_secs_f64() * speed;
+        // A millionth of a tick more, so that a wait for a tick ends with the tick reached in spite of rounding.
         self.first_tick + (passed_s / self.tick_s + 1e-6) as u64
     }
 
     /// Does everything that can be done now.
-    pub(super) fn advance(&mut self, ends: &mut AgentIo<'_>) {
+    pub(super) fn advance(&mut self, io: &mut AgentIo<'_>) {
         match self.time {
-            TimeMode::Untimed => drop(self.step(u64::MAX, ends)),
-            TimeMode::Counted => self.advance_to_grant(ends),
-            TimeMode::Running(speed) => {
+            TimeMode::Untimed => {
+                self.step(u64::MAX, io);
+            }
+            TimeMode::Ticks => self.advance_to_grant(io),
+            TimeMode::RealTime { speed } => {
                 self.tick = self.current_tick(speed).max(self.tick);
-                self.step(u64::MAX, ends);
+                self.step(u64::MAX, io);
                 self.release_delayed();
             }
         }
-        self.flush(ends.mail);
-        // Where time is counted, messages are, too: until no agent has more to say.
-        let may_tell = self.time != TimeMode::Counted || self.is_closed;
-        if may_tell
-            && !self.has_told
-            && let Some(control) = ends.program.control()
-        {
-            self.has_told = true;
-            self.send_log(ends.mail);
-            let control = Control { cycle: self.begin.cycle, control };
-            ends.mail.send_reliable(Peer::Server, Message::Control(control));
-        }
+        self.flush(io.messenger);
+        self.send_control(io);
     }
 
-    /// Goes on to the tick that the server has granted, once all packets that arrive by then are there.
-    fn advance_to_grant(&mut self, ends: &mut AgentIo<'_>) {
-        let is_first = !std::mem::replace(&mut self.has_begun, true);
-        if !is_first {
-            let Some(tick) = self.granted else { return };
+    /// Sends the agent's control, once.
+    fn send_control(&mut self, io: &mut AgentIo<'_>) {
+        // Where time is counted in ticks, an agent that is done still answers others until the server closes the cycle:
+        // the numbers of messages, which are results, would else depend on which node is faster.
+        let may_send = self.time != TimeMode::Ticks || self.is_closed;
+        if !may_send || self.has_sent_control {
+            return;
+        }
+        let Some(control) = io.program.control() else { return };
+        self.has_sent_control = true;
+        self.send_log(io.messenger);
+        let control = Control { cycle: self.number, control };
+        io.messenger.send_reliable(Peer::Server, Message::Control(control));
+    }
+
+    /// Advances to the tick that the server has granted, once all packets that arrive by then are there.
+    fn advance_to_grant(&mut self, io: &mut AgentIo<'_>) {
+        // The first step, in which the agent starts its conversation, needs no grant.
+        if self.has_stepped {
+            let Some(grant) = self.grant else { return };
             let due: usize =
-                self.arrived.range(..=tick.tick).map(|(_, packets)| packets.len()).sum();
-            if self.taken + (due as u64) < tick.packets {
+                self.arrived.range(..=grant.tick).map(|(_, packets)| packets.len()).sum();
+            if self.processed + (due as u64) < grant.packets {
                 return;
             }
-            (self.granted, self.tick) = (None, tick.tick);
+            self.grant = None;
+            self.tick = grant.tick;
         }
-        let sent = self.step(self.tick, ends);
+        self.has_stepped = true;
+        let sent = self.step(self.tick, io);
         let report = AdvanceDone {
-            cycle: self.begin.cycle,
+            cycle: self.number,
             tick: self.tick,
             sent,
-            timer: ends.program.next_timer(),
-            is_done: ends.program.is_done(),
+            next_timer: io.program.next_timer(),
+            is_done: io.program.is_done(),
         };
-        ends.mail.send_reliable(Peer::Server, Message::Ticked(report));
+        io.messenger.send_reliable(Peer::Server, Message::TickDone(report));
     }
 
-    /// Takes the packets that have arrived by a tick, does everything that is due, and sends the resulting packets.
-    /// Returns the receivers of those, with the ticks of arrival.
-    fn step(&mut self, by: u64, ends: &mut AgentIo<'_>) -> Vec<(EntityId, u64)> {
+    /// Gives the program the packets that have arrived by a tick, does everything that is due, and sends the resulting
+    /// packets. Returns the receivers of these, with the ticks of arrival.
+    fn step(&mut self, by: u64, io: &mut AgentIo<'_>) -> Vec<(EntityId, u64)> {
         let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
         let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
-        // As in one process, regardless of the order in which they came.
-        due.sort_by_key(|(from, packet)| (packet.left, *from, packet.sequence));
-        self.taken += due.len() as u64;
+        // The order of one process, regardless of the order in which they have arrived here.
+        due.sort_by_key(|(from, packet)| (packet.departs, *from, packet.sequence));
+        self.processed += due.len() as u64;
         let mut sent = Vec::new();
         for (from, packet) in due {
-            // Where no time passes, each packet is answered by itself, however many have come at once: so there are
-            // as many of them as in one process.
+            // Where no time passes, each packet is answered by itself, however many have arrived at once: so there are
+            // as many answers as in one process.
             if self.time == TimeMode::Untimed {
-                self.send_all(ends, &mut sent);
+                self.send_all(io, &mut sent);
             }
-            ends.program.on_packet(from, &packet.payload, self.tick);
+            io.program.on_packet(from, &packet.payload, self.tick);
         }
         if self.time != TimeMode::Untimed {
-            ends.program.on_timer(self.tick);
+            io.program.on_timer(self.tick);
         }
-        self.send_all(ends, &mut sent);
+        self.send_all(io, &mut sent);
         sent
     }
 
     /// Sends the program's packets.
-    fn send_all(&mut self, ends: &mut AgentIo<'_>, sent: &mut Vec<(EntityId, u64)>) {
-        for packet in ends.program.take_packets() {
-            self.send(packet, ends, sent);
+    fn send_all(&mut self, io: &mut AgentIo<'_>, sent: &mut Vec<(EntityId, u64)>) {
+        for packet in io.program.take_packets() {
+            self.send(packet, io, sent);
         }
     }
 
@@ -240,59 +263,69 @@ impl AgentCycle {
     fn send(
         &mut self,
         packet: OutgoingPacket,
-        ends: &mut AgentIo<'_>,
+        io: &mut AgentIo<'_>,
         sent: &mut Vec<(EntityId, u64)>,
     ) {
         let bytes = packet.payload.len();
-        // In real time packets are numbered within the whole cycle, because all draws are for its first tick.
-        let (tick, sequence) = match self.time {
-            TimeMode::Running(_) => (self.first_tick, self.sequence),
-            _ => (self.tick, packet.sequence),
+        // Faults are drawn by tick and number. In real time all draws are for the first tick of the cycle, because the
+        // tick of sending depends on the machine: so packets are numbered within the whole cycle.
+        let (draw_tick, sequence) = match self.time {
+            TimeMode::RealTime { .. } => (self.first_tick, self.sequence),
+            TimeMode::Untimed | TimeMode::Ticks => (self.tick, packet.sequence),
         };
         self.sequence += 1;
         for &to in &*packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
-            let one = Transmission { to, tick, sequence, bytes };
-            let arrivals = match &mut ends.channel {
-                _ if self.begin.beyond.binary_search(&to).is_ok() => Vec::new(),
-                Some(channel) => channel.arrivals(&one),
-                None => vec![Arrival { leaves: tick, arrives: tick + 1 }],
-            };
-            self.log_packet(one, &arrivals);
-            for Arrival { leaves, arrives } in arrivals {
-                let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
-                let [left, arrives] = [leaves, arrives].map(|at| self.tick + (at - tick));
+            let transmission = Transmission { to, tick: draw_tick, sequence, bytes };
+            let mut arrivals = self.arrivals(&transmission, io);
+            for arrival in &mut arrivals {
+                arrival.departs = self.tick + (arrival.departs - draw_tick);
+                arrival.arrives = self.tick + (arrival.arrives - draw_tick);
+            }
+            self.log_packet(transmission, &arrivals);
+            for Arrival { departs, arrives } in arrivals {
                 sent.push((to, arrives));
-                let packet = Packet { cycle, left, sequence, arrives, payload };
+                let payload = packet.payload.clone();
+                let packet = Packet { cycle: self.number, departs, sequence, arrives, payload };
                 self.schedule(to, packet);
             }
         }
     }
 
+    /// Returns the arrivals of a packet, counted from the tick for which its faults are drawn.
+    fn arrivals(&self, packet: &Transmission, io: &mut AgentIo<'_>) -> Vec<Arrival> {
+        if self.out_of_range.binary_search(&packet.to).is_ok() {
+            return Vec::new();
+        }
+        match &mut io.channel {
+            Some(channel) => channel.arrivals(packet),
+            None => vec![Arrival { departs: packet.tick, arrives: packet.tick + 1 }],
+        }
+    }
+
     fn log_packet(&mut self, packet: Transmission, arrivals: &[Arrival]) {
         let Some(log) = &mut self.log else { return };
-        let Transmission { to, tick, sequence, bytes } = packet;
-        let first = arrivals.iter().map(|one| one.arrives).min();
+        let first_arrival = arrivals.iter().map(|arrival| arrival.arrives).min();
         log.push(PacketRecord {
-            cycle: self.begin.cycle,
+            cycle: self.number,
             sent: self.tick,
-            to,
-            sequence,
-            bytes: bytes as u32,
+            to: packet.to,
+            sequence: packet.sequence,
+            bytes: packet.bytes as u32,
             copies: arrivals.len() as u32,
-            arrives: first.map_or(0, |at| self.tick + (at - tick)),
+            arrives: first_arrival.unwrap_or(0),
         });
     }
 
-    /// Lets a packet leave: at the end of the step, or after its delay.
+    /// Schedules the sending of a packet: at the end of the step, or after its delay.
     fn schedule(&mut self, to: EntityId, packet: Packet) {
-        // One tick is the time of the real network.
+        // One tick of delay is what the real network takes, so only the rest is waited for.
         let delay = packet.arrives.saturating_sub(self.tick + 1);
         match self.time {
-            TimeMode::Running(speed) if delay > 0 => {
+            TimeMode::RealTime { speed } if delay > 0 => {
                 let delay = Duration::from_secs_f64(delay as f64 * self.tick_s / speed);
-                self.leaving.insert((Instant::now() + delay, to, packet.sequence), packet);
+                self.delayed.insert((Instant::now() + delay, to, packet.sequence), packet);
             }
             _ => self.outgoing.entry(to).or_default().push(packet),
         }
@@ -300,28 +333,31 @@ impl AgentCycle {
 
     fn release_delayed(&mut self) {
         let now = Instant::now();
-        while let Some(entry) = self.leaving.first_entry().filter(|entry| entry.key().0 <= now) {
+        while let Some(entry) = self.delayed.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((_, to, _), packet) = entry.remove_entry();
             self.outgoing.entry(to).or_default().push(packet);
         }
     }
 
-    /// Sends the packets of a step: one word to all that get the same packets.
-    fn flush(&mut self, mail: &mut Messenger) {
-        let mut words: Vec<(Vec<Packet>, Vec<Peer>)> = Vec::new();
+    /// Sends the packets of a step: one message to all that get the same packets. A broadcast to a team is then encoded
+    /// once, and published once.
+    fn flush(&mut self, messenger: &mut Messenger) {
+        let mut multicasts: Vec<(Vec<Packet>, Vec<Peer>)> = Vec::new();
         for (to, packets) in std::mem::take(&mut self.outgoing) {
             let to = Peer::Node(to);
-            match words.iter_mut().find(|(same, _)| *same == packets) {
-                Some((_, others)) => others.push(to),
-                None => words.push((packets, vec![to])),
+            match multicasts.iter_mut().find(|(same, _)| *same == packets) {
+                Some((_, receivers)) => receivers.push(to),
+                None => multicasts.push((packets, vec![to])),
             }
         }
-        for (packets, to) in words {
-            let word = Message::Packets(packets);
+        for (packets, to) in multicasts {
+            let message = Message::Packets(packets);
             match self.time {
-                TimeMode::Running(_) => mail.multicast_best_effort(&to, &word),
-                // Only packets lost by the scenario are lost here.
-                TimeMode::Untimed | TimeMode::Counted => mail.multicast_reliable(&to, word),
+                // A control that is late counts for nothing, so a retransmission would come too late as well; the agents'
+                // own protocol repeats what it needs.
+                TimeMode::RealTime { .. } => messenger.multicast_best_effort(&to, &message),
+                // Only packets that the scenario's network loses may be lost here.
+                TimeMode::Untimed | TimeMode::Ticks => messenger.multicast_reliable(&to, message),
             }
         }
     }

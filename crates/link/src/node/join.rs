@@ -1,4 +1,4 @@
-//! Joining: a node asks the server until it hears an answer.
+//! Joining: a node asks the server until it gets an answer.
 
 use super::NodeError;
 use crate::messenger::{Messenger, Received};
@@ -9,36 +9,43 @@ use std::time::{Duration, Instant};
 /// Time after which it asks again.
 const JOIN_RETRY_DELAY: Duration = Duration::from_millis(100);
 
-/// The settings of a node that asks.
+/// The settings of a node that asks to join.
 #[derive(Debug, Clone)]
 pub struct JoinConfig {
-    /// The question.
+    /// The request.
     pub join: Join,
     /// Time after which it gives up.
     pub timeout: Duration,
 }
 
-/// Asks the server whether a node may join, and meets it if so.
+/// Asks the server whether a node may join, and connects with it if so.
 ///
 /// # Errors
-/// When it may not, or no answer comes.
-pub fn join(mail: &mut Messenger, asked: &JoinConfig) -> Result<Welcome, NodeError> {
-    let until = Instant::now() + asked.timeout;
+/// When it may not, or no answer arrives.
+pub fn join(messenger: &mut Messenger, config: &JoinConfig) -> Result<Welcome, NodeError> {
+    let until = Instant::now() + config.timeout;
     while Instant::now() < until {
-        mail.send_best_effort(Peer::Server, Message::Join(asked.join.clone()));
-        let again = Instant::now() + JOIN_RETRY_DELAY;
-        while let Some(heard) = mail.receive(again.saturating_duration_since(Instant::now())) {
-            match heard {
-                Received { from: Peer::Server, word: Message::Welcome(welcome), life } => {
-                    mail.connect(Peer::Server, life);
+        messenger.send_best_effort(Peer::Server, Message::Join(config.join.clone()));
+        let retry_at = Instant::now() + JOIN_RETRY_DELAY;
+        while let Some(received) =
+            messenger.receive(retry_at.saturating_duration_since(Instant::now()))
+        {
+            match received {
+                Received {
+                    from: Peer::Server,
+                    message: Message::Welcome(welcome),
+                    incarnation,
+                } => {
+                    messenger.connect(Peer::Server, incarnation);
                     return Ok(welcome);
                 }
-                Received { from: Peer::Server, word: Message::Refused(refusal), .. } => {
-                    return Err(NodeError::Refused(refusal));
+                Received { from: Peer::Server, message: Message::Refused(error), .. } => {
+                    return Err(NodeError::Refused(error));
                 }
+                // A heartbeat to an earlier process of this agent, for instance.
                 _ => {}
             }
         }
     }
-    Err(NodeError::Silence(asked.timeout.as_secs()))
+    Err(NodeError::ServerSilent(config.timeout.as_secs()))
 }

@@ -2,7 +2,8 @@
 //! agent's program.
 //!
 //! ```text
-//! join.rs      asks the server until it may       turn.rs    one cycle of the agent
+//! join.rs         asks the server until it may join
+//! agent_cycle.rs  one cycle of the agent
 //! ```
 
 mod agent_cycle;
@@ -17,37 +18,41 @@ pub use join::{JoinConfig, join};
 use sidestep::kernel::{Cycle, EntityId};
 use std::time::{Duration, Instant};
 
-/// Time between two reports of a node.
+/// Time between two reports of a node to the server. It is half of the time after which a node counts as silent
+/// ([`SILENCE_TIMEOUT`](crate::server::SILENCE_TIMEOUT)), so that one lost report raises no alarm.
 const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Time without answers from the other end of an open link before the link is taken for deaf.
+/// Time without answers from the other end of an open link before the link counts as half-open: longer than Zenoh's own
+/// lease of 2 s, after which a link that is merely broken is closed.
 const HALF_OPEN_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Time between two openings of links, at least.
+/// Minimum time between two openings of the links: opening one takes up to 3 s, and all links of the node close with it.
 const MIN_REOPEN_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Time after which it looks around, at most.
+/// Maximum time that the node waits for messages before it checks timers and the server's silence.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Most packets that are kept for a cycle that has not begun here: those beyond are lost.
+/// Maximum number of packets that are kept for a cycle that has not started here; further ones are lost. Far more than
+/// a group sends in a cycle, so the limit only bounds the memory that a faulty node can take.
 const MAX_EARLY_PACKETS: usize = 100_000;
 
-/// Most words that are taken before a node goes on, so that it does go on however much it hears.
+/// Maximum number of messages that are received before the node acts on them, so that it does act however many
+/// messages arrive.
 const MAX_MESSAGES_PER_POLL: usize = 1_000;
 
 /// The end of a node before the fleet's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NodeError {
-    /// The server does not take it.
+    /// The server does not let it join.
     #[error("{}", .0.cause)]
     Refused(JoinError),
     /// There is no wire.
     #[error(transparent)]
     Wire(#[from] WireError),
-    /// The server is not there, or no longer.
+    /// The server does not answer, or no longer.
     #[error("the server was not heard for {0} s")]
-    Silence(u64),
-    /// The server has not heard it for too long, and goes on without it.
+    ServerSilent(u64),
+    /// The server has not heard it for too long, and has given it up.
     #[error("{}", .0.cause)]
     Dismissed(JoinError),
     /// A percept cannot be read.
@@ -55,225 +60,248 @@ pub enum NodeError {
     Percept(String),
 }
 
-/// A listener for the status of a node, called as often as the server is told.
+/// A listener for the status of a node, called whenever the status is sent to the server.
 type StatusListener = Box<dyn FnMut(&Status)>;
 
 /// A node that has joined a fleet.
 pub struct Node {
     agent: EntityId,
-    mail: Messenger,
+    messenger: Messenger,
     program: Box<dyn AgentProgram>,
+    /// The faults of the scenario's network; none where it has none.
     channel: Option<Box<dyn Channel>>,
     clock: ClockMode,
     logs_packets: bool,
+    /// Time without a message from the server after which the node ends.
     lease: Duration,
     members: Vec<Member>,
+    /// Whether all other nodes have acknowledged its `Hello`.
     is_ready: bool,
-    turn: Option<AgentCycle>,
-    /// Packets of a cycle that has not begun here.
-    early: Vec<(EntityId, Packet)>,
+    cycle: Option<AgentCycle>,
+    /// Packets of a cycle that has not started here.
+    early_packets: Vec<(EntityId, Packet)>,
     status: Status,
-    /// The part of a cycle that was logged last.
-    part: (Cycle, &'static str),
+    /// The activity that was logged last.
+    logged_activity: (Cycle, &'static str),
     report_at: Instant,
-    /// Time before which no link is opened again.
-    mend_at: Instant,
-    /// Whether its links are closed, and could not be opened.
-    is_cut_off: bool,
-    looks: StatusListener,
+    /// Time before which the links are not opened again.
+    reopen_at: Instant,
+    /// Whether the links are closed because they could not be opened again.
+    are_links_closed: bool,
+    listener: StatusListener,
 }
 
 impl Node {
-    /// Returns a node of an agent that may join, with its program and the faults of its packets.
+    /// Returns the node of an agent that may join, with its program and the faults of its packets.
     pub fn new(
         agent: EntityId,
-        mail: Messenger,
+        messenger: Messenger,
         program: Box<dyn AgentProgram>,
         channel: Option<Box<dyn Channel>>,
         welcome: &Welcome,
-        lease: Duration,
     ) -> Self {
         Self {
             agent,
-            mail,
+            messenger,
             program,
             channel,
             clock: welcome.clock,
             logs_packets: welcome.logs_packets,
-            lease,
+            lease: Duration::MAX,
             members: Vec::new(),
             is_ready: false,
-            turn: None,
-            early: Vec::new(),
+            cycle: None,
+            early_packets: Vec::new(),
             status: Status::default(),
-            part: Default::default(),
+            logged_activity: Default::default(),
             report_at: Instant::now(),
-            mend_at: Instant::now(),
-            is_cut_off: false,
-            looks: Box::new(|_| {}),
+            reopen_at: Instant::now(),
+            are_links_closed: false,
+            listener: Box::new(|_| {}),
         }
+    }
+
+    /// Makes the node end when it has not heard the server for some time.
+    #[must_use]
+    pub fn with_lease(self, lease: Duration) -> Self {
+        Self { lease, ..self }
     }
 
     /// Reports the status of the node to a listener as well, twice a second.
     #[must_use]
-    pub fn with_listener(self, looks: impl FnMut(&Status) + 'static) -> Self {
-        Self { looks: Box::new(looks), ..self }
+    pub fn with_listener(self, listener: impl FnMut(&Status) + 'static) -> Self {
+        Self { listener: Box::new(listener), ..self }
     }
 
     /// Takes part in the fleet until the server ends it.
     ///
     /// # Errors
-    /// When the server is gone, or its words make no sense.
+    /// When the server is silent, has given the node up, or sends a percept that cannot be read.
     pub fn run(mut self) -> Result<Status, NodeError> {
         loop {
-            let wait = self.turn.as_ref().and_then(|turn| turn.max_wait(self.program.as_ref()));
-            let Some(heard) = self.receive_all(wait.unwrap_or(POLL_INTERVAL).min(POLL_INTERVAL))?
-            else {
+            let max_wait = self.cycle.as_ref().and_then(|cycle| cycle.max_wait(&*self.program));
+            let wait = max_wait.map_or(POLL_INTERVAL, |wait| wait.min(POLL_INTERVAL));
+            let Some(received) = self.receive_all(wait)? else {
                 self.leave();
                 return Ok(self.status);
             };
             self.advance();
             self.report_status();
-            let silent = self.mail.silent_for(Peer::Server);
-            // Words that came while this process stood still are heard first.
-            if heard == 0 && silent.is_some_and(|silent| silent > self.lease) {
-                return Err(NodeError::Silence(self.lease.as_secs()));
+            let silent = self.messenger.silent_for(Peer::Server);
+            // If this process was stopped, messages have queued up meanwhile: they are received before the server counts
+            // as silent.
+            if received == 0 && silent.is_some_and(|silent| silent > self.lease) {
+                return Err(NodeError::ServerSilent(self.lease.as_secs()));
             }
         }
     }
 
-    /// Sends its remaining words, and waits a little until they have arrived.
+    /// Sends the final status, and waits a little until it has arrived.
     fn leave(&mut self) {
-        if let Some(turn) = &mut self.turn {
-            turn.send_log(&mut self.mail);
+        if let Some(cycle) = &mut self.cycle {
+            cycle.send_log(&mut self.messenger);
         }
         self.update_status();
-        self.mail.send_reliable(Peer::Server, Message::Status(self.status.clone()));
-        self.mail.send_reliable(Peer::Server, Message::Left);
+        self.messenger.send_reliable(Peer::Server, Message::Status(self.status.clone()));
+        self.messenger.send_reliable(Peer::Server, Message::Goodbye);
         let until = Instant::now() + REPORT_INTERVAL;
-        while !self.mail.has_delivered_to(Peer::Server) && Instant::now() < until {
-            self.mail.receive(POLL_INTERVAL);
+        while !self.messenger.has_delivered_to(Peer::Server) && Instant::now() < until {
+            self.messenger.receive(POLL_INTERVAL);
         }
     }
 
-    /// Takes the words that have come, and waits for the first of them at most the given time. Nothing is answered
-    /// before all are taken: so there is less to do, and less to send. Returns their number; none when the fleet has
-    /// ended.
+    /// Receives all messages that have arrived, and waits for the first of them at most the given time. The node acts on
+    /// them only when all are received: then one step, and one frame, often answers several. Returns their number; none
+    /// when the fleet has ended.
     fn receive_all(&mut self, within: Duration) -> Result<Option<usize>, NodeError> {
         let mut count = 0;
         let mut wait = within;
         while count < MAX_MESSAGES_PER_POLL
-            && let Some(heard) = self.mail.receive(wait)
+            && let Some(received) = self.messenger.receive(wait)
         {
-            if self.on_message(heard)? {
+            if self.on_message(received)? {
                 return Ok(None);
             }
-            (count, wait) = (count + 1, Duration::ZERO);
+            count += 1;
+            wait = Duration::ZERO;
         }
         Ok(Some(count))
     }
 
-    /// Takes a word. Returns whether the fleet has ended.
-    fn on_message(&mut self, Received { from, word, .. }: Received) -> Result<bool, NodeError> {
-        match (from, word) {
+    /// Processes a message. Returns whether the fleet has ended.
+    fn on_message(&mut self, received: Received) -> Result<bool, NodeError> {
+        match (received.from, received.message) {
             (Peer::Server, Message::End) => return Ok(true),
-            (Peer::Server, Message::Refused(refusal)) => return Err(NodeError::Dismissed(refusal)),
+            (Peer::Server, Message::Refused(error)) => return Err(NodeError::Dismissed(error)),
             (Peer::Server, Message::Roster(members)) => self.on_roster(members)?,
-            (Peer::Server, Message::Begin(begin)) => self.on_cycle_start(begin)?,
-            (Peer::Server, Message::Tick(tick)) => {
-                if let Some(turn) = &mut self.turn {
-                    turn.on_grant(tick);
+            (Peer::Server, Message::CycleStart(start)) => self.on_cycle_start(start)?,
+            (Peer::Server, Message::Grant(grant)) => {
+                if let Some(cycle) = &mut self.cycle {
+                    cycle.on_grant(grant);
                 }
             }
-            (Peer::Server, Message::Close(cycle)) => {
-                if let Some(turn) = self.turn.as_mut().filter(|turn| turn.cycle() == cycle) {
-                    turn.close();
+            (Peer::Server, Message::Close(number)) => {
+                if let Some(cycle) = self.cycle.as_mut().filter(|cycle| cycle.number() == number) {
+                    cycle.close();
                 }
             }
             (Peer::Node(from), Message::Packets(packets)) => {
                 packets.into_iter().for_each(|packet| self.on_packet(from, packet));
             }
-            // The arrival of `Hello` is its whole purpose; other parties send only the words above.
+            // `Hello` and `Heartbeat` have done their work by arriving; all else is not for a node.
             _ => {}
         }
         Ok(false)
     }
 
-    /// Begins a cycle.
-    fn on_cycle_start(&mut self, begin: CycleStart) -> Result<(), NodeError> {
-        let begun = self.program.start_cycle(begin.cycle, &begin.sight);
-        let first_tick = begun.map_err(NodeError::Percept)?;
-        self.status.cycle = begin.cycle;
+    /// Starts a cycle.
+    fn on_cycle_start(&mut self, start: CycleStart) -> Result<(), NodeError> {
+        let first_tick =
+            self.program.start_cycle(start.cycle, &start.percept).map_err(NodeError::Percept)?;
+        self.status.cycle = start.cycle;
         let tick_s = self.channel.as_mut().map(|channel| {
-            channel.start_cycle(begin.cycle);
+            channel.start_cycle(start.cycle);
             channel.tick_s()
         });
-        if let Some(turn) = &mut self.turn {
-            turn.send_log(&mut self.mail);
+        if let Some(previous) = &mut self.cycle {
+            previous.send_log(&mut self.messenger);
         }
-        let turn = AgentCycle::new(begin, self.clock, tick_s, first_tick);
-        self.turn = Some(if self.logs_packets { turn.with_log() } else { turn });
-        for (from, packet) in std::mem::take(&mut self.early) {
+        let cycle = AgentCycle::new(start, self.clock, tick_s, first_tick);
+        self.cycle = Some(if self.logs_packets { cycle.with_log() } else { cycle });
+        for (from, packet) in std::mem::take(&mut self.early_packets) {
             self.on_packet(from, packet);
         }
         Ok(())
     }
 
-    /// Meets the other nodes, and finds out whether they hear it.
+    /// Connects with the other nodes, and sends each a `Hello` to find out whether it receives this node's messages.
     fn on_roster(&mut self, members: Vec<Member>) -> Result<(), NodeError> {
-        self.mail.connect_mesh(self.agent, &members)?;
-        let is_new =
-            |member: &&Member| member.agent != self.agent && !self.members.contains(member);
-        for member in members.iter().filter(is_new) {
-            let party = Peer::Node(member.agent);
-            self.mail.connect(party, member.life);
-            self.mail.send_reliable(party, Message::Hello);
+        self.messenger.connect_mesh(self.agent, &members)?;
+        for member in &members {
+            if member.agent == self.agent || self.members.contains(member) {
+                continue;
+            }
+            let peer = Peer::Node(member.agent);
+            self.messenger.connect(peer, member.incarnation);
+            self.messenger.send_reliable(peer, Message::Hello);
         }
         self.members = members;
         Ok(())
     }
 
     fn on_packet(&mut self, from: EntityId, packet: Packet) {
-        match &mut self.turn {
-            Some(turn) if packet.cycle == turn.cycle() => turn.on_packet(from, packet),
+        let current = self.cycle.as_ref().map(AgentCycle::number);
+        match &mut self.cycle {
+            Some(cycle) if current == Some(packet.cycle) => cycle.on_packet(from, packet),
             // Another node may have heard of the cycle before this one.
-            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle())
-                && self.early.len() < MAX_EARLY_PACKETS =>
-            {
-                self.early.push((from, packet));
+            _ if current.is_none_or(|current| packet.cycle > current) => {
+                if self.early_packets.len() < MAX_EARLY_PACKETS {
+                    self.early_packets.push((from, packet));
+                }
             }
-            // Of a talk that is over, or one more than there is room for.
+            // Of a conversation that is over.
             _ => {}
         }
     }
 
     /// Does everything that can be done now.
     fn advance(&mut self) {
-        if !self.is_ready && !self.members.is_empty() && self.mail.has_delivered() {
+        if !self.is_ready && !self.members.is_empty() && self.messenger.has_delivered() {
             self.is_ready = true;
-            self.mail.send_reliable(Peer::Server, Message::Ready);
+            self.messenger.send_reliable(Peer::Server, Message::Ready);
         }
-        if let Some(turn) = &mut self.turn {
-            let Self { program, channel, mail, .. } = self;
-            let channel = channel.as_deref_mut();
-            turn.advance(&mut AgentIo { program: program.as_mut(), channel, mail });
-            let sent = turn.take_sent();
+        if let Some(cycle) = &mut self.cycle {
+            cycle.advance(&mut AgentIo {
+                program: &mut *self.program,
+                channel: self.channel.as_deref_mut(),
+                messenger: &mut self.messenger,
+            });
+            let sent = cycle.take_sent();
             self.status.packets += sent.packets;
             self.status.bytes += sent.bytes;
             self.log_activity();
         }
     }
 
-    /// Logs that the agent has come to another part of a cycle.
+    /// Logs the agent's activity if it has changed.
     fn log_activity(&mut self) {
-        let Activity { word, round, epoch } = self.program.activity();
-        let (agent, cycle) = (self.agent, self.status.cycle);
-        if std::mem::replace(&mut self.part, (cycle, word)) != (cycle, word) {
-            tracing::debug!(agent, cycle, talk = word, round, epoch, "the talk goes on");
+        let Activity { name, round, epoch } = self.program.activity();
+        let agent = self.agent;
+        let cycle = self.status.cycle;
+        if self.logged_activity != (cycle, name) {
+            self.logged_activity = (cycle, name);
+            tracing::debug!(
+                agent,
+                cycle,
+                talk = name,
+                round,
+                epoch,
+                "the agent's activity has changed"
+            );
         }
     }
 
-    /// Tells the server the status of this node, now and then.
+    /// Sends the status of this node to the server once in a while, and repairs its links.
     fn report_status(&mut self) {
         let now = Instant::now();
         if now < self.report_at {
@@ -281,39 +309,43 @@ impl Node {
         }
         self.report_at = now + REPORT_INTERVAL;
         self.update_status();
-        (self.looks)(&self.status);
-        self.mail.send_best_effort(Peer::Server, Message::Status(self.status.clone()));
+        (self.listener)(&self.status);
+        self.messenger.send_best_effort(Peer::Server, Message::Status(self.status.clone()));
         self.repair_links(now);
     }
 
-    /// Opens the direct links again when one of them is deaf: alive at both ends, and nothing comes through. Zenoh
-    /// leaves such links behind where opening one took as long as it may, and on a busy machine that is not rare.
+    /// Opens the direct links again when one of them is half-open: alive at both ends, and nothing arrives through it.
+    /// Zenoh leaves such links behind where opening one takes as long as it may, which is not rare on a busy machine.
     fn repair_links(&mut self, now: Instant) {
-        // Of two, the one with the higher id has opened the link.
-        let mut before = self.members.iter().filter(|member| member.agent < self.agent);
-        let deaf = before.find(|member| self.mail.is_half_open(member, HALF_OPEN_TIMEOUT));
-        if now < self.mend_at || (deaf.is_none() && !self.is_cut_off) {
+        // This node has opened the links to those with lower ids, and repairs only these: if both ends of a link did, one
+        // would close what the other has just opened.
+        let mut opened_here = self.members.iter().filter(|member| member.agent < self.agent);
+        let half_open =
+            opened_here.find(|member| self.messenger.is_half_open(member, HALF_OPEN_TIMEOUT));
+        if now < self.reopen_at || (half_open.is_none() && !self.are_links_closed) {
             return;
         }
-        let (agent, other) = (self.agent, deaf.map(|member| member.agent));
-        tracing::warn!(agent, other, "a link is deaf or closed: links are opened anew");
-        self.mend_at = now + MIN_REOPEN_INTERVAL;
-        let opened = self.mail.reopen_links();
-        self.is_cut_off = opened.is_err();
-        if let Err(error) = opened {
-            // Until it can be done, everything goes by the server.
+        let agent = self.agent;
+        let other = half_open.map(|member| member.agent);
+        tracing::warn!(agent, other, "a link is half-open or closed: all links are opened again");
+        self.reopen_at = now + MIN_REOPEN_INTERVAL;
+        let result = self.messenger.reopen_links();
+        self.are_links_closed = result.is_err();
+        if let Err(error) = result {
+            // Until it can be done, everything goes through the server.
             tracing::warn!(agent, %error, "links cannot be opened yet");
         }
     }
 
     fn update_status(&mut self) {
-        let doing = self.program.activity();
-        let counts = self.mail.stats();
-        let dropped = counts.dropped.iter().map(|(&reason, &count)| (reason.to_string(), count));
-        self.status.doing = doing.word.into();
-        (self.status.round, self.status.epoch) = (doing.round, doing.epoch);
+        let activity = self.program.activity();
+        let stats = self.messenger.stats();
+        let dropped = stats.dropped.iter().map(|(&reason, &count)| (reason.to_string(), count));
+        self.status.activity = activity.name.into();
+        self.status.round = activity.round;
+        self.status.epoch = activity.epoch;
         self.status.heard = self.program.heard_agents();
-        self.status.retries = counts.retries;
+        self.status.retries = stats.retries;
         self.status.dropped = dropped.chain(self.program.drop_counts()).collect();
     }
 }

@@ -1,11 +1,11 @@
-//! Checks of certificates before anything starts, because a wrong one shows on a network only as silence.
+//! Checks of certificates before anything starts: on a network a wrong one shows only as silence.
 
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::Tls;
 use std::path::Path;
 use x509_parser::pem::Pem;
 
-/// Checks certificates, and that endpoints are of the kind that goes with them.
+/// Checks certificates, and that endpoints are encrypted if and only if there are certificates.
 ///
 /// # Errors
 /// With the first thing that is wrong.
@@ -38,32 +38,28 @@ fn check(tls: &Tls) -> Result<(), InputError> {
 /// Checks that all links are encrypted if there are certificates, and none is without.
 ///
 /// # Errors
-/// With the first endpoint at which it is otherwise.
+/// With the first endpoint for which that is not so.
 fn check_endpoints<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
     tls: Option<&Tls>,
 ) -> Result<(), InputError> {
     for endpoint in endpoints {
-        match (tls.is_some(), endpoint.starts_with("tls/")) {
-            (false, true) => {
-                let cause = "links to it are encrypted, and there is no certificate to show";
-                let remedy = "give --tls-ca, --tls-cert and --tls-key, or tcp/HOST:PORT";
-                return Err(InputError::new(endpoint, cause, remedy));
-            }
-            (true, false) if endpoint.starts_with("tcp/") => {
-                let cause = "links to it are not encrypted, although there are certificates";
-                return Err(InputError::new(endpoint, cause, "write it as tls/HOST:PORT"));
-            }
-            _ => {}
+        if tls.is_none() && endpoint.starts_with("tls/") {
+            let cause = "links to it are encrypted, and there is no certificate to show";
+            let remedy = "give --tls-ca, --tls-cert and --tls-key, or tcp/HOST:PORT";
+            return Err(InputError::new(endpoint, cause, remedy));
+        }
+        if tls.is_some() && endpoint.starts_with("tcp/") {
+            let cause = "links to it are not encrypted, although there are certificates";
+            return Err(InputError::new(endpoint, cause, "write it as tls/HOST:PORT"));
         }
     }
     Ok(())
 }
 
 fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
-    let unreadable =
-        |e: std::io::Error| InputError::new(place, e.to_string(), "name a file that can be read");
-    std::fs::read(file).map_err(unreadable)
+    std::fs::read(file)
+        .map_err(|e| InputError::new(place, e.to_string(), "name a file that can be read"))
 }
 
 fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {
@@ -71,7 +67,7 @@ fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {
         let remedy = "give a file that begins with -----BEGIN CERTIFICATE-----";
         InputError::new(place, cause, remedy)
     };
-    let mut is_any = false;
+    let mut has_any = false;
     for pem in Pem::iter_from_buffer(text) {
         let pem = pem.map_err(|e| no_certificate(e.to_string()))?;
         let certificate = pem.parse_x509().map_err(|e| no_certificate(e.to_string()))?;
@@ -81,7 +77,10 @@ fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {
             let remedy = "have it made again, or see whether the date of this machine is right";
             return Err(InputError::new(place, cause, remedy));
         }
-        is_any = true;
+        has_any = true;
     }
-    if is_any { Ok(()) } else { Err(no_certificate("there is no certificate in it".into())) }
+    if !has_any {
+        return Err(no_certificate("there is no certificate in it".into()));
+    }
+    Ok(())
 }

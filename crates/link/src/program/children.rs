@@ -1,7 +1,7 @@
-//! The crew: processes of nodes on this machine, started, watched and ended.
+//! Processes of nodes on this machine: started, watched and ended.
 //!
-//! A node ends when its standard input does, so it cannot outlive the server, however that ends. Those that do not end
-//! when they are asked to are killed: a stopped process hears nothing.
+//! A node ends when its standard input does, so it cannot outlive the server, however that ends. One that does not end
+//! when it is asked to is killed: a process that is stopped by a signal does not react to anything else.
 
 use sidestep::kernel::EntityId;
 use sidestep_session::Error;
@@ -14,59 +14,59 @@ use std::time::{Duration, Instant};
 /// Time that nodes have to end when they are asked to.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Time after which a node that has ended is started again; twice as long after each time that it has not lasted.
+/// Time after which a node that has ended is started again, doubled each time that it has not lasted: a node that cannot
+/// run must not take a whole processor for being started.
 const MIN_RESTART_DELAY: Duration = Duration::from_millis(500);
 
-/// Longest time before a node is started again.
+/// Maximum time before a node is started again.
 const MAX_RESTART_DELAY: Duration = Duration::from_secs(16);
 
-/// Time that a node must last to count as one that does.
+/// Time after which a node counts as one that has lasted: it has joined, and done some cycles.
 const MIN_STABLE_UPTIME: Duration = Duration::from_secs(10);
 
-/// Zenoh's threads: a node says little, and each thread costs memory.
+/// Threads of Zenoh in a node: one, because a node sends little, and each thread costs memory.
 const ZENOH_RUNTIME_CONFIG: &str = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), \
                        net: (handover: rx), app: (handover: rx))";
 
-/// A node of the crew.
+/// The process of a node.
 struct NodeProcess {
     job: NodeJob,
     child: Option<Child>,
-    began: Instant,
+    started: Instant,
     /// Time at which it is started again, if it has ended.
-    again_at: Option<Instant>,
-    /// The wait until then.
-    wait: Duration,
+    restart_at: Option<Instant>,
+    restart_delay: Duration,
 }
 
 /// The nodes that this process has started.
 pub(super) struct NodeProcesses {
-    mates: BTreeMap<EntityId, NodeProcess>,
+    nodes: BTreeMap<EntityId, NodeProcess>,
     /// Whether nodes that have ended are started again.
     restarts: bool,
 }
 
 impl NodeProcess {
     fn start(&mut self) -> Result<(), Error> {
-        let cannot = |e: std::io::Error| {
-            Error::other(format!("cannot start a node: {e}"), "see whether there is memory left")
-        };
-        let program = std::env::current_exe().map_err(cannot)?;
+        let program = std::env::current_exe().map_err(start_error)?;
         let mut command = Command::new(program);
         command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .env("ZENOH_RUNTIME", ZENOH_RUNTIME_CONFIG);
-        // Ctrl-C in a terminal is for the program that started the fleet, which ends all in good order.
+        // In a process group of its own it gets no Ctrl-C from a terminal: that is for the command that started the fleet,
+        // which ends all processes in good order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command.spawn().map_err(cannot)?;
+        let mut child = command.spawn().map_err(start_error)?;
         let mut line = serde_json::to_string(&Job::Node(self.job.clone())).expect("plain data");
         line.push('\n');
         if let Some(stdin) = &mut child.stdin {
-            // One that has ended at once is found below.
+            // An error means that the process has ended at once, which `poll_exit` finds.
             let _ = stdin.write_all(line.as_bytes());
         }
-        (self.child, self.began, self.again_at) = (Some(child), Instant::now(), None);
+        self.child = Some(child);
+        self.started = Instant::now();
+        self.restart_at = None;
         Ok(())
     }
 
@@ -76,20 +76,24 @@ impl NodeProcess {
         let status = child.try_wait().ok().flatten()?;
         let reason = last_error(child).unwrap_or_else(|| describe_exit(status));
         self.child = None;
-        self.wait = if self.began.elapsed() > MIN_STABLE_UPTIME {
+        self.restart_delay = if self.started.elapsed() > MIN_STABLE_UPTIME {
             MIN_RESTART_DELAY
         } else {
-            (2 * self.wait).min(MAX_RESTART_DELAY)
+            (2 * self.restart_delay).min(MAX_RESTART_DELAY)
         };
         Some(reason)
     }
 }
 
-/// Returns the last message of a node: why it could not go on.
+fn start_error(error: std::io::Error) -> Error {
+    Error::other(format!("cannot start a node: {error}"), "see whether there is memory left")
+}
+
+/// Returns the cause of the failure that a node has reported in its last line.
 fn last_error(child: &mut Child) -> Option<String> {
     let out = BufReader::new(child.stdout.take()?);
-    let told = out.lines().map_while(Result::ok).last()?;
-    match serde_json::from_str(&told).ok()? {
+    let last_line = out.lines().map_while(Result::ok).last()?;
+    match serde_json::from_str(&last_line).ok()? {
         LinkMessage::Failed(JobError { cause, .. }) => Some(cause),
         _ => None,
     }
@@ -105,55 +109,57 @@ impl NodeProcesses {
     /// # Errors
     /// When a process cannot be started.
     pub(super) fn start(jobs: BTreeMap<EntityId, NodeJob>, restarts: bool) -> Result<Self, Error> {
-        let mut crew = Self { mates: BTreeMap::new(), restarts };
+        let mut processes = Self { nodes: BTreeMap::new(), restarts };
         for (agent, job) in jobs {
-            let began = Instant::now();
-            let mut mate = NodeProcess {
+            let mut node = NodeProcess {
                 job,
                 child: None,
-                began,
-                again_at: None,
-                wait: MIN_RESTART_DELAY / 2,
+                started: Instant::now(),
+                restart_at: None,
+                // It is doubled before its first use.
+                restart_delay: MIN_RESTART_DELAY / 2,
             };
-            mate.start()?;
-            crew.mates.insert(agent, mate);
+            node.start()?;
+            processes.nodes.insert(agent, node);
         }
-        Ok(crew)
+        Ok(processes)
     }
 
-    /// Looks after the processes. Returns the nodes that have ended since the last call, with the reasons. One that is
-    /// started again is reached where it was before, as given by `reached`: there the others look for it.
+    /// Checks the processes, and starts those again that are due. Returns the nodes that have ended since the last call,
+    /// with the reasons. One that is started again listens where it did before, as given by `listens`: the other nodes
+    /// reconnect to these endpoints.
     ///
     /// # Errors
     /// When one cannot be started again.
     pub(super) fn poll(
         &mut self,
-        reached: impl Fn(EntityId) -> Option<Vec<String>>,
+        listens: impl Fn(EntityId) -> Option<Vec<String>>,
     ) -> Result<Vec<(EntityId, String)>, Error> {
-        let mut gone = Vec::new();
-        for (&agent, mate) in &mut self.mates {
-            if let Some(reason) = mate.poll_exit() {
-                gone.push((agent, reason));
-                mate.again_at = self.restarts.then(|| Instant::now() + mate.wait);
+        let mut ended = Vec::new();
+        for (&agent, node) in &mut self.nodes {
+            if let Some(reason) = node.poll_exit() {
+                ended.push((agent, reason));
+                node.restart_at = self.restarts.then(|| Instant::now() + node.restart_delay);
             }
-            if mate.again_at.is_some_and(|at| at <= Instant::now()) {
-                mate.job.listen = reached(agent).unwrap_or_else(|| mate.job.listen.clone());
-                mate.start()?;
+            if node.restart_at.is_some_and(|at| at <= Instant::now()) {
+                if let Some(listens) = listens(agent) {
+                    node.job.listen = listens;
+                }
+                node.start()?;
             }
         }
-        Ok(gone)
+        Ok(ended)
     }
 
     /// Ends all nodes, and waits until they have.
     pub(super) fn shut_down(&mut self) {
-        let children = self.mates.values_mut().filter_map(|mate| mate.child.as_mut());
+        let children = self.nodes.values_mut().filter_map(|node| node.child.as_mut());
         let mut children: Vec<&mut Child> = children.collect();
         for child in &mut children {
             drop(child.stdin.take());
         }
         let until = Instant::now() + SHUTDOWN_TIMEOUT;
-        let runs = |child: &mut &mut Child| child.try_wait().is_ok_and(|status| status.is_none());
-        while children.iter_mut().any(runs) && Instant::now() < until {
+        while children.iter_mut().any(|child| is_running(child)) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
         for child in children {
@@ -161,6 +167,10 @@ impl NodeProcesses {
             let _ = child.wait();
         }
     }
+}
+
+fn is_running(child: &mut Child) -> bool {
+    child.try_wait().is_ok_and(|status| status.is_none())
 }
 
 impl Drop for NodeProcesses {

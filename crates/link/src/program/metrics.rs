@@ -9,15 +9,15 @@ use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The place where metrics are shown; without an address it shows none.
+/// An address at which metrics are served; without one, nothing is.
 #[derive(Debug, Default)]
 pub(super) struct MetricsExporter(Option<Arc<Mutex<String>>>);
 
 impl MetricsExporter {
-    /// Opens a board at an address, if one is given.
+    /// Serves metrics at an address from now on, if one is given.
     ///
     /// # Errors
-    /// When the address cannot be taken.
+    /// When the address cannot be bound.
     pub(super) fn open(address: Option<&str>) -> Result<Self, InputError> {
         let Some(address) = address else { return Ok(Self::default()) };
         let text = Arc::new(Mutex::new(String::new()));
@@ -28,10 +28,10 @@ impl MetricsExporter {
         Ok(Self(Some(text)))
     }
 
-    /// Shows a text, which is made only if there is an address.
+    /// Replaces the text that is served; it is made only if there is an address.
     pub(super) fn publish(&self, text: impl FnOnce() -> String) {
-        if let Some(shown) = &self.0 {
-            *shown.lock().unwrap_or_else(PoisonError::into_inner) = text();
+        if let Some(served) = &self.0 {
+            *served.lock().unwrap_or_else(PoisonError::into_inner) = text();
         }
     }
 }
@@ -41,7 +41,7 @@ impl MetricsExporter {
 struct MetricsText(String);
 
 impl MetricsText {
-    /// Begins a metric.
+    /// Adds the head of a metric.
     fn push_header(&mut self, name: &str, kind: &str, help: &str) {
         let _ = writeln!(self.0, "# HELP sidestep_{name} {help}\n# TYPE sidestep_{name} {kind}");
     }
@@ -61,7 +61,7 @@ impl MetricsText {
         self.push_sample(&format!("{name}_count"), "", histogram.count());
     }
 
-    /// Adds a metric with a value for each agent, named by a label.
+    /// Adds a metric with a value for each agent, which is given by its label.
     fn push_per_agent(
         &mut self,
         name: &str,
@@ -77,43 +77,47 @@ impl MetricsText {
 }
 
 /// Returns the metrics of a fleet.
-pub(super) fn fleet_metrics(now: &FleetStatus, fleet: &FleetView<'_>) -> String {
+pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> String {
     let mut text = MetricsText::default();
     text.push_header("cycle", "gauge", "Cycles done.");
-    text.push_sample("cycle", "", now.cycle);
-    let tally = fleet.tally;
+    text.push_sample("cycle", "", status.cycle);
+    let metrics = fleet.metrics;
     text.push_histogram(
         "talk_seconds",
         "Time from the percepts of a cycle to its last control.",
-        &tally.talked,
+        &metrics.decision_time,
     );
     text.push_histogram(
         "advance_seconds",
-        "Time in which the world went on by a cycle.",
-        &tally.advanced,
+        "Time to advance the world by a cycle.",
+        &metrics.advance_time,
     );
     text.push_histogram(
         "late_seconds",
-        "In real time: by how much later than due a cycle began.",
-        &tally.late,
+        "In real time: time by which a cycle started later than due.",
+        &metrics.lateness,
     );
     text.push_header(
         "late_cycles_total",
         "counter",
-        "Cycles that began later than a tenth of their length.",
+        "Cycles that started later than a tenth of their length.",
     );
-    text.push_sample("late_cycles_total", "", tally.late_cycles);
-    text.push_header("absurd_controls_total", "counter", "Controls that could not be flown.");
-    text.push_sample("absurd_controls_total", "", tally.absurd_controls);
+    text.push_sample("late_cycles_total", "", metrics.late_cycles);
+    text.push_header(
+        "absurd_controls_total",
+        "counter",
+        "Controls that could not be read or carried out.",
+    );
+    text.push_sample("absurd_controls_total", "", metrics.invalid_controls);
     text.push_header("refused_total", "counter", "Nodes that were refused, by reason.");
-    for (reason, count) in &tally.refused {
+    for (reason, count) in &metrics.refused {
         text.push_sample("refused_total", &format_label("reason", reason), count);
     }
     text.push_header("frames_total", "counter", "Frames that the server has sent.");
-    text.push_sample("frames_total", "", fleet.mail.stats().frames);
+    text.push_sample("frames_total", "", fleet.messenger.stats().frames);
     text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
-    text.push_sample("frame_bytes_total", "", fleet.mail.stats().bytes);
-    push_node_metrics(&mut text, now, fleet);
+    text.push_sample("frame_bytes_total", "", fleet.messenger.stats().bytes);
+    push_node_metrics(&mut text, status, fleet);
     text.0
 }
 
@@ -129,19 +133,19 @@ const NODE_METRICS: [NodeMetric; 8] = [
     NodeMetric {
         name: "node_up",
         kind: "gauge",
-        help: "Whether the node of an agent is there.",
+        help: "Whether an agent has a node.",
         value: |node| f64::from(!["awaited", "gone"].contains(&&*node.state)),
     },
     NodeMetric {
         name: "controls_flown_total",
         kind: "counter",
-        help: "Controls that were flown.",
+        help: "Controls that were carried out.",
         value: |node| node.flown as f64,
     },
     NodeMetric {
         name: "controls_late_total",
         kind: "counter",
-        help: "Controls that were not there in time.",
+        help: "Controls that did not arrive in time.",
         value: |node| node.late as f64,
     },
     NodeMetric {
@@ -176,14 +180,15 @@ const NODE_METRICS: [NodeMetric; 8] = [
     },
 ];
 
-fn push_node_metrics(text: &mut MetricsText, now: &FleetStatus, fleet: &FleetView<'_>) {
+fn push_node_metrics(text: &mut MetricsText, status: &FleetStatus, fleet: &FleetView<'_>) {
     for NodeMetric { name, kind, help, value } in &NODE_METRICS {
         let values =
-            now.nodes.iter().map(|node| (format_label(&now.noun, &node.name), value(node)));
+            status.nodes.iter().map(|node| (format_label(&status.noun, &node.name), value(node)));
         text.push_per_agent(name, kind, help, values);
     }
-    let statuses = now.nodes.iter().filter_map(|node| {
-        Some((format_label(&now.noun, &node.name), &fleet.seats.get(&node.agent)?.status))
+    let statuses = status.nodes.iter().filter_map(|node| {
+        let entry = fleet.nodes.get(&node.agent)?;
+        Some((format_label(&status.noun, &node.name), &entry.status))
     });
     push_messenger_metrics(text, &statuses.collect::<Vec<_>>());
 }
@@ -194,10 +199,15 @@ fn format_label(name: &str, value: &str) -> String {
     format!("{name}=\"{value}\"")
 }
 
-/// Adds the mail counts of nodes, by the labels of their agents.
+/// Adds the counts of the nodes' messengers, by the labels of their agents.
 fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]) {
     let retries = statuses.iter().map(|(agent, status)| (agent.clone(), status.retries as f64));
-    text.push_per_agent("retries_total", "counter", "Letters that a node has sent again.", retries);
+    text.push_per_agent(
+        "retries_total",
+        "counter",
+        "Messages that a node has retransmitted.",
+        retries,
+    );
     text.push_header(
         "dropped_total",
         "counter",

@@ -1,12 +1,15 @@
 //! The program: reads its job, does it, and reports the results, each as a line of JSON.
 //!
 //! ```text
-//! fleet.rs   the server of a world, and nodes that it starts    crew.rs     processes of nodes
-//! node.rs    one node                                           lifeline.rs the end of the parent process
-//! told.rs    lines for the parent process                       metrics.rs  Prometheus' text
-//! log.rs     logs to standard error                             scenario.rs the scenario they fly
-//! packets.rs the table of all packets                           certificates.rs whether they hold
-//! shown.rs   the view of a fleet                                watch.rs    the watcher of one
+//! fleet.rs           the server of a world, with the nodes that it starts (children.rs)
+//! node.rs            one node
+//! watch.rs           a viewer of a fleet; view.rs: the views at the server
+//! scenario.rs        the scenario that server and nodes read
+//! certificates.rs    checks of certificates
+//! output.rs          lines for the parent process; parent_monitor.rs: the end of that process
+//! log.rs             logs to standard error
+//! metrics.rs         metrics in Prometheus' text format
+//! packet_table.rs    the table of all packets
 //! ```
 
 mod certificates;
@@ -24,12 +27,13 @@ mod watch;
 
 use output::print_message;
 use parent_monitor::ParentMonitor;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
 use std::io::BufRead;
 use std::process::ExitCode;
 
-/// Words for a user who starts the program by hand.
+/// Usage, for a user who starts the program by hand.
 const USAGE: &str = "\
 sidestep-link runs the server and the nodes of a fleet. `sidestep fleet` and `sidestep node` start it
 and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
@@ -44,10 +48,10 @@ pub fn main() -> ExitCode {
         return ExitCode::from(if is_known { 0 } else { 2 });
     }
     let mut line = String::new();
-    let job = std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string());
-    let job = job.and_then(|_| serde_json::from_str::<Job>(&line).map_err(|e| e.to_string()));
+    let read = std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string());
+    let job = read.and_then(|_| serde_json::from_str::<Job>(&line).map_err(|e| e.to_string()));
     match job {
-        Ok(job) => exit_code(run_job(job)),
+        Ok(job) => report_result(run_job(job)),
         Err(reason) => {
             eprintln!("error: standard input has no job: {reason}\n{USAGE}");
             ExitCode::from(2)
@@ -56,19 +60,19 @@ pub fn main() -> ExitCode {
 }
 
 fn version() -> String {
-    format!("sidestep-link {}", sidestep_session::build_id())
+    format!("sidestep-link {}", WORLDS.build())
 }
 
 fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
             check_and_start_log(&job.common, &job.listen)?;
-            fleet::fly(&job, &ParentMonitor::watch())
+            fleet::run(&job, &ParentMonitor::watch())
         }
         Job::Node(job) => {
             check_and_start_log(&job.common, job.connect.iter().chain(&job.listen))?;
             ParentMonitor::exit_with_parent();
-            node::fly(&job)
+            node::run(&job)
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
@@ -78,7 +82,7 @@ fn run_job(job: Job) -> Result<(), Error> {
     }
 }
 
-/// Checks the options that server and nodes share, and begins their log.
+/// Checks the options that server and nodes share, and starts their log.
 fn check_and_start_log<'a>(
     common: &CommonSettings,
     endpoints: impl IntoIterator<Item = &'a String>,
@@ -89,9 +93,9 @@ fn check_and_start_log<'a>(
     Ok(())
 }
 
-/// Refuses the job of another build: all that decide must be of the same build.
+/// Refuses the job of another build: results are the same only if server, nodes and command are of one build.
 fn check_build(build: &str) -> Result<(), Error> {
-    let own = sidestep_session::build_id();
+    let own = WORLDS.build();
     if build == own {
         return Ok(());
     }
@@ -100,15 +104,17 @@ fn check_build(build: &str) -> Result<(), Error> {
     Err(sidestep::kernel::InputError::new("sidestep-link", cause, remedy).into())
 }
 
-/// Tells why a job failed, and returns the exit code.
-fn exit_code(done: Result<(), Error>) -> ExitCode {
-    let Err(error) = done else { return ExitCode::SUCCESS };
-    let failed = JobError::from(&error);
-    let code = match () {
-        () if failed.is_input => 2,
-        () if failed.is_interrupted => 130,
-        () => 1,
+/// Reports why a job failed, and returns the exit code.
+fn report_result(result: Result<(), Error>) -> ExitCode {
+    let Err(error) = result else { return ExitCode::SUCCESS };
+    let error = JobError::from(&error);
+    let code = if error.is_input {
+        2
+    } else if error.is_interrupted {
+        130
+    } else {
+        1
     };
-    print_message(&LinkMessage::Failed(failed));
+    print_message(&LinkMessage::Failed(error));
     ExitCode::from(code)
 }

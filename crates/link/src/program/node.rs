@@ -9,6 +9,7 @@ use crate::wire::Peer;
 use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::NodeJob;
 use std::time::Duration;
@@ -17,32 +18,32 @@ use std::time::Duration;
 ///
 /// # Errors
 /// When anything is wrong with the job, or the server is gone.
-pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
+pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
     let agent = scenario.world.find(job.agent)?;
-    let ports = job
+    let ports: Vec<PortReservation> = job
         .listen
         .iter()
         .map(|endpoint| reserve_port(endpoint))
-        .collect::<Result<Vec<PortReservation>, _>>();
-    let ports = ports.map_err(endpoint_error)?;
-    let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
-    let board = MetricsExporter::open(job.common.metrics.as_deref())?;
-    let patience = Duration::from_secs_f64(job.patience_s);
-    let tls = job.common.tls.as_ref();
-    let wire = ZenohWire::node(Peer::Node(agent), &job.connect, tls, patience);
-    let wire = wire.map_err(endpoint_error)?.with_listeners(ports);
-    let mut mail = Messenger::new(Peer::Node(agent), Box::new(wire));
-    let build = sidestep_session::build_id();
-    let question = Join {
+        .collect::<Result<_, _>>()
+        .map_err(endpoint_error)?;
+    let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
+    let timeout = Duration::from_secs_f64(job.patience_s);
+    let build = WORLDS.build();
+    let request = Join {
         agent,
         scenario: scenario.fingerprint()?,
         build: build.into(),
-        listens,
+        listens: ports.iter().map(|port| port.endpoint.clone()).collect(),
         process: std::process::id(),
     };
-    let welcome = join(&mut mail, &JoinConfig { join: question, timeout: patience })
+    let wire = ZenohWire::node(Peer::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
+        .map_err(endpoint_error)?
+        .with_listeners(ports);
+    let mut messenger = Messenger::new(Peer::Node(agent), Box::new(wire));
+    let welcome = join(&mut messenger, &JoinConfig { join: request, timeout })
         .map_err(|e| node_error(e, job))?;
+    // Only the server knows the topology.
     if welcome.topology == Topology::Mesh && job.listen.is_empty() {
         let cause = "in a mesh other nodes must reach this one";
         let remedy =
@@ -52,15 +53,15 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let scenario = scenario.with_overrides(&welcome.overrides)?;
     let program = scenario.world.program(agent, build);
     let channel = scenario.world.channel(agent);
-    let lease = Duration::from_secs_f64(job.common.lease_s);
     let name = job.agent;
     tracing::info!(agent, who = format!("{} {name}", name.noun()), "joined");
-    let node = Node::new(agent, mail, program, channel, &welcome, lease);
-    let node = node.with_listener(move |status| board.publish(|| node_metrics(name, status)));
+    let node = Node::new(agent, messenger, program, channel, &welcome)
+        .with_lease(Duration::from_secs_f64(job.common.lease_s))
+        .with_listener(move |status| exporter.publish(|| node_metrics(name, status)));
     node.run().map(drop).map_err(|e| node_error(e, job))
 }
 
-/// Returns the error of a wire that could not be made.
+/// Converts the error of a wire that could not be made.
 pub(super) fn endpoint_error(error: WireError) -> Error {
     let cause = error.to_string();
     match error {
@@ -93,7 +94,7 @@ fn node_error(error: NodeError, job: &NodeJob) -> Error {
         }
         NodeError::Wire(error) => endpoint_error(error),
         NodeError::Dismissed(JoinError { remedy, .. }) => Error::other(cause, remedy),
-        NodeError::Silence(_) => {
+        NodeError::ServerSilent(_) => {
             Error::other(cause, "see whether the server runs, and start both again")
         }
         NodeError::Percept(_) => Error::other(cause, "please report it with the scenario"),

@@ -7,17 +7,19 @@ use sidestep::kernel::ports::{RecordError, Recorder, Table};
 use sidestep_record::{ParquetRecorder, Provenance};
 use std::path::Path;
 
-/// Rows that are stored at once.
+/// Number of rows that are written at once: a block of some megabytes, so that Parquet compresses well and the memory of
+/// the server stays small.
 const BLOCK_ROWS: usize = 1 << 16;
 
 /// A row: the sender and its packet.
 type PacketRow = (EntityId, PacketRecord);
 
-/// A packet's table in a run folder. Until it is finished it is called `packets.partial`.
+/// The table `packets` of a run folder. Until it is finished it is called `packets.partial`.
 pub(super) struct PacketTable {
     recorder: ParquetRecorder,
     table: Table<PacketRow>,
-    waiting: Vec<PacketRow>,
+    /// Rows that are not written yet.
+    rows: Vec<PacketRow>,
 }
 
 fn table() -> Table<PacketRow> {
@@ -45,16 +47,16 @@ fn table() -> Table<PacketRow> {
 }
 
 impl PacketTable {
-    /// Begins the table in a run folder.
+    /// Creates the table in a run folder.
     ///
     /// # Errors
     /// When it cannot be written.
     pub(super) fn create(folder: &Path, scenario: &str, seed: u64) -> Result<Self, RecordError> {
-        let (program_version, scenario) = (VERSION.into(), scenario.into());
         let table = table();
-        let origin = Provenance { program_version, scenario, seed };
-        let recorder = ParquetRecorder::create(folder, &[table.schema()], &origin)?;
-        Ok(Self { recorder, table, waiting: Vec::new() })
+        let provenance =
+            Provenance { program_version: VERSION.into(), scenario: scenario.into(), seed };
+        let recorder = ParquetRecorder::create(folder, &[table.schema()], &provenance)?;
+        Ok(Self { recorder, table, rows: Vec::new() })
     }
 
     /// Adds packets of cycles that will get no further ones.
@@ -62,18 +64,18 @@ impl PacketTable {
     /// # Errors
     /// When they cannot be written.
     pub(super) fn add(&mut self, mut rows: Vec<PacketRow>) -> Result<(), RecordError> {
-        // Nodes may have reported them in any order.
+        // Nodes report in any order; the file of two equal runs is the same.
         rows.sort_unstable_by_key(|(sender, packet)| (packet.cycle, *sender, *packet));
-        self.waiting.append(&mut rows);
-        if self.waiting.len() < BLOCK_ROWS {
+        self.rows.append(&mut rows);
+        if self.rows.len() < BLOCK_ROWS {
             return Ok(());
         }
         self.write_block()
     }
 
     fn write_block(&mut self) -> Result<(), RecordError> {
-        let block = self.table.block(&self.waiting);
-        self.waiting.clear();
+        let block = self.table.block(&self.rows);
+        self.rows.clear();
         self.recorder.append(0, &block)
     }
 

@@ -1,20 +1,20 @@
-//! The lifeline: standard input, which ends when the parent of the program wants it to end, or is gone.
+//! The monitor of the parent process: standard input ends when the parent wants this process to end, or is gone.
 //!
-//! It holds however the parent ends, and needs no calls of a particular system: a pipe is closed when no process is
-//! left to write to it.
+//! That works however the parent ends, and needs no calls of a particular operating system: a pipe is closed when no
+//! process is left that can write to it.
 
 use std::io::Read;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time that the program has to end in good order; then it is ended anyway.
+/// Time that the program has to end in good order: to finish a recording, for instance. Then it exits in any case.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// Exit code of a program that was told to end.
+/// Exit code of a program that was interrupted, as shells use it for SIGINT: 128 + 2.
 const INTERRUPTED_EXIT_CODE: i32 = 130;
 
-/// Whether standard input has ended.
+/// A flag that says whether standard input has ended.
 #[derive(Debug, Clone)]
 pub(super) struct ParentMonitor(Arc<AtomicBool>);
 
@@ -32,7 +32,7 @@ impl ParentMonitor {
         Self(has_ended)
     }
 
-    /// Ends the process when standard input ends: for a process with nothing to lose.
+    /// Exits when standard input ends: for a process that has nothing to store.
     pub(super) fn exit_with_parent() {
         std::thread::spawn(|| {
             wait_for_end();

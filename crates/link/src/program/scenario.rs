@@ -1,4 +1,4 @@
-//! The scenario that a server and its nodes fly.
+//! The scenario of a server and its nodes.
 
 use crate::distributed::DistributedWorld;
 use crate::protocol::{ClockMode, Fingerprint};
@@ -20,10 +20,10 @@ impl Scenario {
     /// Reads a scenario.
     ///
     /// # Errors
-    /// When it is wrong, or its agents cannot be flown by nodes.
-    pub(super) fn read(flown: &JobScenario) -> Result<Self, InputError> {
+    /// When it is wrong, or its agents cannot be nodes.
+    pub(super) fn read(job: &JobScenario) -> Result<Self, InputError> {
         let (source, compiled) =
-            sidestep_session::read_scenario(WORLDS, &flown.file, &flown.overrides)?;
+            sidestep_session::read_scenario(&WORLDS, &job.file, &job.overrides)?;
         Self::from_compiled(source, compiled)
     }
 
@@ -51,21 +51,21 @@ impl Scenario {
     /// Returns the fingerprint.
     ///
     /// # Errors
-    /// When a file that it names cannot be read.
+    /// When a file to which it refers cannot be read.
     pub(super) fn fingerprint(&self) -> Result<Fingerprint, InputError> {
         fingerprint(self.compiled.as_ref(), &self.source)
     }
 
-    /// Returns the changes that a fleet needs: controls that are recorded, so that the run can be computed again, and in
-    /// real time a network on which no agent waits forever for one that is gone.
+    /// Returns the changes that a fleet needs: controls are recorded, because a run whose agents were elsewhere cannot be
+    /// computed again without them, and in real time agents get a timeout for the answers of others.
     pub(super) fn required_overrides(&self, clock: ClockMode, is_recorded: bool) -> Vec<String> {
-        let mut needs = Vec::new();
+        let mut overrides = Vec::new();
         if is_recorded {
-            needs.push("record.controls=true".to_string());
+            overrides.push("record.controls=true".to_string());
         }
         if let ClockMode::Realtime { speed } = clock {
-            needs.extend(self.world.timeout_override(speed));
+            overrides.extend(self.world.timeout_override(speed));
         }
-        needs
+        overrides
     }
 }

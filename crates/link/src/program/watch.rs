@@ -1,4 +1,4 @@
-//! The watcher of a fleet: asks for its views, and passes them on.
+//! The viewer of a fleet: queries its views, and passes them on to the parent process.
 
 use super::node::endpoint_error;
 use super::output::print_message;
@@ -12,28 +12,29 @@ use sidestep_session::fleet::{FleetFrame, FleetScene, LinkMessage, WatchJob};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Time between two questions.
+/// Time between two queries: up to 20 views a second.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Watches a fleet until it is over, or the parent process has seen enough.
+/// Watches a fleet until it is over, or the parent process ends the watching.
 ///
 /// # Errors
-/// When no answer comes, the fleet is of another build, or it has fallen silent.
-pub(super) fn watch(job: &WatchJob, lifeline: &ParentMonitor) -> Result<(), Error> {
-    let patience = Duration::from_secs_f64(job.patience_s);
-    let outlook =
-        ViewClient::new(&job.connect, job.tls.as_ref(), patience).map_err(endpoint_error)?;
-    let mut viewer = ViewPoller { job, lifeline, patience, heard: Instant::now() };
-    let Some(scene) = viewer.poll_until_answered(|| outlook.scene())? else { return Ok(()) };
+/// When there is no reply, the fleet is of another build, or it has fallen silent.
+pub(super) fn watch(job: &WatchJob, parent: &ParentMonitor) -> Result<(), Error> {
+    let timeout = Duration::from_secs_f64(job.patience_s);
+    let client =
+        ViewClient::new(&job.connect, job.tls.as_ref(), timeout).map_err(endpoint_error)?;
+    let mut poller = ViewPoller { job, parent, timeout, last_reply: Instant::now() };
+    let Some(scene) = poller.poll_until_answered(|| client.scene())? else { return Ok(()) };
+    // Before the rest is read: the scene of another build may have another form.
     check_build(&scene, job)?;
     print_message(&LinkMessage::Scene(Box::new(read::<FleetScene>(&scene, job)?)));
     let mut number = 0;
-    while let Some(text) = viewer.poll_until_answered(|| outlook.view(number))? {
+    while let Some(text) = poller.poll_until_answered(|| client.view(number))? {
         if !text.is_empty() {
-            let seen: FleetFrame = read(&text, job)?;
-            let is_over = seen.is_over;
-            number = seen.number;
-            print_message(&LinkMessage::Seen(Box::new(seen)));
+            let view: FleetFrame = read(&text, job)?;
+            let is_over = view.is_over;
+            number = view.number;
+            print_message(&LinkMessage::Seen(Box::new(view)));
             if is_over {
                 break;
             }
@@ -45,28 +46,29 @@ pub(super) fn watch(job: &WatchJob, lifeline: &ParentMonitor) -> Result<(), Erro
 
 struct ViewPoller<'a> {
     job: &'a WatchJob,
-    lifeline: &'a ParentMonitor,
-    patience: Duration,
-    heard: Instant,
+    parent: &'a ParentMonitor,
+    timeout: Duration,
+    last_reply: Instant,
 }
 
 impl ViewPoller<'_> {
-    /// Asks until there is an answer; `None` when it is no longer wanted.
+    /// Repeats a query until there is a reply; `None` when the parent process ends the watching.
     fn poll_until_answered(
         &mut self,
-        ask: impl Fn() -> Option<String>,
+        query: impl Fn() -> Option<String>,
     ) -> Result<Option<String>, Error> {
-        while !self.lifeline.has_ended() {
-            if let Some(text) = ask() {
-                self.heard = Instant::now();
+        while !self.parent.has_ended() {
+            if let Some(text) = query() {
+                self.last_reply = Instant::now();
                 return Ok(Some(text));
             }
-            if self.heard.elapsed() > self.patience {
-                let (place, s) = (self.job.connect.join(", "), self.patience.as_secs_f64());
-                let cause = format!("the fleet at {place} was not heard for {s} s");
+            if self.last_reply.elapsed() > self.timeout {
+                let place = self.job.connect.join(", ");
+                let timeout_s = self.timeout.as_secs_f64();
+                let cause = format!("the fleet at {place} was not heard for {timeout_s} s");
                 return Err(Error::other(cause, "see whether it flies, and watch it again"));
             }
-            // Without a link, the lack of an answer may show at once.
+            // Without a link a query fails at once, and would be repeated in a busy loop.
             sleep(POLL_INTERVAL);
         }
         Ok(None)
@@ -81,7 +83,7 @@ fn read<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
     })
 }
 
-/// Refuses a fleet of another build, because its views may have another form.
+/// Refuses a fleet of another build.
 fn check_build(scene: &str, job: &WatchJob) -> Result<(), Error> {
     #[derive(Deserialize)]
     struct SceneBuild {

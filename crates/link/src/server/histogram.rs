@@ -1,43 +1,48 @@
-//! Durations in classes, from which percentiles and Prometheus' histograms are made.
+//! Durations in buckets, from which percentiles and Prometheus' histograms are made.
 
 use std::time::Duration;
 
-/// Upper bounds of the classes, in seconds: a class for each factor of about 2.
+/// Upper bounds of the buckets, in seconds: a bucket for each factor of about 2. From a tenth of a millisecond, less than
+/// a round trip on one machine, to a minute, more than any cycle.
 pub const BUCKET_BOUNDS_S: [f64; 18] = [
     0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0,
     10.0, 30.0, 60.0,
 ];
 
-/// Counts of durations by class.
+/// Counts of durations by bucket.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Histogram {
+    /// The last bucket is for all durations above the last bound.
     counts: [u64; BUCKET_BOUNDS_S.len() + 1],
     /// Sum of all durations, in seconds.
     pub sum_s: f64,
 }
 
 impl Histogram {
-    /// Counts a duration.
-    pub fn record(&mut self, took: Duration) {
-        let took_s = took.as_secs_f64();
-        self.counts[BUCKET_BOUNDS_S.partition_point(|&bound| bound < took_s)] += 1;
-        self.sum_s += took_s;
+    /// Records a duration.
+    pub fn record(&mut self, duration: Duration) {
+        let duration_s = duration.as_secs_f64();
+        self.counts[BUCKET_BOUNDS_S.partition_point(|&bound| bound < duration_s)] += 1;
+        self.sum_s += duration_s;
     }
 
-    /// Returns the number of durations counted.
+    /// Returns the number of durations recorded.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// Returns the bound in seconds below which the given part of the durations lies; `None` without durations, and
+    /// Returns the lowest bound in seconds below which a fraction of the durations lies; `None` without durations, and
     /// infinity above the last bound.
-    pub fn quantile(&self, part: f64) -> Option<f64> {
-        let wanted = (part * self.count() as f64).ceil().max(1.0) as u64;
-        let bound = self.cumulative().find(|(_, count)| *count >= wanted);
-        (self.count() > 0).then(|| bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
+    pub fn quantile(&self, fraction: f64) -> Option<f64> {
+        if self.count() == 0 {
+            return None;
+        }
+        let rank = (fraction * self.count() as f64).ceil().max(1.0) as u64;
+        let bound = self.cumulative().find(|(_, count)| *count >= rank);
+        Some(bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
     }
 
-    /// Returns, for each bound, the number of durations at most that long.
+    /// Returns, for each bound, the number of durations that do not exceed it.
     pub fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         BUCKET_BOUNDS_S.iter().zip(&self.counts).scan(0, |sum, (&bound, &count)| {
             *sum += count;
@@ -51,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_are_counted_in_the_class_whose_bound_they_do_not_exceed() {
+    fn durations_are_counted_in_the_bucket_whose_bound_they_do_not_exceed() {
         let mut histogram = Histogram::default();
         for ms in [1, 2, 3, 100_000] {
             histogram.record(Duration::from_millis(ms));

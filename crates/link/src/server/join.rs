@@ -1,126 +1,138 @@
-//! The muster: nodes join, until every agent has one and all have heard each other.
+//! Joining: nodes ask, until every agent has one and all have received a message from each other.
 
 use super::{FleetError, NodeEntry, Server};
 use crate::protocol::{Incarnation, Join, JoinError, Member, Message};
 use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 
+/// A refusal of a node.
+struct Refusal {
+    /// The name of the reason in metrics.
+    reason: &'static str,
+    /// The reason and the remedy, for the node's user.
+    error: JoinError,
+}
+
+impl Refusal {
+    fn new(reason: &'static str, cause: String, remedy: &str) -> Self {
+        Self { reason, error: JoinError { cause, remedy: remedy.into() } }
+    }
+}
+
 impl Server<'_> {
-    /// Waits until all nodes are there and ready.
+    /// Waits until all nodes have joined and are ready.
     ///
     /// # Errors
     /// When the fleet is asked to end.
     pub(super) fn wait_for_nodes(&mut self) -> Result<(), FleetError> {
         self.wait_for_all()?;
-        tracing::info!(nodes = self.seats.len(), "all nodes are there");
+        tracing::info!(nodes = self.nodes.len(), "all nodes are there");
         Ok(())
     }
 
-    /// Answers a node that wants to join. It asks until it hears the answer.
-    pub(super) fn on_join(&mut self, agent: EntityId, life: Incarnation, join: Join) {
-        if let Some((reason, refusal)) = self.join_error(agent, life, &join) {
-            let JoinError { cause, remedy } = &refusal;
+    /// Answers a node that asks to join. It repeats its request until it receives the answer.
+    pub(super) fn on_join(&mut self, agent: EntityId, incarnation: Incarnation, join: Join) {
+        if let Err(Refusal { reason, error }) = self.check_join(agent, incarnation, &join) {
+            let JoinError { cause, remedy } = &error;
             tracing::warn!(agent, process = join.process, cause, remedy, "a node is refused");
-            *self.tally.refused.entry(reason).or_default() += 1;
-            self.mail.reply(Peer::Node(agent), life, Message::Refused(refusal));
+            *self.metrics.refused.entry(reason).or_default() += 1;
+            self.messenger.reply(Peer::Node(agent), incarnation, Message::Refused(error));
             return;
         }
-        let member = Member { agent, life, listens: join.listens };
-        let is_known = self.seats[&agent].incarnation() == Some(life);
-        self.mail.connect(Peer::Node(agent), life);
-        let welcome = Message::Welcome(self.terms.welcome.clone());
-        self.mail.reply(Peer::Node(agent), life, welcome);
+        let is_known = self.nodes[&agent].incarnation() == Some(incarnation);
+        self.messenger.connect(Peer::Node(agent), incarnation);
+        let welcome = Message::Welcome(self.config.welcome.clone());
+        self.messenger.reply(Peer::Node(agent), incarnation, welcome);
         if is_known {
             return;
         }
-        if let Some(seat) = self.seats.get_mut(&agent) {
-            seat.assign(member, join.process);
+        let process = join.process;
+        if let Some(node) = self.nodes.get_mut(&agent) {
+            node.assign(Member { agent, incarnation, listens: join.listens }, process);
         }
-        let who = self.stage.agent_label(agent);
-        tracing::info!(agent, who, process = join.process, "a node has joined");
+        let who = self.run.agent_label(agent);
+        tracing::info!(agent, who, process, "a node has joined");
         self.send_roster();
     }
 
-    /// Tells all nodes the list of members, once all have joined.
+    /// Sends all nodes the list of members, once all have joined.
     fn send_roster(&mut self) {
-        let members = self.seats.values().map(|seat| seat.member.clone());
+        let members = self.nodes.values().map(|node| node.member.clone());
         let Some(members) = members.collect::<Option<Vec<Member>>>() else { return };
-        let seated: Vec<EntityId> = self.joined_agents().collect();
-        for agent in seated {
-            self.mail.send_reliable(Peer::Node(agent), Message::Roster(members.clone()));
+        let joined: Vec<EntityId> = self.joined_agents().collect();
+        for agent in joined {
+            self.messenger.send_reliable(Peer::Node(agent), Message::Roster(members.clone()));
         }
     }
 
-    /// Returns the reason why a node may not join, in one word and in detail; none if it may.
-    fn join_error(
+    /// Checks whether the sender of a request may join.
+    fn check_join(
         &self,
         agent: EntityId,
-        life: Incarnation,
+        incarnation: Incarnation,
         join: &Join,
-    ) -> Option<(&'static str, JoinError)> {
-        let Some(seat) = self.seats.get(&agent).filter(|_| join.agent == agent) else {
-            let remedy = self.stage.world().agent_hint();
-            return reject("unknown", format!("the fleet has no agent {agent}"), &remedy);
+    ) -> Result<(), Refusal> {
+        // A frame whose sender and content differ is of a faulty program.
+        let Some(entry) = self.nodes.get(&agent).filter(|_| join.agent == agent) else {
+            let cause = format!("the fleet has no agent {agent}");
+            return Err(Refusal::new("unknown", cause, &self.run.world().agent_hint()));
         };
-        self.mismatch_error(join).or_else(|| self.entry_error(agent, seat, life, join))
+        self.check_program(join)?;
+        self.check_entry(entry, incarnation, join)
     }
 
-    /// Returns why a node of another build or scenario may not join.
-    fn mismatch_error(&self, join: &Join) -> Option<(&'static str, JoinError)> {
-        if join.build != self.terms.build {
+    /// Refuses a node of another build or scenario.
+    fn check_program(&self, join: &Join) -> Result<(), Refusal> {
+        if join.build != self.config.build {
             let cause = format!(
                 "the server is of sidestep {}, this node of {}",
-                self.terms.build, join.build
+                self.config.build, join.build
             );
-            return reject("build", cause, "install the same build on both machines");
+            return Err(Refusal::new("build", cause, "install the same build on both machines"));
         }
-        if join.scenario != self.terms.scenario {
+        if join.scenario != self.config.scenario {
             let cause = format!(
                 "the server flies another scenario (fingerprint {}, this node has read {})",
-                self.terms.scenario, join.scenario
+                self.config.scenario, join.scenario
             );
-            return reject(
+            return Err(Refusal::new(
                 "scenario",
                 cause,
                 "give the node the same file and the same --set, --seed and --cycles as the server",
-            );
+            ));
         }
-        None
+        Ok(())
     }
 
-    /// Returns why a node may not have the seat of its agent.
-    fn entry_error(
+    /// Refuses a node whose agent has another one, or cannot get one again.
+    fn check_entry(
         &self,
-        agent: EntityId,
-        seat: &NodeEntry,
-        life: Incarnation,
+        entry: &NodeEntry,
+        incarnation: Incarnation,
         join: &Join,
-    ) -> Option<(&'static str, JoinError)> {
-        let who = self.stage.agent_label(agent);
-        let is_other = seat.incarnation().is_some_and(|taken| taken != life);
-        if is_other {
-            let cause = format!("{who} has a node already (process {})", seat.process);
-            let noun = self.stage.world().name(agent).noun();
-            return reject("taken", cause, &format!("give the --{noun} of one that has none"));
+    ) -> Result<(), Refusal> {
+        let who = self.run.agent_label(join.agent);
+        if entry.incarnation().is_some_and(|present| present != incarnation) {
+            let cause = format!("{who} has a node already (process {})", entry.process);
+            let noun = self.run.world().name(join.agent).noun();
+            let remedy = format!("give the --{noun} of one that has none");
+            return Err(Refusal::new("taken", cause, &remedy));
         }
-        let is_back = seat.lives > 0 && seat.incarnation().is_none();
-        if is_back && self.has_begun && !self.allows_rejoin() {
+        let replaces_lost_node = entry.joins > 0 && entry.incarnation().is_none();
+        if !replaces_lost_node || !self.has_begun {
+            return Ok(());
+        }
+        if !self.allows_rejoin() {
             let cause = "the fleet flies in lockstep, and has begun".to_string();
-            return reject("begun", cause, "start the fleet again");
+            return Err(Refusal::new("begun", cause, "start the fleet again"));
         }
-        let moved = seat.member.as_ref().filter(|_| is_back && self.has_begun);
-        if moved.is_some_and(|member| member.listens != join.listens) {
-            let cause = format!(
-                "the other nodes look for {who} at {}",
-                seat.member.as_ref().map(|member| member.listens.join(", ")).unwrap_or_default()
-            );
-            return reject("moved", cause, "give the same --listen as before");
+        // The other nodes keep the endpoints of the first roster: their Zenoh sessions reconnect to these.
+        if let Some(member) = &entry.member
+            && member.listens != join.listens
+        {
+            let cause = format!("the other nodes look for {who} at {}", member.listens.join(", "));
+            return Err(Refusal::new("moved", cause, "give the same --listen as before"));
         }
-        None
+        Ok(())
     }
-}
-
-/// Returns a refusal, in a word and at length.
-fn reject(word: &'static str, cause: String, remedy: &str) -> Option<(&'static str, JoinError)> {
-    Some((word, JoinError { cause, remedy: remedy.into() }))
 }

@@ -1,4 +1,4 @@
-//! Nodes that are not heard: gone ones, and silent ones, for which a fleet in lockstep waits.
+//! Liveness of nodes: lost ones, and silent ones, for which a fleet in lockstep waits.
 
 use super::{FleetError, POLL_INTERVAL, Server};
 use crate::protocol::{ClockMode, Incarnation, JoinError, Message};
@@ -6,83 +6,92 @@ use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
-/// Time after which a node that is not heard counts as silent: it sends a status twice a second.
+/// Time after which a node that is not heard counts as silent: two of its reports are missing then.
 pub const SILENCE_TIMEOUT: Duration = Duration::from_secs(1);
 
 impl Server<'_> {
     /// Returns whether a node that has joined was not heard for longer than some time.
     pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
-        self.mail.silent_for(Peer::Node(agent)).is_some_and(|silent| silent > time)
+        self.messenger.silent_for(Peer::Node(agent)).is_some_and(|silent| silent > time)
     }
 
-    /// Returns whether the node of an agent is gone.
-    pub(super) fn is_gone(&self, agent: EntityId) -> bool {
-        self.seats.get(&agent).is_none_or(|seat| seat.incarnation().is_none())
+    /// Returns whether an agent has no node, because none has joined or it is lost.
+    pub(super) fn has_no_node(&self, agent: EntityId) -> bool {
+        self.nodes.get(&agent).is_none_or(|node| node.incarnation().is_none())
     }
 
     /// Returns whether the fleet is in lockstep.
     fn is_in_lockstep(&self) -> bool {
-        self.terms.welcome.clock == ClockMode::Lockstep
+        self.config.welcome.clock == ClockMode::Lockstep
     }
 
-    /// Returns whether the fleet takes back a node that returns after the start.
+    /// Returns whether an agent may get another node after the start. In real time the state of the world is with the
+    /// server, and a new node needs only the next percept; in lockstep it depends on the world.
     pub(super) fn allows_rejoin(&self) -> bool {
-        !self.is_in_lockstep() || self.stage.world().waits_for_lost_nodes()
+        !self.is_in_lockstep() || self.run.world().waits_for_lost_nodes()
     }
 
-    /// Notes that a node is gone.
+    /// Records that a node is lost.
     ///
     /// # Errors
-    /// When the fleet does not go on without it.
+    /// When the fleet cannot continue without it.
     pub(super) fn mark_lost(&mut self, agent: EntityId, reason: String) -> Result<(), FleetError> {
-        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.incarnation().is_some())
+        let Some(node) = self.nodes.get_mut(&agent).filter(|node| node.incarnation().is_some())
         else {
             return Ok(());
         };
-        seat.is_gone = true;
-        self.mail.disconnect(Peer::Node(agent));
-        let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
+        node.is_lost = true;
+        self.messenger.disconnect(Peer::Node(agent));
+        let who = self.run.agent_label(agent);
+        let cycle = self.run.cycle();
         tracing::warn!(agent, who, cycle, reason, "a node is gone");
-        match self.has_begun && !self.allows_rejoin() {
-            true => Err(FleetError::Gone { agent: who, cycle, reason }),
-            false => Ok(()),
+        if self.has_begun && !self.allows_rejoin() {
+            return Err(FleetError::NodeLost { agent: who, cycle, reason });
+        }
+        Ok(())
+    }
+
+    /// Tells a node that was given up, and still sends, that it has lost its place: it ends then, and can be started again
+    /// under a new incarnation.
+    pub(super) fn dismiss(&mut self, agent: EntityId, incarnation: Incarnation) {
+        let Some(node) = self.nodes.get(&agent) else { return };
+        let is_former = node.member.as_ref().is_some_and(|known| known.incarnation == incarnation);
+        if node.is_lost && is_former {
+            let error = JoinError {
+                cause: "the server has not heard this node for too long, and has given it up"
+                    .into(),
+                remedy: "start it again".into(),
+            };
+            self.messenger.reply(Peer::Node(agent), incarnation, Message::Refused(error));
         }
     }
 
-    /// Tells a node that was taken to be gone, and still speaks, that its place is lost.
-    pub(super) fn dismiss(&mut self, agent: EntityId, life: Incarnation) {
-        let Some(seat) = self.seats.get(&agent) else { return };
-        let is_lost = seat.is_gone && seat.member.as_ref().is_some_and(|one| one.life == life);
-        if is_lost {
-            let cause = "the server had not heard this node for a while, and has given it up";
-            let remedy = "start it again";
-            let refusal = JoinError { cause: cause.into(), remedy: remedy.into() };
-            self.mail.reply(Peer::Node(agent), life, Message::Refused(refusal));
-        }
-    }
-
-    /// Waits until all nodes are there and ready, also those that were gone.
+    /// Waits until all nodes are there and ready, including replacements of lost ones.
     ///
     /// # Errors
     /// When the fleet is asked to end.
     pub(super) fn wait_for_all(&mut self) -> Result<(), FleetError> {
-        while !self.seats.values().all(|seat| seat.is_ready && !seat.is_gone) {
+        while !self.nodes.values().all(|node| node.is_ready && !node.is_lost) {
             self.receive(POLL_INTERVAL)?;
         }
         Ok(())
     }
 
-    /// Notes the agents for which a fleet in lockstep waits, and reports the new ones.
+    /// Updates the list of agents for which a fleet in lockstep waits, and logs the new ones.
     pub(super) fn report_waits(&mut self) {
         if !self.is_in_lockstep() || !self.has_begun {
             return;
         }
-        let is_missed =
-            |agent: &EntityId| self.is_gone(*agent) || self.is_silent(*agent, SILENCE_TIMEOUT);
-        let waits_for: Vec<EntityId> = self.seats.keys().copied().filter(is_missed).collect();
+        let mut waits_for = Vec::new();
+        for &agent in self.nodes.keys() {
+            if self.has_no_node(agent) || self.is_silent(agent, SILENCE_TIMEOUT) {
+                waits_for.push(agent);
+            }
+        }
         for &agent in waits_for.iter().filter(|agent| !self.waits_for.contains(agent)) {
-            let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
-            tracing::warn!(agent, who, cycle, "all wait for a node of which nothing is heard");
+            let who = self.run.agent_label(agent);
+            let cycle = self.run.cycle();
+            tracing::warn!(agent, who, cycle, "all wait for a node that is not heard");
         }
         self.waits_for = waits_for;
     }

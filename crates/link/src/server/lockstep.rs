@@ -5,19 +5,18 @@ use super::{FleetError, POLL_INTERVAL, Server};
 use std::time::Instant;
 
 impl Server<'_> {
-    /// Makes a cycle.
+    /// Runs a cycle.
     ///
     /// # Errors
-    /// When a node that the fleet needs is gone, the world cannot go on, or the fleet is asked to
-    /// end.
+    /// When a node that the fleet needs is lost, the world cannot advance, or the fleet is asked to end.
     pub(super) fn run_lockstep_cycle(&mut self) -> Result<(), FleetError> {
-        // Time stands still while a node is missing: only the cycle under way at its loss was made without it.
+        // No cycle starts while a node is missing: only the one under way at its loss is computed without it.
         self.wait_for_all()?;
-        let began = Instant::now();
+        let started = Instant::now();
         loop {
             let groups = self.send_percepts();
-            let is_last = groups.is_empty() || self.stage.max_further_rounds(groups.len()) == 0;
-            if self.terms.has_faults {
+            let is_last = groups.is_empty() || self.run.max_further_rounds(groups.len()) == 0;
+            if self.config.has_faults {
                 self.run_ticks(&groups)?;
             }
             while !groups.iter().all(|group| self.has_decided(group)) {
@@ -28,13 +27,14 @@ impl Server<'_> {
                 break;
             }
         }
-        self.tally.talked.record(began.elapsed());
+        self.metrics.decision_time.record(started.elapsed());
         self.advance()
     }
 
-    /// Returns whether all of a group have sent their controls, or one is gone: then others may wait for it forever.
+    /// Returns whether all of a group have sent their controls, or one has no node: then the others may wait for its
+    /// messages forever.
     pub(super) fn has_decided(&self, group: &Group) -> bool {
-        let has_lost = group.iter().any(|&agent| self.is_gone(agent));
+        let has_lost = group.iter().any(|&agent| self.has_no_node(agent));
         has_lost || group.iter().all(|&agent| self.has_control(agent))
     }
 }

@@ -1,13 +1,14 @@
-//! The server of a fleet: it has the world, hands each node its percept, takes the controls, and lets the world go on.
+//! The server of a fleet: it holds the world, sends each node its percept, receives the controls, and advances the world.
 //!
 //! ```text
-//! muster.rs    nodes join, until all are there       seat.rs      the known state of a node
-//! lockstep.rs  waits for every control               realtime.rs  each cycle is a deadline
-//! rounds.rs    sights out and controls in            missing.rs   nodes not heard
-//! ticks.rs     counted time, on a network with faults
+//! join.rs        nodes join, until all are there    node_entry.rs  what is known of a node
+//! lockstep.rs    waits for every control            realtime.rs    each cycle is a deadline
+//! rounds.rs      percepts out and controls in       liveness.rs    lost and silent nodes
+//! ticks.rs       time counted in ticks, on a network with faults
+//! histogram.rs   durations by bucket, for metrics
 //! ```
 //!
-//! It names no socket: all its words go over [`Messenger`].
+//! It opens no socket: all its messages go through a [`Messenger`].
 
 pub mod histogram;
 mod join;
@@ -30,13 +31,14 @@ use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// The longest wait of the server before it looks around.
+/// Maximum time that the server waits for messages before it calls its hooks: 50 times a second, so that viewers get
+/// frames that look continuous, and an interrupt ends the fleet at once.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Time between two signs of life to all nodes.
+/// Time between two signs of life to all nodes: several of them may be lost before a node's lease ends.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 
-/// The terms on which nodes join, and how the fleet is flown.
+/// The configuration of a server.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
     /// Fingerprint of the scenario.
@@ -45,9 +47,9 @@ pub struct ServerConfig {
     pub build: String,
     /// The answer to nodes that may join.
     pub welcome: Welcome,
-    /// Time after which a node that is not heard counts as gone.
+    /// Time after which a node that is not heard counts as lost.
     pub lease: Duration,
-    /// Whether packets may be lost, delayed or doubled, so that lockstep counts time in ticks.
+    /// Whether packets may be lost, delayed or duplicated, so that lockstep counts time in ticks.
     pub has_faults: bool,
 }
 
@@ -57,9 +59,9 @@ pub enum FleetError {
     /// It was asked to end.
     #[error("interrupted")]
     Interrupted,
-    /// A node is gone, and lockstep does not go on without it.
+    /// A node is lost, and the fleet cannot continue without it.
     #[error("the node of {agent} is gone in cycle {cycle}: {reason}")]
-    Gone {
+    NodeLost {
         /// Its agent, by its name for people.
         agent: String,
         /// The cycle.
@@ -67,233 +69,250 @@ pub enum FleetError {
         /// The reason.
         reason: String,
     },
-    /// The world cannot go on.
+    /// The world cannot advance.
     #[error(transparent)]
     World(#[from] sidestep_session::Error),
 }
 
-/// The fleet as seen by its [`ServerHooks`] now and then.
+/// The state of the fleet, as its [`ServerHooks`] see it.
 pub struct FleetView<'a> {
-    /// The seats.
-    pub seats: &'a BTreeMap<EntityId, NodeEntry>,
+    /// The nodes, by their agents.
+    pub nodes: &'a BTreeMap<EntityId, NodeEntry>,
     /// The counts of the server.
-    pub tally: &'a ServerMetrics,
-    /// The mail of the server.
-    pub mail: &'a Messenger,
-    /// The stage.
-    pub stage: &'a HostedRun,
-    /// Whether all nodes are there.
+    pub metrics: &'a ServerMetrics,
+    /// The messenger of the server.
+    pub messenger: &'a Messenger,
+    /// The run.
+    pub run: &'a HostedRun,
+    /// Whether all nodes have joined.
     pub has_begun: bool,
-    /// Agents for which all wait, because nothing is heard of their nodes.
+    /// Agents for which all wait, because their nodes are not heard.
     pub waits_for: &'a [EntityId],
 }
 
-/// An attendant, which looks after the fleet while the server waits.
+/// Hooks that a server calls while it waits for messages.
 pub trait ServerHooks {
-    /// Looks at the fleet, 50 times a second or so. Returns the nodes that have ended, with the reason.
+    /// Inspects the fleet, about 50 times a second. Returns the nodes whose processes have ended, with the reason.
     ///
     /// # Errors
     /// When the fleet is to end.
     fn on_poll(&mut self, fleet: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError>;
 
-    /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
-    /// with its sender.
+    /// Receives the records of packets that nodes have sent, where all are recorded: those of the cycles before the
+    /// present one, each with its sender.
     fn on_packets(&mut self, _: Vec<(EntityId, PacketRecord)>) {}
 
-    /// Returns whether a watcher has no frame of this cycle yet.
+    /// Returns whether a viewer waits for a frame of this cycle.
     fn wants_frame(&self, _: Cycle) -> bool {
         false
     }
 
-    /// Takes a frame that it wanted.
+    /// Receives a frame that a viewer waits for.
     fn on_frame(&mut self, _: Frame) {}
 
-    /// Looks at the fleet when all nodes have sent their last words.
+    /// Inspects the fleet when all nodes have said goodbye.
     fn on_end(&mut self, _: &FleetView<'_>) {}
 }
 
 /// Counts of a server.
 #[derive(Debug, Clone, Default)]
 pub struct ServerMetrics {
-    /// Time from the sights to the last control of a cycle.
-    pub talked: Histogram,
+    /// Time from the percepts of a cycle to its last control.
+    pub decision_time: Histogram,
     /// Time to advance the world by one cycle.
-    pub advanced: Histogram,
-    /// Lateness of cycles: the delay between the due time and the start of one, in real time.
-    pub late: Histogram,
-    /// Number of cycles that began later than a tenth of their length.
+    pub advance_time: Histogram,
+    /// Time by which a cycle has started later than due, in real time.
+    pub lateness: Histogram,
+    /// Number of cycles that started later than a tenth of their length.
     pub late_cycles: u64,
-    /// Number of controls that were not there in time.
+    /// Number of controls that did not arrive in time.
     pub late_controls: u64,
-    /// Number of controls that made no sense.
-    pub absurd_controls: u64,
+    /// Number of controls that could not be read or carried out.
+    pub invalid_controls: u64,
     /// Nodes that were refused, by reason.
     pub refused: BTreeMap<&'static str, u64>,
 }
 
 /// The server of a fleet.
 pub struct Server<'a> {
-    mail: Messenger,
-    stage: &'a mut HostedRun,
-    attendant: &'a mut dyn ServerHooks,
-    terms: ServerConfig,
-    seats: BTreeMap<EntityId, NodeEntry>,
-    tally: ServerMetrics,
+    messenger: Messenger,
+    run: &'a mut HostedRun,
+    hooks: &'a mut dyn ServerHooks,
+    config: ServerConfig,
+    nodes: BTreeMap<EntityId, NodeEntry>,
+    metrics: ServerMetrics,
+    /// Whether all nodes have joined.
     has_begun: bool,
-    /// Agents for which all wait, because nothing is heard of their nodes.
+    /// Agents for which all wait, because their nodes are not heard.
     waits_for: Vec<EntityId>,
-    beat_at: Instant,
-    look_at: Instant,
+    heartbeat_at: Instant,
+    poll_at: Instant,
     /// Reports of nodes that have done a tick.
-    ticked: Vec<(EntityId, AdvanceDone)>,
-    /// Packets that nodes have sent, where all are recorded.
+    advance_reports: Vec<(EntityId, AdvanceDone)>,
+    /// Records of packets that nodes have sent, where all are recorded.
     packets: Vec<(EntityId, PacketRecord)>,
 }
 
 impl<'a> Server<'a> {
     /// Returns a server that no node has joined yet.
     pub fn new(
-        mail: Messenger,
-        stage: &'a mut HostedRun,
-        attendant: &'a mut dyn ServerHooks,
-        terms: ServerConfig,
+        messenger: Messenger,
+        run: &'a mut HostedRun,
+        hooks: &'a mut dyn ServerHooks,
+        config: ServerConfig,
     ) -> Self {
-        let seats = stage.agents().map(|agent| (agent, NodeEntry::default())).collect();
-        let (beat_at, look_at) = (Instant::now(), Instant::now());
-        let (tally, ticked, packets) = (ServerMetrics::default(), Vec::new(), Vec::new());
+        let nodes = run.agents().map(|agent| (agent, NodeEntry::default())).collect();
+        let now = Instant::now();
         Self {
-            mail,
-            stage,
-            attendant,
-            terms,
-            seats,
-            tally,
+            messenger,
+            run,
+            hooks,
+            config,
+            nodes,
+            metrics: ServerMetrics::default(),
             has_begun: false,
             waits_for: Vec::new(),
-            beat_at,
-            look_at,
-            ticked,
-            packets,
+            heartbeat_at: now,
+            poll_at: now,
+            advance_reports: Vec::new(),
+            packets: Vec::new(),
         }
     }
 
-    /// Waits for all nodes, and flies the world to its end. The nodes are told to end in any case.
+    /// Waits for all nodes, and runs the world to its end. The nodes are asked to end in any case.
     ///
     /// # Errors
     /// When it ends before.
     pub fn run(mut self) -> (Result<(), FleetError>, ServerMetrics) {
-        let flown = self.wait_for_nodes().and_then(|()| self.fly());
+        let result = self.wait_for_nodes().and_then(|()| self.run_cycles());
         self.shut_down();
-        (flown, self.tally)
+        (result, self.metrics)
     }
 
-    fn fly(&mut self) -> Result<(), FleetError> {
+    fn run_cycles(&mut self) -> Result<(), FleetError> {
         self.has_begun = true;
-        match self.terms.welcome.clock {
+        match self.config.welcome.clock {
             ClockMode::Lockstep => {
-                while !self.stage.is_over() {
+                while !self.run.is_over() {
                     self.run_lockstep_cycle()?;
                 }
                 Ok(())
             }
-            ClockMode::Realtime { speed } => self.fly_in_real_time(speed),
+            ClockMode::Realtime { speed } => self.run_in_real_time(speed),
         }
     }
 
-    /// Tells all nodes that the fleet has ended, and waits a little until they have sent their last words.
+    /// Tells all nodes that the fleet has ended, and waits a little until they have said goodbye, because their last
+    /// records of packets come before that.
     fn shut_down(&mut self) {
-        let seated: Vec<EntityId> = self.joined_agents().collect();
-        seated.iter().for_each(|&agent| self.mail.send_reliable(Peer::Node(agent), Message::End));
+        self.send_to_joined(|messenger, node| messenger.send_reliable(node, Message::End));
         let until = Instant::now() + HEARTBEAT_INTERVAL;
-        while self.joined_agents().any(|agent| !self.seats[&agent].has_left)
+        while self.joined_agents().any(|agent| !self.nodes[&agent].has_left)
             && Instant::now() < until
         {
-            if let Some(heard) = self.mail.receive(POLL_INTERVAL) {
-                self.on_message(heard);
+            if let Some(received) = self.messenger.receive(POLL_INTERVAL) {
+                self.on_message(received);
             }
         }
-        self.attendant.on_packets(std::mem::take(&mut self.packets));
+        self.hooks.on_packets(std::mem::take(&mut self.packets));
         self.waits_for.clear();
         self.publish_frame();
-        let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
-        let has_begun = *has_begun;
-        self.attendant.on_end(&FleetView { seats, tally, mail, stage, has_begun, waits_for });
+        let (hooks, view) = self.hooks_and_view();
+        hooks.on_end(&view);
     }
 
-    /// Agents with nodes that are there, rising.
+    /// Agents that have nodes, in ascending order.
     fn joined_agents(&self) -> impl Iterator<Item = EntityId> + '_ {
-        self.seats.iter().filter(|(_, seat)| seat.incarnation().is_some()).map(|(&agent, _)| agent)
+        self.nodes.iter().filter(|(_, node)| node.incarnation().is_some()).map(|(&agent, _)| agent)
     }
 
-    /// Hears the words that come within some time, at most until the next look around.
+    fn send_to_joined(&mut self, send: impl Fn(&mut Messenger, Peer)) {
+        let joined: Vec<EntityId> = self.joined_agents().collect();
+        joined.into_iter().for_each(|agent| send(&mut self.messenger, Peer::Node(agent)));
+    }
+
+    /// Receives the messages that arrive within some time, at most until the next poll.
     ///
     /// # Errors
     /// When the fleet is to end.
     fn receive(&mut self, within: Duration) -> Result<(), FleetError> {
-        if let Some(heard) = self.mail.receive(within.min(POLL_INTERVAL)) {
-            self.on_message(heard);
+        if let Some(received) = self.messenger.receive(within.min(POLL_INTERVAL)) {
+            self.on_message(received);
         }
         let now = Instant::now();
-        if now >= self.look_at {
-            // Words that came while this process stood still are heard before any node counts as missing.
-            while let Some(heard) = self.mail.receive(Duration::ZERO) {
-                self.on_message(heard);
+        if now >= self.poll_at {
+            // If this process was stopped, messages have queued up meanwhile: they are received before any node counts
+            // as silent.
+            while let Some(received) = self.messenger.receive(Duration::ZERO) {
+                self.on_message(received);
             }
-            self.look_at = now + POLL_INTERVAL;
+            self.poll_at = now + POLL_INTERVAL;
             self.poll(now)?;
         }
         Ok(())
     }
 
     fn poll(&mut self, now: Instant) -> Result<(), FleetError> {
-        if now >= self.beat_at {
-            self.beat_at = now + HEARTBEAT_INTERVAL;
-            let seated: Vec<EntityId> = self.joined_agents().collect();
-            seated
-                .into_iter()
-                .for_each(|agent| self.mail.send_best_effort(Peer::Node(agent), Message::Beat));
+        if now >= self.heartbeat_at {
+            self.heartbeat_at = now + HEARTBEAT_INTERVAL;
+            self.send_to_joined(|messenger, node| {
+                messenger.send_best_effort(node, Message::Heartbeat);
+            });
         }
         self.publish_frame();
-        let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
-        let has_begun = *has_begun;
-        let look = FleetView { seats, tally, mail, stage, has_begun, waits_for };
-        let mut gone = self.attendant.on_poll(&look)?;
-        let lease = self.terms.lease;
-        let silent = self.joined_agents().filter(|&agent| self.is_silent(agent, lease));
-        let reason = || format!("not heard for {} s", lease.as_secs_f64());
-        gone.extend(silent.map(|agent| (agent, reason())));
-        gone.into_iter().try_for_each(|(agent, reason)| self.mark_lost(agent, reason))?;
+        let (hooks, view) = self.hooks_and_view();
+        let mut lost = hooks.on_poll(&view)?;
+        let lease = self.config.lease;
+        for agent in self.joined_agents().filter(|&agent| self.is_silent(agent, lease)) {
+            lost.push((agent, format!("not heard for {} s", lease.as_secs_f64())));
+        }
+        for (agent, reason) in lost {
+            self.mark_lost(agent, reason)?;
+        }
         self.report_waits();
         Ok(())
     }
 
-    /// Shows the world to its watchers.
+    /// Returns the hooks, and the state of the fleet that is shown to them.
+    fn hooks_and_view(&mut self) -> (&mut dyn ServerHooks, FleetView<'_>) {
+        let view = FleetView {
+            nodes: &self.nodes,
+            metrics: &self.metrics,
+            messenger: &self.messenger,
+            run: &*self.run,
+            has_begun: self.has_begun,
+            waits_for: &self.waits_for,
+        };
+        (&mut *self.hooks, view)
+    }
+
+    /// Gives viewers a frame if they wait for one.
     fn publish_frame(&mut self) {
-        if self.attendant.wants_frame(self.stage.cycle()) {
-            self.attendant.on_frame(self.stage.frame());
+        if self.hooks.wants_frame(self.run.cycle()) {
+            self.hooks.on_frame(self.run.frame());
         }
     }
 
-    fn on_message(&mut self, Received { from, life, word }: Received) {
+    fn on_message(&mut self, Received { from, incarnation, message }: Received) {
         let Peer::Node(agent) = from else { return };
-        if let Message::Join(join) = word {
-            self.on_join(agent, life, join);
+        if let Message::Join(join) = message {
+            self.on_join(agent, incarnation, join);
             return;
         }
-        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.incarnation() == Some(life))
-        else {
-            return self.dismiss(agent, life);
+        let node = self.nodes.get_mut(&agent);
+        let Some(node) = node.filter(|node| node.incarnation() == Some(incarnation)) else {
+            return self.dismiss(agent, incarnation);
         };
-        match word {
-            Message::Ready => seat.is_ready = true,
-            Message::Status(status) => seat.status = status,
+        match message {
+            Message::Ready => node.is_ready = true,
+            Message::Status(status) => node.status = status,
             Message::Control(control) => self.on_control(agent, control),
-            Message::Ticked(ticked) => self.ticked.push((agent, ticked)),
-            Message::Log(sent) => {
-                self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
+            Message::TickDone(report) => self.advance_reports.push((agent, report)),
+            Message::PacketLog(records) => {
+                self.packets.extend(records.into_iter().map(|record| (agent, record)));
             }
-            Message::Left => seat.has_left = true,
-            // From a node, a word that only other parties send.
+            Message::Goodbye => node.has_left = true,
+            // A message that only servers send, or that nodes send to each other: of a faulty program.
             _ => {}
         }
     }

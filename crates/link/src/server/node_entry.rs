@@ -1,51 +1,52 @@
-//! Seats of a fleet: one for each agent, taken by the node that has joined for it.
+//! What the server knows of the node of an agent.
 
 use crate::protocol::{Incarnation, Member, Status};
-use std::time::Instant;
 
-/// The place of an agent in the fleet.
+/// The entry of an agent in the server's list of nodes.
 #[derive(Debug, Default)]
 pub struct NodeEntry {
     /// Its node, if one has joined.
     pub member: Option<Member>,
-    /// The process of the node.
+    /// The process id of the node.
     pub process: u32,
-    /// Whether all other nodes have heard it.
+    /// Whether all other nodes have acknowledged the node's `Hello`.
     pub is_ready: bool,
     /// The last status reported by the node.
     pub status: Status,
-    /// Whether its node is gone: it has ended, or was not heard for too long.
-    pub is_gone: bool,
-    /// Whether its node has said that it has nothing more to say.
+    /// Whether the node is lost: it has ended, or was not heard for too long.
+    pub is_lost: bool,
+    /// Whether the node has said goodbye.
     pub has_left: bool,
-    /// The present cycle's control, once it has come.
+    /// The present cycle's control, once it has arrived.
     pub control: Option<Vec<u8>>,
-    /// Number of its controls that were flown.
-    pub flown: u64,
+    /// Number of its controls that were carried out.
+    pub carried_out: u64,
     /// Number of its controls that came too late, or not at all.
     pub late: u64,
-    /// Number of its controls that made no sense.
-    pub absurd: u64,
-    /// Number of nodes that it has had.
-    pub lives: u64,
-    /// Time at which its node joined.
-    pub since: Option<Instant>,
+    /// Number of its controls that could not be read or carried out.
+    pub invalid: u64,
+    /// Number of nodes that have joined for the agent.
+    pub joins: u64,
 }
 
 impl NodeEntry {
-    /// Returns the present life of its node, if it has one that is not gone.
+    /// Returns the present incarnation of the node, if one has joined and is not lost.
     pub fn incarnation(&self) -> Option<Incarnation> {
-        self.member.as_ref().filter(|_| !self.is_gone).map(|member| member.life)
+        let member = self.member.as_ref()?;
+        (!self.is_lost).then_some(member.incarnation)
     }
 
-    /// Seats a node in place of any other.
+    /// Records that a node has joined, in place of any other. The same node may join more than once, because its first
+    /// answer may be lost.
     pub fn assign(&mut self, member: Member, process: u32) {
-        let is_new = self.member.as_ref().is_none_or(|known| known.life != member.life);
+        let is_new =
+            self.member.as_ref().is_none_or(|known| known.incarnation != member.incarnation);
         if is_new {
-            self.lives += 1;
+            self.joins += 1;
             self.is_ready = false;
-            self.since = Some(Instant::now());
         }
-        (self.member, self.process, self.is_gone) = (Some(member), process, false);
+        self.member = Some(member);
+        self.process = process;
+        self.is_lost = false;
     }
 }

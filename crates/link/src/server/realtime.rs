@@ -1,77 +1,90 @@
-//! Real time: every cycle is a deadline. A control that is not there by then is not flown, and its agent does the
-//! safe thing.
+//! Real time: every cycle is a deadline. A control that is late is not carried out, and its agent does what is safe
+//! without one.
 //!
-//! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment that
-//! it has heard of the cycle. Clocks are never compared, so one that is wrong, or jumps, changes nothing.
+//! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment at which
+//! the cycle's start arrives. Clocks are never compared, so one that is wrong, or jumps, changes nothing.
 
+use super::rounds::Group;
 use super::{FleetError, Server};
 use std::time::{Duration, Instant};
 
-/// Part of a cycle by which it may begin later than due without being counted as late.
+/// Fraction of a cycle by which it may start later than due without being counted as late. Without it each cycle would
+/// count, because no timer of an operating system is exact.
 const LATE_FRACTION: f64 = 0.1;
 
-/// The shortest cycle: below it only lateness would be seen.
+/// The shortest cycle: timers are no more exact than that, so below it only lateness would be measured.
 const MIN_CYCLE: Duration = Duration::from_millis(1);
 
 impl Server<'_> {
-    /// Flies the world to its end, `speed` times as fast as in the scenario.
+    /// Runs the world to its end, `speed` times as fast as in the scenario.
     ///
     /// # Errors
-    /// When the world cannot go on, or the fleet is asked to end.
-    pub(super) fn fly_in_real_time(&mut self, speed: f64) -> Result<(), FleetError> {
-        let cycle = Duration::from_secs_f64(self.stage.world().cycle_s() / speed).max(MIN_CYCLE);
+    /// When the world cannot advance, or the fleet is asked to end.
+    pub(super) fn run_in_real_time(&mut self, speed: f64) -> Result<(), FleetError> {
+        let cycle = Duration::from_secs_f64(self.run.world().cycle_s() / speed).max(MIN_CYCLE);
         let mut due = Instant::now();
-        while !self.stage.is_over() {
+        while !self.run.is_over() {
             self.record_lateness(due.elapsed(), cycle);
-            let began = Instant::now();
-            // A server that was stopped for a while does not rush to catch up.
-            due = (due + cycle).max(began + cycle / 2);
+            // A server that was stopped for some time does not catch up in a hurry: agents get half a cycle at least.
+            due = (due + cycle).max(Instant::now() + cycle / 2);
             self.run_rounds_until(due)?;
-            let left = || due.saturating_duration_since(Instant::now());
-            while !left().is_zero() {
-                self.receive(left())?;
+            loop {
+                let remaining = due.saturating_duration_since(Instant::now());
+                if remaining.is_zero() {
+                    break;
+                }
+                self.receive(remaining)?;
             }
             self.advance()?;
         }
         Ok(())
     }
 
-    /// Lets the agents of a cycle talk, round after round. Each round has an equal part of the remaining time, so
-    /// that a late agent costs later rounds nothing more.
+    /// Runs the rounds of a cycle. Each round gets an equal share of the remaining time, so that a late agent costs later
+    /// rounds nothing more.
     fn run_rounds_until(&mut self, due: Instant) -> Result<(), FleetError> {
-        let began = Instant::now();
+        let started = Instant::now();
         loop {
             let groups = self.send_percepts();
-            let further = self.stage.max_further_rounds(groups.len());
-            let left = due.saturating_duration_since(Instant::now());
-            let ends = Instant::now() + left / (further as u32 + 1);
-            let is_there =
-                |server: &Self, agent| server.is_gone(agent) || server.has_control(agent);
-            let mut is_in_time = true;
-            while !groups.iter().flatten().all(|&agent| is_there(self, agent)) {
-                let left = ends.saturating_duration_since(Instant::now());
-                is_in_time = !left.is_zero();
-                if !is_in_time {
-                    break;
-                }
-                self.receive(left)?;
-            }
+            let further = self.run.max_further_rounds(groups.len());
+            let remaining = due.saturating_duration_since(Instant::now());
+            let round_ends = Instant::now() + remaining / (further as u32 + 1);
+            let is_in_time = self.receive_controls_until(&groups, round_ends)?;
             self.accept_controls(&groups);
             if groups.is_empty() || further == 0 {
-                let talked = if is_in_time { began.elapsed() } else { due - began };
-                self.tally.talked.record(talked);
+                // A late control may arrive long after the deadline, or never.
+                let decision_time = if is_in_time { started.elapsed() } else { due - started };
+                self.metrics.decision_time.record(decision_time);
                 return Ok(());
             }
         }
     }
 
-    fn record_lateness(&mut self, late: Duration, cycle: Duration) {
-        self.tally.late.record(late);
-        if late > cycle.mul_f64(LATE_FRACTION) {
-            self.tally.late_cycles += 1;
+    /// Waits for the controls of all agents that have nodes. Returns whether they have arrived by a time.
+    fn receive_controls_until(
+        &mut self,
+        groups: &[Group],
+        until: Instant,
+    ) -> Result<bool, FleetError> {
+        let is_settled =
+            |server: &Self, agent| server.has_no_node(agent) || server.has_control(agent);
+        while !groups.iter().flatten().all(|&agent| is_settled(self, agent)) {
+            let remaining = until.saturating_duration_since(Instant::now());
+            if remaining.is_zero() {
+                return Ok(false);
+            }
+            self.receive(remaining)?;
+        }
+        Ok(true)
+    }
+
+    fn record_lateness(&mut self, lateness: Duration, cycle: Duration) {
+        self.metrics.lateness.record(lateness);
+        if lateness > cycle.mul_f64(LATE_FRACTION) {
+            self.metrics.late_cycles += 1;
             tracing::warn!(
-                cycle = self.stage.cycle(),
-                late_ms = late.as_millis() as u64,
+                cycle = self.run.cycle(),
+                late_ms = lateness.as_millis() as u64,
                 "the server is late"
             );
         }

@@ -1,5 +1,5 @@
 //! Rounds of a cycle: percepts go out to the agents that decide next, and controls come in; after the last round the
-//! world goes on.
+//! world advances.
 
 use super::{FleetError, Server};
 use crate::agent::{AgentPercept, Controls, InvalidControl};
@@ -12,12 +12,13 @@ use std::time::Instant;
 pub(super) type Group = Vec<EntityId>;
 
 impl Server<'_> {
-    /// Hands each agent that decides next its percept; returns the groups of agents that decide together.
+    /// Sends each agent that decides next its percept; returns the groups of agents that decide together.
     pub(super) fn send_percepts(&mut self) -> Vec<Group> {
-        self.seats.values_mut().for_each(|seat| seat.control = None);
+        self.nodes.values_mut().for_each(|node| node.control = None);
         let mut groups = Vec::new();
-        for AgentPercept { agent, group, begin } in self.stage.percepts() {
-            self.mail.send_reliable(Peer::Node(agent), Message::Begin(begin));
+        for AgentPercept { agent, group, start } in self.run.percepts() {
+            self.messenger.send_reliable(Peer::Node(agent), Message::CycleStart(start));
+            // Each member has the whole group: it is taken from the first one.
             if group.first() == Some(&agent) {
                 groups.push(group);
             }
@@ -26,76 +27,79 @@ impl Server<'_> {
     }
 
     pub(super) fn on_control(&mut self, agent: EntityId, Control { cycle, control }: Control) {
-        let Some(seat) = self.seats.get_mut(&agent) else { return };
-        if cycle == self.stage.cycle() {
-            seat.control = Some(control);
+        let Some(node) = self.nodes.get_mut(&agent) else { return };
+        // A late control of an earlier cycle must not be carried out in this one.
+        if cycle == self.run.cycle() {
+            node.control = Some(control);
         }
     }
 
     /// Returns whether an agent has sent its control.
     pub(super) fn has_control(&self, agent: EntityId) -> bool {
-        self.seats.get(&agent).is_some_and(|seat| seat.control.is_some())
+        self.nodes.get(&agent).is_some_and(|node| node.control.is_some())
     }
 
-    /// Takes the controls that are there, and counts those that are not.
+    /// Hands the world the controls that have arrived, and counts those that have not.
     pub(super) fn accept_controls(&mut self, groups: &[Group]) {
         let mut controls = Controls::new();
-        let mut gone = Vec::new();
+        let mut lost = Vec::new();
         for &agent in groups.iter().flatten() {
-            if self.is_gone(agent) {
-                gone.push(agent);
+            if self.has_no_node(agent) {
+                lost.push(agent);
             }
             match self.take_control(agent) {
                 Some(control) => controls.push((agent, control)),
                 None => self.record_late(agent),
             }
         }
-        let absurd = self.stage.accept_controls(groups, controls, &gone);
-        self.record_invalid(absurd);
+        let invalid = self.run.accept_controls(groups, controls, &lost);
+        self.record_invalid(invalid);
     }
 
     /// Takes the control of an agent, if there is one that counts.
     fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
-        let is_heeded = !self.is_gone(agent) || self.stage.world().keeps_controls_of_lost_nodes();
-        let seat = self.seats.get_mut(&agent)?;
-        let control = seat.control.take().filter(|_| is_heeded)?;
-        seat.flown += 1;
+        let counts = !self.has_no_node(agent) || self.run.world().keeps_controls_of_lost_nodes();
+        let node = self.nodes.get_mut(&agent)?;
+        let control = node.control.take().filter(|_| counts)?;
+        node.carried_out += 1;
         Some(control)
     }
 
     fn record_late(&mut self, agent: EntityId) {
-        let Some(seat) = self.seats.get_mut(&agent) else { return };
-        let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
-        let talk = &*seat.status.doing;
-        tracing::info!(agent, who, cycle, talk, "a control is late");
-        seat.late += 1;
-        self.tally.late_controls += 1;
+        let Some(node) = self.nodes.get_mut(&agent) else { return };
+        let who = self.run.agent_label(agent);
+        let cycle = self.run.cycle();
+        tracing::info!(agent, who, cycle, talk = &*node.status.activity, "a control is late");
+        node.late += 1;
+        self.metrics.late_controls += 1;
     }
 
-    /// Lets the world go on.
+    /// Advances the world by one cycle.
     ///
     /// # Errors
     /// When it cannot.
     pub(super) fn advance(&mut self) -> Result<(), FleetError> {
-        let began = Instant::now();
-        let cycle = self.stage.cycle();
-        let absurd = self.stage.advance()?;
-        self.record_invalid(absurd);
-        self.tally.advanced.record(began.elapsed());
-        // A node may report on a cycle until it hears of the next one.
-        let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
-        self.attendant.on_packets(past);
+        let started = Instant::now();
+        let cycle = self.run.cycle();
+        let invalid = self.run.advance()?;
+        self.record_invalid(invalid);
+        self.metrics.advance_time.record(started.elapsed());
+        // Packets of the present cycle wait: a node may send more of them until it hears of the next one.
+        let complete = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
+        self.hooks.on_packets(complete);
         Ok(())
     }
 
-    fn record_invalid(&mut self, absurd: Vec<InvalidControl>) {
-        for InvalidControl { agent, reason } in absurd {
-            let (who, cycle) = (self.stage.agent_label(agent), self.stage.cycle());
-            tracing::warn!(agent, who, cycle, reason, "an absurd control");
-            self.tally.absurd_controls += 1;
-            if let Some(seat) = self.seats.get_mut(&agent) {
-                seat.absurd += 1;
-                seat.flown -= 1;
+    /// Counts controls that [`Server::take_control`] has counted as carried out, and were not.
+    fn record_invalid(&mut self, invalid: Vec<InvalidControl>) {
+        for InvalidControl { agent, reason } in invalid {
+            let who = self.run.agent_label(agent);
+            let cycle = self.run.cycle();
+            tracing::warn!(agent, who, cycle, reason, "an invalid control");
+            self.metrics.invalid_controls += 1;
+            if let Some(node) = self.nodes.get_mut(&agent) {
+                node.invalid += 1;
+                node.carried_out -= 1;
             }
         }
     }
@@ -124,43 +128,47 @@ mod tests {
         deployment = \"compact-team\"\nmax_rounds = 20\n[airspace.generator]\nkind = \"superconflict\"\n\
         n = 3\nradius_m = 1500.0\n";
 
-    struct Nobody;
+    struct NoHooks;
 
-    impl ServerHooks for Nobody {
+    impl ServerHooks for NoHooks {
         fn on_poll(&mut self, _: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
             Ok(Vec::new())
         }
     }
 
-    fn stage(text: &str) -> HostedRun {
+    fn hosted_run(text: &str) -> HostedRun {
         let source = Source::new("s.toml", text, "");
         let compiled = WORLDS.compile(&source).expect("a scenario");
         let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
-        let keep = OutputPaths::default();
-        let journey =
-            ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
-        HostedRun::new(journey, world, &NoWatcher)
+        let paths = OutputPaths::default();
+        let run =
+            ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, paths).expect("started");
+        HostedRun::new(run, world, &NoWatcher)
     }
 
-    fn terms() -> ServerConfig {
-        let (clock, topology, overrides) = (ClockMode::Lockstep, Topology::Star, Vec::new());
+    fn config() -> ServerConfig {
         ServerConfig {
             scenario: String::new(),
             build: "test".into(),
-            welcome: Welcome { clock, topology, overrides, logs_packets: false },
+            welcome: Welcome {
+                clock: ClockMode::Lockstep,
+                topology: Topology::Star,
+                overrides: Vec::new(),
+                logs_packets: false,
+            },
             lease: Duration::from_secs(60),
             has_faults: false,
         }
     }
 
     /// Returns the decisions of agents with these percepts that hear each other completely.
-    fn decided(stage: &HostedRun, sights: &[AgentPercept]) -> Controls {
-        let program = |sight: &AgentPercept| {
-            let mut program = stage.world().program(sight.agent, "test");
-            program.start_cycle(sight.begin.cycle, &sight.begin.sight).expect("a percept");
+    fn decide(run: &HostedRun, percepts: &[AgentPercept]) -> Controls {
+        let program = |percept: &AgentPercept| {
+            let mut program = run.world().program(percept.agent, "test");
+            program.start_cycle(percept.start.cycle, &percept.start.percept).expect("a percept");
             program
         };
-        let mut programs: Vec<_> = sights.iter().map(program).collect();
+        let mut programs: Vec<_> = percepts.iter().map(program).collect();
         let mut tick = 0;
         while !programs.iter().all(|program| program.is_done()) {
             tick += 1;
@@ -173,22 +181,23 @@ mod tests {
                 }
             }
         }
-        let agents = sights.iter().map(|sight| sight.agent);
+        let agents = percepts.iter().map(|percept| percept.agent);
         agents.zip(programs.iter().map(|program| program.control().expect("it is done"))).collect()
     }
 
-    /// Makes a cycle in which all have decided before the node of agent 1 is lost. Returns the numbers of controls
-    /// flown and not flown for each agent.
-    fn with_a_loss(stage: &mut HostedRun) -> Vec<(u64, u64)> {
-        let sights = stage.percepts();
-        let controls = decided(stage, &sights);
-        let mut nobody = Nobody;
-        let mail = Messenger::new(Peer::Server, Box::new(MemoryHub::default().wire(Peer::Server)));
-        let mut server = Server::new(mail, stage, &mut nobody, terms());
+    /// Runs a cycle in which all have decided before the node of agent 1 is lost. Returns the numbers of controls
+    /// carried out and not carried out for each agent.
+    fn run_with_a_loss(run: &mut HostedRun) -> Vec<(u64, u64)> {
+        let percepts = run.percepts();
+        let controls = decide(run, &percepts);
+        let mut hooks = NoHooks;
+        let messenger =
+            Messenger::new(Peer::Server, Box::new(MemoryHub::default().wire(Peer::Server)));
+        let mut server = Server::new(messenger, run, &mut hooks, config());
         server.has_begun = true;
         for agent in 0..3 {
-            let member = Member { agent, life: Incarnation(1), listens: Vec::new() };
-            server.seats.get_mut(&agent).expect("a seat").assign(member, 0);
+            let member = Member { agent, incarnation: Incarnation(1), listens: Vec::new() };
+            server.nodes.get_mut(&agent).expect("an entry").assign(member, 0);
         }
         let groups = server.send_percepts();
         for (agent, control) in controls {
@@ -196,21 +205,26 @@ mod tests {
         }
         let _ = server.mark_lost(1, "it was killed".into());
         server.accept_controls(&groups);
-        server.advance().expect("the world goes on");
-        server.seats.values().map(|seat| (seat.flown, seat.late)).collect()
+        server.advance().expect("the world advances");
+        server.nodes.values().map(|node| (node.carried_out, node.late)).collect()
     }
 
     #[test]
-    fn a_connector_that_is_lost_after_it_has_decided_is_not_flown_and_its_chain_stands() {
-        let mut stage = stage(CHAIN);
-        assert_eq!(with_a_loss(&mut stage), [(1, 0), (0, 1), (1, 0)]);
-        assert_eq!(stage.run().metrics()["stood"], 1, "{}", stage.run().metrics());
+    fn the_control_of_a_connector_lost_after_its_decision_does_not_count_and_its_chain_stands() {
+        let mut run = hosted_run(CHAIN);
+        assert_eq!(run_with_a_loss(&mut run), [(1, 0), (0, 1), (1, 0)]);
+        assert_eq!(run.simulation().metrics()["stood"], 1, "{}", run.simulation().metrics());
     }
 
     #[test]
-    fn what_an_airplane_has_decided_is_flown_although_its_node_is_lost_then() {
-        let mut stage = stage(AIRPLANES);
-        assert_eq!(with_a_loss(&mut stage), [(1, 0), (1, 0), (1, 0)]);
-        assert_eq!(stage.run().metrics()["optimizations"], 1, "{}", stage.run().metrics());
+    fn the_control_of_an_airplane_lost_after_its_decision_is_flown() {
+        let mut run = hosted_run(AIRPLANES);
+        assert_eq!(run_with_a_loss(&mut run), [(1, 0), (1, 0), (1, 0)]);
+        assert_eq!(
+            run.simulation().metrics()["optimizations"],
+            1,
+            "{}",
+            run.simulation().metrics()
+        );
     }
 }

@@ -1,9 +1,10 @@
-//! Counted time: lockstep on a network with faults.
+//! Time counted in ticks: lockstep on a network with faults.
 //!
-//! A packet takes a number of ticks, and an agent asks again after some. To have the same faults as in one process,
-//! all nodes go through the same ticks: the server knows when each timer ends and each packet arrives, and lets the
-//! nodes go on for which something happens next. No node goes on to a tick before all packets that arrive by then are
-//! there: the server tells it their number.
+//! A packet takes a number of ticks, and an agent repeats a request after some. To have the same faults as in one
+//! process, all nodes go through the same ticks. This is a conservative discrete-event simulation with the server as
+//! coordinator: it knows when each timer ends and each packet arrives, and grants the next tick in which anything
+//! happens to the nodes at which it happens. No node advances to a tick before all packets that arrive by then are
+//! there: the grant says how many.
 
 use super::rounds::Group;
 use super::{FleetError, POLL_INTERVAL, Server};
@@ -12,119 +13,131 @@ use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 
-/// The server's knowledge of a node in a cycle.
+/// The clock of a node in a cycle.
 #[derive(Debug, Default)]
 struct NodeClock {
     /// The tick of its next timer.
-    timer: Option<u64>,
-    /// Number of packets that arrive at it, by tick.
+    next_timer: Option<u64>,
+    /// Number of packets that will arrive at it, by tick.
     arrivals: BTreeMap<u64, u64>,
-    /// Number of those that have arrived.
+    /// Number of packets that have arrived.
     arrived: u64,
     is_done: bool,
-    /// Whether it has yet to report.
-    is_out: bool,
+    /// Whether it has yet to report on the tick that it was granted.
+    is_advancing: bool,
 }
 
 impl NodeClock {
     /// Returns the next tick in which something happens.
     fn next_tick(&self) -> Option<u64> {
-        let arrival = self.arrivals.keys().next().copied();
-        self.timer.into_iter().chain(arrival).min()
+        let next_arrival = self.arrivals.keys().next().copied();
+        self.next_timer.into_iter().chain(next_arrival).min()
     }
 
-    /// Goes on to a tick, and returns the number of packets that have arrived by then.
+    /// Advances to a tick, and returns the number of packets that have arrived by then.
     fn advance_to(&mut self, tick: u64) -> u64 {
         let later = self.arrivals.split_off(&(tick + 1));
         self.arrived += self.arrivals.values().sum::<u64>();
         self.arrivals = later;
-        self.is_out = true;
+        self.is_advancing = true;
         self.arrived
     }
 }
 
-/// The courses of the nodes of one group, with ticks of its own.
+/// The clocks of the nodes of one group. Groups do not talk to each other, so each has ticks of its own.
 #[derive(Debug, Default)]
 struct GroupClock {
-    courses: BTreeMap<EntityId, NodeClock>,
+    nodes: BTreeMap<EntityId, NodeClock>,
     is_over: bool,
 }
 
 impl GroupClock {
     fn new(group: &[EntityId]) -> Self {
-        let out = || NodeClock { is_out: true, ..NodeClock::default() };
-        let courses = group.iter().map(|&agent| (agent, out())).collect();
-        Self { courses, is_over: false }
+        let mut nodes = BTreeMap::new();
+        for &agent in group {
+            // Nodes do their first tick without a grant.
+            nodes.insert(agent, NodeClock { is_advancing: true, ..NodeClock::default() });
+        }
+        Self { nodes, is_over: false }
     }
 
     fn record(&mut self, agent: EntityId, report: AdvanceDone) {
-        for (receiver, arrives) in report.sent {
-            if let Some(course) = self.courses.get_mut(&receiver) {
-                *course.arrivals.entry(arrives).or_default() += 1;
+        for (receiver, tick) in report.sent {
+            if let Some(node) = self.nodes.get_mut(&receiver) {
+                *node.arrivals.entry(tick).or_default() += 1;
             }
         }
-        if let Some(course) = self.courses.get_mut(&agent) {
-            (course.timer, course.is_done, course.is_out) = (report.timer, report.is_done, false);
+        if let Some(node) = self.nodes.get_mut(&agent) {
+            node.next_timer = report.next_timer;
+            node.is_done = report.is_done;
+            node.is_advancing = false;
         }
     }
 
-    /// Returns the nodes that go on, with the packets that have arrived at each by then, and the tick; none before all
-    /// have reported. When all are done, or nothing more can happen, the talk is over.
-    fn advance(&mut self) -> Vec<(EntityId, u64, u64)> {
-        if self.is_over || self.courses.values().any(|course| course.is_out) {
+    /// Returns the grants of the next tick, by the agents of the nodes for which something happens in it; none before all
+    /// nodes have reported, because any of them may still send a packet that arrives earlier. When all are done, or
+    /// nothing more can happen, the conversation is over.
+    fn advance(&mut self, cycle: u64) -> Vec<(EntityId, AdvanceGrant)> {
+        if self.is_over || self.nodes.values().any(|node| node.is_advancing) {
             return Vec::new();
         }
-        let next = self.courses.values().filter_map(NodeClock::next_tick).min();
+        let next = self.nodes.values().filter_map(NodeClock::next_tick).min();
+        // A timer that never ends is in the last tick there is.
         let next = next.filter(|&tick| tick < u64::MAX);
-        let is_done = self.courses.values().all(|course| course.is_done);
+        let is_done = self.nodes.values().all(|node| node.is_done);
         let Some(tick) = next.filter(|_| !is_done) else {
             self.is_over = true;
             return Vec::new();
         };
-        let go = self.courses.iter_mut().filter(|(_, course)| course.next_tick() == Some(tick));
-        go.map(|(&agent, course)| (agent, course.advance_to(tick), tick)).collect()
+        let mut grants = Vec::new();
+        for (&agent, node) in &mut self.nodes {
+            if node.next_tick() == Some(tick) {
+                let packets = node.advance_to(tick);
+                grants.push((agent, AdvanceGrant { cycle, tick, packets }));
+            }
+        }
+        grants
     }
 }
 
 impl Server<'_> {
-    /// Lets nodes talk, tick by tick, until each of them has a control.
+    /// Runs the conversations of groups, tick by tick, until each agent has a control.
     ///
     /// # Errors
-    /// When a node that the fleet needs is gone, or the fleet is asked to end.
+    /// When a node that the fleet needs is lost, or the fleet is asked to end.
     pub(super) fn run_ticks(&mut self, groups: &[Group]) -> Result<(), FleetError> {
-        let cycle = self.stage.cycle();
-        let mut talks: Vec<GroupClock> =
+        let cycle = self.run.cycle();
+        let mut clocks: Vec<GroupClock> =
             groups.iter().map(|group| GroupClock::new(group)).collect();
-        while talks.iter().any(|talk| !talk.is_over) {
+        while clocks.iter().any(|clock| !clock.is_over) {
             self.receive(POLL_INTERVAL)?;
-            for talk in &mut talks {
-                // Others may wait forever for one that is gone.
-                talk.is_over |= talk.courses.keys().any(|&agent| self.is_gone(agent));
+            for clock in &mut clocks {
+                // Without a node of the group its tick would never be complete.
+                clock.is_over |= clock.nodes.keys().any(|&agent| self.has_no_node(agent));
             }
-            for (agent, report) in std::mem::take(&mut self.ticked) {
-                let of = |talk: &&mut GroupClock| talk.courses.contains_key(&agent);
-                if let Some(talk) = talks.iter_mut().find(of)
-                    && report.cycle == cycle
-                {
-                    talk.record(agent, report);
-                    self.send_grants(talk);
+            for (agent, report) in std::mem::take(&mut self.advance_reports) {
+                // One of an earlier cycle may arrive late, if its conversation was ended by the loss of a node.
+                if report.cycle != cycle {
+                    continue;
+                }
+                let clock = clocks.iter_mut().find(|clock| clock.nodes.contains_key(&agent));
+                if let Some(clock) = clock {
+                    clock.record(agent, report);
+                    self.send_grants(clock);
                 }
             }
         }
         Ok(())
     }
 
-    fn send_grants(&mut self, talk: &mut GroupClock) {
-        let cycle = self.stage.cycle();
-        for (agent, packets, tick) in talk.advance() {
-            self.mail.send_reliable(
-                Peer::Node(agent),
-                Message::Tick(AdvanceGrant { cycle, tick, packets }),
-            );
+    fn send_grants(&mut self, clock: &mut GroupClock) {
+        let cycle = self.run.cycle();
+        for (agent, grant) in clock.advance(cycle) {
+            self.messenger.send_reliable(Peer::Node(agent), Message::Grant(grant));
         }
-        if talk.is_over {
-            for &agent in talk.courses.keys() {
-                self.mail.send_reliable(Peer::Node(agent), Message::Close(cycle));
+        if clock.is_over {
+            for &agent in clock.nodes.keys() {
+                self.messenger.send_reliable(Peer::Node(agent), Message::Close(cycle));
             }
         }
     }

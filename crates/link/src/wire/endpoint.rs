@@ -1,11 +1,11 @@
-//! Endpoints: their notation, ports that are held, and reasons why there is no wire.
+//! Endpoints: their notation, reserved ports, and reasons why there is no wire.
 
 use std::net::{TcpListener, ToSocketAddrs};
 
 /// The reason why there is no wire.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WireError {
-    /// Listening at an address is impossible.
+    /// An address cannot be bound.
     #[error("cannot listen at {endpoint}: {reason}")]
     Taken {
         /// The address.
@@ -24,7 +24,7 @@ pub enum WireError {
         /// The reason.
         reason: String,
     },
-    /// There is an answer, and one of the two ends does not take the other's certificate.
+    /// There is an answer, and one of the two ends rejects the other's certificate.
     #[error("{endpoint} and this party do not trust each other: {reason}")]
     Distrust {
         /// The address.
@@ -48,7 +48,7 @@ pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
     Ok((host, port.parse().map_err(|_| no_endpoint())?))
 }
 
-/// A port held until another socket may have it.
+/// A port that is bound, so that no other program gets it, until a socket of this program needs it.
 #[derive(Debug)]
 pub struct PortReservation {
     /// The endpoint, with a port.
@@ -56,42 +56,53 @@ pub struct PortReservation {
     _port: TcpListener,
 }
 
-/// Lowest port that is tried where any will do, and their number: below those that systems give to outgoing
-/// connections, one of which could take it first.
-const PORT_RANGE: (u16, u16) = (20_000, 12_000);
+/// Lowest port that is tried where any will do. The ports are below those that systems give to outgoing connections (from
+/// 32,768 on for Linux), one of which could get the port between its reservation and its use.
+const FIRST_PORT: u16 = 20_000;
 
-/// Holds the port of an endpoint; port 0 stands for any free one.
+/// Number of ports that are tried.
+const PORT_COUNT: u16 = 12_000;
+
+/// Reserves the port of an endpoint; port 0 stands for any free one.
 ///
 /// # Errors
-/// When it cannot be taken, or the text is no endpoint.
+/// When it cannot be bound, or the text is no endpoint.
 pub fn reserve_port(endpoint: &str) -> Result<PortReservation, WireError> {
     let (host, port) = host_and_port(endpoint)?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
-    let bind = |port: u16| {
-        let addresses = (bare, port).to_socket_addrs().map_err(|e| e.to_string())?;
-        TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
-    };
-    let with = |port: u16| {
-        let start = endpoint.len() - endpoint.rsplit(':').next().map_or(0, str::len);
-        format!("{}{port}", &endpoint[..start])
-    };
     if port > 0 {
-        let held = bind(port).map_err(|reason| endpoint_in_use(&[endpoint.into()], reason))?;
-        return Ok(PortReservation { endpoint: endpoint.into(), _port: held });
+        let bound =
+            bind(bare, port).map_err(|reason| endpoint_in_use(&[endpoint.into()], reason))?;
+        return Ok(PortReservation { endpoint: endpoint.into(), _port: bound });
     }
-    let first = (std::process::id().wrapping_mul(97) % u32::from(PORT_RANGE.1)) as u16;
-    let mut why = String::new();
-    for k in 0..PORT_RANGE.1 {
-        let port = PORT_RANGE.0 + (first + k) % PORT_RANGE.1;
-        match bind(port) {
-            Ok(held) => return Ok(PortReservation { endpoint: with(port), _port: held }),
-            Err(reason) => why = reason,
+    // Processes that start together begin their search at different ports.
+    let first = (std::process::id().wrapping_mul(97) % u32::from(PORT_COUNT)) as u16;
+    let mut last_reason = String::new();
+    for k in 0..PORT_COUNT {
+        let port = FIRST_PORT + (first + k) % PORT_COUNT;
+        match bind(bare, port) {
+            Ok(bound) => {
+                let endpoint = with_port(endpoint, port);
+                return Ok(PortReservation { endpoint, _port: bound });
+            }
+            Err(reason) => last_reason = reason,
         }
     }
-    Err(endpoint_in_use(&[endpoint.into()], why))
+    Err(endpoint_in_use(&[endpoint.into()], last_reason))
 }
 
-/// Checks that listening at an endpoint is possible.
+fn bind(host: &str, port: u16) -> Result<TcpListener, String> {
+    let addresses = (host, port).to_socket_addrs().map_err(|e| e.to_string())?;
+    TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
+}
+
+/// Returns an endpoint with another port.
+pub fn with_port(endpoint: &str, port: u16) -> String {
+    let address = endpoint.rsplit_once(':').map_or(endpoint, |(address, _)| address);
+    format!("{address}:{port}")
+}
+
+/// Checks that an endpoint can be bound.
 pub(super) fn check_vacant(endpoint: &str) -> Result<(), WireError> {
     reserve_port(endpoint).map(drop)
 }

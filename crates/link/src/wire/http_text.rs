@@ -5,16 +5,17 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time that a client has for its request.
+/// Time that a client has for each step of its request: requests are answered one after the other, so a client that says
+/// nothing must not keep others waiting.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Most bytes of a request that are read.
+/// Maximum size of a request.
 const MAX_REQUEST_BYTES: usize = 4096;
 
-/// Shows a text at an address from now on, one request after the other.
+/// Serves a text at an address from now on, one request after the other. Each answer is the text at that moment.
 ///
 /// # Errors
-/// When the address cannot be taken.
+/// When the address cannot be bound.
 pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
     let listener = TcpListener::bind(address)?;
     std::thread::spawn(move || {
@@ -29,17 +30,18 @@ pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
 fn respond(mut stream: TcpStream, text: &Mutex<String>) -> io::Result<()> {
     stream.set_read_timeout(Some(REQUEST_TIMEOUT))?;
     stream.set_write_timeout(Some(REQUEST_TIMEOUT))?;
-    let mut asked = [0; MAX_REQUEST_BYTES];
+    let mut request = [0; MAX_REQUEST_BYTES];
     let mut length = 0;
-    while !asked[..length].windows(4).any(|end| end == b"\r\n\r\n") {
-        let read = stream.read(&mut asked[length..])?;
+    while !request[..length].windows(4).any(|end| end == b"\r\n\r\n") {
+        let read = stream.read(&mut request[length..])?;
+        // The client has closed the connection, or its request is too long.
         if read == 0 {
             return Ok(());
         }
         length += read;
     }
     let text = text.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let status = if asked.starts_with(b"GET ") { "200 OK" } else { "405 Method Not Allowed" };
+    let status = if request.starts_with(b"GET ") { "200 OK" } else { "405 Method Not Allowed" };
     write!(
         stream,
         "HTTP/1.1 {status}\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\n\

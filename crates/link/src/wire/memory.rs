@@ -6,16 +6,16 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The place where parties of one process meet.
+/// A network within one process.
 #[derive(Debug, Clone, Default)]
 pub struct MemoryHub(Arc<Mutex<BTreeMap<Peer, Sender<Vec<u8>>>>>);
 
 impl MemoryHub {
-    /// Returns the wire of a party. Frames to it go to the wire that was asked for last.
+    /// Returns the wire of a peer. Frames to the peer go to its newest wire.
     pub fn wire(&self, me: Peer) -> MemoryWire {
         let (sender, arrived) = channel();
         self.lock().insert(me, sender);
-        MemoryWire { exchange: self.clone(), arrived }
+        MemoryWire { hub: self.clone(), arrived }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<Peer, Sender<Vec<u8>>>> {
@@ -23,18 +23,18 @@ impl MemoryHub {
     }
 }
 
-/// The end of an [`MemoryHub`] at one party.
+/// The connection of one peer to a [`MemoryHub`].
 #[derive(Debug)]
 pub struct MemoryWire {
-    exchange: MemoryHub,
+    hub: MemoryHub,
     arrived: Receiver<Vec<u8>>,
 }
 
 impl Wire for MemoryWire {
     fn send(&mut self, to: &[Peer], frame: &[u8]) {
-        let others = self.exchange.lock();
-        // A frame to an absent party is lost, as on any other wire.
-        for other in to.iter().filter_map(|party| others.get(party)) {
+        let others = self.hub.lock();
+        // A frame to an absent peer is lost, as on any other wire.
+        for other in to.iter().filter_map(|peer| others.get(peer)) {
             let _ = other.send(frame.to_vec());
         }
     }

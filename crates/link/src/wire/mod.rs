@@ -1,11 +1,14 @@
-//! The wire: frames from one party of a fleet to another, some of which may be lost.
+//! The wire: frames from one peer of a fleet to another, some of which may be lost.
 //!
-//! Everything that must arrive is numbered, acknowledged and repeated above it (`post.rs`).
+//! Everything that must arrive is numbered, acknowledged and retransmitted above it (`arq.rs`).
 //!
 //! ```text
-//! zenoh.rs   between processes      handshake.rs  why a certificate is not taken
-//! memory.rs  between threads        board.rs      a text served by HTTP
-//! endpoint.rs notation of endpoints, and ports that are held
+//! zenoh.rs        between processes, with zenoh/echo.rs: probes of half-open links
+//! memory.rs       between threads
+//! endpoint.rs     notation of endpoints, and reserved ports
+//! handshake.rs    the reason why a certificate is rejected
+//! view_server.rs  views of a fleet for its viewers, by query and reply
+//! http_text.rs    a text served by HTTP
 //! ```
 
 pub mod endpoint;
@@ -21,24 +24,24 @@ pub use endpoint::WireError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
-/// Carries frames between parties. A frame may be lost without notice.
+/// A carrier of frames between peers. A frame may be lost without notice.
 pub trait Wire: Send {
-    /// Sends a frame to other parties, without waiting for them. Further parties may hear it.
+    /// Sends a frame to other peers, without waiting for them. Further peers may receive it, too.
     fn send(&mut self, to: &[Peer], frame: &[u8]);
 
-    /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none came.
+    /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none arrives.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
 
-    /// Learns of all nodes of the fleet, and makes the direct links from this one to the others, where there are any.
+    /// Learns of all nodes of the fleet, and opens the direct links from this one to the others, where there are any.
     ///
     /// # Errors
-    /// When an endpoint cannot be taken.
+    /// When an endpoint cannot be bound.
     fn connect_mesh(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
         Ok(())
     }
 
-    /// Asks the other end of a direct link, and returns whether the link seems to be open and all questions have been
-    /// left unanswered for some time. Ends answer by themselves, however busy their nodes are.
+    /// Probes a direct link, and returns whether it is half-open: it seems to be open, and its other end has answered no
+    /// probe for some time. The ends answer by themselves, however busy their nodes are.
     fn is_half_open(&mut self, _member: &Member, _within: Duration) -> bool {
         false
     }
@@ -46,7 +49,7 @@ pub trait Wire: Send {
     /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be taken again: there are no direct links then, and it can be tried once more.
+    /// When an endpoint cannot be bound again: there are no direct links then, and the call can be repeated.
     fn reopen_links(&mut self) -> Result<(), WireError> {
         Ok(())
     }

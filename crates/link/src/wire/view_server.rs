@@ -1,7 +1,7 @@
-//! The window of a fleet: views of it, which watchers fetch from its server by query and reply.
+//! Views of a fleet, which viewers fetch from its server by query and reply.
 //!
-//! Nothing is sent unasked, and each watcher has one question on the way: so a watcher that is slow, or has stopped,
-//! sees less and slows none of the others. Views are made only while they are asked for.
+//! Nothing is pushed, and each viewer has at most one query in flight: so a viewer that is slow, or has stopped, gets fewer
+//! views and slows nobody. Views are made only while there are queries.
 
 use super::endpoint::WireError;
 use super::zenoh::{ZenohWire, open_query_session};
@@ -14,35 +14,35 @@ use zenoh::qos::CongestionControl;
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-/// The key of the unchanging part; no party has that name.
+/// The key of the unchanging part; no peer has that name.
 const SCENE_KEY: &str = "sidestep/scene";
 
 /// The key of the newest view.
 const VIEW_KEY: &str = "sidestep/view";
 
-/// Time after a question in which its asker counts as a watcher.
-const WATCHER_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time after a query in which there counts as being a viewer: much longer than the time between two queries of one.
+const VIEWER_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Time between two looks at whether the last view was fetched.
+/// Time between two checks whether the last view was fetched.
 const FETCH_POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time that an answer may take.
+/// Time that a reply may take.
 const QUERY_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The newest view, and the record of who has it.
+/// The newest view, and when it was fetched.
 #[derive(Debug, Default)]
 struct LatestView {
     text: String,
     number: u64,
     /// The largest number of a view that was fetched.
     fetched: u64,
-    asked: Option<Instant>,
+    last_query: Option<Instant>,
 }
 
 impl LatestView {
-    /// Returns the view if it is newer than the one that the asker has, else nothing.
+    /// Returns the view if it is newer than the one that the viewer has, else an empty text.
     fn fetch(&mut self, after: u64) -> String {
-        self.asked = Some(Instant::now());
+        self.last_query = Some(Instant::now());
         if self.number <= after {
             return String::new();
         }
@@ -51,80 +51,88 @@ impl LatestView {
     }
 }
 
-/// The server's side of the window. It stays open until it is dropped.
+/// The side of the fleet's server. It answers until it is dropped.
 pub struct ViewServer {
-    pane: Arc<Mutex<LatestView>>,
-    _answers: [Queryable<()>; 2],
+    latest: Arc<Mutex<LatestView>>,
+    _queryables: [Queryable<()>; 2],
     _session: Session,
 }
 
 impl fmt::Debug for ViewServer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Window").finish_non_exhaustive()
+        f.debug_struct("ViewServer").finish_non_exhaustive()
     }
 }
 
-fn lock(pane: &Mutex<LatestView>) -> MutexGuard<'_, LatestView> {
-    pane.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(latest: &Mutex<LatestView>) -> MutexGuard<'_, LatestView> {
+    latest.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl ViewServer {
-    /// Opens a window at a server's wire, with the unchanging part.
+    /// Answers queries over a server's wire from now on; `scene` is the unchanging part.
     ///
     /// # Errors
     /// When the wire is closed.
     pub fn open(wire: &ZenohWire, scene: String) -> Result<Self, WireError> {
-        let (session, pane) = (wire.session().clone(), Arc::new(Mutex::new(LatestView::default())));
+        let session = wire.session().clone();
+        let latest = Arc::new(Mutex::new(LatestView::default()));
         let closed =
             |e: zenoh::Error| WireError::Taken { endpoint: VIEW_KEY.into(), reason: e.to_string() };
-        let tell_scene = move |query: Query| reply(&query, scene.clone());
-        let scenes = session.declare_queryable(SCENE_KEY).callback(tell_scene).wait();
-        let asked = pane.clone();
-        let tell_view = move |query: Query| {
-            let after = query.parameters().get("after").and_then(|number| number.parse().ok());
-            let text = lock(&asked).fetch(after.unwrap_or(0));
-            reply(&query, text);
-        };
-        let views = session.declare_queryable(VIEW_KEY).callback(tell_view).wait();
-        let answers = [scenes.map_err(closed)?, views.map_err(closed)?];
-        Ok(Self { pane, _answers: answers, _session: session })
+        let scenes = session
+            .declare_queryable(SCENE_KEY)
+            .callback(move |query| reply(&query, scene.clone()))
+            .wait()
+            .map_err(closed)?;
+        let queried = latest.clone();
+        let views = session
+            .declare_queryable(VIEW_KEY)
+            .callback(move |query| {
+                let after = query.parameters().get("after").and_then(|number| number.parse().ok());
+                let text = lock(&queried).fetch(after.unwrap_or(0));
+                reply(&query, text);
+            })
+            .wait()
+            .map_err(closed)?;
+        Ok(Self { latest, _queryables: [scenes, views], _session: session })
     }
 
-    /// Returns whether a question came a short while ago.
+    /// Returns whether there was a query in the last seconds.
     pub fn is_watched(&self) -> bool {
-        lock(&self.pane).asked.is_some_and(|asked| asked.elapsed() < WATCHER_TIMEOUT)
+        lock(&self.latest).last_query.is_some_and(|query| query.elapsed() < VIEWER_TIMEOUT)
     }
 
-    /// Shows a view; its number is above all earlier ones.
+    /// Makes a view the newest one; its number is above all earlier ones.
     pub fn publish(&self, number: u64, text: String) {
-        let mut pane = lock(&self.pane);
-        (pane.number, pane.text) = (number, text);
+        let mut latest = lock(&self.latest);
+        latest.number = number;
+        latest.text = text;
     }
 
-    /// Waits a little until the last view has been fetched, if there is a watcher.
+    /// Waits at most the given time until the newest view has been fetched, if there is a viewer.
     pub fn wait_until_fetched(&self, within: Duration) {
         let until = Instant::now() + within;
-        let is_fetched = || {
-            let pane = lock(&self.pane);
-            pane.fetched == pane.number
-        };
-        while self.is_watched() && !is_fetched() && Instant::now() < until {
+        while self.is_watched() && !self.is_fetched() && Instant::now() < until {
             sleep(FETCH_POLL_INTERVAL);
         }
+    }
+
+    fn is_fetched(&self) -> bool {
+        let latest = lock(&self.latest);
+        latest.fetched == latest.number
     }
 }
 
 fn reply(query: &Query, text: String) {
-    // A watcher that has gone meanwhile needs no answer.
+    // An error means that the viewer has left meanwhile.
     let _ = query.reply(query.key_expr().clone(), text).wait();
 }
 
-/// The viewer's side of the window.
+/// The side of a viewer.
 pub struct ViewClient(Session);
 
 impl fmt::Debug for ViewClient {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Outlook").finish_non_exhaustive()
+        f.debug_struct("ViewClient").finish_non_exhaustive()
     }
 }
 
@@ -137,20 +145,20 @@ impl ViewClient {
         open_query_session(connect, tls, within).map(Self)
     }
 
-    /// Asks for the unchanging part; `None` when there is no answer.
+    /// Queries the unchanging part; `None` when there is no reply.
     pub fn scene(&self) -> Option<String> {
         self.query(SCENE_KEY)
     }
 
-    /// Asks for a view newer than the one with a number: empty if there is none. `None` when there is no answer.
+    /// Queries a view newer than the one with a number: empty if there is none. `None` when there is no reply.
     pub fn view(&self, after: u64) -> Option<String> {
         self.query(&format!("{VIEW_KEY}?after={after}"))
     }
 
     fn query(&self, selector: &str) -> Option<String> {
-        let asked = self.0.get(selector).timeout(QUERY_TIMEOUT);
-        // An answer that cannot be sent soon is lost, and asked for again.
-        let replies = asked.congestion_control(CongestionControl::Drop).wait().ok()?;
+        let query = self.0.get(selector).timeout(QUERY_TIMEOUT);
+        // A reply that cannot be sent soon is dropped, and queried again: waiting for it would stop the server.
+        let replies = query.congestion_control(CongestionControl::Drop).wait().ok()?;
         let reply = replies.recv().ok()?.into_result().ok()?;
         String::from_utf8(reply.payload().to_bytes().into_owned()).ok()
     }

@@ -44,25 +44,25 @@ fn chains_that_may_meet_decide_one_after_the_other_in_rounds_of_one_cycle() {
     let source = Source::new("s.toml", text, "");
     let compiled = WORLDS.compile(&source).expect("a scenario");
     let world = distributed_world(compiled.as_ref(), &source).expect("connectors");
-    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
-    let mut stage = HostedRun::new(journey, world, &NoWatcher);
+    let mut run = HostedRun::new(run, world, &NoWatcher);
     let (first, second): (Vec<EntityId>, Vec<EntityId>) = ((0..5).collect(), (5..10).collect());
     for (group, further) in [(first, 1), (second, 0)] {
-        let sights = stage.percepts();
-        let agents: Vec<EntityId> = sights.iter().map(|sight| sight.agent).collect();
-        assert_eq!((&agents, stage.max_further_rounds(1)), (&group, further));
-        assert!(sights.iter().all(|sight| sight.group == group && sight.begin.cycle == 0));
-        assert!(stage.accept_controls(&[group], Vec::new(), &[]).is_empty());
+        let percepts = run.percepts();
+        let agents: Vec<EntityId> = percepts.iter().map(|percept| percept.agent).collect();
+        assert_eq!((&agents, run.max_further_rounds(1)), (&group, further));
+        assert!(percepts.iter().all(|percept| percept.group == group && percept.start.cycle == 0));
+        assert!(run.accept_controls(&[group], Vec::new(), &[]).is_empty());
     }
-    assert!(stage.percepts().is_empty());
-    stage.advance().expect("it goes on, and both stand");
-    assert_eq!((stage.cycle(), stage.percepts().len()), (1, 5));
-    assert_eq!(stage.run().metrics()["stood"], 2, "{}", stage.run().metrics());
+    assert!(run.percepts().is_empty());
+    run.advance().expect("it goes on, and both stand");
+    assert_eq!((run.cycle(), run.percepts().len()), (1, 5));
+    assert_eq!(run.simulation().metrics()["stood"], 2, "{}", run.simulation().metrics());
 }
 
 fn end(program: &LinkProcess) -> (serde_json::Value, FleetStatus) {
-    program.until("the end", |told| match told {
+    program.until("the end", |message| match message {
         LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
@@ -86,7 +86,7 @@ fn processes_come_out_as_one_process_does_and_leave_a_folder_that_is_replayed() 
         let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
         assert_eq!(summary["metrics"]["messages"], packets, "nodes count what the run does");
         assert!(fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
-        let recorded = RecordedRun::open(WORLDS, &out).expect("an ordinary folder");
+        let recorded = RecordedRun::open(&WORLDS, &out).expect("an ordinary folder");
         replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
     }
 }
@@ -116,10 +116,10 @@ fn events(out: &Path, kind: &str) -> Vec<(u64, u64)> {
 fn resumed(mut program: LinkProcess, out: &Path) {
     drop(program.stdin.take());
     assert_eq!(program.end().0, Some(130));
-    let journey = ManagedRun::resume(WORLDS, out, 1, None).expect("it can be resumed");
-    let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
+    let run = ManagedRun::resume(&WORLDS, out, 1, None).expect("it can be resumed");
+    let summary = run.run_to_end(&NoWatcher).expect("flown to the end");
     assert_eq!(summary.status, RunStatus::Complete);
-    let recorded = RecordedRun::open(WORLDS, out).expect("an ordinary folder");
+    let recorded = RecordedRun::open(&WORLDS, out).expect("an ordinary folder");
     replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
 }
 
@@ -203,7 +203,7 @@ fn in_real_time_a_chain_stands_in_the_cycles_in_which_a_connector_is_late_and_go
     signal(stopped, "CONT");
     program.fleet("it flies again", |now| now.nodes[1].flown >= late.nodes[1].flown + 4);
     drop(program.stdin.take());
-    let metrics = program.until("the end", |told| match told {
+    let metrics = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["metrics"].clone()),
         _ => None,
     });
@@ -257,7 +257,7 @@ fn a_node_joins_a_chain_by_the_name_of_its_connector_and_not_twice() {
         FleetJob { nodes: Some(3), ..job(folder.path(), Topology::Star, ClockMode::Lockstep) };
     let common = fleet.common.clone();
     let program = LinkProcess::start(&Job::Fleet(fleet));
-    let connect = program.until("its endpoints", |told| match told {
+    let connect = program.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });

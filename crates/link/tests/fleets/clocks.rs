@@ -84,7 +84,7 @@ fn a_wall_clock_that_jumps_makes_nobody_late_or_lost() {
     let hours: BTreeSet<String> = lines.iter().filter_map(hour).collect();
     assert!(hours.len() > 1, "the clock has jumped: {hours:?}");
     drop(program.stdin.take());
-    let losses = program.until("the end", |told| match told {
+    let losses = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => {
             Some(summary["metrics"]["losses_of_separation"].clone())
         }
@@ -108,7 +108,7 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
         FleetJob { nodes: Some(2), ..job(folder.path(), Topology::Mesh, ClockMode::Lockstep) };
     let common = fleet.common.clone();
     let server = LinkProcess::start(&Job::Fleet(fleet));
-    let connect = server.until("its endpoints", |told| match told {
+    let connect = server.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
@@ -118,7 +118,7 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
     let mut command = Command::new("unshare");
     command.args(shifted).arg(env!("CARGO_BIN_EXE_sidestep-link"));
     let node = LinkProcess::start_by(command, &node);
-    let digest = server.until("the end", |told| match told {
+    let digest = server.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,

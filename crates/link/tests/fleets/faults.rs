@@ -17,14 +17,14 @@ fn program(folder: &std::path::Path, topology: Topology) -> LinkProcess {
 /// Ends a fleet, and returns the losses of separation and the fleet at the end.
 fn ended(mut program: LinkProcess) -> (u64, FleetStatus) {
     drop(program.stdin.take());
-    let came = program.until("the end", |told| match told {
+    let result = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, fleet, .. } => {
             Some((summary["metrics"]["losses_of_separation"].as_u64().expect("counted"), fleet))
         }
         _ => None,
     });
     program.end();
-    came
+    result
 }
 
 #[test]

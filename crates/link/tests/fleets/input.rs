@@ -75,7 +75,7 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
     let folder = folder(&text);
     let fleet = FleetJob { nodes: Some(1), ..fleet(folder.path()) };
     let program = LinkProcess::start(&Job::Fleet(fleet.clone()));
-    let connect = program.until("its endpoints", |told| match told {
+    let connect = program.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
@@ -97,7 +97,7 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
         assert!(said.contains(cause), "{cause} in {said}");
     }
     let last = LinkProcess::start(&node(&fleet, 1));
-    let digest = program.until("the end", |told| match told {
+    let digest = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         _ => None,
     });

@@ -87,7 +87,7 @@ fn start(machines: &Machines, mut fleet: FleetJob) -> (LinkProcess, Vec<LinkProc
     let common = fleet.common.clone();
     let connect = fleet.listen.clone();
     let server = LinkProcess::start_in(&machines.names[0], &Job::Fleet(fleet));
-    server.until("it listens", |told| matches!(told, LinkMessage::Listens(_)).then_some(()));
+    server.until("it listens", |message| matches!(message, LinkMessage::Listens(_)).then_some(()));
     let node = |airplane| {
         let (common, connect) = (common.clone(), connect.clone());
         let listen = vec![format!("tcp/{}:0", ADDRESSES[1])];
@@ -104,7 +104,7 @@ fn two_machines_come_out_as_one_process_does() {
     let text = superconflict(4, "compact-team", 15, "");
     let folder = folder(&text);
     let (server, nodes) = start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
-    let digest = server.until("the end", |told| match told {
+    let digest = server.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
@@ -128,7 +128,7 @@ fn a_cable_that_loses_packets_costs_time_and_no_bit() {
     let folder = folder(&text);
     let (server, _nodes) =
         start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
-    let digest = server.until("the end", |told| match told {
+    let digest = server.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
@@ -142,7 +142,7 @@ const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };
 fn losses(mut server: LinkProcess) -> u64 {
     drop(server.stdin.take());
     let losses = |summary: &serde_json::Value| summary["metrics"]["losses_of_separation"].as_u64();
-    server.until("the end", |told| match told {
+    server.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => losses(&summary),
         _ => None,
     })

@@ -131,7 +131,7 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     fleet.common.metrics = Some(at_server.clone());
     fleet.nodes = Some(2);
     let server = LinkProcess::start(&Job::Fleet(fleet));
-    let connect = server.until("its endpoints", |told| match told {
+    let connect = server.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
@@ -225,7 +225,7 @@ fn the_table_of_packets_has_a_row_for_each_that_was_counted() {
         let lockstep = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
         let fleet = FleetJob { out: out_there, packets, ..lockstep };
         let program = LinkProcess::start(&Job::Fleet(fleet));
-        let (summary, fleet) = program.until("the end", |told| match told {
+        let (summary, fleet) = program.until("the end", |message| match message {
             LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
             LinkMessage::Failed(failed) => panic!("{failed:?}"),
             _ => None,

@@ -22,7 +22,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
     let flown = JobScenario {
         file: folder.join("s.toml"),
         overrides: Vec::new(),
-        build: sidestep_session::build_id().into(),
+        build: WORLDS.build().into(),
     };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
@@ -41,7 +41,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
 pub(crate) struct LinkProcess {
     pub(crate) child: Child,
     pub(crate) stdin: Option<ChildStdin>,
-    told: Receiver<LinkMessage>,
+    messages: Receiver<LinkMessage>,
     /// The lines that it, and the nodes that it starts, have logged so far.
     logged: Arc<Mutex<Vec<String>>>,
 }
@@ -73,13 +73,13 @@ impl LinkProcess {
         let line = serde_json::to_string(job).expect("plain data");
         writeln!(stdin, "{line}").expect("it reads its job");
         let out = BufReader::new(child.stdout.take().expect("a pipe"));
-        let (sender, told) = channel();
+        let (sender, messages) = channel();
         std::thread::spawn(move || {
             for line in out.lines().map_while(Result::ok) {
                 let _ = sender.send(serde_json::from_str(&line).expect("a line that is known"));
             }
         });
-        Self { child, stdin: Some(stdin), told, logged }
+        Self { child, stdin: Some(stdin), messages, logged }
     }
 
     /// Returns the lines that were logged so far.
@@ -101,9 +101,10 @@ impl LinkProcess {
     ) -> T {
         let until = Instant::now() + within;
         loop {
-            let told = self.told.recv_timeout(until.saturating_duration_since(Instant::now()));
-            let told = told.unwrap_or_else(|e| panic!("waited for {what}: {e}"));
-            if let Some(found) = wanted(told) {
+            let message =
+                self.messages.recv_timeout(until.saturating_duration_since(Instant::now()));
+            let message = message.unwrap_or_else(|e| panic!("waited for {what}: {e}"));
+            if let Some(found) = wanted(message) {
                 return found;
             }
         }
@@ -111,7 +112,7 @@ impl LinkProcess {
 
     /// Returns the fleet once something holds for it.
     pub(crate) fn fleet(&self, what: &str, holds: impl Fn(&FleetStatus) -> bool) -> FleetStatus {
-        self.until(what, |told| match told {
+        self.until(what, |message| match message {
             LinkMessage::Fleet(now) if holds(&now) => Some(now),
             LinkMessage::Failed(failed) => panic!("{failed:?}"),
             _ => None,
@@ -121,7 +122,7 @@ impl LinkProcess {
     /// Returns the exit code, and the reason if it failed.
     pub(crate) fn end(mut self) -> (Option<i32>, Option<JobError>) {
         let status = self.child.wait().expect("it ends");
-        let failed = self.told.iter().find_map(|told| match told {
+        let failed = self.messages.iter().find_map(|message| match message {
             LinkMessage::Failed(failed) => Some(failed),
             _ => None,
         });
@@ -181,7 +182,7 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
         ..job(folder.path(), Topology::Mesh, ClockMode::Lockstep)
     };
     let program = LinkProcess::start(&Job::Fleet(job));
-    let (summary, fleet) = program.until("the end", |told| match told {
+    let (summary, fleet) = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
@@ -207,11 +208,12 @@ fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment
             let folder = folder(&text);
             let job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
             let program = LinkProcess::start(&Job::Fleet(job));
-            let digest = program.until_within("the end", 60 * TEST_TIMEOUT, |told| match told {
-                LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
-                LinkMessage::Failed(failed) => panic!("{failed:?}"),
-                _ => None,
-            });
+            let digest =
+                program.until_within("the end", 60 * TEST_TIMEOUT, |message| match message {
+                    LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
+                    LinkMessage::Failed(failed) => panic!("{failed:?}"),
+                    _ => None,
+                });
             assert_eq!(digest, run_in_one_process(&text).digest, "{deployment} {network}");
         }
     }
@@ -248,7 +250,7 @@ fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
     let fleet = program.fleet("some cycles", |now| now.cycle > 10);
     program.child.kill().expect("killed");
     wait_until_gone(&fleet, Duration::from_secs(10));
-    let journey = ManagedRun::resume(WORLDS, &out, 1, None).expect("it can be resumed");
+    let journey = ManagedRun::resume(&WORLDS, &out, 1, None).expect("it can be resumed");
     assert!(journey.cycle() >= 5);
     let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
     assert_eq!(summary.status, RunStatus::Complete);

@@ -213,7 +213,7 @@ fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() 
     let mut program = LinkProcess::start(&Job::Fleet(job));
     let now = fly(&program, &plan, lasts);
     drop(program.stdin.take());
-    let losses = program.until("the end", |told| match told {
+    let losses = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => {
             Some(summary["metrics"]["losses_of_separation"].clone())
         }

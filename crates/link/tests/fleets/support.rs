@@ -85,23 +85,22 @@ pub(crate) fn untimed(mut metrics: Value) -> Value {
     metrics
 }
 
-fn run_result(journey: ManagedRun) -> RunResult {
-    let summary = journey.finish(&NoWatcher).expect("stored");
+fn run_result(run: ManagedRun) -> RunResult {
+    let summary = run.finish(&NoWatcher).expect("stored");
     RunResult { digest: summary.digest, metrics: untimed(summary.metrics) }
 }
 
 /// Returns the outcome of a scenario in one process.
 pub(crate) fn run_in_one_process(text: &str) -> RunResult {
     let (source, compiled) = compiled(text);
-    let mut journey =
-        ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
-            .expect("started");
-    let cycles = journey.simulation().config().cycles;
-    journey.advance_to(cycles, &NoWatcher).expect("flown");
-    run_result(journey)
+    let mut run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
+        .expect("started");
+    let cycles = run.simulation().config().cycles;
+    run.advance_to(cycles, &NoWatcher).expect("flown");
+    run_result(run)
 }
 
-/// An attendant that leaves a fleet alone.
+/// Hooks that do nothing.
 pub(crate) struct NoHooks;
 
 impl ServerHooks for NoHooks {
@@ -110,16 +109,16 @@ impl ServerHooks for NoHooks {
     }
 }
 
-/// The way in which a fleet is flown in a test.
+/// The setup of a fleet in a test.
 pub(crate) struct FleetSetup<'a> {
     pub(crate) clock: ClockMode,
     pub(crate) topology: Topology,
     pub(crate) lease: Duration,
-    /// The wire of each party.
+    /// The wire of each peer.
     pub(crate) wire: &'a dyn Fn(Peer) -> Box<dyn Wire>,
     /// Endpoints at which a node is reached.
     pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
-    pub(crate) attendant: &'a mut dyn ServerHooks,
+    pub(crate) hooks: &'a mut dyn ServerHooks,
     /// The agent with a node that sends nonsense instead of its control.
     pub(crate) liar: Option<EntityId>,
 }
@@ -128,8 +127,8 @@ pub(crate) struct FleetSetup<'a> {
 struct FaultyProgram(Box<dyn AgentProgram>);
 
 impl AgentProgram for FaultyProgram {
-    fn start_cycle(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
-        self.0.start_cycle(cycle, sight)
+    fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String> {
+        self.0.start_cycle(cycle, percept)
     }
 
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
@@ -172,38 +171,45 @@ impl AgentProgram for FaultyProgram {
 /// Flies a scenario with a thread for each agent.
 pub(crate) fn run_in_threads(
     text: &str,
-    way: FleetSetup<'_>,
+    setup: FleetSetup<'_>,
 ) -> (RunResult, Result<(), FleetError>, ServerMetrics) {
     let (source, compiled) = compiled(text);
     let scenario = fingerprint(compiled.as_ref(), &source).expect("a fingerprint");
     let world = distributed_world(compiled.as_ref(), &source).expect("agents of their own");
     let welcome = Welcome {
-        clock: way.clock,
-        topology: way.topology,
+        clock: setup.clock,
+        topology: setup.topology,
         overrides: Vec::new(),
         logs_packets: false,
     };
-    let terms = ServerConfig {
+    let config = ServerConfig {
         scenario: scenario.clone(),
         build: "test".into(),
         welcome,
-        lease: way.lease,
+        lease: setup.lease,
         has_faults: world.has_faults(),
     };
-    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, OutputPaths::default(), None)
+    let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
-    let mut stage = HostedRun::new(journey, world.clone(), &NoWatcher);
-    let mail = Messenger::new(Peer::Server, (way.wire)(Peer::Server));
+    let mut run = HostedRun::new(run, world.clone(), &NoWatcher);
+    let messenger = Messenger::new(Peer::Server, (setup.wire)(Peer::Server));
     let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.count() as EntityId)
         .map(|agent| {
-            let mail = Messenger::new(Peer::Node(agent), (way.wire)(Peer::Node(agent)));
-            let (listens, scenario) = ((way.listens)(agent), scenario.clone());
-            let join = Join { agent, scenario, build: "test".into(), listens, process: 0 };
-            let (world, lease, is_liar) = (world.clone(), way.lease, way.liar == Some(agent));
-            spawn(move || node(mail, join, world, (lease, is_liar)))
+            let messenger = Messenger::new(Peer::Node(agent), (setup.wire)(Peer::Node(agent)));
+            let join = Join {
+                agent,
+                scenario: scenario.clone(),
+                build: "test".into(),
+                listens: (setup.listens)(agent),
+                process: 0,
+            };
+            let world = world.clone();
+            let lease = setup.lease;
+            let is_liar = setup.liar == Some(agent);
+            spawn(move || run_node(messenger, join, world, lease, is_liar))
         })
         .collect();
-    let (flown, tally) = Server::new(mail, &mut stage, way.attendant, terms).run();
+    let (flown, metrics) = Server::new(messenger, &mut run, setup.hooks, config).run();
     for node in nodes {
         let ended = node.join().expect("no panic");
         match (&flown, ended) {
@@ -211,19 +217,21 @@ pub(crate) fn run_in_threads(
             (Err(broken), ended) => println!("{broken}; a node: {ended:?}"),
         }
     }
-    (run_result(stage.into_managed_run()), flown, tally)
+    (run_result(run.into_managed_run()), flown, metrics)
 }
 
-fn node(
-    mut mail: Messenger,
-    question: Join,
+fn run_node(
+    mut messenger: Messenger,
+    request: Join,
     world: Arc<dyn DistributedWorld>,
-    (lease, is_liar): (Duration, bool),
+    lease: Duration,
+    is_liar: bool,
 ) -> Result<Status, NodeError> {
-    let agent = question.agent;
-    let welcome = join(&mut mail, &JoinConfig { join: question, timeout: TEST_TIMEOUT })?;
+    let agent = request.agent;
+    let welcome = join(&mut messenger, &JoinConfig { join: request, timeout: TEST_TIMEOUT })?;
     let program = world.program(agent, "test");
     let program: Box<dyn AgentProgram> =
         if is_liar { Box::new(FaultyProgram(program)) } else { program };
-    Node::new(agent, mail, program, world.channel(agent), &welcome, lease).run()
+    let node = Node::new(agent, messenger, program, world.channel(agent), &welcome);
+    node.with_lease(lease).run()
 }

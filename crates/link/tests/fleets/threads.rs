@@ -22,19 +22,19 @@ const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_
 
 pub(crate) fn run_over_memory(text: &str) -> crate::support::RunResult {
     let exchange = MemoryHub::default();
-    let way = FleetSetup {
+    let setup = FleetSetup {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
         wire: &|me| Box::new(exchange.wire(me)),
         listens: &|_| Vec::new(),
-        attendant: &mut NoHooks,
+        hooks: &mut NoHooks,
         liar: None,
     };
-    let (came, flown, tally) = run_in_threads(text, way);
+    let (result, flown, metrics) = run_in_threads(text, setup);
     flown.expect("flown to the end");
-    assert_eq!((tally.late_controls, tally.absurd_controls), (0, 0));
-    came
+    assert_eq!((metrics.late_controls, metrics.invalid_controls), (0, 0));
+    result
 }
 
 #[test]
@@ -97,18 +97,18 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
             Box::new(wire.with_listeners(held.into_iter().collect()))
         };
         let (clock, lease) = (ClockMode::Lockstep, Duration::from_secs(10));
-        let way = FleetSetup {
+        let setup = FleetSetup {
             clock,
             topology,
             lease,
             wire: &wire,
             listens: &listens,
-            attendant: &mut NoHooks,
+            hooks: &mut NoHooks,
             liar: None,
         };
-        let (came, flown, _) = run_in_threads(&text, way);
+        let (result, flown, _) = run_in_threads(&text, setup);
         flown.expect("flown to the end");
-        assert_eq!(came, run_in_one_process(&text), "{topology:?} {more}");
+        assert_eq!(result, run_in_one_process(&text), "{topology:?} {more}");
     }
 }
 
@@ -118,17 +118,17 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
 fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
     let exchange = MemoryHub::default();
     let text = superconflict(3, "compact-team", 8, "");
-    let way = FleetSetup {
+    let setup = FleetSetup {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
         wire: &|me| Box::new(exchange.wire(me)),
         listens: &|_| Vec::new(),
-        attendant: &mut NoHooks,
+        hooks: &mut NoHooks,
         liar: Some(1),
     };
-    let (came, flown, tally) = run_in_threads(&text, way);
+    let (result, flown, metrics) = run_in_threads(&text, setup);
     flown.expect("flown to the end");
-    assert_eq!(tally.absurd_controls, 8);
-    assert_eq!(came.metrics["losses_of_separation"], 0);
+    assert_eq!(metrics.invalid_controls, 8);
+    assert_eq!(result.metrics["losses_of_separation"], 0);
 }

@@ -66,7 +66,7 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     let mut job = FleetJob { nodes: Some(1), ..fleet(folder.path(), Some(ours.clone())) };
     job.common.log = "warn".into();
     let server = LinkProcess::start(&Job::Fleet(job));
-    let connect = server.until("its endpoints", |told| match told {
+    let connect = server.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
@@ -99,7 +99,7 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     let says = |line: &String| line.contains("UnknownIssuer");
     assert!(server.logged().iter().any(says), "{:?}", server.logged());
     let last = node(Some(ours), 30.0);
-    let digest = server.until("the end", |told| match told {
+    let digest = server.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
         _ => None,
     });

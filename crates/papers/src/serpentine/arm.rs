@@ -9,15 +9,15 @@ use crate::study::{
 };
 use serde::Serialize;
 use serde_json::{Value as Json, json};
+use sidestep::arms::kinematics::SerialChain;
 use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::import::urdf::Model;
 use sidestep::kernel::stream::Draws;
 use sidestep::kernel::{InputError, Simulation};
+use sidestep::rods::geometry::{Point, between_segments};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::chain::ChainRun;
-use sidestep::worlds::chain::geometry::{Point, between_segments};
-use sidestep::worlds::chain::kinematics::SerialChain;
 use sidestep_document::Table;
 
 const SCENARIO: &str = include_str!("../../scenarios/serpentine/arm.toml");

@@ -11,9 +11,9 @@ use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Draws;
-use sidestep::worlds::chain::geometry::{Point, add_scaled, distance};
-use sidestep::worlds::chain::rebuild::{MovableEnd, ReformResult, reform};
-use sidestep::worlds::chain::{Chain, Connector, Rod};
+use sidestep::rods::geometry::{Point, add_scaled, distance};
+use sidestep::rods::rebuild::{MovableEnd, ReformResult, reform};
+use sidestep::rods::{Chain, Connector, Rod};
 use sidestep_document::{Table, estimate::format_short};
 
 /// Connectors of the whole chain.

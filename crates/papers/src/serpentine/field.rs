@@ -11,8 +11,8 @@ use sidestep::experiment::sweep::{Setting, Variant, start_cell};
 use sidestep::kernel::InputError;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Draws;
+use sidestep::rods::geometry::{Point, distance};
 use sidestep::worlds::WORLDS;
-use sidestep::worlds::chain::geometry::{Point, distance};
 use sidestep_document::{Figure, Table};
 use std::f64::consts::TAU;
 use toml::Value;
@@ -134,7 +134,7 @@ impl FieldResults {
             .with_size(plan.field_seeds, Some(plan.field_cycles));
         let results =
             study.run_with(plan.workers, "open field", progress, settings, |source, cell| {
-                Ok(start_cell(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
+                Ok(start_cell(&WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }

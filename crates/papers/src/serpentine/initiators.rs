@@ -8,11 +8,12 @@ use serde::Serialize;
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
-use sidestep::worlds::chain::geometry::{Point, add_scaled, distance, normalized};
-use sidestep::worlds::chain::{
-    BEND_TOLERANCE_RAD, Chain, ChainRun, Connector, Mobility, Obstacles, Outcome, Propagator,
-    Request, Rod, VetoReason, chain_run,
+use sidestep::rods::geometry::{Point, add_scaled, distance, normalized};
+use sidestep::rods::{
+    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Request, Rod,
+    VetoReason,
 };
+use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::Table;
 
 const FAILING: &str = include_str!("../../scenarios/serpentine/failing.toml");

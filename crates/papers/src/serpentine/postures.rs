@@ -7,16 +7,14 @@ use crate::study::{Progress, Study, outcome_from_values, setting, setting_number
 use cpu_time::ThreadTime;
 use serde::Serialize;
 use serde_json::{Value as Json, json};
+use sidestep::arms::ik::{ChainIkGoal, Engine, IkSolver};
 use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::powf;
 use sidestep::kernel::stream::Draws;
-use sidestep::worlds::chain::geometry::{Point, add_scaled, distance, normalized, scaled};
-use sidestep::worlds::chain::ik::{ChainIkGoal, Engine, IkSolver};
-use sidestep::worlds::chain::{
-    Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules,
-};
+use sidestep::rods::geometry::{Point, add_scaled, distance, normalized, scaled};
+use sidestep::rods::{Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules};
 use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, FigureKind, Table};
 

@@ -9,11 +9,9 @@ use serde_json::{Value as Json, json};
 use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
-use sidestep::worlds::chain::geometry::add_scaled;
+use sidestep::rods::geometry::add_scaled;
+use sidestep::rods::{Chain, Connector, Obstacles, Outcome, Propagator, Request, Rod, Rules};
 use sidestep::worlds::chain::ground::{Corridor, Leg};
-use sidestep::worlds::chain::{
-    Chain, Connector, Obstacles, Outcome, Propagator, Request, Rod, Rules,
-};
 use sidestep_document::{Figure, FigureKind, Table};
 use std::collections::BTreeSet;
 

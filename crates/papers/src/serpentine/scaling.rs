@@ -8,8 +8,8 @@ use cpu_time::ThreadTime;
 use serde::Serialize;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::{Digest, InputError};
-use sidestep::worlds::chain::geometry::{Point, add_scaled, normalized};
-use sidestep::worlds::chain::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
+use sidestep::rods::geometry::{Point, add_scaled, normalized};
+use sidestep::rods::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
 use sidestep_document::figure::{Point as FigurePoint, Scale};
 use sidestep_document::{Estimate, Figure, Series, Table};
 

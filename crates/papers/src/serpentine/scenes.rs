@@ -9,7 +9,7 @@ use sidestep::kernel::view::{
     Body, BodyId, BodyKind, Frame, FrameOptions, Pose, Scenery, Shape, Trail, Vec3,
 };
 use sidestep::kernel::{InputError, Simulation};
-use sidestep::worlds::chain::geometry::Point;
+use sidestep::rods::geometry::Point;
 use sidestep::worlds::chain::{ChainRun, chain_run};
 
 /// Number of cycles from one point of a trail to the next.

@@ -123,17 +123,17 @@ fn join(schema: &mut Value, own: &mut Map<String, Value>) {
 
 impl Worlds {
     /// Returns the schema of scenarios of one world, or of any; `None` if there is no such world.
-    pub fn schema(self, world: Option<&str>) -> Option<Value> {
+    pub fn schema(&self, world: Option<&str>) -> Option<Value> {
         match world {
             Some(name) => self.find(name).map(for_world),
             None => Some(self.for_any_world()),
         }
     }
 
-    fn for_any_world(self) -> Value {
+    fn for_any_world(&self) -> Value {
         let mut definitions = Map::new();
-        for kind in self.0 {
-            let mut schema = for_world(*kind);
+        for kind in self.iter() {
+            let mut schema = for_world(kind);
             rename(&mut schema, kind.name());
             if let Some(members) = schema.as_object_mut() {
                 members.remove("$schema");

@@ -1,11 +1,11 @@
-//! Casts: the bodies that the columns of frames stand for.
+//! Body tables: the bodies that the columns of frames stand for.
 
 use super::{CONDITIONS, convert};
 use crate::protocol::{Appearance, BodyTable, SessionId};
-use sidestep::kernel::view::{BODY_COLORS, Body, BodyKind, Shape};
+use sidestep_kernel::view::{BODY_COLORS, Body, BodyKind, Shape};
 use std::collections::BTreeMap;
 
-/// The part of a body that stays the same as long as the cast does.
+/// The part of a body that stays the same as long as the body table does.
 #[derive(PartialEq)]
 struct BodyIdentity {
     kind: BodyKind,
@@ -16,7 +16,7 @@ struct BodyIdentity {
     shape: u32,
 }
 
-/// The bodies of a cast, in the order of the frames.
+/// The bodies of a body table, in the order of the frames.
 pub(super) struct BodySet {
     members: Vec<BodyIdentity>,
     /// All different shapes, those of lines without their points.
@@ -30,21 +30,21 @@ pub(super) struct BodySet {
 type ShapeKey = (u8, [u64; 3]);
 
 impl BodySet {
-    /// Returns the troupe of these bodies.
+    /// Returns the set of these bodies.
     pub(super) fn from_bodies(bodies: &[Body], dimensions: u8) -> Self {
         let is_flat = dimensions == 2;
         let members = Vec::with_capacity(bodies.len());
-        let mut troupe = Self { members, shapes: Vec::new(), forms: Vec::new(), is_flat };
+        let mut body_set = Self { members, shapes: Vec::new(), forms: Vec::new(), is_flat };
         let mut known = BTreeMap::new();
         for body in bodies {
             let form = shape_key(&body.shape, is_flat);
             let shape = *known.entry(form).or_insert_with(|| {
-                troupe.shapes.push(without_points(&body.shape));
-                troupe.forms.push(form);
-                troupe.forms.len() as u32 - 1
+                body_set.shapes.push(without_points(&body.shape));
+                body_set.forms.push(form);
+                body_set.forms.len() as u32 - 1
             });
             let &Body { kind, number, part, .. } = body;
-            troupe.members.push(BodyIdentity {
+            body_set.members.push(BodyIdentity {
                 kind,
                 number,
                 part,
@@ -52,7 +52,7 @@ impl BodySet {
                 shape,
             });
         }
-        troupe
+        body_set
     }
 
     /// Returns whether the given bodies are its own, in their order, with the same shapes.
@@ -67,19 +67,19 @@ impl BodySet {
         self.members.len() == bodies.len() && self.members.iter().zip(bodies).all(is_same)
     }
 
-    /// Returns its cast, as the page gets it.
+    /// Returns its table, as the page gets it.
     pub(super) fn to_table(
         &self,
         session: SessionId,
-        cast: u32,
+        id: u32,
         bodies: &[Body],
         names: &BTreeMap<(BodyKind, u32), String>,
     ) -> BodyTable {
         let (kinds, kind) = index_distinct(self.members.iter().map(|member| member.kind));
         let group = |m: &BodyIdentity| (m.kind, m.number as usize % BODY_COLORS.len(), m.moves);
-        let (groups, look) = index_distinct(self.members.iter().map(group));
+        let (groups, appearance) = index_distinct(self.members.iter().map(group));
         let first = |of: &_| bodies.iter().zip(&self.members).find(|(_, m)| group(m) == *of);
-        let looks = groups
+        let appearances = groups
             .iter()
             .filter_map(first)
             .map(|(body, _)| appearances(body, if self.is_flat { 2 } else { 3 }));
@@ -88,22 +88,22 @@ impl BodySet {
         };
         BodyTable {
             session,
-            cast,
+            id,
             kinds: kinds.iter().map(|kind| kind.name().into()).collect(),
             kind: kind.iter().map(|&kind| kind as u8).collect(),
             number: self.members.iter().map(|member| member.number).collect(),
             part: self.members.iter().map(|m| m.part.map_or(-1, |part| part as i32)).collect(),
             shapes: self.shapes.iter().map(convert::shape).collect(),
             shape: self.members.iter().map(|member| member.shape).collect(),
-            looks: looks.collect(),
-            look,
+            appearances: appearances.collect(),
+            appearance,
             names: (0..).zip(&self.members).filter_map(name).collect(),
             is_agent: self.members.iter().map(|member| member.kind.is_agent()).collect(),
         }
     }
 }
 
-/// Returns all different items in the order in which they first come, and the number of each item among them.
+/// Returns all different items in the order in which they first occur, and the number of each item among them.
 fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec<u16>) {
     let (mut all, mut known) = (Vec::new(), BTreeMap::new());
     let number = |item: T| {
@@ -116,7 +116,7 @@ fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec
     (all, numbers)
 }
 
-/// Returns the look of a body in each condition.
+/// Returns the appearance of a body in each condition.
 fn appearances(body: &Body, dimensions: u8) -> [Appearance; 5] {
     CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
 }

@@ -1,10 +1,10 @@
-//! Views of the kernel in the words of the protocol.
+//! Views of the kernel as types of the protocol.
 
 use crate::protocol::{
-    Appearance, BodyId, Event, OccupancyGrid, Problem, Scan, Scene, Shape, StaticBody,
+    Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, Shape, StaticBody,
 };
-use sidestep::kernel::InputError;
-use sidestep::kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
+use sidestep_kernel::InputError;
+use sidestep_kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
@@ -24,12 +24,12 @@ pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: b
 fn static_body(body: &Body, scenery: &Scenery) -> StaticBody {
     let own = |(kind, number, _): &&(_, u32, String)| (*kind, *number) == (body.kind, body.number);
     StaticBody {
-        who: body_id(&body.id()),
+        id: body_id(&body.id()),
         name: scenery.names.iter().find(own).map(|(_, _, name)| name.clone()),
         at_m: body.pose.at_m,
-        turn: body.pose.turn,
+        orientation: body.pose.turn,
         shape: shape(&body.shape),
-        look: appearance(body, scenery.dimensions),
+        appearance: appearance(body, scenery.dimensions),
     }
 }
 
@@ -63,25 +63,25 @@ pub(super) fn shape(shape: &view::Shape) -> Shape {
     }
 }
 
-/// Returns the look of a body.
+/// Returns the appearance of a body.
 pub(super) fn appearance(body: &Body, dimensions: u8) -> Appearance {
     let view::Appearance { color, opacity, layer, .. } = body.appearance(dimensions);
     Appearance { color, opacity, layer }
 }
 
-/// Returns the name of a body.
-pub(crate) fn body_id(who: &view::BodyId) -> BodyId {
-    BodyId { kind: who.kind.name().into(), number: who.number, part: who.part }
+/// Returns the identity of a body.
+pub(crate) fn body_id(id: &view::BodyId) -> BodyId {
+    BodyId { kind: id.kind.name().into(), number: id.number, part: id.part }
 }
 
 /// Returns a scan.
 pub(crate) fn scan(scan: &view::Scan) -> Scan {
     let in_range = |range_m: &f64| range_m.is_finite().then_some(*range_m);
     Scan {
-        of: body_id(&scan.of),
+        body: body_id(&scan.of),
         sensor: scan.sensor.clone(),
         at_m: scan.pose.at_m,
-        turn: scan.pose.turn,
+        orientation: scan.pose.turn,
         bearings_rad: scan.bearings_rad.clone(),
         ranges_m: scan.ranges_m.iter().map(in_range).collect(),
         true_m: scan.true_m.iter().map(in_range).collect(),
@@ -90,28 +90,29 @@ pub(crate) fn scan(scan: &view::Scan) -> Scan {
 }
 
 /// Returns an event.
-pub(crate) fn event(entry: &LogEvent) -> Event {
+pub(crate) fn event(entry: &LogEvent) -> RunEvent {
     let level = match entry.level {
         Severity::Info => "info",
         Severity::Warning => "warning",
         Severity::Error => "error",
     };
-    Event {
+    RunEvent {
         cycle: entry.cycle as f64,
         level: level.into(),
         kind: entry.kind.name().into(),
-        who: Some(body_id(&entry.who)),
-        with: entry.with.as_ref().map(body_id),
+        body: Some(body_id(&entry.who)),
+        other: entry.with.as_ref().map(body_id),
         at_m: entry.at_m,
         value: entry.value.as_ref().map(|amount| amount.value),
         unit: entry.value.as_ref().map_or_else(String::new, |amount| amount.unit.to_string()),
-        words: entry.words.clone(),
+        text: entry.words.clone(),
     }
 }
 
-/// Returns the body that a page names; `None` where there is no such kind.
-pub(crate) fn body(who: &BodyId) -> Option<view::BodyId> {
-    Some(view::BodyId::new(view::BodyKind::from_name(&who.kind)?, who.number, who.part))
+/// Returns the body that a page asks for; `None` where there is no such kind.
+pub(crate) fn body(id: &BodyId) -> Option<view::BodyId> {
+    let kind = view::BodyKind::from_name(&id.kind)?;
+    Some(view::BodyId::new(kind, id.number, id.part))
 }
 
 /// Returns an error of the program's own.

@@ -7,7 +7,7 @@ pub(crate) use convert::{body, body_id, event, problem, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
-use sidestep::kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
+use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
 use std::collections::BTreeMap;
 
 /// First bytes of a frame.
@@ -15,52 +15,52 @@ const MAGIC: u32 = 0x4654_5353;
 /// Bytes before the first column.
 const HEADER_BYTES: usize = 56;
 
-/// The maker of a session's frames, and of a cast whenever the bodies are no longer those of the last one.
+/// Encodes the frames of a session, and a body table whenever the bodies are no longer those of the last one.
 pub struct Encoder {
     session: SessionId,
     dimensions: u8,
     names: BTreeMap<(BodyKind, u32), String>,
-    troupe: Option<BodySet>,
-    casts: u32,
+    body_set: Option<BodySet>,
+    tables: u32,
 }
 
 impl Encoder {
     /// Creates an encoder for a run with this scenery.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();
-        let mut encoder = Self { session, dimensions: 2, names, troupe: None, casts: 0 };
+        let mut encoder = Self { session, dimensions: 2, names, body_set: None, tables: 0 };
         encoder.restart(scenery);
         encoder
     }
 
-    /// Switches to another run; the numbering of casts goes on.
+    /// Switches to another run; the numbering of body tables continues.
     pub fn restart(&mut self, scenery: &Scenery) {
         let named =
             |(kind, number, name): &(BodyKind, u32, String)| ((*kind, *number), name.clone());
         self.names = scenery.names.iter().map(named).collect();
         self.dimensions = scenery.dimensions;
-        self.troupe = None;
+        self.body_set = None;
     }
 
-    /// Returns a frame as bytes, and the cast that it begins, if it begins one.
+    /// Returns a frame as bytes, and the body table that it begins, if it begins one.
     pub fn encode(
         &mut self,
         frame: &Frame,
         text: &FrameText,
         left_out: u32,
     ) -> (Option<BodyTable>, Vec<u8>) {
-        let is_new = !self.troupe.as_ref().is_some_and(|troupe| troupe.matches(&frame.bodies));
+        let is_new =
+            !self.body_set.as_ref().is_some_and(|body_set| body_set.matches(&frame.bodies));
         if is_new {
-            self.casts += 1;
-            self.troupe = Some(BodySet::from_bodies(&frame.bodies, self.dimensions));
+            self.tables += 1;
+            self.body_set = Some(BodySet::from_bodies(&frame.bodies, self.dimensions));
         }
-        let cast =
-            self.troupe.as_ref().filter(|_| is_new).map(|troupe| {
-                troupe.to_table(self.session, self.casts, &frame.bodies, &self.names)
-            });
+        let table = self.body_set.as_ref().filter(|_| is_new).map(|body_set| {
+            body_set.to_table(self.session, self.tables, &frame.bodies, &self.names)
+        });
         // Text made of numbers and strings only: serializing cannot fail.
         let text = serde_json::to_vec(text).unwrap_or_default();
-        (cast, self.bytes(frame, &text, left_out))
+        (table, self.bytes(frame, &text, left_out))
     }
 
     fn bytes(&self, frame: &Frame, text: &[u8], left_out: u32) -> Vec<u8> {
@@ -96,7 +96,7 @@ impl Encoder {
         out.extend((VERSION as u16).to_le_bytes());
         out.extend([self.dimensions, 0]);
         out.extend(self.session.to_le_bytes());
-        out.extend(self.casts.to_le_bytes());
+        out.extend(self.tables.to_le_bytes());
         out.extend((frame.cycle as f64).to_le_bytes());
         out.extend(frame.time_s.to_le_bytes());
         counts.iter().chain(&[left_out, 0]).for_each(|n| out.extend(n.to_le_bytes()));

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::protocol::Scan;
-use sidestep::kernel::view::{BODY_COLORS, Pose};
+use sidestep_kernel::view::{BODY_COLORS, Pose};
 
 fn scenery(dimensions: u8) -> Scenery {
     Scenery {
@@ -59,11 +59,11 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
     let touching = robot(1, [3.0, 4.0, 0.5], 1.0).with_state_if(true, Condition::Touching);
     let bodies = vec![robot(0, [1.0, 2.0, 0.5], -2.0), touching];
     let mut encoder = Encoder::new(9, &scenery(2));
-    let (cast, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
+    let (table, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
     let mut read = Reader(&bytes);
     assert_eq!(read.take(), *b"SSTF");
     assert_eq!(read.take(), [1, 0, 2, 0], "version, dimensions");
-    assert_eq!(read.u32s(), [9, 1], "session, cast");
+    assert_eq!(read.u32s(), [9, 1], "session, table");
     assert_eq!((read.f64(), read.f64()), (7.0, 3.5));
     let text = br#"{"scans":[],"events":[],"events_left_out":0}"#;
     assert_eq!(read.u32s(), [2, 0, 0, text.len() as u32, 5, 0]);
@@ -74,19 +74,19 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
     assert_eq!(read.u32s(), [0], "no line");
     assert_eq!(read.take(), [0, 3, 0, 0], "conditions, padded");
     assert_eq!(read.0, text);
-    let cast = cast.expect("the first frame begins a cast");
-    assert_eq!((cast.session, cast.cast), (9, 1));
-    assert_eq!((cast.kinds, cast.kind), (vec!["robot".to_string()], vec![0, 0]));
-    assert_eq!((cast.number, cast.part, cast.shape), (vec![0, 1], vec![-1, -1], vec![0, 0]));
-    assert_eq!(cast.looks[usize::from(cast.look[1])][0].color, BODY_COLORS[1]);
-    assert_eq!((cast.names, cast.is_agent), (vec![(1, "Anna".to_string())], vec![true, true]));
+    let table = table.expect("the first frame begins a table");
+    assert_eq!((table.session, table.id), (9, 1));
+    assert_eq!((table.kinds, table.kind), (vec!["robot".to_string()], vec![0, 0]));
+    assert_eq!((table.number, table.part, table.shape), (vec![0, 1], vec![-1, -1], vec![0, 0]));
+    assert_eq!(table.appearances[usize::from(table.appearance[1])][0].color, BODY_COLORS[1]);
+    assert_eq!((table.names, table.is_agent), (vec![(1, "Anna".to_string())], vec![true, true]));
 }
 
 #[test]
 fn a_frame_of_space_has_quaternions_and_points_of_lines() {
     let rods = line(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
     let bodies = vec![rods.clone(), robot(0, [7.0, 8.0, 9.0], 0.0), rods];
-    let (cast, bytes) = Encoder::new(1, &scenery(3)).encode(&frame(bodies), &NOTHING, 0);
+    let (table, bytes) = Encoder::new(1, &scenery(3)).encode(&frame(bodies), &NOTHING, 0);
     let mut read = Reader(&bytes[32..]);
     assert_eq!(read.u32s::<3>(), [3, 2, 4], "bodies, lines, points");
     read.0 = &bytes[56..];
@@ -95,10 +95,10 @@ fn a_frame_of_space_has_quaternions_and_points_of_lines() {
     assert_eq!(read.u32s(), [0, 2, 4]);
     assert_eq!(read.f32s(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     assert_eq!(read.take(), [0; 4]);
-    let cast = cast.expect("a cast");
-    assert_eq!(cast.shape, [0, 1, 0]);
+    let table = table.expect("a table");
+    assert_eq!(table.shape, [0, 1, 0]);
     let without = crate::protocol::Shape::Line { points_m: vec![], thickness_m: 0.1 };
-    assert_eq!(cast.shapes[0], without);
+    assert_eq!(table.shapes[0], without);
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn every_column_starts_at_a_multiple_of_four_bytes() {
 #[test]
 fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
     let mut encoder = Encoder::new(1, &scenery(2));
-    let mut begins = |bodies| encoder.encode(&frame(bodies), &NOTHING, 0).0.map(|c| c.cast);
+    let mut begins = |bodies| encoder.encode(&frame(bodies), &NOTHING, 0).0.map(|table| table.id);
     let two = || vec![robot(0, [0.0; 3], 0.0), line(vec![[0.0; 3]; 2])];
     assert_eq!(begins(two()), Some(1));
     assert_eq!(begins(vec![robot(0, [9.0; 3], 1.0), line(vec![[1.0; 3]; 5])]), None);
@@ -141,8 +141,8 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
 
 #[test]
 fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
-    let seen = sidestep::kernel::view::Scan {
-        of: sidestep::kernel::view::BodyId::new(BodyKind::Robot, 1, None),
+    let seen = sidestep_kernel::view::Scan {
+        of: sidestep_kernel::view::BodyId::new(BodyKind::Robot, 1, None),
         sensor: "eye".into(),
         pose: Pose::from_position([0.0; 3]),
         bearings_rad: vec![0.0, 1.0],

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use serde_json::Value;
-use sidestep::scenario::{self, CharEdit};
+use sidestep_scenario::CharEdit;
 
 /// A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
 /// alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
@@ -57,7 +57,7 @@ pub enum Edit {
     },
 }
 
-impl From<Edit> for scenario::Edit {
+impl From<Edit> for sidestep_scenario::Edit {
     fn from(edit: Edit) -> Self {
         match edit {
             Edit::Set { key, value } => Self::Set { key, value },

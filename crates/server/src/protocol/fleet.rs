@@ -18,17 +18,17 @@ pub struct Fleet {
     /// The time in milliseconds below which 99 of 100 of them are.
     pub talk_p99_ms: Option<f64>,
     /// The nodes, by rising number of the agent.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<FleetNode>,
 }
 
 /// The node of an agent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Node {
+pub struct FleetNode {
     /// The agent's number on the network.
     pub agent: u32,
-    /// The body by which the agent is seen.
-    pub who: BodyId,
+    /// The body that shows the agent.
+    pub body: BodyId,
     /// A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
     pub state: String,
     /// Epoch of the coordinator that it follows.

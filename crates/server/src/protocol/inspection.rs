@@ -8,7 +8,7 @@ use serde::Serialize;
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Inspection {
     /// The body.
-    pub who: BodyId,
+    pub body: BodyId,
     /// Cycles done.
     pub cycle: f64,
     /// The body's name.
@@ -58,11 +58,11 @@ pub enum Value {
     /// Words.
     Text(String),
     /// A body.
-    Who(BodyId),
+    Body(BodyId),
     /// A place, in meters.
     Place([f64; 3]),
     /// Yes or no.
-    Yes(bool),
+    Flag(bool),
     /// Nothing.
     None,
 }

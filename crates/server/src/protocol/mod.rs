@@ -1,16 +1,16 @@
-//! The words between page and server: requests, replies and notices as JSON text, frames as binary.
+//! The words between page and server: requests, replies and notifications as JSON text, frames as binary.
 //!
 //! ```text
-//! page -> server   Request { id, call }                  text
+//! page -> server   ClientRequest { id, call }            text
 //! server -> page   Reply   { id, answer | problem }      text, one for each request
-//!                  Notice                                text, unasked
+//!                  ServerNotification                    text, unasked
 //!                  frame                                 binary, see below
 //! ```
 //! TypeScript's types are generated from these (`studio/src/protocol/types.ts`, see `typescript.rs`). A frame is
 //! little-endian; every column starts at a multiple of 4 bytes, so typed arrays can view it without a copy:
 //! ```text
 //!  0 u32  magic 0x46545353 ("SSTF")      4 u16 version     6 u8 dimensions (2|3)    7 u8 0
-//!  8 u32  session                       12 u32 cast (the cast that the columns follow)
+//!  8 u32  session                       12 u32 table (the body table that the columns follow)
 //! 16 f64  cycle                         24 f64 time_s
 //! 32 u32  bodies (n)                    36 u32 lines (k)   40 u32 points of all lines (p)
 //! 44 u32  bytes of text (t)             48 u32 frames left out since the session began   52 u32 0
@@ -22,7 +22,7 @@
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
 //! A page grants credit for frames ([`Method::Credit`]), and gets none without it. At most
-//! [`FRAMES_PER_S`](crate::FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
+//! [`MAX_FRAMES_PER_S`](crate::MAX_FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 
 mod edit;
@@ -35,19 +35,19 @@ mod scene;
 mod typescript;
 
 pub use edit::Edit;
-pub use fleet::{Fleet, Node};
+pub use fleet::{Fleet, FleetNode};
 pub use inspection::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
 pub use reply::{
-    FileEntry, FileKind, MetricName, Notification, Problem, Reply, ReplyBody, ReplyResult,
+    FileEntry, FileKind, MetricName, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
     SessionState, SessionStatus, SweepRun, TargetRef,
 };
-pub use request::{BodyId, Method, OpenTarget, Request, Speed};
+pub use request::{BodyId, ClientRequest, Method, OpenTarget, Speed};
 pub use scene::{
-    Appearance, BodyTable, Event, FrameText, OccupancyGrid, Scan, Scene, Shape, StaticBody,
+    Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, Shape, StaticBody,
 };
 
-/// Version of requests, replies, notices and frames together.
-pub const VERSION: u32 = 1;
+/// Version of requests, replies, notifications and frames together.
+pub const VERSION: u32 = 2;
 
 /// A session's number, as the server gave it.
 pub type SessionId = u32;

@@ -1,6 +1,6 @@
 //! The server's messages: replies, and notices without a request.
 
-use super::{BodyTable, Event, Fleet, Inspection, Scene, SessionId, Speed};
+use super::{BodyTable, Fleet, Inspection, RunEvent, Scene, SessionId, Speed};
 use serde::Serialize;
 
 /// The reply to a request.
@@ -66,7 +66,7 @@ pub enum ReplyBody {
     /// Events, the oldest first.
     Events {
         /// The events.
-        entries: Vec<Event>,
+        entries: Vec<RunEvent>,
         /// Number of events of these cycles that are not here: beyond the requested number, or never kept.
         left_out: u64,
         /// The cycle before which all events are known: of a run those so far, of a recording soon all.
@@ -234,7 +234,7 @@ pub enum FileKind {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "notice", rename_all = "kebab-case")]
-pub enum Notification {
+pub enum ServerNotification {
     /// The first of all notices.
     Hello {
         /// See [`VERSION`](super::VERSION).
@@ -249,7 +249,7 @@ pub enum Notification {
         open: Vec<TargetRef>,
     },
     /// The bodies that the columns of frames with this number stand for; sent before the first such frame.
-    Cast(BodyTable),
+    Bodies(BodyTable),
     /// The state of a session; sent when it changes, at most ten times a second.
     Status(SessionStatus),
     /// The end of a session by itself, and the reason.
@@ -261,7 +261,7 @@ pub enum Notification {
     },
 }
 
-/// A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
+/// Something that the command line asked to open: a kind as in [`OpenTarget`](super::OpenTarget), with its path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct TargetRef {
@@ -304,17 +304,17 @@ pub struct SessionStatus {
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub enum SessionState {
-    /// It goes on.
+    /// It advances.
     Playing,
-    /// It stands still.
+    /// It is paused.
     Paused,
     /// It is on its way to a cycle that was asked for.
     Seeking,
-    /// It goes on elsewhere, and is only watched here.
+    /// It runs elsewhere, and is only watched here.
     Watched,
     /// It has come to its end.
     Over,
-    /// It cannot go on; the notice [`Notification::Ended`] gives the reason.
+    /// It cannot go on; the notice [`ServerNotification::Ended`] gives the reason.
     Failed,
 }
 
@@ -324,8 +324,8 @@ pub enum SessionState {
 pub struct MetricName {
     /// Its name in results.
     pub key: String,
-    /// A few words for it.
-    pub words: String,
+    /// A short label.
+    pub label: String,
     /// Its unit; may be empty.
     pub unit: String,
 }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]
-pub struct Request {
+pub struct ClientRequest {
     /// Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
     pub id: u32,
-    /// The question.
+    /// What is asked.
     pub call: Method,
 }
 
-/// A question or an order of a page.
+/// A query or a command of a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
@@ -26,8 +26,8 @@ pub enum Method {
     },
     /// Opens a scenario or a recording: a new session, which is paused at its start and belongs to the socket.
     Open {
-        /// The thing to open.
-        what: OpenTarget,
+        /// What to open.
+        target: OpenTarget,
         /// Another seed than the scenario's.
         seed: Option<u64>,
     },
@@ -36,19 +36,19 @@ pub enum Method {
         /// The session.
         session: SessionId,
     },
-    /// Lets a session go on.
+    /// Plays a session.
     Play {
         /// The session.
         session: SessionId,
         /// The speed.
         speed: Speed,
     },
-    /// Lets a session stand still.
+    /// Pauses a session.
     Pause {
         /// The session.
         session: SessionId,
     },
-    /// Goes some cycles on and stays paused; answered there. While a seek or a step is under way, counted from its
+    /// Advances by some cycles and stays paused; answered there. While a seek or a step is under way, counted from its
     /// end; the request for that one is then answered at once.
     Step {
         /// The session.
@@ -65,7 +65,7 @@ pub enum Method {
         cycle: u64,
     },
     /// Starts anew, with another seed and another text where given. Answered by
-    /// [`Opened`](super::Answer::Opened), with the session's own number; the run before stays if the text is wrong.
+    /// [`Opened`](super::ReplyBody::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
         /// The session.
         session: SessionId,
@@ -74,12 +74,12 @@ pub enum Method {
         /// Another text for the scenario, which is not saved.
         text: Option<String>,
     },
-    /// Names the bodies of which frames shall hold scans.
-    Look {
+    /// Selects the bodies whose scans the frames contain.
+    SelectScans {
         /// The session.
         session: SessionId,
         /// The bodies.
-        scans_of: Vec<BodyId>,
+        bodies: Vec<BodyId>,
     },
     /// Grants the server further frames; it sends none without credit.
     Credit {
@@ -88,12 +88,12 @@ pub enum Method {
         /// Number of frames.
         frames: u32,
     },
-    /// Asks for the percepts, decisions and deeds of a body.
+    /// Asks for the percepts, decisions and actions of a body.
     Inspect {
         /// The session.
         session: SessionId,
         /// The body.
-        who: BodyId,
+        body: BodyId,
     },
     /// Asks for samples of all metrics, from the sample with this number on.
     Metrics {
@@ -102,7 +102,7 @@ pub enum Method {
         /// The number of the first sample wanted.
         from: u32,
     },
-    /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `most`, after the
+    /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `limit`, after the
     /// first `skip` ones.
     Events {
         /// The session.
@@ -114,7 +114,7 @@ pub enum Method {
         /// The number of first events to leave out; 0 without it.
         skip: Option<u32>,
         /// The largest number of events.
-        most: u32,
+        limit: u32,
     },
     /// Asks for the scenario's text.
     Source {
@@ -167,7 +167,7 @@ pub enum Method {
         /// written, which another program may have changed before a page was connected again.
         base: Option<String>,
         /// Whether a file is replaced even if it holds something else.
-        over: bool,
+        overwrite: bool,
     },
     /// Asks for the JSON Schema of a world's scenarios.
     Schema {
@@ -196,7 +196,7 @@ pub enum OpenTarget {
         /// Its path, as a listing gave it.
         path: String,
     },
-    /// A fleet that flies elsewhere: watched, not steered.
+    /// A fleet that flies elsewhere: it is watched, not controlled.
     Fleet {
         /// The endpoint that the command line named.
         path: String,
@@ -214,7 +214,7 @@ pub enum Speed {
     Fastest,
 }
 
-/// The name of a body: kind, number, and, for things that have parts, the part.
+/// The identity of a body: kind, number, and, for things that have parts, the part.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]

@@ -1,4 +1,4 @@
-//! Everything to be seen: the scene that stays the same, the cast of moving bodies, and the text of frames.
+//! Everything visible: the static scene, the table of moving bodies, and the text of frames.
 
 use super::{BodyId, SessionId};
 use serde::Serialize;
@@ -48,17 +48,17 @@ pub struct OccupancyGrid {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct StaticBody {
     /// The body.
-    pub who: BodyId,
+    pub id: BodyId,
     /// Its own name, if it has one.
     pub name: Option<String>,
     /// Its place, in meters.
     pub at_m: [f64; 3],
     /// Its orientation: a unit quaternion x, y, z, w.
-    pub turn: [f64; 4],
+    pub orientation: [f64; 4],
     /// Its shape.
     pub shape: Shape,
-    /// Its look.
-    pub look: Appearance,
+    /// Its appearance.
+    pub appearance: Appearance,
 }
 
 /// The shape of a body, around its pose.
@@ -99,7 +99,7 @@ pub enum Shape {
     },
 }
 
-/// The look of a body, apart from its shape. Color per condition comes from the kernel's one table of appearance.
+/// The appearance of a body, apart from its shape. Colors per condition come from the one table of the kernel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Appearance {
@@ -112,14 +112,14 @@ pub struct Appearance {
 }
 
 /// Bodies that move, in columns: body i is `kinds[kind[i]]`, `number[i]`, `part[i]` (-1: none), `shapes[shape[i]]`,
-/// `looks[look[i]]`.
+/// `appearances[appearance[i]]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct BodyTable {
     /// The session.
     pub session: SessionId,
-    /// Its number, which frames name.
-    pub cast: u32,
+    /// Its number, to which frames refer.
+    pub id: u32,
     /// The names of kinds.
     pub kinds: Vec<String>,
     /// The kind of each body.
@@ -132,10 +132,10 @@ pub struct BodyTable {
     pub shapes: Vec<Shape>,
     /// The shape of each body.
     pub shape: Vec<u32>,
-    /// Looks, each for the five conditions.
-    pub looks: Vec<[Appearance; 5]>,
-    /// The look of each body.
-    pub look: Vec<u16>,
+    /// Appearances, each for the five conditions.
+    pub appearances: Vec<[Appearance; 5]>,
+    /// The appearance of each body.
+    pub appearance: Vec<u16>,
     /// Names of the bodies that have one: index of the body, name.
     pub names: Vec<(u32, String)>,
     /// The bodies that are agents, which can be inspected.
@@ -149,7 +149,7 @@ pub struct FrameText {
     /// The scans of the bodies that were asked for.
     pub scans: Vec<Scan>,
     /// The last events since the frame before.
-    pub events: Vec<Event>,
+    pub events: Vec<RunEvent>,
     /// Number of events since the frame before that are not here.
     pub events_left_out: u64,
 }
@@ -159,13 +159,13 @@ pub struct FrameText {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Scan {
     /// The body with the sensor.
-    pub of: BodyId,
+    pub body: BodyId,
     /// The sensor's name.
     pub sensor: String,
     /// The sensor's place, in meters.
     pub at_m: [f64; 3],
     /// The direction of its bearing 0: a unit quaternion x, y, z, w.
-    pub turn: [f64; 4],
+    pub orientation: [f64; 4],
     /// Bearing of each beam, in radians.
     pub bearings_rad: Vec<f64>,
     /// Range of each beam in meters, as reported; null: nothing in range.
@@ -176,10 +176,10 @@ pub struct Scan {
     pub range_m: f64,
 }
 
-/// An event.
+/// An event of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Event {
+pub struct RunEvent {
     /// The cycle in which it happened.
     pub cycle: f64,
     /// `info`, `warning` or `error`.
@@ -187,15 +187,15 @@ pub struct Event {
     /// A word of the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world gives none.
     pub kind: String,
     /// The body concerned.
-    pub who: Option<BodyId>,
+    pub body: Option<BodyId>,
     /// The other body or thing that took part, if any.
-    pub with: Option<BodyId>,
+    pub other: Option<BodyId>,
     /// Its place, in meters.
     pub at_m: Option<[f64; 3]>,
     /// Its value, if it has one.
     pub value: Option<f64>,
     /// The value's unit; may be empty.
     pub unit: String,
-    /// The event in words.
-    pub words: String,
+    /// The event as text.
+    pub text: String,
 }

@@ -26,7 +26,7 @@ fn types() -> String {
         ($($name:ty),+ $(,)?) => { [$(declaration::<$name>(&config)),+] };
     }
     let types = all![
-        Request,
+        ClientRequest,
         Method,
         Edit,
         OpenTarget,
@@ -39,12 +39,12 @@ fn types() -> String {
         FileEntry,
         FileKind,
         MetricName,
-        Notification,
+        ServerNotification,
         TargetRef,
         SessionStatus,
         SessionState,
         Fleet,
-        Node,
+        FleetNode,
         Scene,
         OccupancyGrid,
         StaticBody,
@@ -54,7 +54,7 @@ fn types() -> String {
         SweepRun,
         FrameText,
         Scan,
-        Event,
+        RunEvent,
         Inspection,
         Section,
         Fact,
@@ -65,7 +65,7 @@ fn types() -> String {
         MarkShape,
     ];
     let version = format!(
-        "/** Version of requests, replies, notices and frames together. */\nexport const VERSION = {VERSION};\n"
+        "/** Version of requests, replies, notifications and frames together. */\nexport const VERSION = {VERSION};\n"
     );
     let lines = format!("{HEADER}\n{version}\n{}", types.join("\n"));
     lines.lines().map(|line| line.trim_end().to_string() + "\n").collect()

@@ -9,38 +9,39 @@ use axum::extract::State;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::kernel::{Cycle, Interrupt};
-use sidestep::scenario::Worlds;
+use sidestep_kernel::{Cycle, Interrupt};
+use sidestep_scenario::Worlds;
 use sidestep_session::export::{AnimationOptions, ExportRequest, Format, export};
 use sidestep_session::{Error, RecordedRun, Watcher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The largest export; the command has no such bound.
+/// Maximum size of an export, which is held in memory; the command has no such limit.
 const MAX_EXPORT_BYTES: u64 = 256 << 20;
 
 /// Returns a recorded run in another format.
 pub(crate) async fn answer(
-    State(house): State<Arc<AppState>>,
+    State(state): State<Arc<AppState>>,
     headers: HeaderMap,
     uri: Uri,
 ) -> Response {
-    if let Err(refusal) = house.guard.authorize_fetch(&headers) {
+    if let Err(refusal) = state.access.authorize_fetch(&headers) {
         return refusal.into_response();
     }
-    export_response(&house, &QueryFields::from_query(uri.query()))
+    export_response(&state, &QueryFields::from_query(uri.query()))
         .await
         .unwrap_or_else(ResultError::into_response)
 }
 
-async fn export_response(house: &AppState, fields: &QueryFields) -> Result<Response, ResultError> {
-    let path = house.means.files.resolve(fields.require("path")?)?;
-    let wanted = ExportSpec::from_fields(fields)?;
-    let (worlds, workers) = (house.means.worlds, house.means.workers);
-    let name = wanted.file_name(&path);
-    let media = wanted.media;
-    let work = move |client: &CancelToken| write_export(worlds, &path, &wanted, workers, client);
-    let bytes = house.workshop.run(work).await?;
+async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Response, ResultError> {
+    let path = state.deps.files.resolve(fields.require("path")?)?;
+    let spec = ExportSpec::from_fields(fields)?;
+    let worlds = state.deps.worlds.clone();
+    let workers = state.deps.workers;
+    let name = spec.file_name(&path);
+    let media = spec.media;
+    let job = move |cancel: &CancelToken| write_export(&worlds, &path, &spec, workers, cancel);
+    let bytes = state.jobs.run(job).await?;
     let disposition = format!("attachment; filename=\"{name}\"");
     let about = [
         (CONTENT_TYPE, media),
@@ -50,11 +51,11 @@ async fn export_response(house: &AppState, fields: &QueryFields) -> Result<Respo
     Ok((about, bytes).into_response())
 }
 
-/// The part of a run that is wanted, and its format.
+/// The requested part of a run, and its format.
 struct ExportSpec {
-    form: Format,
+    format: Format,
     /// The text that is added to the name of the run.
-    ending: String,
+    suffix: String,
     media: &'static str,
     cycle: Option<Cycle>,
 }
@@ -62,7 +63,7 @@ struct ExportSpec {
 impl ExportSpec {
     fn from_fields(fields: &QueryFields) -> Result<Self, ResultError> {
         let table = || fields.require("table").map(String::from);
-        let (form, media) = match fields.require("as")? {
+        let (format, media) = match fields.require("as")? {
             "csv" => (Format::Csv(Some(table()?)), "text/csv; charset=utf-8"),
             "parquet" => (Format::Parquet(Some(table()?)), "application/vnd.apache.parquet"),
             "mcap" => (Format::Mcap, "application/octet-stream"),
@@ -76,21 +77,22 @@ impl ExportSpec {
                 );
             }
         };
-        let ending = match &form {
+        let suffix = match &format {
             Format::Csv(Some(table)) => format!("-{table}.csv"),
             Format::Parquet(Some(table)) => format!("-{table}.parquet"),
             _ => format!(".{}", fields.require("as")?),
         };
         let cycle =
             fields.get("cycle").map(|cycle| cycle.parse().map_err(|_| no_such_cycle(cycle)));
-        Ok(Self { form, ending, media, cycle: cycle.transpose()? })
+        Ok(Self { format, suffix, media, cycle: cycle.transpose()? })
     }
 
     /// Returns the name of the file.
     fn file_name(&self, path: &Path) -> String {
+        // `.` has no name of its own.
         let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let stem = if whole.is_file() { whole.file_stem() } else { whole.file_name() };
-        plain_file_name(&(stem.unwrap_or_default().to_string_lossy() + self.ending.as_str()))
+        plain_file_name(&(stem.unwrap_or_default().to_string_lossy() + self.suffix.as_str()))
     }
 }
 
@@ -107,34 +109,35 @@ pub(super) fn plain_file_name(name: &str) -> String {
 
 /// Exports to a temporary folder; returns the content of the file.
 fn write_export(
-    worlds: Worlds,
+    worlds: &Worlds,
     path: &Path,
-    wanted: &ExportSpec,
+    spec: &ExportSpec,
     workers: usize,
-    client: &CancelToken,
+    cancel: &CancelToken,
 ) -> Result<Vec<u8>, ResultError> {
     let recorded = RecordedRun::open(worlds, path).map_err(|e| result_error(&e))?;
-    let place = tempfile::tempdir()
+    let folder = tempfile::tempdir()
         .map_err(|e| result_error(&Error::cannot_write(&std::env::temp_dir(), &e)))?;
-    let out = place.path().join("export");
-    let until = wanted.cycle.filter(|_| !matches!(wanted.form, Format::Svg | Format::Png { .. }));
-    let from = if until.is_some() { None } else { wanted.cycle };
-    let asked = ExportRequest {
-        form: wanted.form.clone(),
+    let out = folder.path().join("export");
+    // The page gives the cycle on display: a picture shows it, everything else ends there.
+    let is_picture = matches!(spec.format, Format::Svg | Format::Png { .. });
+    let request = ExportRequest {
+        form: spec.format.clone(),
         out: Some(&out),
         replace: false,
-        from,
-        until,
+        from: spec.cycle.filter(|_| is_picture),
+        until: spec.cycle.filter(|_| !is_picture),
         every: None,
         workers,
     };
-    let bounded = SizeLimitWatcher { client, folder: place.path() };
-    match export(&recorded, &asked, &bounded) {
-        Err(_) if bounded.is_too_large() => Err(too_large()),
-        Err(error) => Err(result_error(&error)),
-        Ok(_) if bounded.is_too_large() => Err(too_large()),
-        Ok(_) => std::fs::read(&out).map_err(|e| result_error(&Error::cannot_write(&out, &e))),
+    let watcher = SizeLimitWatcher { cancel, folder: folder.path() };
+    let exported = export(&recorded, &request, &watcher);
+    // An export that was stopped because of its size ends like one that was cancelled.
+    if watcher.is_too_large() {
+        return Err(too_large());
     }
+    exported.map_err(|error| result_error(&error))?;
+    std::fs::read(&out).map_err(|e| result_error(&Error::cannot_write(&out, &e)))
 }
 
 fn too_large() -> ResultError {
@@ -145,7 +148,7 @@ fn too_large() -> ResultError {
 
 /// A watcher that stops an export that becomes too large.
 struct SizeLimitWatcher<'a> {
-    client: &'a CancelToken,
+    cancel: &'a CancelToken,
     folder: &'a Path,
 }
 
@@ -159,11 +162,11 @@ impl SizeLimitWatcher<'_> {
 
 impl Watcher for SizeLimitWatcher<'_> {
     fn should_continue(&self) -> bool {
-        self.client.should_continue() && !self.is_too_large()
+        self.cancel.should_continue() && !self.is_too_large()
     }
 
     fn interrupt(&self) -> Interrupt {
-        self.client.interrupt()
+        self.cancel.interrupt()
     }
 }
 
@@ -180,11 +183,11 @@ mod tests {
     #[test]
     fn what_is_wanted_is_read_or_refused_in_words() {
         let of = |query: &str| ExportSpec::from_fields(&QueryFields::from_query(Some(query)));
-        let wanted = of("as=csv&table=events").unwrap_or_else(|_| panic!("a table"));
-        assert_eq!(wanted.file_name(Path::new("/no/office")), "office-events.csv");
+        let spec = of("as=csv&table=events").unwrap_or_else(|_| panic!("a table"));
+        assert_eq!(spec.file_name(Path::new("/no/office")), "office-events.csv");
         for query in ["as=csv", "as=exe", "", "as=svg&cycle=-1", "as=png&cycle=x"] {
             assert!(of(query).is_err(), "{query}");
         }
-        assert_eq!(of("as=png&cycle=12").ok().and_then(|wanted| wanted.cycle), Some(12));
+        assert_eq!(of("as=png&cycle=12").ok().and_then(|spec| spec.cycle), Some(12));
     }
 }

@@ -1,9 +1,9 @@
-//! Work for a browser that waits for it: one piece at a time, and none for a browser that is gone.
+//! Jobs for browsers that wait for the results: one at a time, and cancelled when the browser disconnects.
 
 use super::ResultError;
 use crate::protocol::Problem;
 use axum::http::StatusCode;
-use sidestep::kernel::Interrupt;
+use sidestep_kernel::Interrupt;
 use sidestep_report::RenderedReport;
 use sidestep_session::{Error, Watcher};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,35 +13,35 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
-/// The place where results are made.
+/// The queue of jobs. A report or an export uses all processors, so several at a time would only finish later.
 pub(crate) struct JobQueue {
     turn: Semaphore,
-    /// The report that was made last, because its figures are asked for next.
-    last: Mutex<Option<(PathBuf, Arc<RenderedReport>)>>,
+    /// The report that was rendered last: the page requests its figures next.
+    last_report: Mutex<Option<(PathBuf, Arc<RenderedReport>)>>,
 }
 
 impl Default for JobQueue {
     fn default() -> Self {
-        Self { turn: Semaphore::new(1), last: Mutex::default() }
+        Self { turn: Semaphore::new(1), last_report: Mutex::default() }
     }
 }
 
-/// A browser that waits, as the work sees it.
+/// A token by which a job learns that its browser has disconnected.
 #[derive(Clone, Default)]
 pub(super) struct CancelToken {
-    is_gone: Arc<AtomicBool>,
+    is_cancelled: Arc<AtomicBool>,
     interrupt: Interrupt,
 }
 
 impl CancelToken {
-    /// Returns whether it is gone.
+    /// Returns whether the job is cancelled.
     pub(super) fn is_cancelled(&self) -> bool {
-        self.is_gone.load(Relaxed)
+        self.is_cancelled.load(Relaxed)
     }
 
-    /// Notes that it no longer wants the work.
+    /// Cancels the job.
     pub(super) fn cancel(&self) {
-        self.is_gone.store(true, Relaxed);
+        self.is_cancelled.store(true, Relaxed);
         self.interrupt.raise();
     }
 }
@@ -56,7 +56,7 @@ impl Watcher for CancelToken {
     }
 }
 
-/// A guard that tells the work that its browser no longer waits.
+/// A guard that cancels a job when it is dropped: axum drops the future of a request whose browser has disconnected.
 struct CancelOnDrop(CancelToken);
 
 impl Drop for CancelOnDrop {
@@ -66,13 +66,13 @@ impl Drop for CancelOnDrop {
 }
 
 impl JobQueue {
-    /// Does a piece of work in its turn, for as long as the future is awaited.
+    /// Runs a job in its turn; it is cancelled when the future is dropped.
     ///
     /// # Errors
-    /// Those of the work; a bug in it.
+    /// Those of the job; a bug in it.
     pub(super) async fn run<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&CancelToken) -> Result<T, ResultError> + Send + 'static,
+        job: impl FnOnce(&CancelToken) -> Result<T, ResultError> + Send + 'static,
     ) -> Result<T, ResultError> {
         let bug = || {
             let problem = Problem::new("result", "this is a bug in sidestep", "please report it");
@@ -80,25 +80,27 @@ impl JobQueue {
         };
         // The semaphore is never closed.
         let _turn = self.turn.acquire().await.map_err(|_| bug())?;
-        let leaves = CancelOnDrop(CancelToken::default());
-        let client = leaves.0.clone();
-        let done = spawn_blocking(move || catch_unwind(AssertUnwindSafe(|| work(&client)))).await;
+        let guard = CancelOnDrop(CancelToken::default());
+        let cancel = guard.0.clone();
+        let done = spawn_blocking(move || catch_unwind(AssertUnwindSafe(|| job(&cancel)))).await;
         done.map_err(|_| bug())?.map_err(|_| bug())?
     }
 
-    /// Keeps a report.
+    /// Keeps a report as the last one.
     pub(super) fn cache_report(&self, path: PathBuf, rendered: Arc<RenderedReport>) {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some((path, rendered));
+        *self.last_report.lock().unwrap_or_else(PoisonError::into_inner) = Some((path, rendered));
     }
 
-    /// Returns the report of a folder, if it is the one that was made last.
+    /// Returns the report of a folder, if it is the last one.
     pub(super) fn cached_report(&self, path: &PathBuf) -> Option<Arc<RenderedReport>> {
-        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        last.as_ref().filter(|(of, _)| of == path).map(|(_, rendered)| rendered.clone())
+        let last = self.last_report.lock().unwrap_or_else(PoisonError::into_inner);
+        last.as_ref()
+            .filter(|(last_path, _)| last_path == path)
+            .map(|(_, rendered)| rendered.clone())
     }
 }
 
-/// Returns an error of the work as an answer.
+/// Converts an error of a job.
 pub(super) fn result_error(error: &Error) -> ResultError {
     crate::session::problem_of(error).into()
 }

@@ -6,8 +6,8 @@
 //! /report?path=DIR&as=html|markdown|NN-figure   the same as a file, its text, or one of its figures
 //! /export?path=DIR&as=csv&table=NAME     the output of `sidestep export`; of pictures, with &cycle=N
 //! ```
-//! Requests must come from our own page, and each path must be below the folders that were named at start. One result
-//! is made at a time, in a thread of its own; none is finished for a browser that is gone.
+//! Requests must come from our own page, and each path must be below the folders given at start. One result
+//! is made at a time, in a thread of its own; it is cancelled when its browser disconnects.
 
 mod export;
 mod job_queue;

@@ -1,4 +1,4 @@
-//! The fields of an address.
+//! The fields of a query string.
 
 use super::ResultError;
 use crate::protocol::Problem;

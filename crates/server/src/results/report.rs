@@ -13,71 +13,68 @@ use axum::http::header::{
 };
 use axum::http::{HeaderMap, Uri};
 use axum::response::{IntoResponse, Response};
-use sidestep::scenario::Worlds;
 use sidestep_report::{RenderedReport, SvgFile, render};
+use sidestep_scenario::Worlds;
 use sidestep_session::report::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The rights of the page of a report, unlike those of all others: it runs its inline scripts, in our frame, and
-/// nothing else. It has no origin, so it could send no requests even if a name in it were taken for a script.
+/// The policy of the page of a report, unlike that of all others: it runs its inline scripts, in our frame, and nothing
+/// else. It has no origin, so it could send no requests even if a name in it were taken for a script.
 const REPORT_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
     style-src 'unsafe-inline'; img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'self'";
 
 /// Returns the report of a folder, or a part of it.
 pub(crate) async fn answer(
-    State(house): State<Arc<AppState>>,
+    State(state): State<Arc<AppState>>,
     headers: HeaderMap,
     uri: Uri,
 ) -> Response {
-    if let Err(refusal) = house.guard.authorize_fetch(&headers) {
+    if let Err(refusal) = state.access.authorize_fetch(&headers) {
         return refusal.into_response();
     }
-    let made = report_response(
-        &house,
-        &QueryFields::from_query(uri.query()),
-        compress::accepts_gzip(&headers),
-    )
-    .await;
-    made.unwrap_or_else(ResultError::into_response)
+    let fields = QueryFields::from_query(uri.query());
+    let accepts_gzip = compress::accepts_gzip(&headers);
+    report_response(&state, &fields, accepts_gzip).await.unwrap_or_else(ResultError::into_response)
 }
 
 async fn report_response(
-    house: &AppState,
+    state: &AppState,
     fields: &QueryFields,
     is_zipped: bool,
 ) -> Result<Response, ResultError> {
-    let path = house.means.files.resolve(fields.require("path")?)?;
+    let path = state.deps.files.resolve(fields.require("path")?)?;
     let part = fields.get("as").map(String::from);
-    let worlds = house.means.worlds;
-    let kept = house.workshop.cached_report(&path).filter(|_| part.is_some());
+    let worlds = state.deps.worlds.clone();
+    // The report itself is rendered anew each time: its run or sweep may have grown.
+    let cached = state.jobs.cached_report(&path).filter(|_| part.is_some());
     let folder = path.clone();
-    let work = move |client: &CancelToken| match kept {
-        Some(kept) => Ok(kept),
-        None => render_cached(worlds, &folder, client).map(Arc::new),
+    let job = move |cancel: &CancelToken| match cached {
+        Some(report) => Ok(report),
+        None => render_report(&worlds, &folder, cancel).map(Arc::new),
     };
-    let rendered = house.workshop.run(work).await?;
-    house.workshop.cache_report(path.clone(), rendered.clone());
-    let work = move |_: &CancelToken| {
-        ReportPart::from_report(&rendered, &path, part.as_deref(), is_zipped)
-    };
-    Ok(house.workshop.run(work).await?.into_response())
+    let report = state.jobs.run(job).await?;
+    state.jobs.cache_report(path.clone(), report.clone());
+    // A job, because gzip of a large report takes some time.
+    let job =
+        move |_: &CancelToken| ReportPart::from_report(&report, &path, part.as_deref(), is_zipped);
+    Ok(state.jobs.run(job).await?.into_response())
 }
 
-fn render_cached(
-    worlds: Worlds,
+fn render_report(
+    worlds: &Worlds,
     folder: &Path,
-    client: &CancelToken,
+    cancel: &CancelToken,
 ) -> Result<RenderedReport, ResultError> {
-    let document = document(worlds, folder, client).map_err(|e| result_error(&e))?;
+    let document = document(worlds, folder, cancel).map_err(|e| result_error(&e))?;
     render(&document, "figures").map_err(|e| result_error(&e.into()))
 }
 
 /// A part of a report that is sent.
 struct ReportPart {
     media: &'static str,
-    /// The name of the file, unless it is shown.
+    /// The name of the file that the browser saves; none where it shows the part.
     file: Option<String>,
     bytes: Vec<u8>,
     is_zipped: bool,

@@ -1,11 +1,11 @@
-//! The runs of a sweep, each with the thing that opens it.
+//! The runs of a sweep, each with the target that opens it.
 
 use crate::encode::problem;
 use crate::protocol::{Problem, ReplyBody, SweepRun, TargetRef};
 use sidestep_session::sweep::{FinishedRuns, Folder, read_finished};
 use std::path::Path;
 
-/// The largest number of runs listed.
+/// Maximum number of runs listed.
 const MAX_RUNS: usize = 20_000;
 
 /// Lists the runs of the sweep in a folder.
@@ -15,16 +15,18 @@ const MAX_RUNS: usize = 20_000;
 pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
     let folder = Folder::open(path).map_err(|e| problem(&e))?;
     let FinishedRuns { table, is_complete } = read_finished(&folder).map_err(|e| problem(&e))?;
-    let (plan, names) = (folder.plan(), folder.plan().names());
+    let plan = folder.plan();
+    let names = plan.names();
     let number = |name: &str, row: usize| table.column(name)?.values.number(row);
     let run = |row: usize| {
         let cell = plan.cell_of(number("cell", row)? as u64)?;
         let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
-        let kept = folder.run_folder(cell.id);
+        let recording = folder.run_folder(cell.id);
         // A run that is not recorded is its variant's scenario run with its seed.
-        let (kind, replay) = match kept.join("run.json").is_file() {
-            true => ("recording", kept),
-            false => ("scenario", folder.scenario(cell.variant)),
+        let (kind, replay) = if recording.join("run.json").is_file() {
+            ("recording", recording)
+        } else {
+            ("scenario", folder.scenario(cell.variant))
         };
         Some(SweepRun {
             variant: names.get(cell.variant as usize)?.clone(),

@@ -1,84 +1,89 @@
-//! Viewers of Foxglove's protocol, which watch the session that was opened last.
+//! Viewers by Foxglove's protocol, which watch the session that was opened last.
 
 use crate::event_store::EventStore;
 use crate::protocol::SessionId;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::Scenery;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::Scenery;
 use sidestep_session::{
     Error, Playback, PlaybackPhase, PlaybackRequest, ViewerAddress, ViewerServer,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The time between two checks of viewers' wishes.
+/// Time between two checks of viewers' requests.
 const POLL_INTERVAL: Duration = Duration::from_millis(40);
 
-/// The one place at which viewers are served. Sessions share it: it goes to the one opened last.
+/// The one address at which viewers are served. Sessions share it: the one opened last has the lease.
 pub(crate) struct FoxgloveHost {
-    at: ViewerAddress,
-    shown: Mutex<Option<(SessionId, ViewerServer)>>,
+    address: ViewerAddress,
+    current: Mutex<Option<(SessionId, ViewerServer)>>,
 }
 
 impl FoxgloveHost {
-    /// Returns the place at an address that is free.
-    pub(crate) fn new(at: ViewerAddress) -> Self {
-        Self { at, shown: Mutex::default() }
+    /// Returns a host that no session has leased yet.
+    pub(crate) fn new(address: ViewerAddress) -> Self {
+        Self { address, current: Mutex::default() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<(SessionId, ViewerServer)>> {
-        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The side of one session.
+/// A session's lease of the host, which the next session takes over.
 pub(super) struct FoxgloveLease {
-    showcase: Option<Arc<FoxgloveHost>>,
+    /// None where viewers are not served.
+    host: Option<Arc<FoxgloveHost>>,
     session: SessionId,
     due: Instant,
 }
 
 impl Drop for FoxgloveLease {
     fn drop(&mut self) {
-        let Some(showcase) = &self.showcase else { return };
-        let mut shown = showcase.lock();
-        if shown.as_ref().is_some_and(|(of, _)| *of == self.session) {
-            *shown = None;
+        let Some(host) = &self.host else { return };
+        let mut current = host.lock();
+        if current.as_ref().is_some_and(|(session, _)| *session == self.session) {
+            *current = None;
         }
     }
 }
 
 impl FoxgloveLease {
-    pub(super) fn new(showcase: Option<Arc<FoxgloveHost>>, session: SessionId) -> Self {
-        Self { showcase, session, due: Instant::now() }
+    pub(super) fn new(host: Option<Arc<FoxgloveHost>>, session: SessionId) -> Self {
+        Self { host, session, due: Instant::now() }
     }
 
-    /// Returns whether there may be viewers at all.
+    /// Returns whether viewers are served at all.
     pub(super) fn is_enabled(&self) -> bool {
-        self.showcase.is_some()
+        self.host.is_some()
     }
 
-    /// Takes the place for a run of a given number of simulated seconds.
+    /// Takes over the lease for a run of a given number of simulated seconds.
     ///
     /// # Errors
-    /// When another program has taken the address.
+    /// When another program uses the address.
     pub(super) fn start(
         &self,
         run: &mut dyn Simulation,
         scenery: &Scenery,
         end_s: f64,
     ) -> Result<(), Error> {
-        let Some(showcase) = &self.showcase else { return Ok(()) };
-        let mut shown = showcase.lock();
-        // Viewers reconnect to a server that tells the new length and the new topics.
-        *shown = None;
-        let (playing, time_s) = (PlaybackPhase::Paused, run.cycle() as f64 * scenery.cycle_s);
-        let now = Playback { playing, time_s, speed: 1.0, did_seek: false };
-        let viewers = ViewerServer::start(&showcase.at, run, scenery, end_s, true, now)?;
-        *shown = Some((self.session, viewers));
+        let Some(host) = &self.host else { return Ok(()) };
+        let mut current = host.lock();
+        // A server announces the length and the topics of one run. Viewers reconnect to the new one.
+        *current = None;
+        let playback = Playback {
+            playing: PlaybackPhase::Paused,
+            time_s: run.cycle() as f64 * scenery.cycle_s,
+            speed: 1.0,
+            did_seek: false,
+        };
+        let viewers = ViewerServer::start(&host.address, run, scenery, end_s, true, playback)?;
+        *current = Some((self.session, viewers));
         Ok(())
     }
 
-    /// Shows the run to its viewers, and returns their wishes.
+    /// Sends the run to its viewers, and returns their request, if there is one.
     pub(super) fn update(
         &mut self,
         run: &mut dyn Simulation,
@@ -86,12 +91,13 @@ impl FoxgloveLease {
         playback: Playback,
         now: Instant,
     ) -> Option<PlaybackRequest> {
-        let mut shown = self.showcase.as_ref()?.lock();
-        let (_, viewers) = shown.as_mut().filter(|(of, _)| *of == self.session)?;
+        let mut current = self.host.as_ref()?.lock();
+        let (_, viewers) = current.as_mut().filter(|(session, _)| *session == self.session)?;
         self.due = now + POLL_INTERVAL;
         if viewers.is_frame_due(playback.time_s, now) {
             let mut frame = run.frame(ViewerServer::FRAME_OPTIONS);
             log.record(&mut frame);
+            // Those of the frame alone would lack the events of frames that only the page got.
             (frame.log, frame.log_left_out) = log.take_for_viewers();
             viewers.send_frame(frame, now);
         }
@@ -99,7 +105,7 @@ impl FoxgloveLease {
         viewers.take_request()
     }
 
-    /// Returns when to check viewers' wishes.
+    /// Returns when to check viewers' requests.
     pub(super) fn next_update(&self) -> Option<Instant> {
         self.is_enabled().then_some(self.due)
     }

@@ -1,50 +1,51 @@
-//! The memory of a session as its run goes on: places to go back to, samples of metrics, and events.
+//! What a session keeps of a run as it advances: keyframes to seek to, samples of metrics, and events.
 
 use crate::event_store::EventStore;
 use crate::keyframes::{Keyframes, MemoryBudget};
 use crate::samples::Samples;
-use sidestep::kernel::Simulation;
-use sidestep::scenario::MetricInfo;
+use sidestep_kernel::Simulation;
+use sidestep_scenario::MetricInfo;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The memory of one run, filled by the first of its computations to come to a cycle.
+/// The history of one run. Each cycle is recorded by the computation that gets there first: the played one, or the
+/// [`Prefetcher`](super::prefetcher::Prefetcher).
 pub(super) struct RunHistory {
     pub(super) keyframes: Keyframes,
     pub(super) samples: Samples,
     pub(super) log: EventStore,
-    sampled: Instant,
+    last_sample: Instant,
 }
 
 impl RunHistory {
-    /// Returns the memory of a run that is at its start.
+    /// Returns the history of a run that is at its start.
     pub(super) fn from_run(
         run: &dyn Simulation,
-        meanings: &'static [MetricInfo],
+        infos: &'static [MetricInfo],
         budget: &Arc<MemoryBudget>,
     ) -> Self {
-        let mut memory = Self {
+        let mut history = Self {
             keyframes: Keyframes::new(budget),
-            samples: Samples::new(meanings),
+            samples: Samples::new(infos),
             log: EventStore::default(),
-            sampled: Instant::now(),
+            last_sample: Instant::now(),
         };
-        memory.add_keyframe(run);
-        memory.add_sample(run);
-        memory
+        history.add_keyframe(run);
+        history.add_sample(run);
+        history
     }
 
-    /// Records a run that has gone on for a time.
-    pub(super) fn record(&mut self, run: &dyn Simulation, took: Duration) {
-        if self.keyframes.is_due(run.cycle(), took) {
+    /// Records a run that has advanced for some computing time.
+    pub(super) fn record(&mut self, run: &dyn Simulation, computing_time: Duration) {
+        if self.keyframes.is_due(run.cycle(), computing_time) {
             self.add_keyframe(run);
         }
-        if self.samples.is_due(run.cycle(), self.sampled.elapsed()) {
+        if self.samples.is_due(run.cycle(), self.last_sample.elapsed()) {
             self.add_sample(run);
         }
     }
 
-    /// Records the place where a run stands still.
+    /// Records the cycle at which a run pauses, so that its metrics are those on display.
     pub(super) fn record_pause(&mut self, run: &dyn Simulation) {
         if self.samples.is_new(run.cycle()) {
             self.add_sample(run);
@@ -61,6 +62,6 @@ impl RunHistory {
         let started = Instant::now();
         let metrics = run.metrics();
         self.samples.push(run.cycle(), &metrics, started.elapsed());
-        self.sampled = Instant::now();
+        self.last_sample = Instant::now();
     }
 }

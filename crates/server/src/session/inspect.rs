@@ -4,8 +4,8 @@ use crate::encode::{body, body_id};
 use crate::protocol::{
     BodyId, Fact, Inspection, Mark, MarkShape, Problem, Role, Section, Table, Value,
 };
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view;
 
 /// Returns the percepts, decisions and deeds of a body.
 ///
@@ -19,7 +19,7 @@ pub(super) fn inspection(run: &dyn Simulation, of: &BodyId) -> Result<Inspection
         Problem::new(place, "nothing is to tell of this body", remedy)
     })?;
     Ok(Inspection {
-        who: body_id(&told.who),
+        body: body_id(&told.who),
         cycle: told.cycle as f64,
         title: told.title,
         sections: told.sections.into_iter().map(section).collect(),
@@ -46,9 +46,9 @@ fn value(value: view::FactValue) -> Value {
         view::FactValue::Number { value, unit } => Value::Number { value, unit: unit.into() },
         view::FactValue::Share(share) => Value::Share(share),
         view::FactValue::Text(words) => Value::Text(words),
-        view::FactValue::Who(of) => Value::Who(body_id(&of)),
+        view::FactValue::Who(of) => Value::Body(body_id(&of)),
         view::FactValue::Place(at_m) => Value::Place(at_m),
-        view::FactValue::Yes(is_so) => Value::Yes(is_so),
+        view::FactValue::Yes(is_so) => Value::Flag(is_so),
         view::FactValue::None => Value::None,
     }
 }

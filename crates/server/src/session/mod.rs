@@ -1,7 +1,7 @@
 //! Sessions: each is a thread of its own that owns a run, and takes requests by a channel.
 //!
-//! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread alone controls
-//! the computation, and its views go to an [`Outbox`], which never makes it wait.
+//! No socket waits for another one, and no result depends on any: the session's thread alone controls the computation, and
+//! its frames go to an [`Outbox`], which never makes it wait.
 
 mod edit;
 mod fleet_session;
@@ -25,8 +25,8 @@ use fleet_session::FleetSession;
 use open_run::OpenRun;
 use player::Player;
 use save::SharedSource;
-use sidestep::kernel::Interrupt;
-use sidestep::scenario::Source;
+use sidestep_kernel::Interrupt;
+use sidestep_scenario::Source;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -34,53 +34,53 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-/// The largest number of requests that wait for a session.
+/// Maximum number of requests that wait for a session.
 const MAX_QUEUED_REQUESTS: usize = 256;
-/// The longest wait for a request, after which the thread looks around again.
+/// Maximum wait for a request. It is a safeguard: a request wakes the thread, and so does the time of the next work.
 const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// The first request of a session.
+/// The request that opens a session.
 pub(crate) struct OpenRequest {
     /// The session's number.
     pub(crate) session: SessionId,
-    /// The request.
+    /// The number of the request.
     pub(crate) id: u32,
     /// The thing to open.
-    pub(crate) what: OpenTarget,
+    pub(crate) target: OpenTarget,
     /// Another seed than the scenario's.
     pub(crate) seed: Option<u64>,
 }
 
-/// A session, from the side of a socket. It ends when this is dropped.
+/// A session, as its socket holds it. It ends when this is dropped.
 pub(crate) struct Session {
-    orders: SyncSender<(u32, Method)>,
+    requests: SyncSender<(u32, Method)>,
     interrupt: Interrupt,
     thread: JoinHandle<()>,
-    shown: SharedSource,
+    source: SharedSource,
 }
 
 impl Session {
-    /// Starts a session, which answers the request that opens it; `ticket` is dropped when it has ended.
+    /// Starts a session, which answers the request that opens it; `permit` is dropped when it has ended.
     ///
     /// # Errors
     /// When the system has no threads left.
     pub(crate) fn start(
-        means: SessionDeps,
-        opening: OpenRequest,
+        deps: SessionDeps,
+        request: OpenRequest,
         outbox: Arc<Outbox>,
-        ticket: impl Send + 'static,
+        permit: impl Send + 'static,
     ) -> std::io::Result<Self> {
-        let (orders, taken) = sync_channel(MAX_QUEUED_REQUESTS);
+        let (sender, receiver) = sync_channel(MAX_QUEUED_REQUESTS);
         let interrupt = Interrupt::default();
-        let shown = SharedSource::default();
-        let (heeded, told) = (interrupt.clone(), shown.clone());
+        let source = SharedSource::default();
+        let worker = SessionWorker { outbox, interrupt: interrupt.clone(), requests: receiver };
+        let worker_source = source.clone();
         let thread =
-            Builder::new().name(format!("session-{}", opening.session)).spawn(move || {
-                let _ticket = ticket;
-                let desk = SessionWorker { outbox, interrupt: heeded, orders: taken };
-                desk.run(means, opening, told);
+            Builder::new().name(format!("session-{}", request.session)).spawn(move || {
+                let _permit = permit;
+                worker.run(deps, request, worker_source);
             })?;
-        Ok(Self { orders, interrupt, thread, shown })
+        Ok(Self { requests: sender, interrupt, thread, source })
     }
 
     /// Passes a request on; it is answered by the session.
@@ -88,7 +88,7 @@ impl Session {
     /// # Errors
     /// When too many wait, or the session has ended.
     pub(crate) fn send_request(&self, id: u32, call: Method) -> Result<(), Problem> {
-        self.orders.try_send((id, call)).map_err(|error| match error {
+        self.requests.try_send((id, call)).map_err(|error| match error {
             TrySendError::Full(_) => {
                 Problem::new("session", "too many requests wait for it", "ask less often")
             }
@@ -98,7 +98,7 @@ impl Session {
 
     /// Returns its scenario, once it is open: in the file in which it was saved last.
     pub(crate) fn source(&self) -> Option<Source> {
-        self.shown.source()
+        self.source.get()
     }
 
     /// Returns whether it has ended.
@@ -109,67 +109,82 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // There is no need to wait for the end of its cycle: the result will not be seen.
+        // The cycle under way is abandoned: nobody will see its result.
         self.interrupt.raise();
     }
 }
 
-/// Returns the problem of a request for a session that is gone.
+/// Returns the problem of a request for a session that does not exist, or no longer.
 pub(crate) fn no_such_session() -> Problem {
     Problem::new("session", "there is no such session, or it has ended", "open it again")
 }
 
-/// The place of a session's thread.
+/// The thread of a session.
 struct SessionWorker {
     outbox: Arc<Outbox>,
     interrupt: Interrupt,
-    orders: Receiver<(u32, Method)>,
+    requests: Receiver<(u32, Method)>,
 }
 
-/// The reason why work was not done to its end.
+/// The reason why a session's work unwound.
 enum SessionExit {
-    /// It was interrupted, because it is no longer wanted.
+    /// It was interrupted, because the socket has dropped the session.
     Interrupted,
-    /// A bug, in words.
+    /// A bug: the message of the panic.
     Bug(String),
 }
 
 impl SessionWorker {
-    /// Opens the requested thing and plays it, until the socket drops it or a bug ends it.
-    fn run(self, means: SessionDeps, opening: OpenRequest, shown: SharedSource) {
-        let OpenRequest { session, id, what, seed } = opening;
-        if let OpenTarget::Fleet { path } = &what {
-            match means.fleet_feed(path) {
-                Ok(screen) => {
-                    FleetSession::new(session, self.outbox.clone(), screen).run(&self, id)
-                }
-                Err(problem) => return self.refuse(id, problem),
+    /// Opens the target and serves it, until the socket drops the session or it ends by itself.
+    fn run(self, deps: SessionDeps, request: OpenRequest, source: SharedSource) {
+        let OpenRequest { session, id, target, seed } = request;
+        match target {
+            OpenTarget::Scenario { path } => {
+                self.run_player(session, id, source, || OpenRun::from_file(deps, &path, seed));
             }
-            return self.refuse_queued();
+            OpenTarget::New { world } => {
+                self.run_player(session, id, source, || OpenRun::from_default(deps, &world, seed));
+            }
+            OpenTarget::Recording { path } => {
+                self.run_player(session, id, source, || OpenRun::from_recording(deps, &path, seed));
+            }
+            OpenTarget::Fleet { path } => match deps.fleet_feed(&path) {
+                Ok(feed) => FleetSession::new(session, self.outbox.clone(), feed).run(&self, id),
+                Err(problem) => self.refuse(id, problem),
+            },
         }
+        self.refuse_queued();
+    }
+
+    /// Opens a run and plays it; `id` is the number of the request that opens it.
+    fn run_player(
+        &self,
+        session: SessionId,
+        id: u32,
+        source: SharedSource,
+        open: impl FnOnce() -> Result<OpenRun, Problem>,
+    ) {
         let opened = self.catch_panic(|| {
-            let stage = OpenRun::open(means, &what, seed)?.with_shared_source(shown);
-            let (outbox, interrupt) = (self.outbox.clone(), self.interrupt.clone());
-            Player::new(session, outbox, interrupt, stage)
+            let open_run = open()?.with_shared_source(source);
+            Player::new(session, self.outbox.clone(), self.interrupt.clone(), open_run)
         });
         let mut player = match opened {
             Ok(Ok(player)) => player,
             Ok(Err(problem)) => return self.refuse(id, problem),
-            Err(SessionExit::Bug(words)) => return self.refuse(id, internal_error(&words)),
+            Err(SessionExit::Bug(message)) => return self.refuse(id, internal_error(&message)),
             Err(SessionExit::Interrupted) => return self.refuse(id, no_such_session()),
         };
         let result = ReplyResult::Answer(player.opened_reply());
         self.outbox.send_reply(&Reply { id, result });
         match self.catch_panic(|| self.play(&mut player)) {
             Ok(()) | Err(SessionExit::Interrupted) => player.cancel_seek("the session was closed"),
-            Err(SessionExit::Bug(words)) => player.fail(internal_error(&words)),
+            Err(SessionExit::Bug(message)) => player.fail(internal_error(&message)),
         }
-        self.refuse_queued();
     }
 
-    /// Refuses requests that came after the end.
+    /// Refuses the requests in the queue of a session that has ended: each request gets a reply.
     fn refuse_queued(&self) {
-        while let Ok((id, _)) = self.orders.try_recv() {
+        while let Ok((id, _)) = self.requests.try_recv() {
             self.refuse(id, no_such_session());
         }
     }
@@ -177,12 +192,12 @@ impl SessionWorker {
     fn play(&self, player: &mut Player) {
         loop {
             let wait = player.poll().unwrap_or(MAX_WAIT);
-            match self.orders.recv_timeout(wait) {
+            match self.requests.recv_timeout(wait) {
                 Ok((id, call)) => player.on_request(id, call),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            while let Ok((id, call)) = self.orders.try_recv() {
+            while let Ok((id, call)) = self.requests.try_recv() {
                 player.on_request(id, call);
             }
         }
@@ -194,9 +209,10 @@ impl SessionWorker {
 
     fn catch_panic<T>(&self, work: impl FnOnce() -> T) -> Result<T, SessionExit> {
         catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
-            match self.interrupt.caused(payload.as_ref()) {
-                true => SessionExit::Interrupted,
-                false => SessionExit::Bug(panic_message(payload.as_ref())),
+            if self.interrupt.caused(payload.as_ref()) {
+                SessionExit::Interrupted
+            } else {
+                SessionExit::Bug(panic_message(payload.as_ref()))
             }
         })
     }
@@ -208,9 +224,9 @@ fn panic_message(payload: &(dyn Any + Send)) -> String {
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
 }
 
-fn internal_error(words: &str) -> Problem {
+fn internal_error(message: &str) -> Problem {
     let remedy = "please report it with the scenario; the other sessions go on";
-    Problem::new("session", format!("this is a bug in sidestep: {words}"), remedy)
+    Problem::new("session", format!("this is a bug in sidestep: {message}"), remedy)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The run of a session, and its origin.
+//! The run of a session, and where it comes from.
 
 use super::foxglove::FoxgloveHost;
 use super::save::{
@@ -8,48 +8,48 @@ use crate::encode::problem;
 use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
-use crate::protocol::{OpenTarget, Problem, ReplyBody};
-use sidestep::kernel::{Cycle, Simulation};
-use sidestep::scenario::{MetricInfo, Source, Worlds};
+use crate::protocol::{Problem, ReplyBody};
+use sidestep_kernel::{Cycle, Simulation};
+use sidestep_scenario::{MetricInfo, Source, Worlds};
 use sidestep_session::{Error, RecordedRun, read_scenario};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The means that sessions need to begin.
+/// What sessions depend on.
 #[derive(Clone)]
 pub(crate) struct SessionDeps {
     /// The worlds.
     pub(crate) worlds: Worlds,
-    /// The files that may be read.
+    /// The files that pages may read.
     pub(crate) files: AllowedFiles,
     /// The number of worker threads of each session.
     pub(crate) workers: usize,
-    /// Whether texts of a page are refused.
+    /// Whether texts of pages are refused.
     pub(crate) read_only: bool,
-    /// The memory that the keyframes of all sessions share.
+    /// The memory for keyframes, shared by all sessions.
     pub(crate) budget: Arc<MemoryBudget>,
-    /// The place for viewers beside the page, if they are served.
-    pub(crate) showcase: Option<Arc<FoxgloveHost>>,
-    /// The fleets that are watched.
-    pub(crate) screens: Vec<Arc<FleetFeed>>,
+    /// The host of Foxglove viewers, if they are served.
+    pub(crate) foxglove: Option<Arc<FoxgloveHost>>,
+    /// The feeds of the fleets that are watched.
+    pub(crate) fleets: Vec<Arc<FleetFeed>>,
 }
 
 impl SessionDeps {
-    /// Returns the screen of a fleet.
+    /// Returns the feed of a fleet.
     ///
     /// # Errors
-    /// When none of this name is watched, or it is not heard now.
+    /// When no fleet of this endpoint is watched, or its views do not arrive.
     pub(super) fn fleet_feed(&self, endpoint: &str) -> Result<Arc<FleetFeed>, Problem> {
-        let found = self.screens.iter().find(|screen| screen.endpoint == endpoint);
-        let screen = found.cloned().ok_or_else(|| {
+        let feed = self.fleets.iter().find(|feed| feed.endpoint == endpoint);
+        let feed = feed.cloned().ok_or_else(|| {
             let remedy = format!("start the studio with it: sidestep studio {endpoint}");
             Problem::new(endpoint, "no fleet of this address is watched", remedy)
         })?;
-        screen.snapshot().lost.map_or(Ok(screen), Err)
+        feed.snapshot().lost.map_or(Ok(feed), Err)
     }
 }
 
-/// A run, and where it comes from.
+/// An open run.
 pub(crate) struct OpenRun {
     /// The run.
     pub(crate) run: Box<dyn Simulation>,
@@ -57,84 +57,104 @@ pub(crate) struct OpenRun {
     pub(crate) until: Cycle,
     /// The scenario, without the requested seed.
     pub(crate) source: Source,
-    /// The recording that is shown, if it is one.
+    /// The recording that is computed again, if it is one.
     pub(crate) recorded: Option<RecordedRun>,
-    means: SessionDeps,
+    deps: SessionDeps,
+    /// Another seed than the scenario's, if one was requested.
     seed: Option<u64>,
-    own: Option<SessionFile>,
-    shown: SharedSource,
+    /// The file of the scenario, if it is in one.
+    file: Option<SessionFile>,
+    shared_source: SharedSource,
 }
 
 impl OpenRun {
-    /// Opens a scenario or a recording.
+    /// Opens a scenario file, or a file of another program that stands for a scenario.
     ///
     /// # Errors
     /// When it cannot be opened; with place, cause and remedy.
-    pub(crate) fn open(
-        means: SessionDeps,
-        what: &OpenTarget,
+    pub(crate) fn from_file(
+        deps: SessionDeps,
+        path: &str,
         seed: Option<u64>,
     ) -> Result<Self, Problem> {
-        match what {
-            OpenTarget::Scenario { path } => {
-                let path = means.files.resolve(path)?;
-                let read = read_scenario(means.worlds, &path, &[]).map_err(|e| problem(&e))?;
-                let own = SessionFile::open(&path, &read.0);
-                Self::from_scenario(means, read.0, seed, own)
-            }
-            OpenTarget::New { world } => {
-                let kind = means.worlds.find(world).ok_or_else(|| {
-                    let names = means.worlds.names().join(", ");
-                    Problem::new(
-                        world.as_str(),
-                        "no such world is known",
-                        format!("name one of {names}"),
-                    )
-                })?;
-                let folder = means.files.first_root_folder();
-                let source = Source::new(format!("{world}.toml"), kind.default_scenario(), folder);
-                Self::from_scenario(means, source, seed, None)
-            }
-            OpenTarget::Recording { path } => Self::from_recording(means, path, seed),
-            OpenTarget::Fleet { path } => {
-                Err(Problem::new(path.as_str(), "a fleet has no run here", "report this as a bug"))
-            }
-        }
+        let path = deps.files.resolve(path)?;
+        let (source, _) = read_scenario(&deps.worlds, &path, &[]).map_err(|e| problem(&e))?;
+        let file = SessionFile::open(&path, &source);
+        Self::from_scenario(deps, source, seed, file)
     }
 
-    /// Shows the scenario to other threads.
-    pub(crate) fn with_shared_source(mut self, shown: SharedSource) -> Self {
-        shown.set(&self.source);
-        self.shown = shown;
+    /// Opens the default scenario of a world.
+    ///
+    /// # Errors
+    /// When there is no such world.
+    pub(crate) fn from_default(
+        deps: SessionDeps,
+        world: &str,
+        seed: Option<u64>,
+    ) -> Result<Self, Problem> {
+        let world_type = deps.worlds.find(world).ok_or_else(|| {
+            let names = deps.worlds.names().join(", ");
+            Problem::new(world, "no such world is known", format!("name one of {names}"))
+        })?;
+        let folder = deps.files.first_root_folder();
+        let source = Source::new(format!("{world}.toml"), world_type.default_scenario(), folder);
+        Self::from_scenario(deps, source, seed, None)
+    }
+
+    /// Shares the scenario with other threads.
+    pub(crate) fn with_shared_source(mut self, shared_source: SharedSource) -> Self {
+        shared_source.set(&self.source);
+        self.shared_source = shared_source;
         self
     }
 
     fn from_scenario(
-        means: SessionDeps,
+        deps: SessionDeps,
         source: Source,
         seed: Option<u64>,
-        own: Option<SessionFile>,
+        file: Option<SessionFile>,
     ) -> Result<Self, Problem> {
-        check_names(&means, &source)?;
-        let run = start_run(&means, &source, seed)?;
-        let until = run.config().cycles;
-        let shown = SharedSource::default();
-        Ok(Self { run, until, source, recorded: None, means, seed, own, shown })
+        check_references(&deps, &source)?;
+        let run = start_run(&deps, &source, seed)?;
+        Ok(Self {
+            until: run.config().cycles,
+            run,
+            source,
+            recorded: None,
+            deps,
+            seed,
+            file,
+            shared_source: SharedSource::default(),
+        })
     }
 
-    fn from_recording(means: SessionDeps, path: &str, seed: Option<u64>) -> Result<Self, Problem> {
+    /// Opens a recording, to be computed again.
+    ///
+    /// # Errors
+    /// When it cannot be opened, or another seed is requested.
+    pub(crate) fn from_recording(
+        deps: SessionDeps,
+        path: &str,
+        seed: Option<u64>,
+    ) -> Result<Self, Problem> {
         if seed.is_some() {
             return Err(recording_is_read_only(path));
         }
-        let path = means.files.resolve(path)?;
-        let recorded = RecordedRun::open(means.worlds, &path).map_err(|e| problem_of(&e))?;
+        let path = deps.files.resolve(path)?;
+        let recorded = RecordedRun::open(&deps.worlds, &path).map_err(|e| problem_of(&e))?;
         let resolved = recorded.resolved_scenario().map_err(|e| problem(&e))?;
-        let run = recorded.start_for_viewing(means.workers).map_err(|e| problem(&e))?;
-        let until = recorded.cycles_done;
-        let source =
-            Source::new(path.join("scenario.toml").display().to_string(), resolved.text, path);
-        let (own, shown) = (None, SharedSource::default());
-        Ok(Self { run, until, source, recorded: Some(recorded), means, seed, own, shown })
+        let run = recorded.start_for_viewing(deps.workers).map_err(|e| problem(&e))?;
+        let place = path.join("scenario.toml").display().to_string();
+        Ok(Self {
+            run,
+            until: recorded.cycles_done,
+            source: Source::new(place, resolved.text, path),
+            recorded: Some(recorded),
+            deps,
+            seed,
+            file: None,
+            shared_source: SharedSource::default(),
+        })
     }
 
     /// Starts again. Without a text the scenario stays the same, including its seed unless another is given.
@@ -150,23 +170,25 @@ impl OpenRun {
             if seed.is_some() || text.is_some() {
                 return Err(recording_is_read_only(&self.source.place));
             }
-            self.run = recorded.start_for_viewing(self.means.workers).map_err(|e| problem(&e))?;
+            self.run = recorded.start_for_viewing(self.deps.workers).map_err(|e| problem(&e))?;
             return Ok(());
         }
         let (source, seed) = match text {
-            Some(text) => (source_with_text(&self.means, &self.source, text)?, seed),
+            Some(text) => (source_with_text(&self.deps, &self.source, text)?, seed),
             None => {
-                // Saving it elsewhere has changed the targets of its paths.
-                check_names(&self.means, &self.source)?;
+                // If it was saved elsewhere meanwhile, its relative paths lead to other files.
+                check_references(&self.deps, &self.source)?;
                 (self.source.clone(), seed.or(self.seed))
             }
         };
-        self.run = start_run(&self.means, &source, seed)?;
-        (self.until, self.source, self.seed) = (self.run.config().cycles, source, seed);
+        self.run = start_run(&self.deps, &source, seed)?;
+        self.until = self.run.config().cycles;
+        self.source = source;
+        self.seed = seed;
         Ok(())
     }
 
-    /// Writes a text into a file, the session's own if none is named; it is the session's own from then on.
+    /// Writes a text into a file, the session's own if none is given, which is the session's own from then on.
     ///
     /// # Errors
     /// When it is not written.
@@ -174,9 +196,9 @@ impl OpenRun {
         &mut self,
         text: String,
         to: Option<String>,
-        wish: SaveOptions,
+        options: SaveOptions,
     ) -> Result<ReplyBody, Problem> {
-        if self.means.read_only {
+        if self.deps.read_only {
             let remedy = "start the studio without --read-only";
             return Err(Problem::new(
                 self.source.place.as_str(),
@@ -193,44 +215,47 @@ impl OpenRun {
                 return Err(Problem::new(to, "is no name of a scenario", "end it in .toml"));
             }
             Some(to) => to,
-            None => session_path(self.own.as_ref(), &self.source.place)?,
+            None => session_path(self.file.as_ref(), &self.source.place)?,
         };
-        let target = self.means.files.target(&path)?;
+        let target = self.deps.files.target(&path)?;
         let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
         let source = Source::new(path, text, folder);
-        check_writable(&self.means.files, &self.means.worlds, &source)?;
+        check_writable(&self.deps.files, &self.deps.worlds, &source)?;
         let Source { text, folder, .. } = source;
-        let answer = write_scenario(&target, self.own.as_ref(), &text, &wish)?;
-        if let ReplyBody::Saved { place } = &answer {
-            (self.source.place, self.source.folder) = (place.clone(), folder);
-            self.own = Some(SessionFile { path: target.path, text });
-            self.shown.set(&self.source);
+        let reply = write_scenario(&target, self.file.as_ref(), &text, &options)?;
+        if let ReplyBody::Saved { place } = &reply {
+            self.source.place.clone_from(place);
+            self.source.folder = folder;
+            self.file = Some(SessionFile { path: target.path, text });
+            self.shared_source.set(&self.source);
         }
-        Ok(answer)
+        Ok(reply)
     }
 
-    /// Returns the same run at its start once more, if it is a recording.
+    /// Starts a recording once more, to be computed ahead; none if the run is no recording.
     pub(crate) fn recorded_run_again(&self) -> Option<Box<dyn Simulation>> {
-        // It could be started before: if it cannot now, nothing is computed ahead.
-        self.recorded.as_ref()?.start_for_viewing(self.means.workers).ok()
+        // It could be started before. If it cannot now, because its file was deleted for instance, nothing is computed ahead.
+        self.recorded.as_ref()?.start_for_viewing(self.deps.workers).ok()
     }
 
-    /// Returns the result of comparing the end of a recorded run with the recording; `None` before the end.
+    /// Compares the end of a recorded run with the recording, in a sentence; `None` before the end.
     pub(crate) fn verdict(&self, run: &dyn Simulation) -> Option<String> {
         let recorded = self.recorded.as_ref()?;
-        if let Some(maker) = recorded.other_build() {
+        if let Some(build) = recorded.other_build() {
             return Some(format!(
-                "Recorded by sidestep {maker}, which is not this one: shown from its own {}, not computed again, without \
+                "Recorded by sidestep {build}, which is not this one: shown from its own {}, not computed again, without \
                  inspection.",
                 if recorded.folder.is_some() { "tables" } else { "messages" }
             ));
         }
-        let (done, of) = (run.cycle(), recorded.cycles_done);
-        if run.is_over() && done < of {
-            let words = format!("it is over after {done} cycles, recorded are {of}");
-            return Some(format!("Computed again, but it differs: {words}."));
+        let done = run.cycle();
+        let planned = recorded.cycles_done;
+        if run.is_over() && done < planned {
+            return Some(format!(
+                "Computed again, but it differs: it is over after {done} cycles, recorded are {planned}."
+            ));
         }
-        if done != of {
+        if done != planned {
             return None;
         }
         Some(match recorded.verify_digest(run) {
@@ -245,19 +270,20 @@ impl OpenRun {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_build().is_none())
     }
 
-    /// Returns the memory that keyframes of all sessions share.
+    /// Returns the memory for keyframes, shared by all sessions.
     pub(crate) fn budget(&self) -> &Arc<MemoryBudget> {
-        &self.means.budget
+        &self.deps.budget
     }
 
-    /// Returns the place for viewers beside the page.
+    /// Returns the host of Foxglove viewers.
     pub(crate) fn foxglove_host(&self) -> Option<Arc<FoxgloveHost>> {
-        self.means.showcase.clone()
+        self.deps.foxglove.clone()
     }
 
-    /// Returns the metrics of its world in words.
+    /// Returns the descriptions of the world's metrics.
     pub(crate) fn metric_infos(&self) -> &'static [MetricInfo] {
-        self.means.worlds.find(self.run.world()).map_or(&[], |kind| kind.metric_infos())
+        let world_type = self.deps.worlds.find(self.run.world());
+        world_type.map_or(&[], |world_type| world_type.metric_infos())
     }
 
     /// Returns the names of the recorded tables; none if it has no tables.
@@ -271,7 +297,7 @@ impl OpenRun {
 
     /// Returns whether its text cannot be replaced.
     pub(crate) fn is_read_only(&self) -> bool {
-        self.means.read_only || self.recorded.is_some()
+        self.deps.read_only || self.recorded.is_some()
     }
 }
 
@@ -280,32 +306,33 @@ impl OpenRun {
 /// # Errors
 /// When texts are refused.
 pub(crate) fn text_problems(
-    means: &SessionDeps,
+    deps: &SessionDeps,
     source: &Source,
     text: String,
 ) -> Result<Vec<Problem>, Problem> {
     let syntax = Source { text: text.clone(), ..source.clone() }.syntax_errors();
-    if !means.read_only && !syntax.is_empty() {
+    if !deps.read_only && !syntax.is_empty() {
         return Ok(syntax.iter().map(problem).collect());
     }
-    let source = match source_with_text(means, source, text) {
-        Err(problem) if means.read_only => return Err(problem),
+    let source = match source_with_text(deps, source, text) {
+        Err(problem) if deps.read_only => return Err(problem),
         Err(problem) => return Ok(vec![problem]),
         Ok(source) => source,
     };
-    Ok(match means.worlds.compile(&source) {
+    Ok(match deps.worlds.compile(&source) {
         Err(_) => {
-            let errors = sidestep::problems(means.worlds, &source);
+            let errors = sidestep_experiment::problems(&deps.worlds, &source);
             errors.iter().map(|error| problem(&source.error_at_reference(error))).collect()
         }
         Ok(compiled) => {
             let remarks = compiled.remarks().into_iter();
-            let told = remarks.map(|remark| Problem {
-                is_warning: true,
-                key: Some(remark.key.as_str().into()),
-                ..Problem::new(remark.key, remark.words, "")
-            });
-            told.collect()
+            remarks
+                .map(|remark| Problem {
+                    is_warning: true,
+                    key: Some(remark.key.as_str().into()),
+                    ..Problem::new(remark.key, remark.words, "")
+                })
+                .collect()
         }
     })
 }
@@ -313,38 +340,38 @@ pub(crate) fn text_problems(
 /// Returns a scenario with another text.
 ///
 /// # Errors
-/// When texts are refused, or this one names a file that may not be read.
+/// When texts are refused, or this one refers to a file that may not be read.
 pub(super) fn source_with_text(
-    means: &SessionDeps,
+    deps: &SessionDeps,
     source: &Source,
     text: String,
 ) -> Result<Source, Problem> {
-    if means.read_only {
+    if deps.read_only {
         let remedy = "change the file, or start the studio without --read-only";
         return Err(Problem::new(source.place.as_str(), "texts are not taken here", remedy));
     }
-    let other = Source { text, ..source.clone() };
-    means.files.check_text(&other)?;
-    Ok(other)
+    let source = Source { text, ..source.clone() };
+    deps.files.check_text(&source)?;
+    Ok(source)
 }
 
-/// Refuses a scenario that names files elsewhere: where pages may write, one of them may have written it.
+/// Refuses a scenario that refers to files elsewhere: where pages may write, one of them may have written it.
 ///
 /// # Errors
 /// With the file.
-fn check_names(means: &SessionDeps, source: &Source) -> Result<(), Problem> {
-    if means.read_only { Ok(()) } else { means.files.check_text(source) }
+fn check_references(deps: &SessionDeps, source: &Source) -> Result<(), Problem> {
+    if deps.read_only { Ok(()) } else { deps.files.check_text(source) }
 }
 
 fn start_run(
-    means: &SessionDeps,
+    deps: &SessionDeps,
     source: &Source,
     seed: Option<u64>,
 ) -> Result<Box<dyn Simulation>, Problem> {
     let seed = seed.map(|seed| format!("seed={seed}"));
     let source = source.clone().with_overrides(seed.as_slice()).map_err(|e| problem(&e))?;
-    let compiled = means.worlds.compile(&source).map_err(|e| problem(&e))?;
-    Ok(compiled.start(&source, means.workers))
+    let compiled = deps.worlds.compile(&source).map_err(|e| problem(&e))?;
+    Ok(compiled.start(&source, deps.workers))
 }
 
 fn recording_is_read_only(place: &str) -> Problem {
@@ -352,7 +379,7 @@ fn recording_is_read_only(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-/// Returns an error of a session in the words of the protocol.
+/// Converts an error of a session.
 pub(crate) fn problem_of(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),

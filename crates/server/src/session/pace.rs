@@ -1,11 +1,12 @@
-//! The number of cycles that a run goes at a time, and in a second.
+//! The number of cycles that a run advances at a time, and the number per second.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Duration of a slice, and so the longest wait of orders, unless a cycle takes longer.
+/// Duration of a slice of computing, and so the longest wait of a request, unless a cycle takes longer: less than the time
+/// between two frames of a screen (16 ms).
 const SLICE_DURATION: Duration = Duration::from_millis(12);
-/// The time over which cycles are counted.
+/// Time over which cycles are counted.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
 
 /// The number of cycles of a slice.
@@ -23,9 +24,10 @@ impl SliceSize {
         self.0
     }
 
-    /// Adapts the number of cycles to [`SLICE_DURATION`]; it grows at most fourfold at a time.
-    pub(super) fn adapt(&mut self, cycles: u64, took: Duration) {
-        let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
+    /// Adapts the number of cycles to [`SLICE_DURATION`], after some cycles have taken some time. It grows at most fourfold at
+    /// a time, because a few cheap cycles say little about the next ones.
+    pub(super) fn adapt(&mut self, cycles: u64, time: Duration) {
+        let per_cycle_s = time.as_secs_f64() / cycles.max(1) as f64;
         let fitting = (SLICE_DURATION.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
         self.0 = fitting.clamp(1, self.0.saturating_mul(4));
     }
@@ -39,7 +41,7 @@ impl CycleRate {
     pub(super) fn record(&mut self, now: Instant, cycles: u64) {
         self.drop_old(now);
         match self.0.back_mut() {
-            // A resolution of a hundred stretches is enough.
+            // A hundred entries a second are enough for a number on a page.
             Some((at, sum)) if now.duration_since(*at) < RATE_WINDOW / 100 => *sum += cycles,
             _ => self.0.push_back((now, cycles)),
         }

@@ -1,43 +1,45 @@
-//! The output of a session: frames for which there is credit, and its state when it changes.
+//! The output of a session to its page: frames for which there is credit, and the status when it changes.
 
 use crate::MAX_FRAMES_PER_S;
 use crate::encode::{Encoder, body, scan};
 use crate::event_store::EventStore;
 use crate::outbox::Outbox;
-use crate::protocol::{BodyId, FrameText, Notification, SessionId, SessionStatus};
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
+use crate::protocol::{BodyId, FrameText, ServerNotification, SessionId, SessionStatus};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The time between two frames.
+/// Time between two frames.
 const FRAME_INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / MAX_FRAMES_PER_S as u64);
-/// The time between two states.
+/// Time between two reports of the status: faster changes of numbers cannot be read.
 const STATUS_INTERVAL: Duration = Duration::from_millis(100);
-/// The time between two transfers of events without credit: a run keeps only some thousands.
+/// Time between two transfers of events where there is no credit for frames: a simulation keeps only the last some thousands.
 const EVENTS_INTERVAL: Duration = Duration::from_millis(250);
-/// The largest credit; any beyond it is forgotten.
+/// Maximum credit; any beyond it is ignored.
 const MAX_CREDIT: u32 = 1000;
-/// The largest number of bodies of which scans are shown.
+/// Maximum number of bodies with scans in a frame.
 pub(super) const MAX_SCANNED_BODIES: usize = 16;
 
-/// The view of one socket on one session.
+/// A page's view of one session.
 pub(super) struct PageView {
     session: SessionId,
     outbox: Arc<Outbox>,
     encoder: Encoder,
+    /// Number of frames that the page is ready to receive.
     credit: u32,
+    /// Number of frames that were due and could not be sent.
     left_out: u32,
-    /// The bodies of which frames hold scans.
+    /// The bodies with scans in frames.
     scans_of: Vec<BodyId>,
     /// Whether the last frame is out of date.
     is_stale: bool,
-    /// Whether the run has gone on since a frame was last due.
+    /// Whether the run has advanced since a frame was last due.
     has_moved: bool,
     frame_due: Instant,
     events_due: Instant,
     status_due: Instant,
-    told: Option<SessionStatus>,
+    last_status: Option<SessionStatus>,
 }
 
 impl PageView {
@@ -55,38 +57,42 @@ impl PageView {
             frame_due: now,
             events_due: now,
             status_due: now,
-            told: None,
+            last_status: None,
         }
     }
 
     /// Switches to another run.
     pub(super) fn restart(&mut self, scenery: &Scenery) {
-        // An unsent frame of the run before is of no use.
+        // An unsent frame of the run before is of no use, and its credit is given back.
         if self.outbox.clear(self.session) {
             self.credit += 1;
         }
         self.encoder.restart(scenery);
-        (self.is_stale, self.has_moved, self.told) = (true, false, None);
+        self.is_stale = true;
+        self.has_moved = false;
+        self.last_status = None;
     }
 
-    /// Notes that the run went on, or back.
+    /// Records that the run is at another cycle.
     pub(super) fn mark_moved(&mut self) {
-        (self.is_stale, self.has_moved) = (true, true);
+        self.is_stale = true;
+        self.has_moved = true;
     }
 
-    /// Asks for a frame, regardless of the last one.
+    /// Requests a frame even if the run has not moved.
     pub(super) fn refresh(&mut self) {
         self.is_stale = true;
     }
 
-    /// Takes credit for further frames.
+    /// Adds credit for further frames.
     pub(super) fn add_credit(&mut self, frames: u32) {
         self.credit = self.credit.saturating_add(frames).min(MAX_CREDIT);
     }
 
-    /// Shows scans of these bodies.
+    /// Selects the bodies with scans in frames.
     pub(super) fn set_scanned_bodies(&mut self, scans_of: Vec<BodyId>) {
-        (self.scans_of, self.is_stale) = (scans_of, true);
+        self.scans_of = scans_of;
+        self.is_stale = true;
     }
 
     /// Sends a frame if one is due and there is credit.
@@ -113,7 +119,7 @@ impl PageView {
         self.send_frame(&frame, log);
     }
 
-    /// Sends a frame made by others, with its events already noted, if it is due and there is credit.
+    /// Sends a frame made elsewhere, whose events are recorded already, if one is due and there is credit.
     pub(super) fn forward_frame(&mut self, frame: &Frame, log: &mut EventStore, now: Instant) {
         if self.is_due(now) && self.spend_credit(now) {
             self.send_frame(frame, log);
@@ -124,11 +130,12 @@ impl PageView {
         self.is_stale && now >= self.frame_due
     }
 
-    /// Returns whether there is credit for the frame that is due. One that cannot be sent is left out.
+    /// Returns whether there is credit for the frame that is due. One for which there is none is counted as left out.
     fn spend_credit(&mut self, now: Instant) -> bool {
         let has_credit = self.credit > 0;
         if has_credit {
-            (self.is_stale, self.has_moved) = (false, false);
+            self.is_stale = false;
+            self.has_moved = false;
         } else if std::mem::take(&mut self.has_moved) {
             self.left_out = self.left_out.saturating_add(1);
         } else {
@@ -142,47 +149,48 @@ impl PageView {
         let (events, events_left_out) = log.take_unsent();
         let scans = frame.scans.iter().map(scan).collect();
         let text = FrameText { scans, events, events_left_out };
-        let (cast, bytes) = self.encoder.encode(frame, &text, self.left_out);
-        let cast = cast.map(Notification::Cast);
-        match self.outbox.send_frame(self.session, cast.as_ref(), bytes) {
+        let (bodies, bytes) = self.encoder.encode(frame, &text, self.left_out);
+        let bodies = bodies.map(ServerNotification::Bodies);
+        match self.outbox.send_frame(self.session, bodies.as_ref(), bytes) {
             // It replaces one that has cost its credit.
             true => self.left_out = self.left_out.saturating_add(1),
             false => self.credit -= 1,
         }
     }
 
-    /// Takes over the events of a run that is not shown.
+    /// Takes the events of a run without showing a frame.
     pub(super) fn drain(&mut self, run: &mut dyn Simulation, log: &mut EventStore, now: Instant) {
         log.record(&mut run.frame(FrameOptions::WITHOUT_SCANS));
         self.events_due = now + EVENTS_INTERVAL;
     }
 
-    /// Reports the state, if it is a new one and not too soon; a change of the session's activity, or of the place
-    /// where it stands still, is reported at once.
+    /// Reports the status, if it has changed and the last report is some time ago; a change of the session's activity, or of
+    /// the cycle at which it is paused, is reported at once.
     pub(super) fn report_status(&mut self, status: SessionStatus, now: Instant) {
-        let is_same = self.told.as_ref() == Some(&status);
+        let is_same = self.last_status.as_ref() == Some(&status);
         let is_urgent = self
-            .told
+            .last_status
             .as_ref()
-            .is_none_or(|told| told.state != status.state || told.digest != status.digest);
+            .is_none_or(|last| last.state != status.state || last.digest != status.digest);
         if is_same || (now < self.status_due && !is_urgent) {
             return;
         }
-        self.outbox.send_status(self.session, &Notification::Status(status.clone()));
-        (self.told, self.status_due) = (Some(status), now + STATUS_INTERVAL);
+        self.outbox.send_status(self.session, &ServerNotification::Status(status.clone()));
+        self.last_status = Some(status);
+        self.status_due = now + STATUS_INTERVAL;
     }
 
-    /// Returns whether the last reported state differs from this one.
+    /// Returns whether the last reported status differs from this one.
     pub(super) fn needs_report(&self, status: &SessionStatus) -> bool {
-        self.told.as_ref() != Some(status)
+        self.last_status.as_ref() != Some(status)
     }
 
-    /// Returns the last reported state.
+    /// Returns the last reported status.
     pub(super) fn last_reported(&self) -> Option<SessionStatus> {
-        self.told.clone()
+        self.last_status.clone()
     }
 
-    /// Returns when a state may be reported again.
+    /// Returns when a status may be reported again.
     pub(super) fn status_due(&self) -> Instant {
         self.status_due
     }

@@ -1,4 +1,4 @@
-//! A run that is played: its next steps, and its answers.
+//! A run that is played: the work that is due, and the replies to requests.
 
 mod seek;
 mod viewers;
@@ -15,17 +15,17 @@ use crate::SPEED_RANGE;
 use crate::encode::scene;
 use crate::outbox::Outbox;
 use crate::protocol::{
-    Method, Notification, Problem, Reply, ReplyBody, ReplyResult, SessionId, SessionState,
+    Method, Problem, Reply, ReplyBody, ReplyResult, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
 use seek::Seek;
-use sidestep::kernel::view::Scenery;
-use sidestep::kernel::{Cycle, Interrupt};
+use sidestep_kernel::view::Scenery;
+use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_session::Pacer;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The largest number of events in an answer; a page that wants more asks again.
+/// Maximum number of events in a reply; a page that wants more repeats its request.
 const MAX_EVENTS: u32 = 5000;
 
 /// A run that is played.
@@ -33,19 +33,21 @@ pub(super) struct Player {
     session: SessionId,
     outbox: Arc<Outbox>,
     interrupt: Interrupt,
-    pub(super) stage: OpenRun,
+    pub(super) open_run: OpenRun,
     scenery: Scenery,
-    viewer: PageView,
-    showing: FoxgloveLease,
-    memory: RunHistory,
-    scout: Option<Prefetcher>,
+    page_view: PageView,
+    foxglove: FoxgloveLease,
+    history: RunHistory,
+    /// The second computation of a recording, until it is at its end.
+    prefetcher: Option<Prefetcher>,
     state: SessionState,
     speed: Speed,
-    beat: Option<Pacer>,
-    errand: Option<Seek>,
-    /// The request now being taken.
-    taken: Option<u32>,
-    pace: SliceSize,
+    /// The pacer of a run that is played at a speed; none where it is played as fast as possible.
+    pacer: Option<Pacer>,
+    seek: Option<Seek>,
+    /// The request that is being answered.
+    request_in_progress: Option<u32>,
+    slice: SliceSize,
     rate: CycleRate,
     /// Digest of the state, and its cycle.
     digest: Option<(Cycle, String)>,
@@ -58,27 +60,31 @@ impl Player {
         session: SessionId,
         outbox: Arc<Outbox>,
         interrupt: Interrupt,
-        stage: OpenRun,
+        open_run: OpenRun,
     ) -> Result<Self, Problem> {
-        let scenery = stage.run.scenery();
+        let scenery = open_run.run.scenery();
         let mut player = Self {
             session,
-            viewer: PageView::new(session, outbox.clone(), &scenery),
-            showing: FoxgloveLease::new(stage.foxglove_host(), session),
+            page_view: PageView::new(session, outbox.clone(), &scenery),
+            foxglove: FoxgloveLease::new(open_run.foxglove_host(), session),
             outbox,
             interrupt,
-            memory: RunHistory::from_run(stage.run.as_ref(), stage.metric_infos(), stage.budget()),
-            scout: None,
+            history: RunHistory::from_run(
+                open_run.run.as_ref(),
+                open_run.metric_infos(),
+                open_run.budget(),
+            ),
+            prefetcher: None,
             state: SessionState::Paused,
             speed: Speed::Times(1.0),
-            beat: None,
-            errand: None,
-            taken: None,
-            pace: SliceSize::default(),
+            pacer: None,
+            seek: None,
+            request_in_progress: None,
+            slice: SliceSize::default(),
             rate: CycleRate::default(),
             digest: None,
             verdict: None,
-            stage,
+            open_run,
             scenery,
         };
         player.prepare();
@@ -88,32 +94,34 @@ impl Player {
 
     /// Prepares a run that is at its start.
     fn prepare(&mut self) {
-        self.stage.run.set_interrupt(self.interrupt.clone());
-        self.stage.run.enable_events();
-        if self.showing.is_enabled() {
-            self.memory.log.enable_viewers();
+        self.open_run.run.set_interrupt(self.interrupt.clone());
+        self.open_run.run.enable_events();
+        if self.foxglove.is_enabled() {
+            self.history.log.enable_viewers();
         }
-        self.scout = self
-            .stage
+        self.prefetcher = self
+            .open_run
             .recorded_run_again()
-            .map(|run| Prefetcher::new(run, self.stage.until, self.interrupt.clone()));
+            .map(|run| Prefetcher::new(run, self.open_run.until, self.interrupt.clone()));
         self.pause();
     }
 
     fn restart(&mut self, seed: Option<u64>, text: Option<String>) -> Result<ReplyBody, Problem> {
-        let is_other = text.is_some();
-        self.stage.restart(seed, text)?;
-        self.scenery = self.stage.run.scenery();
-        self.viewer.restart(&self.scenery);
-        self.memory = RunHistory::from_run(
-            self.stage.run.as_ref(),
-            self.stage.metric_infos(),
-            self.stage.budget(),
+        let is_new_scenario = text.is_some();
+        self.open_run.restart(seed, text)?;
+        self.scenery = self.open_run.run.scenery();
+        self.page_view.restart(&self.scenery);
+        self.history = RunHistory::from_run(
+            self.open_run.run.as_ref(),
+            self.open_run.metric_infos(),
+            self.open_run.budget(),
         );
-        (self.digest, self.pace, self.rate) = (None, SliceSize::default(), CycleRate::default());
+        self.digest = None;
+        self.slice = SliceSize::default();
+        self.rate = CycleRate::default();
         self.prepare();
-        // The same scenario only goes back to its start.
-        if is_other {
+        // A server for viewers serves one scenario, at any of its cycles.
+        if is_new_scenario {
             self.restart_viewers()?;
         }
         Ok(self.opened_reply())
@@ -121,26 +129,27 @@ impl Player {
 
     /// Returns the answer to the page that has opened the session.
     pub(super) fn opened_reply(&mut self) -> ReplyBody {
-        let (run, is_recording) = (&self.stage.run, self.stage.recorded.is_some());
+        let run = &self.open_run.run;
+        let is_recording = self.open_run.recorded.is_some();
         let scene = scene(run.world(), run.agent(), &self.scenery, is_recording);
         ReplyBody::Opened { session: self.session, scene, status: self.status(Instant::now()) }
     }
 
     fn cycle(&self) -> Cycle {
-        self.stage.run.cycle()
+        self.open_run.run.cycle()
     }
 
     fn is_at_end(&self) -> bool {
-        self.cycle() >= self.stage.until || self.stage.run.is_over()
+        self.cycle() >= self.open_run.until || self.open_run.run.is_over()
     }
 
     /// Answers a request, now or on arrival.
     pub(super) fn on_request(&mut self, id: u32, call: Method) {
-        self.taken = Some(id);
+        self.request_in_progress = Some(id);
         if let Some(result) = self.answer(id, call) {
             self.reply(id, result);
         }
-        self.taken = None;
+        self.request_in_progress = None;
     }
 
     fn reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
@@ -162,7 +171,7 @@ impl Player {
                 return None;
             }
             Method::Seek { cycle, .. } => {
-                self.seek(Some(id), cycle, None);
+                self.start_seek(Some(id), cycle, None);
                 return None;
             }
             Method::Restart { seed, text, .. } => {
@@ -179,35 +188,40 @@ impl Player {
 
     /// Answers a request that does not move the run.
     fn answer_query(&mut self, call: Method) -> Result<ReplyBody, Problem> {
-        let run = self.stage.run.as_mut();
+        let run = self.open_run.run.as_mut();
         match call {
-            Method::Look { scans_of, .. } if scans_of.len() > MAX_SCANNED_BODIES => {
+            Method::SelectScans { bodies, .. } if bodies.len() > MAX_SCANNED_BODIES => {
                 let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
-                Err(Problem::new("look", cause, "name fewer"))
+                Err(Problem::new("select-scans", cause, "select fewer"))
             }
-            Method::Look { scans_of, .. } => {
-                self.viewer.set_scanned_bodies(scans_of);
+            Method::SelectScans { bodies, .. } => {
+                self.page_view.set_scanned_bodies(bodies);
                 Ok(ReplyBody::Done)
             }
             Method::Credit { frames, .. } => {
-                self.viewer.add_credit(frames);
+                self.page_view.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
-            Method::Inspect { who, .. } => inspection(run, &who).map(ReplyBody::Inspection),
-            Method::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
-            Method::Events { from, until, skip, most, .. } => {
-                self.viewer.drain(run, &mut self.memory.log, Instant::now());
-                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), most.min(MAX_EVENTS)))
+            Method::Inspect { body, .. } => inspection(run, &body).map(ReplyBody::Inspection),
+            Method::Metrics { from, .. } => Ok(self.history.samples.answer(from)),
+            Method::Events { from, until, skip, limit, .. } => {
+                self.page_view.drain(run, &mut self.history.log, Instant::now());
+                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
             }
             Method::Source { .. } => {
-                let source = &self.stage.source;
-                let (place, text) = (source.place.clone(), source.text.clone());
-                Ok(ReplyBody::Source { place, text, read_only: self.stage.is_read_only() })
+                let source = &self.open_run.source;
+                Ok(ReplyBody::Source {
+                    place: source.place.clone(),
+                    text: source.text.clone(),
+                    read_only: self.open_run.is_read_only(),
+                })
             }
-            Method::Save { text, to, base, over, .. } => {
-                self.stage.save(text, to, SaveOptions { base, over })
+            Method::Save { text, to, base, overwrite, .. } => {
+                self.open_run.save(text, to, SaveOptions { base, overwrite })
             }
-            Method::Tables { .. } => self.stage.tables().map(|names| ReplyBody::Tables { names }),
+            Method::Tables { .. } => {
+                self.open_run.tables().map(|names| ReplyBody::Tables { names })
+            }
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
         }
     }
@@ -221,139 +235,146 @@ impl Player {
         }
         self.cancel_seek("the run was played");
         self.speed = speed;
-        self.beat = match speed {
+        self.pacer = match speed {
             Speed::Fastest => None,
             Speed::Times(times) => {
                 Some(Pacer::new(times / self.scenery.cycle_s, Instant::now(), self.cycle()))
             }
         };
-        match self.is_at_end() {
-            true => self.pause(),
-            false => self.state = SessionState::Playing,
+        if self.is_at_end() {
+            self.pause();
+        } else {
+            self.state = SessionState::Playing;
         }
         Ok(ReplyBody::Done)
     }
 
-    /// Stops where the run is.
+    /// Pauses at the present cycle.
     fn pause(&mut self) {
         let is_at_end = self.is_at_end();
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
-        self.errand = None;
+        self.seek = None;
         self.rate = CycleRate::default();
-        self.viewer.refresh();
+        self.page_view.refresh();
         let cycle = self.cycle();
-        self.memory.record_pause(self.stage.run.as_ref());
-        if self.digest.as_ref().is_none_or(|(of, _)| *of != cycle) {
-            self.digest = Some((cycle, self.stage.run.digest().to_string()));
+        self.history.record_pause(self.open_run.run.as_ref());
+        if self.digest.as_ref().is_none_or(|(digest_cycle, _)| *digest_cycle != cycle) {
+            self.digest = Some((cycle, self.open_run.run.digest().to_string()));
         }
-        self.verdict = self.stage.verdict(self.stage.run.as_ref()).or(self.verdict.take());
+        self.verdict = self.open_run.verdict(self.open_run.run.as_ref()).or(self.verdict.take());
     }
 
     /// Does the work that is due, for some milliseconds at most. Returns the time until there is more, unless a
     /// request comes; `None` for forever.
     pub(super) fn poll(&mut self) -> Option<Duration> {
         let now = Instant::now();
-        self.memory.keyframes.shrink_to_budget();
-        match (self.state, self.errand) {
+        self.history.keyframes.shrink_to_budget();
+        match (self.state, self.seek) {
             (SessionState::Playing, _) => {
                 let cycle = self.cycle();
-                let beat = self.beat.as_mut();
-                let target = beat.map_or(self.stage.until, |beat| beat.target(now, cycle));
-                self.advance_slice(target.min(self.stage.until));
+                let until = self.open_run.until;
+                let target = self.pacer.as_mut().map_or(until, |pacer| pacer.target(now, cycle));
+                self.advance_slice(target.min(until));
             }
             (SessionState::Seeking, Some(Seek { target, .. })) => self.advance_slice(target),
             _ => {}
         }
         self.stop_at_target();
         let now = Instant::now();
-        self.viewer.send_due_frame(self.stage.run.as_mut(), &mut self.memory.log, now);
+        self.page_view.send_due_frame(self.open_run.run.as_mut(), &mut self.history.log, now);
         let status = self.status(now);
-        self.viewer.report_status(status.clone(), now);
+        self.page_view.report_status(status.clone(), now);
         self.update_viewers(now);
-        let is_free = self.work_due(now).is_none_or(|due| due > now);
-        if is_free && self.prefetch() {
+        let is_idle = self.work_due(now).is_none_or(|due| due > now);
+        if is_idle && self.prefetch() {
             return Some(Duration::ZERO);
         }
         let status_due = self.status_due(&status);
-        let due =
-            [self.work_due(now), self.viewer.frame_due(), status_due, self.showing.next_update()];
+        let due = [
+            self.work_due(now),
+            self.page_view.frame_due(),
+            status_due,
+            self.foxglove.next_update(),
+        ];
         let next = due.into_iter().flatten().min()?;
         Some(next.saturating_duration_since(Instant::now()))
     }
 
     fn work_due(&self, now: Instant) -> Option<Instant> {
-        match (self.state, &self.beat) {
-            (SessionState::Playing, Some(beat)) => Some(beat.next_due(self.cycle())),
+        match (self.state, &self.pacer) {
+            (SessionState::Playing, Some(pacer)) => Some(pacer.next_due(self.cycle())),
             (SessionState::Playing | SessionState::Seeking, _) => Some(now),
             _ => None,
         }
     }
 
     fn status_due(&self, status: &SessionStatus) -> Option<Instant> {
-        self.viewer.needs_report(status).then(|| self.viewer.status_due())
+        self.page_view.needs_report(status).then(|| self.page_view.status_due())
     }
 
-    /// Stops where the seek or the run ends.
+    /// Pauses where the seek or the run ends.
     fn stop_at_target(&mut self) {
-        let is_there = self.errand.is_some_and(|errand| self.cycle() >= errand.target);
-        let is_on_the_way = matches!(self.state, SessionState::Playing | SessionState::Seeking);
-        if is_on_the_way && (is_there || self.is_at_end()) {
-            let errand = self.errand;
-            self.pause();
-            if let Some(id) = errand.and_then(|errand| errand.id) {
-                self.reply(id, Ok(ReplyBody::Done));
-            }
-            if let Some(speed) = errand.and_then(|errand| errand.then) {
-                // Speeds of viewers are in bounds.
-                let _ = self.play(speed);
-            }
+        let is_advancing = matches!(self.state, SessionState::Playing | SessionState::Seeking);
+        let is_at_target = self.seek.is_some_and(|seek| self.cycle() >= seek.target);
+        if !is_advancing || !(is_at_target || self.is_at_end()) {
+            return;
+        }
+        let seek = self.seek;
+        self.pause();
+        let Some(Seek { id, then, .. }) = seek else { return };
+        if let Some(id) = id {
+            self.reply(id, Ok(ReplyBody::Done));
+        }
+        if let Some(speed) = then {
+            // Only viewers continue after a seek, and their speeds are in range.
+            let _ = self.play(speed);
         }
     }
 
-    /// Goes on for some milliseconds, but not beyond the target cycle.
+    /// Advances for some milliseconds, but not beyond the target cycle.
     fn advance_slice(&mut self, target: Cycle) {
-        let asked = self.pace.cycles().min(target.saturating_sub(self.cycle()));
-        if asked == 0 || self.stage.run.is_over() {
+        let cycles = self.slice.cycles().min(target.saturating_sub(self.cycle()));
+        if cycles == 0 || self.open_run.run.is_over() {
             return;
         }
         let started = Instant::now();
-        let done = self.stage.run.advance(asked);
-        let took = started.elapsed();
-        self.pace.adapt(done, took);
+        let done = self.open_run.run.advance(cycles);
+        let computing_time = started.elapsed();
+        self.slice.adapt(done, computing_time);
         self.rate.record(Instant::now(), done);
-        self.viewer.mark_moved();
+        self.page_view.mark_moved();
         self.digest = None;
-        self.memory.record(self.stage.run.as_ref(), took);
+        self.history.record(self.open_run.run.as_ref(), computing_time);
     }
 
-    /// Computes ahead when there is nothing else to do; returns whether there was anything to compute ahead.
+    /// Computes a recording ahead for some milliseconds; returns whether there was anything left to compute.
     fn prefetch(&mut self) -> bool {
-        let Some(scout) = &mut self.scout else { return false };
-        if let Some(run) = scout.advance_slice(&mut self.memory) {
-            self.verdict = self.stage.verdict(run).or(self.verdict.take());
-            self.scout = None;
+        let Some(prefetcher) = &mut self.prefetcher else { return false };
+        if let Some(run) = prefetcher.advance_slice(&mut self.history) {
+            self.verdict = self.open_run.verdict(run).or(self.verdict.take());
+            self.prefetcher = None;
         }
         true
     }
 
     fn status(&mut self, now: Instant) -> SessionStatus {
         let cycle = self.cycle();
-        let is_still = matches!(self.state, SessionState::Paused | SessionState::Over);
-        let has_digest = is_still && self.stage.is_computed();
+        let is_paused = matches!(self.state, SessionState::Paused | SessionState::Over);
+        let has_digest = is_paused && self.open_run.is_computed();
         let digest = self.digest.as_ref().filter(|(of, _)| has_digest && *of == cycle);
-        let banner = self.stage.recorded.as_ref().map(|_| {
-            let later = || "Computed again; the digest is compared at the end.".into();
-            self.verdict.clone().unwrap_or_else(later)
+        let banner = self.open_run.recorded.as_ref().map(|_| {
+            let pending = || "Computed again; the digest is compared at the end.".into();
+            self.verdict.clone().unwrap_or_else(pending)
         });
         SessionStatus {
             session: self.session,
             state: self.state,
             cycle: cycle as f64,
-            cycles_planned: self.stage.until as f64,
+            cycles_planned: self.open_run.until as f64,
             time_s: cycle as f64 * self.scenery.cycle_s,
             speed: self.speed,
-            cycles_per_s: if is_still { 0.0 } else { self.rate.per_s(now) },
-            seed: self.stage.run.config().seed.to_string(),
+            cycles_per_s: if is_paused { 0.0 } else { self.rate.per_s(now) },
+            seed: self.open_run.run.config().seed.to_string(),
             digest: digest.map(|(_, digest)| digest.clone()),
             banner,
             fleet: None,
@@ -362,18 +383,20 @@ impl Player {
 
     /// Reports that the session ends here; the run is no longer touched.
     pub(super) fn fail(&mut self, problem: Problem) {
-        let errand = self.errand.and_then(|errand| errand.id);
+        let seek_request = self.seek.and_then(|seek| seek.id);
         self.cancel_seek("the session has ended");
-        // The request that met the bug waits for an answer, too.
-        if let Some(id) = self.taken.take().filter(|id| Some(*id) != errand) {
+        // The request that ran into the bug waits for a reply, too, unless it is the seek.
+        let request = self.request_in_progress.take();
+        if let Some(id) = request.filter(|id| Some(*id) != seek_request) {
             self.reply(id, Err(problem.clone()));
         }
-        if let Some(told) = self.viewer.last_reported() {
+        if let Some(last) = self.page_view.last_reported() {
             self.outbox.send_status(
                 self.session,
-                &Notification::Status(SessionStatus { state: SessionState::Failed, ..told }),
+                &ServerNotification::Status(SessionStatus { state: SessionState::Failed, ..last }),
             );
         }
-        self.outbox.send_notification(&Notification::Ended { session: self.session, problem });
+        self.outbox
+            .send_notification(&ServerNotification::Ended { session: self.session, problem });
     }
 }

@@ -1,57 +1,57 @@
-//! A second computation of a recorded run, ahead of the one that is watched, whenever there is nothing else to do:
-//! so a page knows all events of a recording, any cycle is near, and the digest is confirmed, before everything was
-//! played.
+//! A second computation of a recorded run, ahead of the one that is played, whenever there is nothing else to do: so all
+//! events of a recording are known, any cycle is near a keyframe, and the digest is confirmed, before the run was played
+//! to its end.
 
 use super::history::RunHistory;
 use super::pace::SliceSize;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::kernel::{Cycle, Interrupt, Simulation};
+use sidestep_kernel::view::FrameOptions;
+use sidestep_kernel::{Cycle, Interrupt, Simulation};
 use std::time::{Duration, Instant};
 
-/// The time between two transfers of events: a run keeps only some thousands.
+/// Time between two transfers of events: a simulation keeps only the last some thousands.
 const EVENTS_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A run on its way to its end.
+/// A run that is computed ahead to its end.
 pub(super) struct Prefetcher {
     run: Box<dyn Simulation>,
     until: Cycle,
     pace: SliceSize,
-    noted: Instant,
+    events_taken: Instant,
 }
 
 impl Prefetcher {
-    /// Sends out a run that is at its start.
+    /// Returns a prefetcher for a run that is at its start.
     pub(super) fn new(mut run: Box<dyn Simulation>, until: Cycle, interrupt: Interrupt) -> Self {
         run.set_interrupt(interrupt);
         run.enable_events();
-        Self { run, until, pace: SliceSize::default(), noted: Instant::now() }
+        Self { run, until, pace: SliceSize::default(), events_taken: Instant::now() }
     }
 
-    /// Goes on for some milliseconds. Returns the run once it is at its end.
-    pub(super) fn advance_slice(&mut self, memory: &mut RunHistory) -> Option<&dyn Simulation> {
-        self.skip_known(memory);
-        let asked = self.pace.cycles().min(self.until.saturating_sub(self.run.cycle()));
+    /// Advances for some milliseconds. Returns the run once it is at its end.
+    pub(super) fn advance_slice(&mut self, history: &mut RunHistory) -> Option<&dyn Simulation> {
+        self.skip_known(history);
+        let cycles = self.pace.cycles().min(self.until.saturating_sub(self.run.cycle()));
         let started = Instant::now();
-        let done = self.run.advance(asked);
-        let took = started.elapsed();
-        self.pace.adapt(done, took);
-        memory.record(self.run.as_ref(), took);
+        let done = self.run.advance(cycles);
+        let computing_time = started.elapsed();
+        self.pace.adapt(done, computing_time);
+        history.record(self.run.as_ref(), computing_time);
         let is_at_end = self.run.cycle() >= self.until || self.run.is_over() || done == 0;
-        if is_at_end || self.noted.elapsed() >= EVENTS_INTERVAL {
-            memory.log.record_ahead(&mut self.run.frame(FrameOptions::WITHOUT_SCANS));
-            self.noted = Instant::now();
+        if is_at_end || self.events_taken.elapsed() >= EVENTS_INTERVAL {
+            history.log.record_ahead(&mut self.run.frame(FrameOptions::WITHOUT_SCANS));
+            self.events_taken = Instant::now();
         }
         is_at_end.then_some(self.run.as_ref())
     }
 
-    /// Leaves out the cycles that the watched run was the first to compute.
-    fn skip_known(&mut self, memory: &mut RunHistory) {
-        let known = memory.keyframes.before(memory.log.frontier());
+    /// Skips the cycles that the played run was the first to compute.
+    fn skip_known(&mut self, history: &mut RunHistory) {
+        let known = history.keyframes.before(history.log.frontier());
         if let Some((at, checkpoint)) = known
             && at > self.run.cycle()
         {
             self.run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
-            // The events before are known.
+            // Takes the events of the cycles before, which are known, out of the simulation.
             drop(self.run.frame(FrameOptions::WITHOUT_SCANS));
         }
     }

@@ -1,10 +1,10 @@
-//! Scenarios that are saved: whole or not at all, and never over a text that another program wrote meanwhile.
+//! Saving of scenarios: whole or not at all, and never over a text that another program has written meanwhile.
 
 use crate::files::AllowedFiles;
 use crate::protocol::{Problem, ReplyBody};
 use crate::write::{WriteTarget, replace_file};
 use serde_json::Value;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,13 +15,13 @@ pub(super) struct SessionFile {
     pub(super) text: String,
 }
 
-/// The scenario of a session, for other threads than its own: its place is the file in which it was last saved.
+/// The scenario of a session, shared with other threads: its place is the file in which it was last saved.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SharedSource(Arc<Mutex<Option<Source>>>);
 
 impl SharedSource {
     /// Returns the scenario, once it is open.
-    pub(crate) fn source(&self) -> Option<Source> {
+    pub(crate) fn get(&self) -> Option<Source> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -32,7 +32,7 @@ impl SharedSource {
 }
 
 impl SessionFile {
-    /// Returns the file that a scenario was read from, unless it holds something that stands for the scenario.
+    /// Returns the file from which a scenario was read; none where the scenario was made from a file of another program.
     pub(super) fn open(path: &Path, source: &Source) -> Option<Self> {
         let read = Source::read(path, &[]).ok()?;
         (read.text == source.text).then(|| Self { path: path.into(), text: read.text })
@@ -48,21 +48,21 @@ pub(super) fn session_path(own: Option<&SessionFile>, place: &str) -> Result<Str
     })
 }
 
-/// The way in which a page wants a text saved.
+/// Options of saving.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SaveOptions {
     /// The text that the page believes the file holds; without it, the text that the session has read or written.
     pub(super) base: Option<String>,
     /// Whether the file is replaced regardless of its content.
-    pub(super) over: bool,
+    pub(super) overwrite: bool,
 }
 
 /// Refuses a text that would let a page read forbidden files, and one that is no scenario. A text that is no TOML may
 /// be saved, half-typed: it can be read neither as a scenario nor as the file of another program, and formats that
-/// name further files (maps, worlds of Stage) are never read from a file that ends in `.toml`.
+/// refer to further files (maps, worlds of Stage) are never read from a file that ends in `.toml`.
 ///
 /// # Errors
-/// With the file that it names, or the kind of text that it has to be.
+/// With the file to which it refers, or the kind of text that it has to be.
 pub(super) fn check_writable(
     files: &AllowedFiles,
     worlds: &Worlds,
@@ -70,19 +70,14 @@ pub(super) fn check_writable(
 ) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
     files.check_text(source)?;
-    // This holds over a scenario, too: in two saves, a page could otherwise make any file out of one.
-    match values["world"].is_null() {
-        false => Ok(()),
-        true => {
-            let worlds = worlds.names().join(", ");
-            let remedy = format!("begin it with world = \"...\", one of {worlds}");
-            Err(Problem::new(
-                source.place.as_str(),
-                "would be no scenario: it has no `world`",
-                remedy,
-            ))
-        }
+    // A scenario may not be replaced by anything else, either: in two saves, a page could otherwise make any file out of it.
+    if values["world"].is_null() {
+        let worlds = worlds.names().join(", ");
+        let cause = "would be no scenario: it has no `world`";
+        let remedy = format!("begin it with world = \"...\", one of {worlds}");
+        return Err(Problem::new(source.place.as_str(), cause, remedy));
     }
+    Ok(())
 }
 
 /// Writes a text into a file, unless the file holds something that the page does not know.
@@ -93,14 +88,14 @@ pub(super) fn write_scenario(
     target: &WriteTarget,
     own: Option<&SessionFile>,
     text: &str,
-    wish: &SaveOptions,
+    options: &SaveOptions,
 ) -> Result<ReplyBody, Problem> {
     let own = own.filter(|own| is_same_file(&own.path, target)).map(|own| own.text.as_str());
     // A reconnected page knows a different text from the one that its new session has read.
-    let known = wish.base.as_deref().or(own);
+    let known = options.base.as_deref().or(own);
     let may_replace = |found: Option<&str>| match found {
         None => true,
-        Some(found) => wish.over || known == Some(found) || found == text,
+        Some(found) => options.overwrite || known == Some(found) || found == text,
     };
     match replace_file(target, text, own.is_some(), may_replace)? {
         None => Ok(ReplyBody::Saved { place: target.path.display().to_string() }),

@@ -34,17 +34,17 @@ struct Page {
     _folder: tempfile::TempDir,
 }
 
-fn means(folder: &std::path::Path, workers: usize) -> SessionDeps {
+fn deps(folder: &std::path::Path, workers: usize) -> SessionDeps {
     let files = AllowedFiles::from_roots(&[folder.to_path_buf()]).expect("a folder");
-    let (budget, screens) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
+    let (budget, fleets) = (Arc::new(MemoryBudget::new(1 << 28, 1 << 28)), Vec::new());
     SessionDeps {
-        worlds: WORLDS,
+        worlds: WORLDS.clone(),
         files,
         workers,
         read_only: false,
         budget,
-        showcase: None,
-        screens,
+        foxglove: None,
+        fleets,
     }
 }
 
@@ -55,17 +55,17 @@ impl Page {
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).expect("written");
         let what = OpenTarget::Scenario { path: path.display().to_string() };
-        Self::open_target(means(folder.path(), workers), what, folder)
+        Self::open_target(deps(folder.path(), workers), what, folder)
     }
 
     fn open_target(
-        means: SessionDeps,
-        what: OpenTarget,
+        deps: SessionDeps,
+        target: OpenTarget,
         folder: tempfile::TempDir,
     ) -> (Self, Value) {
         let outbox = Arc::new(Outbox::default());
-        let opening = OpenRequest { session: 1, id: 1, what, seed: None };
-        let session = Session::start(means, opening, outbox.clone(), ()).expect("a thread");
+        let request = OpenRequest { session: 1, id: 1, target, seed: None };
+        let session = Session::start(deps, request, outbox.clone(), ()).expect("a thread");
         let (frames, notices, replies) = Default::default();
         let mut page = Self { outbox, session, id: 1, frames, notices, replies, _folder: folder };
         let opened = page.wait(1);
@@ -173,14 +173,14 @@ fn the_digest_is_that_of_a_plain_run_played_stepped_and_sought_to_and_fro() {
 fn a_run_that_is_paused_now_and_then_and_looked_at_is_the_same() {
     let (mut page, _) = Page::open(ROBOTS, 2);
     let who = json!({ "kind": "robot", "number": 2, "part": null });
-    page.ask(json!({ "do": "look", "session": 1, "scans_of": [who] }));
+    page.ask(json!({ "do": "select-scans", "session": 1, "bodies": [who] }));
     for _ in 0..5 {
         page.send(json!({ "do": "credit", "session": 1, "frames": 10 }));
         page.ask(json!({ "do": "play", "session": 1, "speed": { "times": 100.0 } }));
         std::thread::sleep(Duration::from_millis(40));
         page.ask(json!({ "do": "pause", "session": 1 }));
         page.ask(json!({ "do": "metrics", "session": 1, "from": 0 }));
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 9999, "most": 9 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 9999, "limit": 9 }));
     }
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
     assert!(page.frames.len() > 3);
@@ -203,7 +203,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         let by_library = inspect::inspection(run.as_ref(), &who);
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(20);
-        let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
         let told = page.wait(id);
         match by_library {
             Ok(inspection) => {
@@ -217,7 +217,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         }
         assert_eq!((page.digest_at(20), page.digest_at(40)), (digest, plain(text, 40)));
         let who = json!({ "kind": "no such kind", "number": 1, "part": null });
-        let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+        let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
         assert!(page.wait(id).get("problem").is_some());
     }
 }
@@ -257,12 +257,12 @@ fn a_socket_that_takes_nothing_keeps_the_newest_frame_alone() {
 fn events_and_samples_are_told_once_however_often_a_cycle_is_computed() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let events = |page: &mut Page| {
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 600, "most": 100_000 }))
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 100_000 }))
     };
     page.digest_at(600);
     let first = events(&mut page);
     assert!(!first["entries"].as_array().expect("events").is_empty() && first["left_out"] == 0);
-    assert_eq!(first["entries"][0]["who"]["kind"], "robot");
+    assert_eq!(first["entries"][0]["body"]["kind"], "robot");
     assert_eq!(first["entries"][0]["kind"], "contact");
     page.digest_at(10);
     page.digest_at(600);
@@ -313,7 +313,7 @@ fn what_cannot_be_opened_or_done_is_a_problem_and_the_session_goes_on() {
     for call in [
         json!({ "do": "play", "session": 1, "speed": { "times": 0.0 } }),
         json!({ "do": "play", "session": 1, "speed": { "times": 1e9 } }),
-        json!({ "do": "look", "session": 1, "scans_of": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
+        json!({ "do": "select-scans", "session": 1, "bodies": vec![json!({ "kind": "robot", "number": 1 }); 99] }),
         json!({ "do": "restart", "session": 1, "seed": u64::MAX, "text": null }),
         json!({ "do": "restart", "session": 1, "seed": 1, "text": "map = { file = \"/etc/passwd\" }" }),
         json!({ "do": "files" }),
@@ -328,19 +328,19 @@ fn what_cannot_be_opened_or_done_is_a_problem_and_the_session_goes_on() {
 fn a_text_is_checked_with_its_place_and_refused_where_the_studio_only_reads() {
     let folder = tempfile::tempdir().expect("a folder");
     let source = Source::new("s.toml", ROBOTS, folder.path());
-    let means = means(folder.path(), 1);
+    let deps = deps(folder.path(), 1);
     let problems =
-        text_problems(&means, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
+        text_problems(&deps, &source, ROBOTS.replace("count = 6", "cuont = 6")).expect("checked");
     assert_eq!((problems.len(), problems[0].line), (1, Some(16)));
     assert!(problems[0].remedy.contains("count") && !problems[0].is_warning);
     assert_eq!(problems[0].key.as_deref(), Some("robots.cuont"));
     let twice = ROBOTS.replace("count = 6", "cuont = 6").replace("seed = ", "seed = -");
-    let keys = text_problems(&means, &source, twice).expect("checked");
+    let keys = text_problems(&deps, &source, twice).expect("checked");
     let keys: Vec<_> = keys.iter().filter_map(|one| one.key.as_deref()).collect();
     assert_eq!(keys, ["seed", "robots.cuont"]);
-    assert_eq!(text_problems(&means, &source, ROBOTS.into()), Ok(vec![]));
-    assert_eq!(text_problems(&means, &source, "a = = 1".into()).expect("checked").len(), 1);
-    let reads = SessionDeps { read_only: true, ..means };
+    assert_eq!(text_problems(&deps, &source, ROBOTS.into()), Ok(vec![]));
+    assert_eq!(text_problems(&deps, &source, "a = = 1".into()).expect("checked").len(), 1);
+    let reads = SessionDeps { read_only: true, ..deps };
     assert!(text_problems(&reads, &source, ROBOTS.into()).is_err());
 }
 
@@ -364,17 +364,19 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
 fn a_bug_in_a_run_ends_its_session_with_a_notice() {
     let (mut page, _) = Page::open(ROBOTS, 1);
     let who = BodyId { kind: "no such kind".into(), number: 0, part: None };
-    page.session.send_request(99, Method::Look { session: 1, scans_of: vec![who] }).expect("taken");
+    page.session
+        .send_request(99, Method::SelectScans { session: 1, bodies: vec![who] })
+        .expect("taken");
     page.wait(99);
-    let desk = |work: fn()| {
-        let (_, orders) = sync_channel(1);
+    let worker = |work: fn()| {
+        let (_, requests) = sync_channel(1);
         let (outbox, interrupt) = (page.outbox.clone(), Interrupt::default());
-        SessionWorker { outbox, interrupt, orders }.catch_panic(work)
+        SessionWorker { outbox, interrupt, requests }.catch_panic(work)
     };
     assert!(
-        matches!(desk(|| panic!("a rule is broken")), Err(SessionExit::Bug(words)) if words == "a rule is broken")
+        matches!(worker(|| panic!("a rule is broken")), Err(SessionExit::Bug(words)) if words == "a rule is broken")
     );
-    assert!(matches!(desk(|| ()), Ok(())));
+    assert!(matches!(worker(|| ()), Ok(())));
 }
 
 #[test]
@@ -410,6 +412,6 @@ fn a_pipe_is_not_opened_for_nobody_may_ever_write_into_it() {
     let made = std::process::Command::new("mkfifo").arg(&path).status().expect("mkfifo runs");
     assert!(made.success());
     let what = OpenTarget::Scenario { path: path.display().to_string() };
-    let (_, reply) = Page::open_target(means(folder.path(), 1), what, folder);
+    let (_, reply) = Page::open_target(deps(folder.path(), 1), what, folder);
     assert!(reply.get("problem").is_some(), "{reply}");
 }

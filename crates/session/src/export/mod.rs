@@ -8,7 +8,7 @@ mod target;
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};
 use crate::{Error, RecordedRun, Watcher};
-use sidestep::kernel::{Cycle, InputError, Simulation};
+use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
 use target::Target;
 
@@ -173,7 +173,7 @@ fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let resolved = recorded.resolved_scenario()?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
-    let mut film = McapSink::start(target.path(), every, resolved, run.as_mut())?;
+    let mut film = McapSink::start(target.path(), every, resolved, run.as_mut(), recorded.build())?;
     job.drive(run.as_mut(), span.until, Sinks { frames: Some(&mut film), ..Sinks::default() })?;
     let is_confirmed = recorded.verify_digest(run.as_ref())?;
     let is_whole = span.from == 0 && is_confirmed && recorded.is_complete;

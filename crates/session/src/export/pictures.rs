@@ -8,8 +8,8 @@ use crate::frame_sink::{AnimationFrames, write_gif};
 use crate::picture::{draw_svg, footnote};
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep::kernel::Cycle;
 use sidestep_draw::{AnimationFrame, AnimationRenderer, to_png};
+use sidestep_kernel::Cycle;
 use std::io::Write;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use super::ExportContext;
 use crate::Error;
 use crate::files::resolve_path;
-use sidestep::kernel::InputError;
+use sidestep_kernel::InputError;
 use sidestep_record::resolve_link;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

@@ -3,11 +3,11 @@
 
 use super::FrameSink;
 use crate::Error;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::text::group_thousands;
-use sidestep::kernel::view::{Body, BodyId, Frame, FrameOptions, Scenery, Trail, Vec3, corner};
-use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::{AnimationFrame, AnimationRenderer as View, bodies_with_trails};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::text::group_thousands;
+use sidestep_kernel::view::{Body, BodyId, Frame, FrameOptions, Scenery, Trail, Vec3, corner};
+use sidestep_kernel::{Cycle, InputError};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of bodies in all frames; more would take too much memory.
@@ -168,8 +168,8 @@ mod tests {
     use super::*;
     use crate::NoWatcher;
     use crate::driver::{Sinks, drive};
-    use sidestep::scenario::Source;
-    use sidestep::worlds::WORLDS;
+    use crate::testing::WORLDS;
+    use sidestep_scenario::Source;
 
     /// Robots among walls that slip to the side, watched for 200 cycles.
     const SCENARIO: &str = "format = 1\nworld = \"robots\"\nregime = \"both\"\n\
@@ -202,7 +202,7 @@ mod tests {
         }
         assert!(
             pictures
-                .trail(BodyId::new(sidestep::kernel::view::BodyKind::Robot, 9, None), last)
+                .trail(BodyId::new(sidestep_kernel::view::BodyKind::Robot, 9, None), last)
                 .points
                 .is_empty()
         );

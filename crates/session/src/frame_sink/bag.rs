@@ -3,16 +3,17 @@
 use super::FrameSink;
 use super::mcap::FRAME_OPTIONS;
 use crate::Error;
-use sidestep::import::bag::cdr::encode;
-use sidestep::import::bag::messages::{
+use crate::VERSION;
+use sidestep_import::bag::cdr::encode;
+use sidestep_import::bag::messages::{
     Header, LaserScan, Message, Odometry, Pose as RosPose, PoseStamped, PoseWithCovariance,
     TfMessage, Time, TransformStamped, TwistWithCovariance,
 };
-use sidestep::import::write::map_files;
-use sidestep::kernel::math::wrap_angle;
-use sidestep::kernel::view::{BodyId, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scan};
-use sidestep::kernel::{Cycle, InputError, Simulation};
-use sidestep::{Cell, VERSION};
+use sidestep_import::write::map_files;
+use sidestep_kernel::math::wrap_angle;
+use sidestep_kernel::view::{BodyId, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scan};
+use sidestep_kernel::{Cycle, InputError, Simulation};
+use sidestep_map::Cell;
 use sidestep_record::{BagSchema, BagWriter};
 use std::path::Path;
 
@@ -211,7 +212,7 @@ fn ros_pose(pose: &Pose) -> RosPose {
 
 fn yaw_rad(pose: &Pose) -> f64 {
     let ahead = pose.rotate([1.0, 0.0, 0.0]);
-    sidestep::kernel::math::atan2(ahead[1], ahead[0])
+    sidestep_kernel::math::atan2(ahead[1], ahead[0])
 }
 
 /// Returns a scan; directions without a beam have no number.

@@ -1,7 +1,7 @@
 //! Animated GIFs: one palette for all frames, and for each frame only the part that has changed.
 
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
-use sidestep::kernel::view::{
+use sidestep_kernel::view::{
     ALERT_COLOR, BODY_COLORS, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR, WALL_COLOR,
 };
 use std::borrow::Cow;

@@ -2,13 +2,12 @@
 
 use super::FrameSink;
 use crate::Error;
-use crate::identity::build_id;
-use sidestep::VERSION;
-use sidestep::kernel::Cycle;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
-use sidestep::scenario::ResolvedScenario;
+use crate::VERSION;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
 use sidestep_record::{McapFooter, McapProvenance, McapRecorder, Provenance, Status};
+use sidestep_scenario::ResolvedScenario;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -35,7 +34,7 @@ pub struct McapSink {
 }
 
 impl McapSink {
-    /// Starts a new file at `path`; from now on it records the run.
+    /// Starts a new file at `path`; from now on it records the run, which `build` makes.
     ///
     /// # Errors
     /// An I/O error.
@@ -44,13 +43,14 @@ impl McapSink {
         every: Cycle,
         resolved: ResolvedScenario,
         run: &mut dyn Simulation,
+        build: &str,
     ) -> Result<Self, Error> {
         let plan = run.config();
         let mut files = resolved.files;
         files.sort();
         let about = McapProvenance {
             world: run.world().into(),
-            build: build_id().into(),
+            build: build.into(),
             origin: Provenance {
                 program_version: VERSION.into(),
                 scenario: resolved.text,

@@ -15,8 +15,8 @@ pub(crate) use rows::FrameRows;
 pub use rows::frame_rows;
 
 use crate::Error;
-use sidestep::kernel::Cycle;
-use sidestep::kernel::Simulation;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::Simulation;
 
 /// Takes frames of a run at regular cycles.
 pub trait FrameSink {

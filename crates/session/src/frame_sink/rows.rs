@@ -2,10 +2,10 @@
 
 use super::FrameSink;
 use crate::Error;
-use sidestep::kernel::ports::table::label_index;
-use sidestep::kernel::ports::{Table, TableSchema, Values};
-use sidestep::kernel::view::{Body, BodyKind, Condition, Frame, FrameOptions};
-use sidestep::kernel::{Cycle, Simulation};
+use sidestep_kernel::ports::table::label_index;
+use sidestep_kernel::ports::{Table, TableSchema, Values};
+use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, FrameOptions};
+use sidestep_kernel::{Cycle, Simulation};
 use std::ops::Range;
 
 /// Name of the table.

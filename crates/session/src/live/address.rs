@@ -1,6 +1,6 @@
 //! The address at which viewers are served.
 
-use sidestep::kernel::InputError;
+use sidestep_kernel::InputError;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::str::FromStr;

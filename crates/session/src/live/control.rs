@@ -3,7 +3,7 @@
 use super::{FRAME_OPTIONS, ViewerAddress, ViewerServer};
 use crate::Error;
 use crate::pacer::Pacer;
-use sidestep::kernel::{Cycle, Simulation};
+use sidestep_kernel::{Cycle, Simulation};
 use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 use std::time::{Duration, Instant};
 

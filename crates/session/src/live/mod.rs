@@ -11,8 +11,8 @@ pub use control::LiveControl;
 
 use crate::Error;
 use crate::frame_sink::FRAME_OPTIONS;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::{Frame, FrameOptions, Scenery};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::{Frame, FrameOptions, Scenery};
 use sidestep_record::{
     LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, start_live_server,
 };

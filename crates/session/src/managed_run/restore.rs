@@ -1,10 +1,10 @@
 //! The way back of a run: checkpoints, and the rows recorded on a branch that it finally did not take.
 
 use super::ManagedRun;
-use sidestep::kernel::Cycle;
-use sidestep::kernel::checkpoint::{CheckpointError, decode_header};
-use sidestep::kernel::control::{OrderError, Orders};
-use sidestep::kernel::ports::RecordError;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::checkpoint::{CheckpointError, decode_header};
+use sidestep_kernel::control::{OrderError, Orders};
+use sidestep_kernel::ports::RecordError;
 
 /// The reason why a run does not go on from a checkpoint.
 #[derive(Debug, thiserror::Error)]
@@ -44,7 +44,7 @@ pub enum RestoreError {
 }
 
 impl ManagedRun {
-    /// Gives agents an order for the next cycle, see [`order`](sidestep::kernel::Simulation::order).
+    /// Gives agents an order for the next cycle, see [`order`](sidestep_kernel::Simulation::order).
     ///
     /// # Errors
     /// An order that cannot be obeyed; nothing is ordered then.

@@ -1,10 +1,10 @@
 //! Events from their table, for any world.
 
 use crate::run_tables::has_rows;
-use sidestep::kernel::InputError;
-use sidestep::kernel::ports::Values;
-use sidestep::kernel::ports::table::split_unit;
-use sidestep::kernel::view::{
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::table::split_unit;
+use sidestep_kernel::view::{
     Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionColumns, Quantity, Severity,
 };
 use sidestep_record::{Table, read_table};

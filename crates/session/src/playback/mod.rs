@@ -8,15 +8,15 @@ mod pose_reader;
 
 use pose_reader::PoseReader;
 use serde_json::{Value, json};
-use sidestep::kernel::checkpoint::CheckpointError;
-use sidestep::kernel::cycle::PhaseTimes;
-use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep::kernel::text::{Description, KeyValues};
-use sidestep::kernel::view::{
+use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::cycle::PhaseTimes;
+use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
+use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::view::{
     Body, BodyId, Frame, FrameOptions, Inspection, LogEvent, PositionColumns, Scenery,
 };
-use sidestep::kernel::world::DecisionMode;
-use sidestep::kernel::{Cycle, Digest, InputError, Interrupt, RunConfig, Simulation};
+use sidestep_kernel::world::DecisionMode;
+use sidestep_kernel::{Cycle, Digest, InputError, Interrupt, RunConfig, Simulation};
 use sidestep_record::McapSceneReader;
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! Places of bodies at any cycle, from the tables that have them.
 
 use crate::run_tables::has_rows;
-use sidestep::kernel::ports::Values;
-use sidestep::kernel::view::{
+use sidestep_kernel::ports::Values;
+use sidestep_kernel::view::{
     Body, BodyId, BodyKind, Frame, Pose, PositionColumns, Scenery, Shape, Vec3,
 };
-use sidestep::kernel::{Cycle, InputError};
+use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, read_table};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;

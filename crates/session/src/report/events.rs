@@ -2,11 +2,11 @@
 
 use super::metrics::{format_digits, omitted_rows_note};
 use super::tables::{format_cell, format_rows};
-use sidestep::kernel::InputError;
-use sidestep::kernel::ports::Values;
-use sidestep::kernel::ports::table::split_unit;
 use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
 use sidestep_document::{Document, document::Text};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::table::split_unit;
 use sidestep_record::{Table as Recorded, read_table};
 use std::path::Path;
 

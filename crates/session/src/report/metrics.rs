@@ -2,9 +2,9 @@
 
 use super::text::format_count;
 use serde_json::{Map, Value};
-use sidestep::kernel::ports::table::split_unit;
-use sidestep::scenario::{MetricInfo, MetricLabel, metric_label};
 use sidestep_document::Table;
+use sidestep_kernel::ports::table::split_unit;
+use sidestep_scenario::{MetricInfo, MetricLabel, metric_label};
 
 /// Largest number of rows; the number of rows left out is shown.
 const MAX_ROWS: usize = 200;

@@ -15,8 +15,8 @@ mod text;
 
 use crate::sweep::Folder;
 use crate::{Error, Watcher};
-use sidestep::scenario::Worlds;
 use sidestep_document::Document;
+use sidestep_scenario::Worlds;
 use std::path::Path;
 
 pub use text::format_duration;
@@ -26,7 +26,7 @@ pub use text::format_duration;
 ///
 /// # Errors
 /// When the folder holds nothing to report, or something in it is damaged.
-pub fn document(worlds: Worlds, folder: &Path, watcher: &dyn Watcher) -> Result<Document, Error> {
+pub fn document(worlds: &Worlds, folder: &Path, watcher: &dyn Watcher) -> Result<Document, Error> {
     match Folder::is_at(folder) {
         true => sweep::document(worlds, &Folder::open(folder)?, watcher),
         false => Ok(run::document(worlds, folder)?),

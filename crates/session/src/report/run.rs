@@ -5,11 +5,11 @@ use super::text::{format_count, format_duration};
 use super::{events, metrics, tables};
 use crate::read_summary;
 use serde_json::Value;
-use sidestep::kernel::InputError;
-use sidestep::scenario::{MetricInfo, Worlds};
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Code, Picture, Text};
+use sidestep_kernel::InputError;
 use sidestep_record::{Manifest, RunReader, Status};
+use sidestep_scenario::{MetricInfo, Worlds};
 use std::path::Path;
 
 /// The remark beside all numbers of a single run.
@@ -20,7 +20,7 @@ const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and s
 ///
 /// # Errors
 /// When it is no run folder, or something in it is damaged.
-pub(super) fn document(worlds: Worlds, folder: &Path) -> Result<Document, InputError> {
+pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, InputError> {
     let view = RunReader::open(folder)?;
     let summary = read_summary(folder)?;
     let name = name(&view, summary.as_ref());

@@ -4,12 +4,12 @@ use super::run::shell_quote;
 use super::text::{format_count, format_duration};
 use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
-use sidestep::experiment::sweep::rounds::{VariantStop, variant_stops};
-use sidestep::experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
-use sidestep::kernel::ports::Values;
-use sidestep::scenario::Worlds;
 use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
+use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
+use sidestep_experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
+use sidestep_kernel::ports::Values;
+use sidestep_scenario::Worlds;
 
 /// Number of variants for which a run is drawn.
 const MAX_PICTURES: usize = 4;
@@ -23,13 +23,13 @@ const MAX_LISTED_FAILURES: usize = 20;
 /// # Errors
 /// When something in it is damaged, or no run is finished yet.
 pub(super) fn document(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     watcher: &dyn Watcher,
 ) -> Result<Document, Error> {
     let FinishedRuns { table, is_complete } = read_finished(folder)?;
     let plan = folder.plan();
-    let summary = plan.summary(&table)?;
+    let summary = plan.summary(worlds, &table)?;
     let mut document = Document::new(name(plan), lead(plan, &table));
     if !is_complete {
         document.warning(unfinished(folder, &table));
@@ -240,7 +240,7 @@ struct RunPictures {
 
 /// Returns a picture of one run of each of the first variants, except of those that took long.
 fn pictures(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     table: &RunTable,
     watcher: &dyn Watcher,

@@ -2,9 +2,9 @@
 
 use super::metrics::unit_of;
 use crate::run_tables::has_rows;
-use sidestep::kernel::InputError;
-use sidestep::kernel::ports::{ColumnSpec, Values};
 use sidestep_document::{Document, Table};
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{ColumnSpec, Values};
 use sidestep_record::read_table;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! Numbers as text.
 
-use sidestep::kernel::text::group_thousands;
+use sidestep_kernel::text::group_thousands;
 
 /// Returns a number with groups of digits that stay on one line.
 pub(super) fn format_count(number: u64) -> String {

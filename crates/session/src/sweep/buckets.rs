@@ -5,7 +5,7 @@
 
 use super::folder::Folder;
 use crate::Error;
-use sidestep::experiment::sweep::{
+use sidestep_experiment::sweep::{
     ColumnSchema, Outcome, Plan, RunTable, RunTableBuilder, seeds::PilotRuns,
 };
 use sidestep_record::sweep::TempFolder;

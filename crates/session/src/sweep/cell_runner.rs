@@ -6,11 +6,11 @@ use crate::run_recorder::RunRecorder;
 use crate::watcher::{NestedWatcher, Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use serde_json::json;
-use sidestep::experiment::sweep::scheduler::{self, run_cells};
-use sidestep::experiment::sweep::{Cell, Outcome, start_cell};
-use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_experiment::sweep::scheduler::{self, run_cells};
+use sidestep_experiment::sweep::{Cell, Outcome, start_cell};
+use sidestep_kernel::InputError;
 use sidestep_record::IfExists;
+use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ const LARGE_WORLD_AGENTS: u64 = 20_000;
 
 /// Everything that is needed to run cells.
 pub(super) struct CellRunner<'a> {
-    pub(super) worlds: Worlds,
+    pub(super) worlds: &'a Worlds,
     /// Number of agents of the largest variant.
     pub(super) agents: u64,
     /// The scenario of a variant.
@@ -148,7 +148,7 @@ impl CellRunner<'_> {
 /// # Errors
 /// When the scenario is wrong with this seed, or something cannot be stored.
 pub(super) fn run_recorded(
-    worlds: Worlds,
+    worlds: &Worlds,
     cell: Cell,
     variant: Source,
     workers: usize,
@@ -161,8 +161,10 @@ pub(super) fn run_recorded(
     let resolved = compiled.resolve(&source)?;
     let itself = Source::new("scenario.toml", &*resolved.text, folder);
     let mut run = compiled.start(&itself, workers);
-    let recording = RunRecorder::create(folder, &resolved, run.as_mut(), IfExists::Replace)
-        .map_err(folder_error)?;
+    let existing = IfExists::Replace;
+    let build = worlds.build();
+    let recording = RunRecorder::create(folder, &resolved, run.as_mut(), existing, build);
+    let recording = recording.map_err(folder_error)?;
     let compiled = Instant::now();
     let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
     let outcome = is_complete.then(|| Outcome::from_simulation(cell, run.as_ref()));

@@ -4,9 +4,9 @@
 //! self-contained scenarios, and gives outcomes back, in any order: no common file system is needed.
 
 use crate::Error;
-use sidestep::experiment::sweep::{Cell, Outcome};
-use sidestep::kernel::InputError;
-use sidestep::scenario::{ResolvedScenario, Source, Worlds};
+use sidestep_experiment::sweep::{Cell, Outcome};
+use sidestep_kernel::InputError;
+use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 
 /// Takes an outcome; `Ok` once it is safe.
 pub type OutcomeSink<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
@@ -52,7 +52,7 @@ impl Engine<'_> {
 /// Cells that a crew is to run, with their scenarios.
 pub struct CellBatch<'a> {
     pub(super) cells: &'a [Cell],
-    pub(super) worlds: Worlds,
+    pub(super) worlds: &'a Worlds,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
 }

@@ -4,10 +4,10 @@ use super::cell_runner::run_recorded;
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table};
 use crate::watcher::NestedWatcher;
 use crate::{Error, Watcher};
-use sidestep::experiment::sweep::{Cell, RunTable, RunTableBuilder};
-use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, Worlds};
+use sidestep_experiment::sweep::{Cell, RunTable, RunTableBuilder};
+use sidestep_kernel::InputError;
 use sidestep_record::RunReader;
+use sidestep_scenario::{Source, Worlds};
 use std::path::Path;
 
 /// The finished runs of a sweep.
@@ -46,7 +46,7 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
 /// # Errors
 /// When nothing can be stored, or the watcher asks to stop.
 pub(crate) fn run_picture(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     cell: Cell,
     digest: &str,
@@ -59,7 +59,7 @@ pub(crate) fn run_picture(
         return Ok(if made.as_deref() == Some(digest) { Ok(svg) } else { Err(other()) });
     }
     // Another build or another scenario makes another run.
-    if let Err(e) = check_build(folder).and_then(|()| folder.check_variant(cell.variant)) {
+    if let Err(e) = check_build(worlds, folder).and_then(|()| folder.check_variant(cell.variant)) {
         return Ok(Err(e.cause().to_string()));
     }
     let place = tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;

@@ -1,10 +1,11 @@
 //! The folder of a sweep, and the finished runs in it.
 
 use crate::identity::Producer;
-use sidestep::experiment::sweep::{Outcome, Plan, Role, RunTable, Shard};
-use sidestep::kernel::InputError;
+use sidestep_experiment::sweep::{Outcome, Plan, Role, RunTable, Shard};
+use sidestep_kernel::InputError;
 use sidestep_record::LoadedTable;
 use sidestep_record::sweep::{Share, SweepFolder};
+use sidestep_scenario::Worlds;
 
 /// The folder of a sweep.
 pub type Folder = SweepFolder<Plan>;
@@ -20,11 +21,11 @@ pub(super) fn to_share(shard: Shard) -> Share {
 }
 
 /// Refuses another build: results may change between builds, so a single one makes all runs.
-pub(super) fn check_build(folder: &Folder) -> Result<(), InputError> {
+pub(super) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputError> {
     let manifest = folder.manifest();
     let maker =
         Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-    maker.check(folder.path(), "sweep", |wrote| {
+    maker.check(worlds.build(), folder.path(), "sweep", |wrote| {
         format!("go on with sidestep {wrote}, or sweep into a new folder")
     })
 }

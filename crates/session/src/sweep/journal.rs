@@ -1,7 +1,7 @@
 //! Lines of a journal: the outcome of a run, and its time of arrival.
 
 use serde::{Deserialize, Serialize};
-use sidestep::experiment::sweep::Outcome;
+use sidestep_experiment::sweep::Outcome;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// An outcome with the time at which it was stored. Readers of outcomes alone see no difference: no result depends on

@@ -5,8 +5,8 @@ use super::run::SweepResult;
 use super::timing::SweepTiming;
 use crate::files::display_path;
 use serde_json::{Value, json};
-use sidestep::experiment::sweep::rounds::variant_stops;
-use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+use sidestep_experiment::sweep::rounds::variant_stops;
+use sidestep_experiment::sweep::{Plan, RunTable, Summary};
 
 impl SweepResult {
     /// Returns the output of `sidestep sweep --json`: the summary, the number of failed runs, and the reason why each

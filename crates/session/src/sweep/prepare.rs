@@ -4,11 +4,11 @@
 use crate::scenario::{read_scenario, read_source};
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep::experiment::sweep::cell::metric_names;
-use sidestep::experiment::sweep::scheduler::run_cells;
-use sidestep::experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
-use sidestep::kernel::InputError;
-use sidestep::scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
+use sidestep_experiment::sweep::cell::metric_names;
+use sidestep_experiment::sweep::scheduler::run_cells;
+use sidestep_experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
+use sidestep_kernel::InputError;
+use sidestep_scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A plan, and the thing made of each variant, by its number.
@@ -24,7 +24,7 @@ pub(super) type VariantFn<'a, T> =
 /// # Errors
 /// When the design or a variant is wrong, `make` fails, or the watcher asks to stop.
 pub(super) fn prepare<T: Send>(
-    worlds: Worlds,
+    worlds: &Worlds,
     sweep: &Sweep,
     workers: usize,
     watcher: &dyn Watcher,
@@ -109,7 +109,7 @@ fn for_each_variant<T: Send>(
 }
 
 /// Returns the scenario with the settings that all variants share.
-fn base_source(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
+fn base_source(worlds: &Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
     match &sweep.given {
         Some(source) => source.clone().with_overrides(fixed),
         None => read_source(worlds, &sweep.scenario, fixed),
@@ -139,7 +139,7 @@ fn check_metrics(
 
 /// Returns a variant's scenario.
 fn compile_variant(
-    worlds: Worlds,
+    worlds: &Worlds,
     base: &Source,
     wanted: &Variant,
 ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {

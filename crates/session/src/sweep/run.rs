@@ -8,18 +8,17 @@ use super::folder::{Folder, check_build, for_each_outcome, to_run_table, to_shar
 use super::journal::TimestampedOutcome;
 use super::prepare::{VariantFn, prepare};
 use super::timing::SweepTiming;
-use crate::identity::build_id;
+use crate::VERSION;
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep::VERSION;
-use sidestep::experiment::sweep::rounds::Rounds;
-use sidestep::experiment::sweep::seeds::PilotRuns;
-use sidestep::experiment::sweep::{
+use sidestep_experiment::sweep::rounds::Rounds;
+use sidestep_experiment::sweep::seeds::PilotRuns;
+use sidestep_experiment::sweep::{
     Cell, Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, rows::cell_table,
 };
-use sidestep::kernel::InputError;
-use sidestep::scenario::{ResolvedScenario, Source, Worlds};
+use sidestep_kernel::InputError;
 use sidestep_record::sweep::{ResultsWriter, fingerprint};
+use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -57,7 +56,7 @@ impl SweepResult {
 /// # Errors
 /// When the sweep is wrong, or the watcher asks to stop before the first run.
 pub fn run_in_memory<'a>(
-    worlds: Worlds,
+    worlds: &Worlds,
     sweep: &Sweep,
     engine: impl Into<Engine<'a>>,
     watcher: &dyn Watcher,
@@ -89,13 +88,13 @@ pub fn run_in_memory<'a>(
 /// # Errors
 /// When the sweep is wrong, or the folder is taken.
 pub fn create(
-    worlds: Worlds,
+    worlds: &Worlds,
     sweep: &Sweep,
     out: &Path,
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
-    Folder::create(out, VERSION, build_id(), |staging| {
+    Folder::create(out, VERSION, worlds.build(), |staging| {
         let (plan, fingerprints) =
             prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
                 let ResolvedScenario { text, files } = compiled.resolve(source)?;
@@ -112,7 +111,7 @@ pub fn create(
 /// # Errors
 /// When the sweep is wrong, or the folder holds something else, or is of another build.
 pub fn open_or_create(
-    worlds: Worlds,
+    worlds: &Worlds,
     sweep: &Sweep,
     out: &Path,
     workers: usize,
@@ -126,7 +125,7 @@ pub fn open_or_create(
 
 /// Opens the sweep in the folder, which must be the given one.
 fn open_same(
-    worlds: Worlds,
+    worlds: &Worlds,
     sweep: &Sweep,
     out: &Path,
     workers: usize,
@@ -139,7 +138,7 @@ fn open_same(
     })?;
     let manifest = folder.manifest();
     if (&plan, &fingerprints) == (&manifest.plan, &manifest.fingerprints) {
-        check_build(&folder)?;
+        check_build(worlds, &folder)?;
         return Ok(folder);
     }
     let there = out.display();
@@ -153,7 +152,7 @@ fn open_same(
 /// # Errors
 /// When runs cannot be read or stored.
 pub fn run_remaining<'a>(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     engine: impl Into<Engine<'a>>,
     watcher: &dyn Watcher,
@@ -161,7 +160,7 @@ pub fn run_remaining<'a>(
     if folder.is_complete() {
         return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
     }
-    check_build(folder)?;
+    check_build(worlds, folder)?;
     let mut log = CellScheduler::new(folder.plan());
     for_each_outcome(folder, Some(Shard::ALL), |outcome| log.record(&outcome))?;
     let mut effort = SweepTiming::default();
@@ -225,13 +224,13 @@ fn join_runs(
 /// # Errors
 /// When the sweep stops at a precision or is of another build, or runs cannot be read or stored.
 pub fn run_share(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     shard: Shard,
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
-    check_build(folder)?;
+    check_build(worlds, folder)?;
     let plan = folder.plan();
     if plan.until.is_some() {
         let cause = "this sweep stops by its precision, which takes all runs to be seen";
@@ -296,11 +295,11 @@ fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
 ///
 /// # Errors
 /// When runs are missing, cannot be read or stored, or are of another build.
-pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<SweepEnd, Error> {
+pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Result<SweepEnd, Error> {
     if folder.is_complete() {
         return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
     }
-    check_build(folder)?;
+    check_build(worlds, folder)?;
     let plan = folder.plan();
     let mut log = CellScheduler::new(plan);
     for_each_outcome(folder, None, |outcome| log.record(&outcome))?;
@@ -316,7 +315,7 @@ pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<SweepEnd, Error
 
 /// Passes on everything needed to run the cells of a folder.
 fn with_cell_runner(
-    worlds: Worlds,
+    worlds: &Worlds,
     folder: &Folder,
     engine: Engine<'_>,
     watcher: &dyn Watcher,
@@ -443,9 +442,9 @@ impl<'a> CellScheduler<'a> {
 mod tests {
     use super::*;
     use crate::NoWatcher;
+    use crate::testing::WORLDS;
     use serde_json::json;
-    use sidestep::experiment::sweep::Factor;
-    use sidestep::worlds::WORLDS;
+    use sidestep_experiment::sweep::Factor;
     use sidestep_record::sweep::Share;
 
     /// A planned sweep of two times 300 runs, all of them in journals of two shares: made up, and in no order.
@@ -455,7 +454,7 @@ mod tests {
         let mut sweep = Sweep::from_source(Source::new("s.toml", text, place));
         sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
         sweep.replicates = 300;
-        let folder = create(WORLDS, &sweep, &place.join("sweep"), 2, &NoWatcher).expect("planned");
+        let folder = create(&WORLDS, &sweep, &place.join("sweep"), 2, &NoWatcher).expect("planned");
         let mut cells: Vec<Cell> = folder.plan().shard_cells(Shard::ALL).collect();
         cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
         for index in 0..2 {

@@ -1,10 +1,11 @@
-//! The state of a sweep that other processes work on, read from its folder; looking changes nothing.
+//! The progress of a sweep that other processes run, read from its folder without changing it.
 
 use super::folder::{Folder, check_variants, to_run_table, to_share};
 use super::journal::{StoredOutcome, now_unix_s};
 use serde::Serialize;
-use sidestep::experiment::sweep::{Outcome, Plan, Shard};
-use sidestep::kernel::InputError;
+use serde_json::Value;
+use sidestep_experiment::sweep::{Outcome, Plan, Shard};
+use sidestep_kernel::InputError;
 use sidestep_record::sweep::Share;
 use std::collections::BTreeSet;
 
@@ -25,31 +26,43 @@ pub struct SweepStatus {
     /// Number of finished runs, those that failed among them.
     pub runs: u64,
     /// Number of planned runs; an upper bound if a precision ends the sweep.
-    pub of: u64,
+    pub total: u64,
     /// Whether a precision ends the sweep.
     pub until_precise: bool,
     /// Number of runs that failed.
     pub failed: usize,
     /// The first of them.
     pub failures: Vec<FailedRun>,
-    /// Whether a process works on it, by the locks of its journals; where there are no locks, by the time since the
-    /// last runs came in.
-    pub is_worked_on: bool,
-    /// The shares that have been begun, in order.
+    /// Whether a process is running it, by the locks of its journals; where there are no locks, by the time since the
+    /// last finished run.
+    pub is_active: bool,
+    /// The shares that have been started, in order.
     pub shares: Vec<ShareStatus>,
     /// Recent rate of finished runs per second; none before the second run, and none once the sweep is complete.
     pub runs_per_s: Option<f64>,
-    /// Seconds since the last run came in.
+    /// Seconds since the last run finished.
     pub idle_s: Option<f64>,
-    /// Seconds until the last run comes in, at the recent rate; none if no process seems to work on it, or if a
-    /// precision ends it.
-    pub left_s: Option<f64>,
+    /// Estimated seconds left at the recent rate; none if no process seems to be running, or if a precision ends it.
+    pub eta_s: Option<f64>,
+}
+
+impl SweepStatus {
+    /// Returns the status as JSON, with the names of fields that version 0.1 used as well.
+    pub fn to_json(&self) -> Value {
+        let mut json = serde_json::to_value(self).unwrap_or_default();
+        if let Value::Object(fields) = &mut json {
+            fields.insert("of".into(), self.total.into());
+            fields.insert("is_worked_on".into(), self.is_active.into());
+            fields.insert("left_s".into(), self.eta_s.into());
+        }
+        json
+    }
 }
 
 /// A run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FailedRun {
-    /// Number of its cell.
+    /// Number of its trial.
     pub cell: u64,
     /// Name of its variant.
     pub variant: String,
@@ -70,16 +83,16 @@ pub struct ShareStatus {
     pub of: u64,
     /// Whether it is done.
     pub is_done: bool,
-    /// Seconds since its last run came in; none if it is done.
+    /// Seconds since its last run finished; none if it is done.
     pub idle_s: Option<f64>,
 }
 
-/// The findings in the folder.
+/// What a scan of the folder finds.
 #[derive(Default)]
 struct FolderScan {
     cells: BTreeSet<u64>,
     failed: Vec<(u64, String)>,
-    /// The times at which runs came in, of shares in progress.
+    /// The times at which runs of shares in progress finished.
     stamps: Vec<f64>,
 }
 
@@ -110,26 +123,26 @@ pub fn read_status(folder: &Folder) -> Result<SweepStatus, InputError> {
         }
     }
     let (runs, until_precise) = (found.cells.len() as u64, plan.until.is_some());
-    let of = if is_complete { runs } else { plan.runs() };
+    let total = if is_complete { runs } else { plan.runs() };
     let newest_s = found.stamps.iter().copied().reduce(f64::max);
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
     let runs_per_s = newest_s.and_then(|newest_s| rate(&found.stamps, newest_s));
-    let left_s = eta_s(of.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
-    let is_worked_on = is_active(folder, &shares, runs_per_s);
+    let eta_s = eta_s(total.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
+    let is_active = is_active(folder, &shares, runs_per_s);
     let failures = failures(plan, &mut found.failed);
     let failed = found.failed.len();
     Ok(SweepStatus {
         is_complete,
         runs,
-        of,
+        total,
         until_precise,
         failed,
         failures,
-        is_worked_on,
+        is_active,
         shares,
         runs_per_s,
         idle_s,
-        left_s,
+        eta_s,
     })
 }
 
@@ -174,9 +187,9 @@ fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
     (spaces > 0 && span_s > 0.0).then(|| spaces as f64 / span_s)
 }
 
-fn eta_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
+fn eta_s(remaining: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
     let (runs_per_s, idle_s) = (runs_per_s?, idle_s?);
-    (!is_stalled(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
+    (!is_stalled(idle_s, Some(runs_per_s))).then(|| remaining as f64 / runs_per_s)
 }
 
 /// Returns whether no run has finished for longer than a sweep in progress would take.
@@ -187,7 +200,7 @@ fn is_stalled(idle_s: f64, runs_per_s: Option<f64>) -> bool {
         })
 }
 
-/// Returns whether a process works on one of the shares that are begun and not done.
+/// Returns whether a process is running one of the shares that are started and not done.
 fn is_active(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
     shares.iter().filter(|share| !share.is_done).any(|share| {
         let shard: Option<Shard> = share.share.parse().ok();

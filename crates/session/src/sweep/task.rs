@@ -2,11 +2,10 @@
 
 use super::cell_runner::CellRunner;
 use super::executor::Engine;
-use crate::identity::build_id;
 use crate::{Error, Watcher};
-use sidestep::experiment::sweep::{Cell, Outcome};
-use sidestep::kernel::InputError;
-use sidestep::scenario::{ResolvedScenario, Source, Worlds};
+use sidestep_experiment::sweep::{Cell, Outcome};
+use sidestep_kernel::InputError;
+use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 use std::path::Path;
 
 /// Some cells of a sweep that another process drives.
@@ -25,9 +24,10 @@ impl Task {
     ///
     /// # Errors
     /// When another build drives the sweep, or files cannot be unpacked.
-    pub fn run(&self, worlds: Worlds, watcher: &dyn Watcher) -> Result<Vec<Outcome>, Error> {
-        if self.build != build_id() {
-            let cause = format!("the sweep is of sidestep {}, this is {}", self.build, build_id());
+    pub fn run(&self, worlds: &Worlds, watcher: &dyn Watcher) -> Result<Vec<Outcome>, Error> {
+        let own = worlds.build();
+        if self.build != own {
+            let cause = format!("the sweep is of sidestep {}, this is {own}", self.build);
             let remedy = "install the same build of sidestep wherever tasks run";
             return Err(InputError::new("a task of a sweep", cause, remedy).into());
         }

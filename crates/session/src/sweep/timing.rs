@@ -1,6 +1,6 @@
 //! The time that runs took.
 
-use sidestep::experiment::sweep::Outcome;
+use sidestep_experiment::sweep::Outcome;
 use std::time::Instant;
 
 /// The time that runs took in this process, in seconds.

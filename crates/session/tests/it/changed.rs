@@ -1,11 +1,10 @@
 //! Folders changed after they were written: they are refused, and nothing panics.
 
-use crate::support::{TestFolder, WORLDS, edit};
+use crate::support::{BUILD, TestFolder, WORLDS, edit};
 use crate::sweeps::sweep;
 use serde_json::{Value, json};
-use sidestep::BUILD;
-use sidestep::experiment::sweep::{Precision, Shard, Sweep};
-use sidestep::kernel::InputError;
+use sidestep_experiment::sweep::{Precision, Shard, Sweep};
+use sidestep_kernel::InputError;
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
     Folder, SweepEnd, collect, create, read_status, run_remaining, run_share,
@@ -22,9 +21,9 @@ fn refused<T>(result: Result<T, impl Into<Error>>, cause: &str) {
 fn refused_by_all(path: &Path, cause: &str) {
     let open = || Folder::open(path).map_err(Error::from);
     refused(open().and_then(|folder| Ok(read_status(&folder)?)), cause);
-    refused(open().and_then(|folder| run_remaining(WORLDS, &folder, 1, &NoWatcher)), cause);
-    refused(open().and_then(|folder| collect(&folder, &NoWatcher)), cause);
-    refused(document(WORLDS, path, &NoWatcher), cause);
+    refused(open().and_then(|folder| run_remaining(&WORLDS, &folder, 1, &NoWatcher)), cause);
+    refused(open().and_then(|folder| collect(&WORLDS, &folder, &NoWatcher)), cause);
+    refused(document(&WORLDS, path, &NoWatcher), cause);
 }
 
 #[test]
@@ -33,8 +32,8 @@ fn a_table_of_another_sweep_is_refused_by_all_who_read_it() {
     let own = sweep(&place);
     let more = Sweep { replicates: 5, ..own.clone() };
     for (name, sweep) in [("own", &own), ("more", &more)] {
-        let folder = create(WORLDS, sweep, &place.path(name), 1, &NoWatcher).expect("planned");
-        run_remaining(WORLDS, &folder, 1, &NoWatcher).expect("run");
+        let folder = create(&WORLDS, sweep, &place.path(name), 1, &NoWatcher).expect("planned");
+        run_remaining(&WORLDS, &folder, 1, &NoWatcher).expect("run");
     }
     for table in ["results.parquet", "timings.parquet"] {
         let from = place.path("more").join(table);
@@ -43,7 +42,7 @@ fn a_table_of_another_sweep_is_refused_by_all_who_read_it() {
     refused_by_all(&place.path("own"), "the table is of another sweep");
     std::fs::remove_file(place.path("own/results.parquet")).expect("deleted, as the error says");
     let folder = Folder::open(&place.path("own")).expect("a sweep");
-    run_remaining(WORLDS, &folder, 1, &NoWatcher).expect("joined again");
+    run_remaining(&WORLDS, &folder, 1, &NoWatcher).expect("joined again");
     assert_eq!(read_status(&folder).expect("its own table").runs, 6);
 }
 
@@ -52,8 +51,8 @@ fn a_plan_that_does_not_fit_together_is_refused_by_all_who_read_it() {
     let place = TestFolder::new();
     let sweep = sweep(&place);
     let path = place.path("sweep");
-    let folder = create(WORLDS, &sweep, &path, 1, &NoWatcher).expect("planned");
-    run_share(WORLDS, &folder, Shard { index: 0, count: 2 }, 1, &NoWatcher).expect("run");
+    let folder = create(&WORLDS, &sweep, &path, 1, &NoWatcher).expect("planned");
+    run_share(&WORLDS, &folder, Shard { index: 0, count: 2 }, 1, &NoWatcher).expect("run");
     let file = path.join("sweep.json");
     let text = std::fs::read_to_string(&file).expect("there");
     let whole: Value = serde_json::from_str(&text).expect("JSON");
@@ -81,7 +80,7 @@ fn a_run_that_says_to_have_more_cycles_than_its_scenario_is_not_computed_for_as_
     let (folder, _) = place.record("run");
     let manifest = folder.join("run.json");
     edit(&manifest, "\"cycles_done\": 6000", "\"cycles_done\": 18446744073709551615");
-    let recorded = RecordedRun::open(WORLDS, &folder).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &folder).expect("recorded");
     refused(replay_all(&recorded, 1, &NoWatcher), "its scenario has 6000");
     let shown: Result<_, InputError> = recorded.start_for_viewing(1);
     refused(shown, "its scenario has 6000");
@@ -92,10 +91,10 @@ fn a_report_shows_no_picture_of_a_run_that_is_not_in_its_table() {
     let place = TestFolder::new();
     let report = |name: &str, change: &dyn Fn(&Path)| {
         let path = place.path(name);
-        let folder = create(WORLDS, &sweep(&place), &path, 1, &NoWatcher).expect("planned");
-        run_remaining(WORLDS, &folder, 1, &NoWatcher).expect("run");
+        let folder = create(&WORLDS, &sweep(&place), &path, 1, &NoWatcher).expect("planned");
+        run_remaining(&WORLDS, &folder, 1, &NoWatcher).expect("run");
         change(&path);
-        let document = document(WORLDS, &path, &NoWatcher).expect("a document");
+        let document = document(&WORLDS, &path, &NoWatcher).expect("a document");
         sidestep_report::render(&document, "pictures").expect("pages").markdown
     };
     let plain = report("plain", &|_| ());
@@ -122,15 +121,15 @@ fn a_report_finds_the_rows_of_variants_with_different_numbers_of_runs() {
     let until = Precision { half_width: 0.5, is_relative: true, metrics };
     let sweep = Sweep { until: Some(until), replicates: 40, ..sweep(&place) };
     let path = place.path("until");
-    let folder = create(WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
-    let SweepEnd::Done(done) = run_remaining(WORLDS, &folder, 2, &NoWatcher).expect("run") else {
+    let folder = create(&WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
+    let SweepEnd::Done(done) = run_remaining(&WORLDS, &folder, 2, &NoWatcher).expect("run") else {
         panic!("interrupted")
     };
     let cells = done.table.column("cell").expect("a column");
     let row = (0..done.table.runs()).find(|row| cells.values.number(*row) == Some(40.0));
     let row = row.expect("the first run of the second variant");
     assert!(row < 40, "the first variant has fewer runs than it may have");
-    let document = document(WORLDS, &path, &NoWatcher).expect("a document");
+    let document = document(&WORLDS, &path, &NoWatcher).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
     assert!(pages.markdown.contains(&format!("in row {row} of")), "{}", pages.markdown);
 }

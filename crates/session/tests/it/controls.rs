@@ -1,12 +1,12 @@
 //! Promise D1, D2: a run that was flown by pilots outside of it is computed again from its folder, even if some
 //! of their controls are missing.
 
-use sidestep::kernel::EntityId;
-use sidestep::kernel::network::{NetworkAgent, OutgoingPacket};
-use sidestep::scenario::Source;
-use sidestep::worlds::WORLDS;
-use sidestep::worlds::airspace::pilot::{Control, Percept, Pilot};
-use sidestep::worlds::airspace::{AirspaceRun, Fleet};
+use crate::support::SHIPPED_WORLDS;
+use sidestep_airspace::pilot::{Control, Percept, Pilot};
+use sidestep_airspace::{AirspaceRun, Fleet};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
+use sidestep_scenario::Source;
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, replay_all, replay_to};
 use std::any::Any;
 use std::path::Path;
@@ -43,9 +43,10 @@ fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<Control> {
 /// Records a run to cycle `until`; returns its digest. Some controls never reach it.
 fn record_run(folder: &Path, until: u64) -> String {
     let source = Source::new("s.toml", SCENARIO, "");
-    let compiled = WORLDS.compile(&source).expect("valid");
+    let compiled = SHIPPED_WORLDS.compile(&source).expect("valid");
     let keep = OutputPaths { folder: Some(folder), ..OutputPaths::default() };
-    let mut journey = ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant");
+    let mut journey =
+        ManagedRun::start(&SHIPPED_WORLDS, compiled.as_ref(), &source, 1, keep).expect("vacant");
     let world = airspace(&mut journey).world().clone();
     let mut pilots: Vec<Pilot> =
         (0..3).map(|id| Pilot::new(world.clone(), id, Default::default())).collect();
@@ -66,7 +67,7 @@ fn a_run_that_was_flown_from_outside_is_replayed_from_its_controls() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
     let digest = record_run(&folder, 30);
-    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    let again = RecordedRun::open(&SHIPPED_WORLDS, &folder).expect("a run");
     for workers in [1, 2] {
         let replayed = replay_all(&again, workers, &NoWatcher).expect("the digest is confirmed");
         assert_eq!(replayed.run.digest().to_string(), digest);
@@ -82,9 +83,9 @@ fn a_run_that_lost_its_server_goes_on_by_itself_and_is_replayed() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
     record_run(&folder, 17);
-    let journey = ManagedRun::resume(WORLDS, &folder, 1, None).expect("it can go on");
+    let journey = ManagedRun::resume(&SHIPPED_WORLDS, &folder, 1, None).expect("it can go on");
     let digest = journey.run_to_end(&NoWatcher).expect("there is room").digest;
-    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    let again = RecordedRun::open(&SHIPPED_WORLDS, &folder).expect("a run");
     let replayed = replay_all(&again, 2, &NoWatcher).expect("the digest is confirmed");
     assert_eq!(replayed.run.digest().to_string(), digest);
 }

@@ -21,7 +21,7 @@ pub(crate) fn wanted(form: Format, out: &Path) -> ExportRequest<'_> {
 fn a_run_goes_out_in_every_form() {
     let place = TestFolder::new();
     let (folder, _) = place.record("run");
-    let recorded = RecordedRun::open(WORLDS, &folder).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &folder).expect("recorded");
     let events = Some("events".to_string());
     let film = AnimationOptions { fps: Some(10), width_px: Some(160) };
     let forms: [(&str, Format, &[u8]); 6] = [
@@ -58,7 +58,7 @@ fn a_recording_for_viewers_is_replayed() {
     let keep = OutputPaths { mcap: Some((&file, 100)), ..OutputPaths::default() };
     let summary = place.start(2, keep).expect("started").run_to_end(&NoWatcher).expect("no bug");
     assert_eq!(summary.mcap.as_ref(), Some(&file));
-    let recorded = RecordedRun::open(WORLDS, &file).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &file).expect("recorded");
     let replayed = replay_all(&recorded, 1, &NoWatcher).expect("the same digest");
     assert_eq!(replayed.run.digest().to_string(), summary.digest);
 }
@@ -70,7 +70,7 @@ fn a_recording_is_not_exported_onto_itself() {
     let keep = OutputPaths { mcap: Some((&file, 100)), ..OutputPaths::default() };
     place.start(1, keep).expect("started").run_to_end(&NoWatcher).expect("no bug");
     let before = std::fs::read(&file).expect("there");
-    let recorded = RecordedRun::open(WORLDS, &file).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &file).expect("recorded");
     let part = ExportRequest {
         replace: true,
         from: Some(10),
@@ -91,7 +91,7 @@ fn a_recording_is_not_exported_onto_itself() {
 #[test]
 fn a_folder_that_is_named_with_a_slash_at_its_end_is_replaced_by_the_new_export() {
     let place = TestFolder::new();
-    let recorded = RecordedRun::open(WORLDS, &place.record("run").0).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &place.record("run").0).expect("recorded");
     let out = place.path("out/");
     for replace in [false, true] {
         let wanted = ExportRequest { replace, ..wanted(Format::Csv(None), &out) };
@@ -105,7 +105,7 @@ fn a_folder_that_is_named_with_a_slash_at_its_end_is_replaced_by_the_new_export(
 fn an_export_that_is_stopped_leaves_nothing() {
     let place = TestFolder::new();
     let (folder, _) = place.record("run");
-    let recorded = RecordedRun::open(WORLDS, &folder).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &folder).expect("recorded");
     let out = place.path("run.gif");
     let film = wanted(Format::Gif(AnimationOptions::default()), &out);
     let stopped = export(&recorded, &film, &StopAt::new(1));

@@ -19,10 +19,10 @@ fn a_link_to_a_folder_stays_a_link_also_with_a_slash_at_its_end() {
         let named = |name: &str| place.path(&format!("{name}{end}"));
         place.record(&format!("run{end}"));
         let sweep = crate::sweeps::sweep(&place);
-        create(WORLDS, &sweep, &named("sweep"), 1, &NoWatcher).expect("planned");
+        create(&WORLDS, &sweep, &named("sweep"), 1, &NoWatcher).expect("planned");
         let tables = named("tables");
         let wanted = ExportRequest { replace: true, ..wanted(Format::Csv(None), &tables) };
-        let recorded = RecordedRun::open(WORLDS, &recorded).expect("recorded");
+        let recorded = RecordedRun::open(&WORLDS, &recorded).expect("recorded");
         export(&recorded, &wanted, &NoWatcher).expect("written");
         for name in ["run", "sweep", "tables"] {
             assert!(place.path(name).is_symlink(), "{name}{end}");
@@ -37,7 +37,7 @@ fn a_link_to_a_folder_stays_a_link_also_with_a_slash_at_its_end() {
 fn a_link_to_what_is_not_there_is_refused_and_stays() {
     let place = TestFolder::new();
     let recorded = place.record("recorded").0;
-    let recorded = RecordedRun::open(WORLDS, &recorded).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &recorded).expect("recorded");
     symlink(place.path("nowhere"), place.path("link")).expect("linked");
     for name in ["link", "link/"] {
         let folder = place.path(name);

@@ -1,9 +1,9 @@
 //! Promise D1, D2: a run that was decided from outside is computed again from its orders.
 
-use sidestep::kernel::control::Orders;
-use sidestep::kernel::ports::Values;
-use sidestep::scenario::Source;
-use sidestep::worlds::WORLDS;
+use crate::support::SHIPPED_WORLDS;
+use sidestep_kernel::control::Orders;
+use sidestep_kernel::ports::Values;
+use sidestep_scenario::Source;
 use sidestep_session::{
     ManagedRun, NoWatcher, OutputPaths, RecordedRun, RestoreError, RowSelection, replay_all,
     replay_to,
@@ -17,8 +17,8 @@ const SCENARIO: &str = "format = 1\nworld = \"robots\"\ncycles = 200\n\
 
 fn started(keep: OutputPaths<'_>) -> ManagedRun {
     let source = Source::new("s.toml", SCENARIO, "");
-    let compiled = WORLDS.compile(&source).expect("valid");
-    ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant")
+    let compiled = SHIPPED_WORLDS.compile(&source).expect("valid");
+    ManagedRun::start(&SHIPPED_WORLDS, compiled.as_ref(), &source, 1, keep).expect("vacant")
 }
 
 /// Records a run to cycle `until` in which a caller orders turns and steps; returns its digest.
@@ -39,7 +39,7 @@ fn a_run_that_was_decided_from_outside_is_replayed_from_its_orders() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
     let digest = record_run(&folder, 200);
-    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    let again = RecordedRun::open(&SHIPPED_WORLDS, &folder).expect("a run");
     for workers in [1, 2] {
         let replayed = replay_all(&again, workers, &NoWatcher).expect("the digest is confirmed");
         assert_eq!(replayed.run.digest().to_string(), digest);
@@ -55,10 +55,12 @@ fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
     record_run(&folder, 120);
-    let error = ManagedRun::resume(WORLDS, &folder, 1, None).map(drop).expect_err("nobody decides");
+    let error = ManagedRun::resume(&SHIPPED_WORLDS, &folder, 1, None)
+        .map(drop)
+        .expect_err("nobody decides");
     let words = error.to_string();
     assert!(words.contains("its agents were decided from outside up to cycle 120"), "{words}");
-    let again = RecordedRun::open(WORLDS, &folder).expect("a run");
+    let again = RecordedRun::open(&SHIPPED_WORLDS, &folder).expect("a run");
     replay_to(&again, 119, 1, &NoWatcher).expect("what was recorded can be looked at");
 }
 
@@ -104,7 +106,7 @@ fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
 #[test]
 fn another_scenario_is_told_as_such_also_where_rows_are_kept() {
     let source = Source::new("s.toml", format!("seed = 9\n{SCENARIO}"), "");
-    let compiled = WORLDS.compile(&source).expect("valid");
+    let compiled = SHIPPED_WORLDS.compile(&source).expect("valid");
     let other = compiled.start(&source, 1).checkpoint();
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");

@@ -37,7 +37,7 @@ fn a_run_that_was_stopped_comes_to_the_same_end_with_the_same_rows() {
     let stopped = stopped.expect("stopped in good order");
     assert_eq!(stopped.status, RunStatus::Incomplete);
     assert!((1700..6000).contains(&stopped.cycles), "{}", stopped.cycles);
-    let resume = |until| ManagedRun::resume(WORLDS, &parts, 3, until);
+    let resume = |until| ManagedRun::resume(&WORLDS, &parts, 3, until);
     let early = resume(Some(100)).map(drop).expect_err("the run is past cycle 100");
     assert!(early.to_string().contains("--cycles 100"), "{early}");
     let half = resume(Some(5001)).expect("resumed").run_to_end(&NoWatcher).expect("no bug");
@@ -61,7 +61,7 @@ fn a_run_that_was_interrupted_within_a_cycle_comes_to_the_same_end_with_the_same
         let ended = place.start(workers, keep).expect("started").run_to_end(&watcher);
         let Err(Error::InterruptedInCycle(cycle)) = ended else { panic!("{ended:?}") };
         assert!((1700..6000).contains(&cycle), "{cycle}");
-        let resumed = ManagedRun::resume(WORLDS, &parts, 2, None).expect("as after a kill");
+        let resumed = ManagedRun::resume(&WORLDS, &parts, 2, None).expect("as after a kill");
         let resumed = resumed.run_to_end(&NoWatcher).expect("no bug");
         assert_eq!((&resumed.digest, &resumed.metrics), (&in_one_go.digest, &in_one_go.metrics));
         for table in ["trajectories", "events"] {
@@ -77,7 +77,7 @@ fn a_run_leaves_a_picture_and_is_replayed_to_any_cycle() {
     let (folder, _) = place.record("run");
     let svg = std::fs::read_to_string(folder.join("trajectories.svg")).expect("drawn");
     assert!(svg.starts_with("<svg") && svg.contains("evening"));
-    let recorded = RecordedRun::open(WORLDS, &folder).expect("recorded");
+    let recorded = RecordedRun::open(&WORLDS, &folder).expect("recorded");
     let whole = replay_all(&recorded, 3, &NoWatcher).expect("the same digest");
     assert_eq!(whole.run.cycle(), 6000);
     let mut moment = replay_to(&recorded, 1234, 1, &NoWatcher).expect("the same poses");
@@ -91,7 +91,7 @@ fn a_run_leaves_a_picture_and_is_replayed_to_any_cycle() {
 fn a_run_is_reported() {
     let place = TestFolder::new();
     let (folder, summary) = place.record("run");
-    let document = document(WORLDS, &folder, &NoWatcher).expect("a document");
+    let document = document(&WORLDS, &folder, &NoWatcher).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
     for words in ["evening, seed 1", "hops_per_frog", "bump", &summary.digest, "x_m"] {
         assert!(pages.markdown.contains(words), "no {words} in the report");

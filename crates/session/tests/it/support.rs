@@ -1,16 +1,26 @@
 //! Runs of the pond in a folder of their own.
 
 use crate::pond::Pond;
+use sidestep_airspace::Airspace;
 use sidestep_kernel::{Cycle, Interrupt};
+use sidestep_robots::Robots;
 use sidestep_scenario::{WorldType, Worlds};
 use sidestep_session::{
     Error, ManagedRun, NoWatcher, OutputPaths, Progress, Summary, Watcher, read_scenario,
 };
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The one world of these tests.
-pub(crate) const WORLDS: Worlds = Worlds(&[&Pond]);
+pub(crate) static WORLDS: LazyLock<Worlds> = LazyLock::new(|| Worlds::new(BUILD).with(Pond));
+
+/// Worlds that are shipped.
+pub(crate) static SHIPPED_WORLDS: LazyLock<Worlds> =
+    LazyLock::new(|| Worlds::new(BUILD).with(Robots::new()).with(Airspace));
+
+/// The build of these tests.
+pub(crate) const BUILD: &str = "0.1.0+0123456789ab";
 
 /// A folder that is deleted when dropped.
 pub(crate) struct TestFolder(tempfile::TempDir);
@@ -29,8 +39,8 @@ impl TestFolder {
 
     /// Returns the run of the scenario, at its start.
     pub(crate) fn start(&self, workers: usize, keep: OutputPaths<'_>) -> Result<ManagedRun, Error> {
-        let (source, compiled) = read_scenario(WORLDS, &self.path("pond.toml"), &[])?;
-        ManagedRun::start(compiled.as_ref(), &source, workers, keep, None)
+        let (source, compiled) = read_scenario(&WORLDS, &self.path("pond.toml"), &[])?;
+        ManagedRun::start(&WORLDS, compiled.as_ref(), &source, workers, keep)
     }
 
     /// Returns the whole run, recorded to the folder `name`.

@@ -1,13 +1,13 @@
 //! Many runs of one scenario.
 
-use crate::support::{TestFolder, WORLDS};
-use sidestep::experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
+use crate::support::{BUILD, TestFolder, WORLDS};
+use sidestep_experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
     CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task, collect, create,
     read_status, run_in_memory, run_remaining, run_share,
 };
-use sidestep_session::{Error, NoWatcher, build_id};
+use sidestep_session::{Error, NoWatcher};
 
 const SWEEP: &str = "format = 1\nscenario = \"pond.toml\"\nreplicates = 3\n\
                      [set]\n\"cycles\" = 700\n[vary]\n\"pond.frogs\" = [4, 20]\n";
@@ -32,31 +32,31 @@ fn done(ended: SweepEnd) -> RunTable {
 fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
     let place = TestFolder::new();
     let sweep = sweep(&place);
-    let (plan, ended) = run_in_memory(WORLDS, &sweep, 2, &NoWatcher).expect("run");
+    let (plan, ended) = run_in_memory(&WORLDS, &sweep, 2, &NoWatcher).expect("run");
     let table = done(ended);
     assert_eq!((plan.world.as_str(), plan.variants.len(), table.runs()), ("pond", 2, 6));
     assert!(table.column("hops_per_frog").is_some());
 
-    let folder = create(WORLDS, &sweep, &place.path("one"), 2, &NoWatcher).expect("planned");
-    let one = run_remaining(WORLDS, &folder, 3, &NoWatcher).expect("run");
+    let folder = create(&WORLDS, &sweep, &place.path("one"), 2, &NoWatcher).expect("planned");
+    let one = run_remaining(&WORLDS, &folder, 3, &NoWatcher).expect("run");
     assert_eq!(done(one), table);
 
-    let folder = create(WORLDS, &sweep, &place.path("shares"), 2, &NoWatcher).expect("planned");
+    let folder = create(&WORLDS, &sweep, &place.path("shares"), 2, &NoWatcher).expect("planned");
     for shard in ["1/2", "0/2"] {
         let shard: Shard = shard.parse().expect("a share");
-        let ended = run_share(WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
+        let ended = run_share(&WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
         assert_eq!(done(ended).runs(), 3);
     }
-    assert_eq!(done(collect(&folder, &NoWatcher).expect("collected")), table);
+    assert_eq!(done(collect(&WORLDS, &folder, &NoWatcher).expect("collected")), table);
 }
 
 #[test]
 fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     let place = TestFolder::new();
     let sweep = sweep(&place);
-    let folder = create(WORLDS, &sweep, &place.path("s"), 2, &NoWatcher).expect("planned");
+    let folder = create(&WORLDS, &sweep, &place.path("s"), 2, &NoWatcher).expect("planned");
     let shard: Shard = "1/2".parse().expect("a share");
-    run_share(WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
+    run_share(&WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
     // A run of that share again, from another division into shares, and one that failed.
     let journal = place.path("s/shares/0-of-1.journal");
     let outcome =
@@ -69,15 +69,15 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
         writing.append(&outcome(cell)).expect("written");
     }
     let found = read_status(&folder).expect("read");
-    assert!(found.is_worked_on && found.left_s.is_none(), "before the second run, too");
+    assert!(found.is_active && found.eta_s.is_none(), "before the second run, too");
     drop(writing);
     let found = read_status(&folder).expect("read");
-    assert_eq!((found.runs, found.of, found.failed, found.is_complete), (4, 6, 1, false));
-    assert!(!found.is_worked_on, "nobody has the lock of its journal");
+    assert_eq!((found.runs, found.total, found.failed, found.is_complete), (4, 6, 1, false));
+    assert!(!found.is_active, "no process has the lock of its journal");
     assert_eq!(found.failures[0].why, "no frogs");
     assert_eq!(found.failures[0].cell, other.expect("a cell"));
     // Lines of early journals have no times.
-    assert_eq!((found.runs_per_s, found.idle_s, found.left_s), (None, None, None));
+    assert_eq!((found.runs_per_s, found.idle_s, found.eta_s), (None, None, None));
     let shares: Vec<_> =
         found.shares.iter().map(|s| (s.share.as_str(), s.runs, s.is_done)).collect();
     assert_eq!(shares, [("0/1", 2, false), ("1/2", 3, true)]);
@@ -90,11 +90,11 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     let place = TestFolder::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
     let path = place.path("sweep");
-    let folder = create(WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
-    run_remaining(WORLDS, &folder, 2, &NoWatcher).expect("run");
+    let folder = create(&WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
+    run_remaining(&WORLDS, &folder, 2, &NoWatcher).expect("run");
     let folder = Folder::open(&path).expect("a sweep");
     assert!(folder.run_folder(5).join("trajectories.svg").is_file());
-    let document = document(WORLDS, &path, &NoWatcher).expect("a document");
+    let document = document(&WORLDS, &path, &NoWatcher).expect("a document");
     let pages = sidestep_report::render(&document, "pictures").expect("pages");
     for words in ["6 runs of 2 variants", "Hops per frog"] {
         assert!(
@@ -117,11 +117,11 @@ impl ExternalExecutor {
         variants.dedup();
         let scenario = |variant: u32| (variant, deal.scenario(variant).expect("there"));
         let scenarios = variants.into_iter().map(scenario).collect();
-        Task { build: build_id().into(), scenarios, cells: cells.to_vec() }
+        Task { build: BUILD.into(), scenarios, cells: cells.to_vec() }
     }
 
     fn outcomes(deal: &CellBatch<'_>, cells: &[Cell]) -> Vec<Outcome> {
-        Self::task(deal, cells).run(WORLDS, &NoWatcher).expect("run")
+        Self::task(deal, cells).run(&WORLDS, &NoWatcher).expect("run")
     }
 }
 
@@ -146,17 +146,17 @@ impl CellExecutor for ExternalExecutor {
 fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_of_calls() {
     let place = TestFolder::new();
     let sweep = sweep(&place);
-    let (_, ended) = run_in_memory(WORLDS, &sweep, 2, &NoWatcher).expect("run");
+    let (_, ended) = run_in_memory(&WORLDS, &sweep, 2, &NoWatcher).expect("run");
     let table = done(ended);
     for in_a_call in [1, usize::MAX] {
         let others = ExternalExecutor { in_a_call };
         let (_, ended) =
-            run_in_memory(WORLDS, &sweep, Engine::Executor(&others), &NoWatcher).expect("run");
+            run_in_memory(&WORLDS, &sweep, Engine::Executor(&others), &NoWatcher).expect("run");
         assert_eq!(done(ended), table);
         let path = place.path(&format!("others {in_a_call}"));
-        let folder = create(WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
+        let folder = create(&WORLDS, &sweep, &path, 2, &NoWatcher).expect("planned");
         let ended =
-            run_remaining(WORLDS, &folder, Engine::Executor(&others), &NoWatcher).expect("run");
+            run_remaining(&WORLDS, &folder, Engine::Executor(&others), &NoWatcher).expect("run");
         assert_eq!(done(ended), table);
     }
 }
@@ -164,14 +164,14 @@ fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_o
 #[test]
 fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
     let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), cells: Vec::new() };
-    let told = task.run(WORLDS, &NoWatcher).expect_err("another build").to_string();
-    assert!(told.contains("0.0.1+0") && told.contains(build_id()), "{told}");
+    let told = task.run(&WORLDS, &NoWatcher).expect_err("another build").to_string();
+    assert!(told.contains("0.0.1+0") && told.contains(BUILD), "{told}");
 
     let place = TestFolder::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
-    let folder = create(WORLDS, &sweep, &place.path("sweep"), 2, &NoWatcher).expect("planned");
+    let folder = create(&WORLDS, &sweep, &place.path("sweep"), 2, &NoWatcher).expect("planned");
     let others = ExternalExecutor { in_a_call: 1 };
-    let told = run_remaining(WORLDS, &folder, Engine::Executor(&others), &NoWatcher);
+    let told = run_remaining(&WORLDS, &folder, Engine::Executor(&others), &NoWatcher);
     let told = told.err().expect("recorded by others").to_string();
     assert!(told.contains("which others cannot write to"), "{told}");
 }

@@ -8,10 +8,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Files and folders that crates compile in, and their copies for users.
-const COPIES: [(&str, &str); 4] = [
+const COPIES: [(&str, &str); 5] = [
     ("crates/worlds/robots/src/default.toml", "scenarios/robots/default.toml"),
     ("crates/worlds/airspace/src/default.toml", "scenarios/airspace/default.toml"),
     ("crates/worlds/chain/src/default.toml", "scenarios/chain/default.toml"),
+    ("crates/arms/examples/arm.urdf", "scenarios/chain/arm.urdf"),
     ("crates/papers/scenarios", "scenarios/papers"),
 ];
 

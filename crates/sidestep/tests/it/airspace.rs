@@ -214,6 +214,11 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
             "[[airplanes]]\ntrack = [[0, 0, 0, 0], [1e-9, 1000, 0, 0], [9, 0, 0, 0]]\n",
             "faster than 1e6 m/s",
         ),
+        (
+            "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9, 9]]\n\
+             intruder = true\nnon_cooperative = true\n",
+            "earlier name of `non_cooperative`",
+        ),
         ("[airspace]\nshield = false\n", "give \"on\" or \"off\""),
         ("[airspace]\npreset = \"paper\"\nmax_rounds = 4000000000\n", "up to 10000"),
         (

@@ -8,7 +8,7 @@ use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Cuboid as Box3, Segment, Shape};
 use proptest::prelude::*;
-use sidestep::worlds::chain::geometry::{Core, Cuboid, Point};
+use sidestep::rods::geometry::{Core, Cuboid, Point};
 
 /// A plane point lies in the plane z = 0.
 fn vector<const D: usize>(p: Point<D>) -> Vector {

@@ -165,7 +165,7 @@ radius_m = 0.05
 [[fields]]
 lo_m = [-9.0, -9.0]
 hi_m = [-5.0, -5.0]
-part = 0.1
+fill_fraction = 0.1
 radius_m = 0.1
 length_m = 0.3
 keep_m = 0.2

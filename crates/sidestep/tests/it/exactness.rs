@@ -5,7 +5,7 @@ use super::tiles::{Tiles, assert_fits, law};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::RobotsRun;
-use sidestep::worlds::robots::decide::Random;
+use sidestep::worlds::robots::decide::RandomPolicy;
 use sidestep::worlds::robots::effector::{FORWARD, ObstacleRule, Side};
 use sidestep::worlds::robots::exact::{
     self, Comparison, GridPose, MarkovChain, MarkovModel, sampling_limit, total_variation,
@@ -17,16 +17,17 @@ use std::collections::BTreeMap;
 const ROOM: &str = "......## ...#.... ......#. .#...... .....>..";
 
 /// A behavior in the scenario, and the policy that it is in the chain.
-type Policy = (&'static str, fn() -> Random);
+type Policy = (&'static str, fn() -> RandomPolicy);
 
-const UNIFORM: Policy = ("{ kind = \"random\" }", Random::uniform);
-const AHEAD: Policy =
-    ("{ kind = \"replay\", actions = [\"forward\"], repeat = true }", || Random::always(FORWARD));
+const UNIFORM: Policy = ("{ kind = \"random\" }", RandomPolicy::uniform);
+const AHEAD: Policy = ("{ kind = \"replay\", actions = [\"forward\"], repeat = true }", || {
+    RandomPolicy::always(FORWARD)
+});
 /// The paper's basic behavior without sensors and voluntary turns.
 const BOUNCE: Policy = (
     "{ kind = \"random\", weights = { forward = 1 }, \
      weights_after_contact = { left = 1, right = 1 } }",
-    Random::bounce,
+    RandomPolicy::bounce,
 );
 /// Minds contacts, and mixes under every law: a robot that only bounces stands before a wall
 /// forever where blocked transitions are struck out and so never become contacts.
@@ -35,7 +36,7 @@ const EXPLORE: Policy = (
      weights_after_contact = { forward = 2, left = 3, right = 3 } }",
     || {
         let (usual, after_contact) = (vec![0.75, 0.125, 0.125], vec![0.25, 0.375, 0.375]);
-        Random::new(usual, after_contact).expect("two distributions")
+        RandomPolicy::new(usual, after_contact).expect("two distributions")
     },
 );
 
@@ -159,7 +160,7 @@ fn the_comparison_of_the_command_agrees_for_every_law_and_policy() {
 fn the_chain_of_another_law_does_not_fit() {
     let tiles = rooms(ROOM, 1, BOUNCE.0, ObstacleRule::Renormalise);
     let cut = rooms(ROOM, 1, BOUNCE.0, ObstacleRule::Cut);
-    let chain = model(&cut).chain(&Random::bounce()).unwrap();
+    let chain = model(&cut).chain(&RandomPolicy::bounce()).unwrap();
     let expected = chain.pose_distribution(&chain.stationary().distribution);
     let (observed, samples) = long_run(&tiles, 100, 10);
     let share = |pose| observed.get(pose).copied().unwrap_or(0) as f64 / samples;
@@ -175,7 +176,7 @@ fn slow_robots_act_as_seldom_as_their_period_says() {
     let model = model(&tiles);
     // Due in cycles 2, 5, 8 ...
     assert_eq!([0, 2, 3, 5, 6, 9].map(|n| model.actions_in(n)), [0, 0, 1, 1, 2, 3]);
-    let chain = model.chain(&Random::uniform()).unwrap();
+    let chain = model.chain(&RandomPolicy::uniform()).unwrap();
     let mut simulation = tiles.simulation();
     simulation.advance(20);
     let exact = chain.pose_distribution(&chain.distribution_after(model.actions_in(20)));
@@ -188,13 +189,13 @@ fn a_robot_that_always_goes_ahead_ends_at_the_wall() {
     let robots = "effector = \"perfect\"";
     let model = model(&Tiles::new(">..", 1).robots(robots));
     assert_eq!(model.poses().len(), 12);
-    let chain = model.chain(&Random::always(FORWARD)).unwrap();
+    let chain = model.chain(&RandomPolicy::always(FORWARD)).unwrap();
     assert_eq!(chain.states().len(), 3);
     let end = GridPose { col: 2, row: 0, heading: 0 };
     let stationary = chain.pose_distribution(&chain.stationary().distribution);
     assert!((stationary[&end] - 1.0).abs() < 1e-9);
     assert_eq!(chain.pose_distribution(&chain.distribution_after(2))[&end], 1.0);
-    let summary = model.summary("forward", &Random::always(FORWARD), 1).unwrap();
+    let summary = model.summary("forward", &RandomPolicy::always(FORWARD), 1).unwrap();
     assert_eq!((summary.most_visited[0].col, summary.chain_states), (2, 3));
     let contact = model.outcome_distribution(end, FORWARD)[0].0.contact;
     assert_eq!(contact, Some((1, Side::Front)));

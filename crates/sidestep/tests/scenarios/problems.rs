@@ -2,7 +2,7 @@
 
 use crate::shipped;
 use serde_json::Value;
-use sidestep::problems;
+use sidestep::experiment::problems;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use std::ops::Range;
@@ -172,7 +172,7 @@ fn with(source: &Source, mistakes: &[&Mistake]) -> Source {
 }
 
 fn reported_problems(source: &Source) -> Vec<String> {
-    let keys = problems(WORLDS, source).into_iter();
+    let keys = problems(&WORLDS, source).into_iter();
     let mut keys: Vec<String> =
         keys.map(|e| e.key().map_or_else(|| e.to_string(), String::from)).collect();
     keys.sort();

@@ -40,8 +40,9 @@ pub(super) struct AirplaneSection {
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
     pub(super) turns: Option<Turns>,
-    #[serde(default)]
-    pub(super) intruder: bool,
+    non_cooperative: Option<bool>,
+    /// Earlier name of non_cooperative.
+    intruder: Option<Spanned<bool>>,
 }
 
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -76,6 +77,18 @@ fn points_m(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
 const MAX_CALLSIGN_CHARS: usize = 40;
 
 impl AirplaneSection {
+    /// Returns whether it avoids nobody, under either name of the key.
+    pub(super) fn is_non_cooperative(&self, source: &Source) -> Result<bool, InputError> {
+        let Some(intruder) = &self.intruder else {
+            return Ok(self.non_cooperative.unwrap_or(false));
+        };
+        if self.non_cooperative.is_some() {
+            let cause = "`intruder` is an earlier name of `non_cooperative`, which is also given";
+            return Err(source.error(intruder.span(), cause, "leave out `intruder`"));
+        }
+        Ok(*intruder.get_ref())
+    }
+
     /// Returns the call sign, if it has one.
     pub(super) fn callsign(&self, source: &Source) -> Result<Option<String>, InputError> {
         let Some(given) = &self.callsign else { return Ok(None) };

@@ -2,10 +2,10 @@
 //! enter during the cycle.
 
 use super::perceive::Perceiver;
-use super::rods::geometry::{Bounds, with_dimensions};
 use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
+use sidestep_rods::geometry::{Bounds, with_dimensions};
 
 /// Makes the claim of one chain.
 pub(crate) fn claim<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {

@@ -1,11 +1,9 @@
 //! Distances of a chain's parts from the obstacles around them, and from each other.
 
-use super::rods::chain::Chain;
-use super::rods::geometry::{
+use sidestep_rods::geometry::{
     Bounds, Point, between_segments, distance, nearest_on_segment, scaled, sub,
 };
-use super::rods::obstacle::Obstacles;
-use super::rods::rod_bvh::RodBvh;
+use sidestep_rods::{Chain, Obstacles, RodBvh};
 
 /// Distance by which searches go beyond the one that counts, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-9;
@@ -117,9 +115,8 @@ pub(crate) fn self_gap_m<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::chain::{Connector, Rod};
-    use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
+    use sidestep_rods::{Connector, Obstacle, Rod};
 
     /// The same by looking at every pair.
     fn every_pair_m(chain: &Chain<2>) -> f64 {

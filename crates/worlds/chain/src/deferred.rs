@@ -6,9 +6,9 @@
 //! therefore it does not matter when it is looked at.
 
 use super::metrics::ChainTally;
-use super::rods::chain::Chain;
-use super::rods::geometry::Point;
-use super::rods::wavefront::{LANES, pull_and_measure};
+use sidestep_rods::Chain;
+use sidestep_rods::geometry::Point;
+use sidestep_rods::wavefront::{LANES, pull_and_measure};
 
 /// Motions of connector 0 that wait.
 #[derive(Debug, Clone, Default)]

@@ -7,14 +7,14 @@ pub(crate) mod step_motion;
 use super::events::EventKind;
 use super::motion::recovery::RecoveryMemory;
 use super::navigate::Navigator;
-use super::rods::geometry::{Bounds, Point, normalized, with_dimensions};
-use super::rods::veto::{RequestSource, VetoReason};
 use super::script::{Script, ScriptMotion, Turtle};
 use super::swarm::leader::LeaderState;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, InputError, math};
+use sidestep_rods::geometry::{Bounds, Point, normalized, with_dimensions};
+use sidestep_rods::{RequestSource, VetoReason};
 use std::sync::Arc;
 
 /// Largest number of motions in a script.

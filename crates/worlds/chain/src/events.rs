@@ -1,9 +1,9 @@
 //! Events of a run, with their cycles.
 
-use super::rods::veto::VetoReason;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
+use sidestep_rods::VetoReason;
 
 /// Kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -4,16 +4,13 @@
 use super::clearance::part_clearance;
 use super::driver::external::{OrderOutcome, Orders};
 use super::driver::{Task, TaskKind, VetoRecord};
-use super::rods::chain::MAX_COORDINATE_M;
-use super::rods::geometry::{Bounds as Box, Point, distance};
-use super::rods::motion_context::is_length_allowed;
-use super::rods::obstacle::Obstacles;
-use super::rods::veto::VetoReason;
 use super::scratch::Scratch;
 use super::state::{Body, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
 use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_rods::geometry::{Bounds as Box, Point, distance};
+use sidestep_rods::{MAX_COORDINATE_M, Obstacles, VetoReason, is_length_allowed};
 
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,15 @@
-//! Scenes that several tests share.
+//! Numbers, chains and surroundings that several tests share.
+
+pub(super) mod convoy;
+pub(super) mod random_worlds;
 
 use super::ground::Corridor;
-use super::ground::fields::Field;
-use super::rods::chain::{Chain, Connector, Rod};
-use super::rods::geometry::{Bounds, Core, Point, between_segments, distance, nearest_on_segment};
-use super::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, between_segments, distance, first_axis, nearest_on_segment, normalized,
+};
+use sidestep_rods::{Chain, Connector, Obstacle, Obstacles, Rod};
 
 /// Pseudo-random numbers in [0, 1) by (seed, index).
 pub(super) struct TestRng {
@@ -44,9 +47,9 @@ pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     Corridor::pinned(width_m).expect("a width").walls(0)
 }
 
-/// Robots in a row on the first axis, the leader at `lead_m`; the tail of a long convoy is still
-/// outside the corridor.
-pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
+/// A straight chain on the first axis, its leader at `lead_m`; the tail of a long one is still outside
+/// the corridor.
+pub(super) fn straight_chain(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
     Chain::straight([lead_m, 0.0], [-1.0, 0.0], followers, rod, Connector::free(radius_m))
         .expect("a straight chain is right")
 }
@@ -59,42 +62,14 @@ pub(super) struct Wanderer<const D: usize> {
 
 impl<const D: usize> Wanderer<D> {
     pub(super) fn new(seed: u64) -> Self {
-        Self { numbers: TestRng::new(seed), u: super::rods::geometry::first_axis() }
+        Self { numbers: TestRng::new(seed), u: first_axis() }
     }
 
     pub(super) fn next(&mut self, from: Point<D>, step_m: f64) -> Point<D> {
         let by = self.numbers.point(0.3);
-        self.u = super::rods::geometry::normalized(super::rods::geometry::add(self.u, by))
-            .expect("not zero");
-        super::rods::geometry::add_scaled(from, self.u, step_m)
+        self.u = normalized(add(self.u, by)).expect("not zero");
+        add_scaled(from, self.u, step_m)
     }
-
-    /// Turns to any other direction, after a veto.
-    pub(super) fn turn_anywhere(&mut self) {
-        let by = self.numbers.point(1.0);
-        self.u = super::rods::geometry::normalized(by).unwrap_or(self.u);
-    }
-}
-
-/// Random balls that fill a part of a cube, none near the first axis behind the origin.
-pub(super) fn ball_field<const D: usize>(
-    seed: u64,
-    half_m: f64,
-    part: f64,
-    radius_m: f64,
-    keep_m: f64,
-) -> Vec<Obstacle<D>> {
-    let mut tail = [0.0; D];
-    tail[0] = -half_m;
-    let field = Field {
-        room: Bounds { lo: [-half_m; D], hi: [half_m; D] },
-        part,
-        radius_m,
-        length_m: 0.0,
-        keep_clear: vec![Core::Segment([[0.0; D], tail])],
-        keep_m,
-    };
-    field.fill(Seed(seed), 0).expect("a field")
 }
 
 /// Returns the least clearance of any connector and any rod from obstacles, up to 1 m.

@@ -1,10 +1,10 @@
 //! Robots on wheels that keep to the connectors of their chain (slides E2, K5 to K7).
 
-use super::rods::geometry::Point;
 use super::swarm::drive::Pose2;
 use super::swarm::follower::Follower;
 use super::swarm::laser::RobotBody as Seen;
 use serde::{Deserialize, Serialize};
+use sidestep_rods::geometry::Point;
 
 /// The robots of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq)]

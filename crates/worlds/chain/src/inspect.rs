@@ -7,8 +7,6 @@ mod tests;
 
 use super::driver::{Task, TaskKind};
 use super::perceive::Perceiver;
-use super::rods::geometry::{Point, distance, with_dimensions};
-use super::rods::veto::Veto;
 use super::scratch::Scratch;
 use super::state::{Body, ChainState};
 use super::trace::InspectionTrace;
@@ -21,6 +19,8 @@ use sidestep_kernel::view::{
     BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
 };
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::{Point, distance, with_dimensions};
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the inspection of a connector, or of its robot, in cycle `now`; `None` for one that does

@@ -5,25 +5,22 @@
 //! the modules say why. The same code serves two and three dimensions.
 //!
 //! ```text
-//! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
-//! agents/: the program aboard a connector                deploy/: agents on a network in memory; elsewhere.rs
+//! agents/: the program aboard a connector                deploy/: agents on a network in memory; remote_agents.rs
 //! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
 //! one cycle: claim.rs (perceive.rs) -> join.rs -> act/ -> metrics.rs, events.rs, rows.rs
 //! ```
 //!
-//! `rods` and `arms` know neither the world nor runs: they can be used as a library, without
-//! cycles.
+//! Chains, their constraints, and the propagation of one motion are the crate `sidestep-rods`; joints as rods, inverse
+//! kinematics and plans are `sidestep-arms`.
 
 mod act;
 pub mod agents;
-pub mod arms;
 mod bundle;
 mod claim;
 mod clearance;
-pub mod convoy;
 mod deferred;
 mod deploy;
 mod driver;
@@ -44,7 +41,6 @@ mod perceive;
 mod progress;
 mod remarks;
 mod remote_agents;
-pub mod rods;
 mod rows;
 pub mod scenario;
 mod scratch;
@@ -58,15 +54,9 @@ mod world;
 mod world_impl;
 mod world_type;
 
-pub use arms::{ik, kinematics};
 pub use deploy::Deployment;
 pub use motion::escape::{EscapeMethod, EscapePlan, EscapeReport, EscapeRules, Escaper};
 pub use motion::recovery::{RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation};
-pub use rods::{
-    BEND_TOLERANCE_RAD, Chain, CompletedMotion, Connector, Mobility, Motion, Obstacle, Obstacles,
-    Outcome, Propagator, Request, RequestSource, Rod, Rotation, Rules, SKIN_M, TOLERANCE_M, Veto,
-    VetoEffect, VetoReason, geometry, rebuild, wavefront,
-};
 pub use state::{Body, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};

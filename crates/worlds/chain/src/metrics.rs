@@ -3,10 +3,10 @@
 use super::agents::traffic::Traffic;
 use super::motion::escape::EscapeReport;
 use super::motion::recovery::RecoveryOutcome;
-use super::rods::veto::{CompletedMotion, VetoReason};
 use super::swarm::follower::FollowResult;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
+use sidestep_rods::{CompletedMotion, VetoReason};
 use std::collections::BTreeMap;
 
 /// Depth in an obstacle beyond which a part counts as a penetration, meters.

@@ -1,8 +1,8 @@
 //! An initiator on wheels that finds its way with a laser, and its goal (slides N1 to N6).
 
-use super::rods::geometry::{Point, distance};
 use super::swarm::drive::DifferentialDrive;
 use super::swarm::leader::{Leader, TurnMode};
+use sidestep_rods::geometry::{Point, distance};
 use std::ops::Range;
 
 /// Distance before the end of a line at which the end counts as reached, meters.

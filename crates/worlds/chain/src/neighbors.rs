@@ -1,7 +1,7 @@
 //! Claims of many chains by where they begin, so that a chain is compared with its neighbors only.
 
-use super::rods::geometry::Bounds;
 use sidestep_kernel::Slot;
+use sidestep_rods::geometry::Bounds;
 
 /// The claims of one cycle along the axis on which they are spread farthest.
 #[derive(Debug, Clone)]

@@ -3,12 +3,12 @@
 
 use super::driver::TaskKind;
 use super::navigate::{NavigationGoal, Navigator};
-use super::rods::geometry::distance;
 use super::scratch::Scratch;
 use super::state::ChainState;
 use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
 use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
+use sidestep_rods::geometry::distance;
 
 /// Time for which a navigator stands for a body that moves ahead before it takes that for a wall, s.
 const STAND_TIMEOUT_S: f64 = 10.0;
@@ -83,10 +83,10 @@ impl<'a, const D: usize> Perceiver<'a, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::Point;
     use crate::scenario::ChainScenario;
     use crate::swarm::laser::RobotBody as Seen;
     use proptest::prelude::*;
+    use sidestep_rods::geometry::Point;
     use sidestep_scenario::Source;
 
     /// Range of the lasers, meters.

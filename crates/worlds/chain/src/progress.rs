@@ -1,9 +1,9 @@
 //! Progress of a chain through its tasks.
 
 use super::driver::{Task, TaskKind};
-use super::rods::geometry::with_dimensions;
 use super::state::{Body, ChainState};
 use super::world::ChainWorld;
+use sidestep_rods::geometry::with_dimensions;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the part of its tasks that a chain has done, from 0 to 1. Several tasks have equal

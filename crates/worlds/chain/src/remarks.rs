@@ -1,9 +1,9 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
-use super::arms::kinematics::{Dof, JointMotion};
-use super::rods::chain::{Connector, Mobility};
 use super::scenario::ChainScenario;
 use super::world::{ChainSpec, ChainWorld, Change, ChangeKind};
+use sidestep_arms::kinematics::{Dof, JointMotion};
+use sidestep_rods::{Connector, Mobility};
 use sidestep_scenario::Remark;
 
 /// Returns the remarks, in the order of the chains.

@@ -1,8 +1,6 @@
 //! Recorded tables of a run, and their rows until they are written.
 
 use super::events::{Event, EventKind};
-use super::rods::geometry::{Core, Point, with_dimensions};
-use super::rods::veto::VetoReason;
 use super::scenario::RecordSection;
 use super::state::ChainState;
 use super::swarm::drive::Pose2;
@@ -10,6 +8,8 @@ use super::world::ChainWorld;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
+use sidestep_rods::VetoReason;
+use sidestep_rods::geometry::{Core, Point, with_dimensions};
 
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]

@@ -19,8 +19,6 @@ use super::deploy::deployment::Deployment;
 use super::ground::{Movers, Site};
 use super::motion::escape::{EscapeMethod, EscapeRules};
 use super::motion::recovery::RecoveryLimits;
-use super::rods::geometry::{Bounds, norm};
-use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use network::NetworkSection;
@@ -31,6 +29,8 @@ use serde_json::{Value, json};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
+use sidestep_rods::geometry::{Bounds, norm};
+use sidestep_rods::{Rotation, Rules};
 use sidestep_scenario::{
     Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
 };

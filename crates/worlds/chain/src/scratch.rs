@@ -4,15 +4,13 @@ use super::agents::percept::ChainPercepts;
 use super::events::Event;
 use super::formation::Solid;
 use super::motion::escape::Escaper;
-use super::rods::geometry::{Point, with_dimensions};
-use super::rods::obstacle::{Obstacle, Obstacles};
-use super::rods::propagate::Propagator;
-use super::rods::rod_bvh::RodBvh;
 use super::state::{Body, ChainState};
 use super::swarm::laser::{RobotBody as Seen, Scan};
 use super::trace::InspectionTrace;
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
+use sidestep_rods::geometry::{Point, with_dimensions};
+use sidestep_rods::{Obstacle, Obstacles, Propagator, RodBvh};
 
 /// A worker's buffers, kept between tasks.
 #[derive(Debug, Clone)]

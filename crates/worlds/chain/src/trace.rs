@@ -1,9 +1,9 @@
 //! Notes on one chain while it acts.
 
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::geometry::Point;
-use crate::rods::veto::Veto;
 use sidestep_kernel::Slot;
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::Point;
 
 /// Notes for an inspection; no run makes any.
 #[derive(Debug, Clone, Default)]

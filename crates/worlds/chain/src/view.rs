@@ -4,9 +4,6 @@ use super::driver::{Task, TaskKind};
 use super::events::{Event, EventKind};
 use super::navigate::NavigationGoal;
 use super::perceive::Perceiver;
-use super::rods::chain::Chain;
-use super::rods::geometry::{Core, Cuboid, cross, with_dimensions};
-use super::rods::obstacle::Obstacle;
 use super::scratch::Scratch;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
@@ -15,6 +12,8 @@ use sidestep_kernel::view::{
     ScanSelection, Scenery, Severity, Shape, Vec3,
 };
 use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_rods::geometry::{Core, Cuboid, cross, with_dimensions};
+use sidestep_rods::{Chain, Obstacle};
 use std::ops::RangeInclusive;
 
 /// Drawn radius of connectors without a body, as a part of the longest rod.

@@ -1,24 +1,22 @@
 //! A compiled world of chains: everything that never changes during a run.
 
-use super::arms::arm::Arm;
 use super::deploy::deployment::Deployment;
 use super::driver::{Task, TaskKind, TaskProgress};
 use super::formation::{Robot, Robots};
 use super::ground::Movers;
 use super::motion::escape::EscapeRules;
 use super::motion::recovery::RecoveryLimits;
-use super::rods::chain::{Chain, Mobility};
-use super::rods::geometry::{Point, norm, with_dimensions};
-use super::rods::obstacle::{Obstacle, Obstacles};
-use super::rods::rebuild::MovableEnd;
-use super::rods::rules::Rules;
 use super::script::ScriptMotion;
 use super::swarm::drive::Pose2;
+use sidestep_arms::Arm;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot};
+use sidestep_rods::geometry::{Point, norm, with_dimensions};
+use sidestep_rods::rebuild::MovableEnd;
+use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Rules};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 

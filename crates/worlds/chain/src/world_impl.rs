@@ -1,6 +1,5 @@
 //! The hooks that a run calls on the world beside its phases.
 
-use super::arms::arm::Arm;
 use super::events::Event;
 use super::metrics::{ChainMetrics, ChainTally, Metrics};
 use super::rows::Rows;
@@ -11,6 +10,7 @@ use super::text;
 use super::view::view_event;
 use super::world::ChainWorld;
 use serde_json::Value;
+use sidestep_arms::Arm;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};

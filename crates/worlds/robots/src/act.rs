@@ -1,8 +1,9 @@
 //! *Act*: the bodies of a group act one after the other; the environment decides.
 
+use super::action::{Action, StepPath};
 use super::cycle_context::{CycleContext, are_free, box_index};
 use super::decide::Contact;
-use super::effector::{Action, ObstacleRule, Side, StepPath};
+use super::effector::{ObstacleRule, Side};
 use super::state::{BodyState, Facing, LastContact};
 use super::world::Role;
 use super::{Event, EventKind, MotionSample, Scratch};

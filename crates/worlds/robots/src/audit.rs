@@ -1,6 +1,7 @@
 //! A check of the whole state against the world's laws (promise L1), for tests and debugging.
 
-use super::state::{FREE, RobotsState};
+use super::sensor::FREE;
+use super::state::RobotsState;
 use super::world::RobotsWorld;
 use sidestep_kernel::Slot;
 use sidestep_kernel::space::Occupant;

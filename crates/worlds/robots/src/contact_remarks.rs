@@ -1,6 +1,7 @@
 //! Remarks on laws of a scenario that rule something out.
 
-use super::effector::{Action, ObstacleRule};
+use super::action::Action;
+use super::effector::ObstacleRule;
 use super::world::{RobotModel, RobotsWorld, Role};
 use sidestep_scenario::Remark;
 use std::collections::BTreeSet;

@@ -20,15 +20,15 @@ pub use announce::Announce;
 pub use external::External;
 pub use goto::{Avoidance, Goto, Shuttle};
 pub use plan::Planner;
-pub use random::Random;
 pub use replay::Replay;
 pub use sidestep::SensorTrust;
 pub use stall_detector::StallDetector;
 pub use wander::Wander;
 
+pub use super::alias_table::UNSEEN;
 use super::effector::{ActionId, Side};
-pub use super::sensor::UNSEEN;
 use super::sensor::{NOTHING, Reading};
+pub use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;

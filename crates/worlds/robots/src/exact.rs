@@ -29,7 +29,7 @@ pub use obstacle::{ActionOutcome, GridPose, outcome_distribution};
 pub use pomdp::{MAX_BEAMS, Pomdp, PomdpOptions, PomdpSize};
 pub use summary::{Summary, VisitedBox};
 
-use super::decide::Random;
+use super::decide::RandomPolicy;
 use super::effector::{ActionId, FORWARD, ObstacleRule, Side};
 use super::scenario::Compiled;
 use sidestep_kernel::InputError;
@@ -50,11 +50,11 @@ pub const POLICIES: [&str; 3] = ["uniform", "forward", "bounce"];
 ///
 /// # Errors
 /// When there is no such policy.
-pub fn policy(name: &str) -> Result<Random, InputError> {
+pub fn policy(name: &str) -> Result<RandomPolicy, InputError> {
     match name {
-        "uniform" => Ok(Random::uniform()),
-        "forward" => Ok(Random::always(FORWARD)),
-        "bounce" => Ok(Random::bounce()),
+        "uniform" => Ok(RandomPolicy::uniform()),
+        "forward" => Ok(RandomPolicy::always(FORWARD)),
+        "bounce" => Ok(RandomPolicy::bounce()),
         _ => {
             let remedy = sidestep_scenario::suggestion(name, &POLICIES);
             Err(InputError::new("--policy", format!("unknown policy `{name}`"), remedy))
@@ -179,7 +179,7 @@ impl MarkovModel {
     ///
     /// # Errors
     /// When the policy chooses an action that the robot does not have.
-    pub fn chain(&self, policy: &Random) -> Result<MarkovChain, InputError> {
+    pub fn chain(&self, policy: &RandomPolicy) -> Result<MarkovChain, InputError> {
         MarkovChain::new(self, policy)
     }
 

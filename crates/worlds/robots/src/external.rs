@@ -4,8 +4,7 @@
 use super::Scratch;
 use super::cycle_context::{CycleContext, with_scene};
 use super::decide::External;
-use super::effector::Side;
-use super::rows::HEADING_NAMES;
+use super::effector::{HEADING_NAMES, Side};
 use super::state::RobotsState;
 use super::world::{BodyType, RobotModel, RobotsWorld, Role};
 use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};

@@ -6,11 +6,11 @@ mod senses;
 #[cfg(test)]
 mod tests;
 
+use super::action::Action;
 use super::cycle_context::{CycleContext, with_scene};
-use super::effector::Action;
+use super::effector::HEADING_NAMES;
 use super::join::GroupMember;
 use super::policy::ConflictPolicy;
-use super::rows::HEADING_NAMES;
 use super::state::RobotsState;
 use super::world::{RobotsWorld, Role};
 use sidestep_kernel::conflict::ConflictGroups;

@@ -7,11 +7,13 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
-//! sensor.rs, ray.rs, effector.rs: the tables behind it         metrics.rs: the sums of a run
-//! voice.rs: the words of the radio
+//! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
+//! broadcast.rs: the words of the radio
 //! ```
 
 mod act;
+mod action;
+mod alias_table;
 mod auction;
 mod audit;
 pub mod baseline;
@@ -20,23 +22,19 @@ mod bundle;
 mod contact_remarks;
 mod cycle_context;
 pub mod decide;
-pub mod effector;
 pub mod exact;
 mod external;
 mod inspect;
 mod join;
-pub mod learn;
 mod metric_info;
 pub mod metrics;
 mod odometry;
 mod perceive;
 pub mod policy;
 mod purpose;
-mod ray;
 mod remarks;
 pub mod rows;
 pub mod scenario;
-pub mod sensor;
 pub mod state;
 mod text;
 mod view;
@@ -49,6 +47,7 @@ use effector::Side;
 pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
 use sensor::Reading;
+pub use sidestep_error_models::{effector, sensor};
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::world::Auction;
 use sidestep_kernel::{Cycle, EntityId, PhaseContext, Phases, Slot};
@@ -129,7 +128,7 @@ pub struct MotionSample {
 pub struct Scratch {
     readings: Vec<Reading>,
     /// The rows of the readings that a sensor's beams truly have.
-    truths: Vec<sensor::RowIndex>,
+    truths: Vec<alias_table::RowIndex>,
     heard: Vec<decide::ReceivedMessage>,
     order: Vec<join::GroupMember>,
     bids: Vec<auction::Bid>,

@@ -1,10 +1,11 @@
 //! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
 
+use super::action::SweptVolume;
+use super::alias_table::RowIndex;
 use super::cycle_context::{CycleContext, are_free, box_index};
 use super::decide::{Decision, Memory, Percept, ReceivedMessage, Sector, TripEvent, UNSEEN};
-use super::effector::SweptVolume;
 use super::purpose;
-use super::sensor::{Reading, RowIndex};
+use super::sensor::Reading;
 use super::state::{BodyState, Facing, Intent, PackedPose};
 use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
@@ -342,11 +343,4 @@ pub(super) fn memory_of(cell: &BodyState) -> Memory {
 #[inline]
 fn store_memory(cell: &BodyState, memory: Memory) {
     cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
-}
-
-/// Returns the names of a reading's observation and class in its sensor, for logs.
-pub(super) fn reading_names(reading: Reading, sensor: &super::sensor::SensorModel) -> (&str, &str) {
-    let observation = &sensor.observations[usize::from(reading.observation)];
-    let class = sensor.distance_classes.get(usize::from(reading.class));
-    (observation, class.map_or("beyond", String::as_str))
 }

@@ -1,8 +1,7 @@
 //! The tables that a run records, and the rows that wait to be recorded.
 
-use super::effector::Side;
+use super::effector::{HEADING_NAMES, Side};
 use super::odometry::DeadReckoning;
-use super::perceive::reading_names;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
 use super::state::{PoseBuffer, RobotsState};
@@ -24,9 +23,6 @@ const MIN_BUFFER_CYCLES: usize = 16;
 const MAX_BUFFER_POSES: usize = 1 << 24;
 /// Number of bodies for which poses are collected together: a cache line of each cycle.
 const BODIES_PER_BLOCK: usize = 16;
-
-/// Names of the headings by number.
-pub(crate) const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
 const CYCLE_DESCRIPTION: &str = "cycle, counted from 0";
 const HEADING_DESCRIPTION: &str =
@@ -345,8 +341,8 @@ impl ReadingLabels {
             cycle: sample.cycle,
             robot: sample.robot,
             sensor: sample.sensor,
-            truth: labels(reading_names(sample.truth, sensor)),
-            reported: labels(reading_names(sample.reported, sensor)),
+            truth: labels(sensor.names_of(sample.truth)),
+            reported: labels(sensor.names_of(sample.reported)),
         })
     }
 }

@@ -4,6 +4,7 @@ mod packed;
 
 use super::broadcast::BroadcastBuffer;
 use super::policy::ConflictPolicy;
+use super::sensor::{FREE, WALL};
 use super::world::{Body, BodyType, RobotsWorld};
 pub use packed::{Facing, LastContact};
 pub(crate) use packed::{Intent, PackedPose};
@@ -13,11 +14,6 @@ use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::space::{AtomicBitSet, BoxWord, Floor, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::AtomicU64;
-
-/// The kind of an empty box.
-pub const FREE: u8 = 0;
-/// The kind of the static map's walls.
-pub const WALL: u8 = 1;
 
 /// The state of a robots world.
 #[derive(Debug)]

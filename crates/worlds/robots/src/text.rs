@@ -1,8 +1,7 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
-use super::effector::EffectorModel;
+use super::effector::{EffectorModel, HEADING_NAMES};
 use super::metrics::Metrics;
-use super::rows::HEADING_NAMES;
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};

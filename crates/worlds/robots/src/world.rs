@@ -1,12 +1,14 @@
 //! A compiled building: everything that stays fixed during a run.
 
+use super::action::Action;
+use super::alias_table::{AliasTable, RowIndex};
 use super::decide::{Behaviour, Sector};
-use super::effector::{Action, EffectorModel, ObstacleRule};
+use super::effector::{EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
-use super::ray::{Crossing, EPSILON, crossings, turn_crossing};
-use super::sensor::{AliasTable, Reading, RowIndex, SensorModel};
+use super::sensor::{Reading, SensorModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sidestep_error_models::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::distr::{Bernoulli, RowError};
@@ -425,5 +427,23 @@ impl RobotsWorld {
             let first = ((row + self.border) * self.stride + self.border) as usize;
             first..first + width as usize
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// For the sides of boxes that people write; a quotient such as 0.9 / 0.3 is below 3.
+    #[test]
+    fn a_radio_reaches_a_robot_exactly_at_its_range_for_every_side_of_a_box() {
+        for side_mm in (10..=500).step_by(5) {
+            let side_m = f64::from(side_mm) / 1000.0;
+            for boxes in 1..=60 {
+                let range_m = f64::from(boxes * side_mm) / 1000.0;
+                let reach2 = Radio::new(range_m, side_m, 0.0).reach2_half_boxes;
+                assert_eq!(reach2, (4 * boxes * boxes) as u64, "{boxes} boxes of {side_m} m");
+            }
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! The world as it appears to code that runs scenarios of any world.
 
+use super::decide::Behaviour;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, text};
 use sidestep_kernel::text::Description;
@@ -9,6 +10,7 @@ use sidestep_scenario::{
     WorldType,
 };
 use std::any::Any;
+use std::sync::Arc;
 
 /// Situated agents on a grid.
 #[derive(Debug, Clone)]
@@ -22,9 +24,15 @@ impl Robots {
         Self { own: Behaviours::new() }
     }
 
-    /// Returns the world with further behaviors, which scenarios call by these names.
-    pub const fn with(own: Behaviours) -> Self {
-        Self { own }
+    /// Returns the world with a further behavior, which scenarios call by this name.
+    #[must_use]
+    pub fn with_behaviour(
+        mut self,
+        name: impl Into<String>,
+        behaviour: impl Behaviour + 'static,
+    ) -> Self {
+        self.own.insert(name.into(), Arc::new(behaviour));
+        self
     }
 }
 

@@ -1,16 +1,16 @@
 /** Airplanes with their routes. */
 
-import type { Edit, Place } from "../../protocol";
-import { numbersOf, sectionsOf, type Json, type Path, type Table } from "../keypath";
-import { insert, remove, removeFrom, rounded, set, type Item } from "./item";
+import type { Edit, Point3 } from "../../protocol";
+import { numbersOf, sectionsOf, type Json, type Path, type TomlTable } from "../keypath";
+import { insert, remove, removeFrom, roundTo, set, type Item } from "./item";
 
-function pointOf(value: Json | undefined): Place | null {
+function pointOf(value: Json | undefined): Point3 | null {
   const numbers = numbersOf(value, 2);
   return numbers ? [numbers[0]!, numbers[1]!, 0] : null;
 }
 
 /** The way-points of an airplane, with their numbers in the text. */
-function routeOf(value: Table): { at: Place; index: number }[] {
+function routeOf(value: TomlTable): { at: Point3; index: number }[] {
   const given = Array.isArray(value["way_points_m"]) ? value["way_points_m"] : [];
   return given.flatMap((one, index) => {
     const at = pointOf(one);
@@ -19,16 +19,16 @@ function routeOf(value: Table): { at: Place; index: number }[] {
 }
 
 /** Headings are degrees from east, counterclockwise. */
-export function headingTo([x0, y0]: Place, [x1, y1]: Place): number {
+export function headingTo([x0, y0]: Point3, [x1, y1]: Point3): number {
   return Math.round((Math.atan2(y1 - y0, x1 - x0) * 180) / Math.PI);
 }
 
-export function airplaneItems(model: Table, m_per_px: number): Item[] {
+export function airplaneItems(model: TomlTable, m_per_px: number): Item[] {
   return sectionsOf(model, "airplanes").flatMap(({ path, value }, i) => {
     const start = pointOf(value["at_m"]);
     if (!start) return [];
     const words = typeof value["callsign"] === "string" ? value["callsign"] : `airplane ${i + 1}`;
-    const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
+    const round = ([x, y]: Point3): number[] => [roundTo(x, m_per_px), roundTo(y, m_per_px)];
     const route = routeOf(value);
     const own: Item = {
       path,
@@ -60,18 +60,18 @@ export function airplaneItems(model: Table, m_per_px: number): Item[] {
   });
 }
 
-/** An airplane that flies from one place to another. */
-export function putAirplane(from: Place, to: Place, m_per_px: number): Edit[] {
-  const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
+/** Adds an airplane that flies from one position to another. */
+export function putAirplane(from: Point3, to: Point3, m_per_px: number): Edit[] {
+  const round = ([x, y]: Point3): number[] => [roundTo(x, m_per_px), roundTo(y, m_per_px)];
   return [insert(["airplanes"], { at_m: round(from), heading_deg: headingTo(from, to), way_points_m: [round(to)] })];
 }
 
-/** One more way-point of the chosen airplane, else of the last. */
-export function putWayPoint(model: Table, at: Place, chosen: Path | null, m_per_px: number): Edit[] {
+/** Adds a way-point to the selected airplane, else to the last one. */
+export function putWayPoint(model: TomlTable, at: Point3, chosen: Path | null, m_per_px: number): Edit[] {
   const all = sectionsOf(model, "airplanes").filter(({ value }) => value["at_m"] !== undefined);
-  const host = all.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? all.at(-1);
-  if (!host) return [];
-  const place = [rounded(at[0], m_per_px), rounded(at[1], m_per_px)];
-  const path = [...host.path, "way_points_m"];
-  return [Array.isArray(host.value["way_points_m"]) ? insert(path, place) : set(path, [place])];
+  const section = all.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? all.at(-1);
+  if (!section) return [];
+  const place = [roundTo(at[0], m_per_px), roundTo(at[1], m_per_px)];
+  const path = [...section.path, "way_points_m"];
+  return [Array.isArray(section.value["way_points_m"]) ? insert(path, place) : set(path, [place])];
 }

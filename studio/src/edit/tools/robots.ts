@@ -1,43 +1,43 @@
 /** Robots, people, doors and way-points on the boxes of a floor. */
 
-import type { Edit, Place } from "../../protocol";
-import { cellOf, placeOf, type Board, type Ground } from "../board";
+import type { Edit, Point3 } from "../../protocol";
+import { cellOf, cornerPosition, type AsciiMap, type GridPlacement } from "../ascii-map";
 import { rectangleCells, type Cell, type Rect } from "../cells";
-import { numbersOf, sectionsOf, valueAt, type Path, type Table } from "../keypath";
+import { numbersOf, sectionsOf, valueAt, type Path, type TomlTable } from "../keypath";
 import { insert, remove, removeFrom, set, type Item } from "./item";
 
 /** Sides in boxes of the bodies of a section. */
-function sizeOf(key: string, section: Table): [number, number] {
+function sizeOf(key: string, section: TomlTable): [number, number] {
   const { size } = section;
   if (key === "robots") return typeof size === "number" ? [size, size] : [1, 1];
   const sides = numbersOf(size, 2);
   return sides ? [sides[0]!, sides[1]!] : [1, 1];
 }
 
-const ONE: Record<string, string> = { robots: "robot", people: "person", doors: "door" };
+const SINGULAR: Record<string, string> = { robots: "robot", people: "person", doors: "door" };
 
-/** Everything of a scenario of robots that has a place of its own. */
-export function robotItems(model: Table, ground: Ground): Item[] {
+/** All items of a robots scenario with a position of their own. */
+export function robotItems(model: TomlTable, ground: GridPlacement): Item[] {
   const bodies = ["robots", "people", "doors"].flatMap((key) =>
-    sectionsOf(model, key).flatMap(({ path, value }) => bodiesOf(key, path, value, ground)),
+    sectionsOf(model, key).flatMap(({ path, value }) => bodyItems(key, path, value, ground)),
   );
-  const aims = sectionsOf(model, "robots").flatMap(({ path, value }) => aimsOf(path, value, ground));
-  return [...aims, ...bodies];
+  const goals = sectionsOf(model, "robots").flatMap(({ path, value }) => goalItems(path, value, ground));
+  return [...goals, ...bodies];
 }
 
-function outlineOf(ground: Ground, { column, row, width, height }: Rect): Place[] {
-  const corner = (c: number, r: number): Place => placeOf(ground, column + c, row + r);
+function outlineOf(ground: GridPlacement, { column, row, width, height }: Rect): Point3[] {
+  const corner = (c: number, r: number): Point3 => cornerPosition(ground, column + c, row + r);
   return [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
 }
 
-/** The box whose body of this size has its middle near a place. */
-function anchor(ground: Ground, [x, y]: Place, [width, height]: [number, number]): Cell {
+/** The lower-left box of a body of this size centered near a position. */
+function anchor(ground: GridPlacement, [x, y]: Point3, [width, height]: [number, number]): Cell {
   const [dx, dy] = [((width - 1) / 2) * ground.box_m, ((height - 1) / 2) * ground.box_m];
   const [c, s] = [Math.cos(ground.yaw_rad), Math.sin(ground.yaw_rad)];
   return cellOf(ground, x - c * dx + s * dy + 1e-9, y - s * dx - c * dy + 1e-9);
 }
 
-function bodiesOf(key: string, section: Path, value: Table, ground: Ground): Item[] {
+function bodyItems(key: string, section: Path, value: TomlTable, ground: GridPlacement): Item[] {
   const size = sizeOf(key, value);
   const name = typeof value["name"] === "string" && value["name"] !== "" ? ` (${value["name"]})` : "";
   const list = Array.isArray(value["at"]) ? value["at"] : [];
@@ -50,11 +50,11 @@ function bodiesOf(key: string, section: Path, value: Table, ground: Ground): Ite
     return [
       {
         path,
-        words: `${ONE[key]}${name} at column ${column}, row ${row}`,
+        words: `${SINGULAR[key]}${name} at column ${column}, row ${row}`,
         kind: "body",
         outline_m: outlineOf(ground, rect),
         isClosed: true,
-        at_m: placeOf(ground, column + size[0] / 2, row + size[1] / 2),
+        at_m: cornerPosition(ground, column + size[0] / 2, row + size[1] / 2),
         move: (to) => [set(path, [...anchor(ground, to, size), ...(heading === undefined ? [] : [heading])])],
         remove: () => removeFrom(section, "at", i, value),
         ...(key === "robots" ? { turn: () => [set(path, [column, row, ((heading ?? -1) + 1) % 4])] } : {}),
@@ -63,8 +63,8 @@ function bodiesOf(key: string, section: Path, value: Table, ground: Ground): Ite
   });
 }
 
-/** Goals, ends of shuttles, and regions in which places are drawn. */
-function aimsOf(section: Path, value: Table, ground: Ground): Item[] {
+/** Goals, ends of shuttles, and regions for random positions. */
+function goalItems(section: Path, value: TomlTable, ground: GridPlacement): Item[] {
   const name =
     typeof value["name"] === "string" && value["name"] !== "" ? value["name"] : `robots ${Number(section[1] ?? 0) + 1}`;
   const behaviour = [...section, "behaviour"];
@@ -81,19 +81,19 @@ function aimsOf(section: Path, value: Table, ground: Ground): Item[] {
         kind: "goal",
         outline_m: outlineOf(ground, { column, row, width: 1, height: 1 }),
         isClosed: true,
-        at_m: placeOf(ground, column + 0.5, row + 0.5),
+        at_m: cornerPosition(ground, column + 0.5, row + 0.5),
         move: (to) => [set(path, [...cellOf(ground, to[0], to[1])])],
         remove: () => (Array.isArray(goals) && goals.length === 1 ? [remove(behaviour)] : [remove(path)]),
       },
     ];
   });
   const areas = [["behaviour", "a"], ["behaviour", "b"], ["region"]].flatMap((below) =>
-    area(section, below, value, name, ground),
+    areaItem(section, below, value, name, ground),
   );
   return [...areas, ...points];
 }
 
-function area(section: Path, below: string[], value: Table, name: string, ground: Ground): Item[] {
+function areaItem(section: Path, below: string[], value: TomlTable, name: string, ground: GridPlacement): Item[] {
   const given = numbersOf(valueAt(value, below), 4);
   if (!given) return [];
   const [column, row, width, height] = given as [number, number, number, number];
@@ -106,49 +106,53 @@ function area(section: Path, below: string[], value: Table, name: string, ground
       kind: "area",
       outline_m: outlineOf(ground, { column, row, width, height }),
       isClosed: true,
-      at_m: placeOf(ground, column + width / 2, row + height / 2),
+      at_m: cornerPosition(ground, column + width / 2, row + height / 2),
       move: (to) => [set(path, [...anchor(ground, to, [width, height]), width, height])],
       remove: () => [remove(below.at(-1) === "region" ? path : [...section, "behaviour"])],
     },
   ];
 }
 
-const FIRST: Record<string, Table> = {
+const NEW_SECTIONS: Record<string, TomlTable> = {
   robots: { size: 2, sensors: ["sonar-ring"], effector: "nomad", behaviour: { kind: "wander" } },
   people: { size: [2, 2], period: 3 },
   doors: { periodic: { open: 60, closed: 20 } },
 };
 
-/** A section with places of its own to put one more body into: the chosen one, else the last. */
-export function hostOf(model: Table, key: string, chosen: Path | null): { path: Path; value: Table } | null {
+/** The section that a new body is added to: the selected one, else the last one with explicit positions. */
+export function targetSection(
+  model: TomlTable,
+  key: string,
+  chosen: Path | null,
+): { path: Path; value: TomlTable } | null {
   const hosts = sectionsOf(model, key).filter(
     ({ value }) => Array.isArray(value["at"]) && value["count"] === undefined,
   );
   return hosts.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? hosts.at(-1) ?? null;
 }
 
-/** The edits that put a body with its lower-left box there. */
-export function putBody(model: Table, key: "robots" | "people", cell: Cell, chosen: Path | null): Edit[] {
-  const host = hostOf(model, key, chosen);
+/** The edits that add a body with its lower-left box at a cell. */
+export function putBody(model: TomlTable, key: "robots" | "people", cell: Cell, chosen: Path | null): Edit[] {
+  const host = targetSection(model, key, chosen);
   if (host) return [insert([...host.path, "at"], [...cell])];
-  return [insert([key], { ...FIRST[key]!, at: [[...cell]] })];
+  return [insert([key], { ...NEW_SECTIONS[key]!, at: [[...cell]] })];
 }
 
-/** The edits that put a door into a rectangle, and take walls out of its way. */
-export function putDoor(model: Table, board: Board | null, { column, row, width, height }: Rect): Edit[] {
-  const way = board?.paint(rectangleCells([column, row], [column + width - 1, row + height - 1], true), ".");
-  const alike = sectionsOf(model, "doors").find(({ value }) => {
+/** The edits that add a door in a rectangle, and clear the walls there. */
+export function putDoor(model: TomlTable, map: AsciiMap | null, { column, row, width, height }: Rect): Edit[] {
+  const clearing = map?.paint(rectangleCells([column, row], [column + width - 1, row + height - 1], true), ".");
+  const sameSize = sectionsOf(model, "doors").find(({ value }) => {
     const [w, h] = sizeOf("doors", value);
     return Array.isArray(value["at"]) && w === width && h === height;
   });
-  const door = alike
-    ? insert([...alike.path, "at"], [column, row])
-    : insert(["doors"], { at: [[column, row]], size: [width, height], ...FIRST["doors"]! });
-  return way ? [way, door] : [door];
+  const door = sameSize
+    ? insert([...sameSize.path, "at"], [column, row])
+    : insert(["doors"], { at: [[column, row]], size: [width, height], ...NEW_SECTIONS["doors"]! });
+  return clearing ? [clearing, door] : [door];
 }
 
-/** The edits that give robots one more way-point: the chosen ones, else the first. */
-export function putGoal(model: Table, cell: Cell, chosen: Path | null): Edit[] {
+/** The edits that add a way-point to the selected robots, else to the first. */
+export function putGoal(model: TomlTable, cell: Cell, chosen: Path | null): Edit[] {
   const all = sectionsOf(model, "robots");
   const { path, value } = all.find((one) => chosen && one.path.every((part, i) => part === chosen[i])) ?? all[0] ?? {};
   if (!path || !value) return [];
@@ -157,14 +161,14 @@ export function putGoal(model: Table, cell: Cell, chosen: Path | null): Edit[] {
   return [set([...path, "behaviour"], { kind: "goto", goals: [[...cell]], repeat: true })];
 }
 
-/** The lower-left box of a body whose middle is in a box, so that it lies around the pointer. */
-export function around([column, row]: Cell, side: number): Cell {
-  const before = Math.floor((side - 1) / 2);
-  return [column - before, row - before];
+/** The lower-left box of a body centered on a box, so that it is around the pointer. */
+export function lowerLeftAround([column, row]: Cell, side: number): Cell {
+  const offset = Math.floor((side - 1) / 2);
+  return [column - offset, row - offset];
 }
 
-/** Side of the robots that the tool would put. */
-export function robotSide(model: Table, key: "robots" | "people", chosen: Path | null): number {
-  const host = hostOf(model, key, chosen);
+/** Side of the bodies that the tool would add. */
+export function robotSide(model: TomlTable, key: "robots" | "people", chosen: Path | null): number {
+  const host = targetSection(model, key, chosen);
   return host ? sizeOf(key, host.value)[0] : 2;
 }

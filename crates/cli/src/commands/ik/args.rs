@@ -2,12 +2,12 @@
 
 use super::super::arm::{Arm, parse_numbers};
 use clap::{Args, ValueEnum};
-use sidestep::import::urdf::Origin;
-use sidestep::kernel::InputError;
-use sidestep::worlds::chain::ik::Engine;
-use sidestep::worlds::chain::kinematics::{
+use sidestep::arms::ik::Engine;
+use sidestep::arms::kinematics::{
     ArmBody, ArmGoal, MAX_SOLUTIONS, PoseMask, Sphere, Transform, Vector,
 };
+use sidestep::import::urdf::Origin;
+use sidestep::kernel::InputError;
 
 /// The options that all targets share.
 #[derive(Debug, Args)]

@@ -16,7 +16,7 @@ use crate::exit::{ExitCode, Failure};
 use args::GoalArgs;
 use clap::Args;
 use output::IkOutput;
-use sidestep::worlds::chain::kinematics::Vector;
+use sidestep::arms::kinematics::Vector;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\

@@ -3,7 +3,7 @@
 use super::super::arm::{Arm, ArmPositions, format_numbers, format_point};
 use crate::console::{LINE_COLS, align_pairs, wrap};
 use serde::Serialize;
-use sidestep::worlds::chain::kinematics::{ArmGoal, IkResult, IkSolution, OrientationMask, Vector};
+use sidestep::arms::kinematics::{ArmGoal, IkResult, IkSolution, OrientationMask, Vector};
 
 /// The answer of the command.
 #[derive(Debug, Serialize)]

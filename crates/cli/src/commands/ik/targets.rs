@@ -6,9 +6,9 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use cpu_time::ProcessTime;
 use serde::Serialize;
+use sidestep::arms::kinematics::IkResult;
 use sidestep::import::table::{CsvRow, CsvTable};
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::kinematics::IkResult;
 use std::path::Path;
 
 /// Names of the columns of positions, without and with orientations.

@@ -5,6 +5,7 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::link;
 use crate::progress::StageProgress;
+use crate::worlds;
 use clap::Args;
 use sidestep_papers::agentfly::{self, AgentflyConfig, FlightMeasurement, SocketMeasurements};
 use sidestep_session::fleet::{
@@ -66,7 +67,7 @@ fn measure_fleet(file: &Path) -> Result<FlightMeasurement, Failure> {
 }
 
 fn fleet_job(file: &Path) -> FleetJob {
-    let build = sidestep_session::build_id().into();
+    let build = worlds().build().into();
     let common = CommonSettings {
         flown: JobScenario { file: file.into(), overrides: Vec::new(), build },
         tls: None,

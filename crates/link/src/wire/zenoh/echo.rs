@@ -1,5 +1,5 @@
-//! Questions to the other end of a link. Its session answers by itself, however busy its node is: a link without
-//! answers is deaf.
+//! Probes of the other end of a link. Its Zenoh session replies in a thread of its own, however busy its node is: a link
+//! without replies is half-open.
 
 use super::put;
 use sidestep::kernel::EntityId;
@@ -10,37 +10,40 @@ use zenoh::Session;
 use zenoh::key_expr::KeyExpr;
 use zenoh::sample::Sample;
 
-/// Marks of frames that are no mail.
+/// Attachment of a Zenoh message that is a probe. Frames of messengers have no attachment.
 const ECHO_REQUEST: &[u8] = b"question";
+
+/// Attachment of the reply to a probe.
 const ECHO_REPLY: &[u8] = b"answer";
 
-/// Time after which a question counts for nothing if none has followed it.
+/// Time after which an unanswered probe counts for nothing if no further one has followed it: silence is evidence only
+/// while the link is being probed.
 const PROBE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The questions that a node has asked of others over its links, and their answers.
+/// The probes that a node has sent to others over its links, and their replies.
 pub(super) struct EchoProbes {
-    /// The first and the last question since the last answer.
-    asked: BTreeMap<EntityId, (Instant, Instant)>,
-    answered: Receiver<EntityId>,
-    answers: Sender<EntityId>,
+    /// The times of the first and the last probe since the last reply.
+    unanswered: BTreeMap<EntityId, (Instant, Instant)>,
+    replies: Receiver<EntityId>,
+    reply_sender: Sender<EntityId>,
 }
 
 impl Default for EchoProbes {
     fn default() -> Self {
-        let (answers, answered) = channel();
-        Self { asked: BTreeMap::new(), answered, answers }
+        let (reply_sender, replies) = channel();
+        Self { unanswered: BTreeMap::new(), replies, reply_sender }
     }
 }
 
 impl EchoProbes {
-    /// Returns the function of node `me` that answers questions, takes answers, and leaves mail alone; it returns
-    /// whether the frame was no mail. It is called by a thread of the session.
+    /// Returns the handler of node `me` for probes and replies. It returns whether a Zenoh message was one of them, and is
+    /// called by a thread of the session.
     pub(super) fn handler(
         &self,
         me: EntityId,
         session: Session,
     ) -> impl Fn(&Sample) -> bool + use<> {
-        let answers = self.answers.clone();
+        let replies = self.reply_sender.clone();
         move |sample| {
             let Some(mark) = sample.attachment().map(|mark| mark.to_bytes()) else { return false };
             let from =
@@ -48,7 +51,7 @@ impl EchoProbes {
             match (&*mark, from) {
                 (ECHO_REQUEST, Ok(from)) => send(&session, me, from, ECHO_REPLY),
                 // The receiver is gone when the wire is.
-                (ECHO_REPLY, Ok(from)) => drop(answers.send(from)),
+                (ECHO_REPLY, Ok(from)) => drop(replies.send(from)),
                 // From another build.
                 _ => {}
             }
@@ -56,7 +59,7 @@ impl EchoProbes {
         }
     }
 
-    /// Asks another node, and returns whether it has left all questions unanswered for some time.
+    /// Probes another node, and returns whether it has left all probes unanswered for some time.
     pub(super) fn probe(
         &mut self,
         session: &Session,
@@ -66,7 +69,7 @@ impl EchoProbes {
     ) -> bool {
         self.receive_replies();
         let now = Instant::now();
-        let (first, last) = self.asked.entry(of).or_insert((now, now));
+        let (first, last) = self.unanswered.entry(of).or_insert((now, now));
         if now.duration_since(*last) > PROBE_TIMEOUT {
             *first = now;
         }
@@ -75,17 +78,17 @@ impl EchoProbes {
         now.duration_since(*first) > within
     }
 
-    /// Forgets all questions, as needed where links are new.
+    /// Forgets all probes, as needed where links are new.
     pub(super) fn clear(&mut self) {
-        self.asked.clear();
+        self.unanswered.clear();
     }
 
-    /// Takes the answers that have come. Returns whether no question is open.
+    /// Processes the replies that have arrived. Returns whether no probe is unanswered.
     pub(super) fn receive_replies(&mut self) -> bool {
-        for from in self.answered.try_iter() {
-            self.asked.remove(&from);
+        for from in self.replies.try_iter() {
+            self.unanswered.remove(&from);
         }
-        self.asked.is_empty()
+        self.unanswered.is_empty()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Pitfalls of Zenoh that this wire avoids, each shown to be one, on loopback.
 
 use super::*;
-use crate::messenger::{Messenger, Received};
+use crate::messenger::Messenger;
 use crate::protocol::Message;
 use crate::wire::endpoint::reserve_port;
 use std::io::{Read, Write};
@@ -22,21 +22,21 @@ fn free() -> String {
     reserve_port("tcp/127.0.0.1:0").expect("a free port").endpoint
 }
 
-fn line(mode: &str, me: Peer, [listen, connect]: [&[String]; 2]) -> (ZenohLink, Receiver<Vec<u8>>) {
+fn link(mode: &str, me: Peer, [listen, connect]: [&[String]; 2]) -> (ZenohLink, Receiver<Vec<u8>>) {
     let connected_within = (mode == "client").then_some(TEST_TIMEOUT);
     let session = ZenohConfig { mode, listen, connect, connected_within, ..ZenohConfig::default() }
         .open()
         .expect("open");
-    let (arrives, arrived) = channel();
-    (ZenohLink::new(session, me, &arrives, &EchoProbes::default()).expect("a line"), arrived)
+    let (sender, frames) = channel();
+    (ZenohLink::new(session, me, &sender, &EchoProbes::default()).expect("a link"), frames)
 }
 
 /// Sends a frame again and again until it has come.
-fn reaches(from: &mut ZenohLink, to: Peer, arrived: &Receiver<Vec<u8>>) {
+fn reaches(from: &mut ZenohLink, to: Peer, frames: &Receiver<Vec<u8>>) {
     let until = Instant::now() + TEST_TIMEOUT;
     loop {
         from.send(to, b"frame");
-        if arrived.recv_timeout(Duration::from_millis(20)).is_ok() {
+        if frames.recv_timeout(Duration::from_millis(20)).is_ok() {
             return;
         }
         assert!(Instant::now() < until, "no frame has come to {to}");
@@ -49,9 +49,9 @@ fn reaches(from: &mut ZenohLink, to: Peer, arrived: &Receiver<Vec<u8>>) {
 fn a_peer_does_not_relay_and_a_router_does() {
     for (hub, leaf, relays) in [("peer", "peer", false), ("router", "client", true)] {
         let at = [free()];
-        let (_hub, at_hub) = line(hub, Peer::Server, [&at, &[]]);
-        let (mut a, _at_a) = line(leaf, A, [&[], &at]);
-        let (mut b, at_b) = line(leaf, B, [&[], &at]);
+        let (_hub, at_hub) = link(hub, Peer::Server, [&at, &[]]);
+        let (mut a, _at_a) = link(leaf, A, [&[], &at]);
+        let (mut b, at_b) = link(leaf, B, [&[], &at]);
         reaches(&mut a, Peer::Server, &at_hub);
         reaches(&mut b, Peer::Server, &at_hub);
         if relays {
@@ -78,7 +78,7 @@ fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
         .zip(&held)
         .map(|(agent, held)| Member {
             agent,
-            life: crate::protocol::Incarnation(0),
+            incarnation: crate::protocol::Incarnation(0),
             listens: listens(held),
         })
         .collect();
@@ -169,10 +169,10 @@ fn carry(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> Option<
     }
 }
 
-/// In a partition a put succeeds and its frame is gone; letters come when it is over. The link is given up within its
+/// In a partition a put succeeds and its frame is gone; reliable messages arrive when it is over. The link is given up within its
 /// lease, and opened again within seconds, because both time limits of opening are short: Zenoh's own are ten.
 #[test]
-fn frames_vanish_in_a_partition_and_letters_do_not() {
+fn best_effort_messages_are_lost_in_a_partition_and_reliable_ones_are_not() {
     let server = free();
     let cable = Cable::to(&server, false);
     let wire = ZenohWire::server(&[server], None).expect("a server");
@@ -182,40 +182,50 @@ fn frames_vanish_in_a_partition_and_letters_do_not() {
     let mut node = Messenger::new(A, Box::new(wire));
     node.connect(Peer::Server, hub.incarnation());
     hub.connect(A, node.incarnation());
-    let mut hear = |node: &mut Messenger, word: Message, within: Duration| {
+    let mut receives = |node: &mut Messenger, message: Message, within: Duration| {
         let until = Instant::now() + within;
         while Instant::now() < until {
             node.receive(Duration::from_millis(1));
             match hub.receive(Duration::from_millis(5)) {
-                Some(Received { word: heard, .. }) if heard == word => return true,
+                Some(received) if received.message == message => return true,
                 _ => {}
             }
         }
         false
     };
     node.send_reliable(Peer::Server, Message::Close(1));
-    assert!(hear(&mut node, Message::Close(1), TEST_TIMEOUT));
+    assert!(receives(&mut node, Message::Close(1), TEST_TIMEOUT));
     cable.cut(true);
     node.send_best_effort(Peer::Server, Message::Hello);
     node.send_reliable(Peer::Server, Message::Close(2));
-    assert!(!hear(&mut node, Message::Close(2), 2 * Duration::from_millis(LEASE_MS)), "it is cut");
+    assert!(
+        !receives(&mut node, Message::Close(2), 2 * Duration::from_millis(LEASE_MS)),
+        "it is cut"
+    );
     cable.cut(false);
     let healed = Instant::now();
-    assert!(hear(&mut node, Message::Close(2), TEST_TIMEOUT), "a letter comes in the end");
+    assert!(
+        receives(&mut node, Message::Close(2), TEST_TIMEOUT),
+        "a reliable message arrives in the end"
+    );
     assert!(healed.elapsed() < Duration::from_secs(8), "{:?}", healed.elapsed());
-    assert!(!hear(&mut node, Message::Hello, SHORT_WAIT), "a note that was cut off is gone");
+    assert!(!receives(&mut node, Message::Hello, SHORT_WAIT), "a best-effort message is lost");
 }
 
 /// Carries the frames of one end of a link, but from the third on only those of one byte, signs of life, while the
-/// link is deaf.
-fn carry_deaf(mut from: TcpStream, mut to: TcpStream, is_deaf: bool) -> std::io::Result<()> {
+/// link is half-open.
+fn carry_half_open(
+    mut from: TcpStream,
+    mut to: TcpStream,
+    is_half_open: bool,
+) -> std::io::Result<()> {
     for k in 0.. {
         let mut length = [0; 2];
         from.read_exact(&mut length)?;
         let mut frame = vec![0; usize::from(u16::from_le_bytes(length))];
         from.read_exact(&mut frame)?;
         // Two frames open the link.
-        if k < 2 || frame.len() == 1 || !is_deaf {
+        if k < 2 || frame.len() == 1 || !is_half_open {
             to.write_all(&length)?;
             to.write_all(&frame)?;
         }
@@ -223,8 +233,8 @@ fn carry_deaf(mut from: TcpStream, mut to: TcpStream, is_deaf: bool) -> std::io:
     Ok(())
 }
 
-/// Returns an endpoint from which connections are carried to another, the first as deaf links.
-fn deaf_at_first(server: &str) -> String {
+/// Returns an endpoint from which connections are carried to another, the first as half-open links.
+fn half_open_at_first(server: &str) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let endpoint = format!("tcp/{}", listener.local_addr().expect("bound"));
     let server = server.trim_start_matches("tcp/").to_string();
@@ -232,11 +242,11 @@ fn deaf_at_first(server: &str) -> String {
         for (k, near) in listener.incoming().flatten().enumerate() {
             let Ok(far) = TcpStream::connect(&server) else { continue };
             let both = [(near.try_clone(), far.try_clone(), k == 0), (Ok(far), Ok(near), false)];
-            for (from, to, is_deaf) in both {
+            for (from, to, is_half_open) in both {
                 std::thread::spawn(move || {
                     let (from, to) = (from?, to?);
                     let ends = [from.try_clone()?, to.try_clone()?];
-                    let carried = carry_deaf(from, to, is_deaf);
+                    let carried = carry_half_open(from, to, is_half_open);
                     ends.iter().try_for_each(|end| end.shutdown(std::net::Shutdown::Both))?;
                     carried
                 });
@@ -257,7 +267,7 @@ fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>)
     let members: Vec<Member> = (0..)
         .zip(lives)
         .zip(seen_at)
-        .map(|((agent, life), seen)| Member { agent, life, listens: vec![seen] })
+        .map(|((agent, incarnation), seen)| Member { agent, incarnation, listens: vec![seen] })
         .collect();
     let node = |(agent, held)| {
         let wire = ZenohWire::node(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
@@ -284,11 +294,11 @@ fn until(mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire notices it and opens
+/// A link through which signs of life arrive and nothing else: Zenoh keeps it for good, and the wire detects it and opens
 /// it again.
 #[test]
-fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
-    let ([_hub, mut first, mut second], members) = two_in_a_mesh(deaf_at_first);
+fn a_half_open_link_is_detected_and_opened_again() {
+    let ([_hub, mut first, mut second], members) = two_in_a_mesh(half_open_at_first);
     // Rarely, because a sender gives no other sign of life.
     let mut comes = |second: &mut ZenohWire, times: u32| {
         (0..times).any(|_| {
@@ -296,30 +306,31 @@ fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
             first.receive(Duration::from_millis(LEASE_MS / 3)).is_some()
         })
     };
-    assert!(!comes(&mut second, 4), "it is deaf");
-    assert!(is_open(&second, &members[0]), "and nobody says so");
-    assert!(!second.is_half_open(&members[0], TEST_TIMEOUT), "it was asked just now");
-    let is_deaf = |wire: &mut ZenohWire| {
+    assert!(!comes(&mut second, 4), "nothing arrives");
+    assert!(is_open(&second, &members[0]), "and Zenoh keeps it");
+    assert!(!second.is_half_open(&members[0], TEST_TIMEOUT), "it was probed just now");
+    let is_half_open = |wire: &mut ZenohWire| {
         std::thread::sleep(Duration::from_millis(LEASE_MS / 3));
         wire.is_half_open(&members[0], Duration::from_secs(1))
     };
-    assert!((0..20).any(|_| is_deaf(&mut second)), "it answers nothing");
+    assert!((0..20).any(|_| is_half_open(&mut second)), "it answers nothing");
     second.reopen_links().expect("its endpoint is free again");
     assert!(comes(&mut second, 40), "it is heard");
-    let other = Member { agent: 0, life: crate::protocol::Incarnation(7), listens: Vec::new() };
-    assert!(!is_open(&second, &other), "another life of it is not there");
+    let other =
+        Member { agent: 0, incarnation: crate::protocol::Incarnation(7), listens: Vec::new() };
+    assert!(!is_open(&second, &other), "another incarnation of it is not there");
 }
 
-/// The first node takes nothing that comes, as one that computes for long: its session answers all the same.
+/// The first node receives nothing, as one that computes for long: its session answers all the same.
 #[test]
-fn a_node_that_takes_nothing_is_not_taken_for_deaf() {
+fn a_link_of_a_node_that_receives_nothing_is_not_half_open() {
     let ([_hub, mut first, mut second], members) = two_in_a_mesh(ToString::to_string);
     for _ in 0..3 {
         assert!(!second.is_half_open(&members[0], TEST_TIMEOUT));
         until(|| second.echoes.receive_replies());
     }
     second.send(&[Peer::Node(0)], b"frame");
-    assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]), "no question is mail");
+    assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]), "a probe is no frame");
 }
 
 #[test]

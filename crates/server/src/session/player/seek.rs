@@ -1,52 +1,54 @@
-//! Ways to a cycle: begun, gone on with, and given up.
+//! Seeks: started, redirected, and cancelled.
 
 use super::Player;
 use crate::protocol::{Problem, ReplyBody, SessionState, Speed};
-use sidestep::kernel::Cycle;
+use sidestep_kernel::Cycle;
 use std::time::Instant;
 
-/// A way to a cycle that a page waits for.
+/// A seek under way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seek {
-    /// The request that is answered on arrival; none for a viewer's.
+    /// The request that is answered at the target; none for a viewer's.
     pub(super) id: Option<u32>,
     pub(super) target: Cycle,
-    /// The speed at which the run goes on from there.
+    /// The speed at which the run is played from there; none if it pauses.
     pub(super) then: Option<Speed>,
 }
 
 impl Player {
-    /// Answers the request for a way that is given up before its end.
+    /// Answers the request for a seek that is cancelled before its end.
     pub(in super::super) fn cancel_seek(&mut self, cause: &str) {
-        if let Some(Seek { id: Some(id), target, .. }) = self.errand.take() {
+        if let Some(Seek { id: Some(id), target, .. }) = self.seek.take() {
             let place = format!("cycle {target}");
             self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
         }
     }
 
-    /// Goes some cycles on from where it is, or is going to: steps requested faster than they are done add up.
+    /// Advances by some cycles from the present one, or from the target of a seek under way: so steps that are requested
+    /// faster than they are computed add up.
     pub(super) fn step(&mut self, id: u32, cycles: u32) {
-        let from = self.errand.map_or(self.cycle(), |errand| errand.target);
-        if let Some(Seek { id: Some(earlier), .. }) = self.errand.take() {
+        let from = self.seek.map_or(self.cycle(), |seek| seek.target);
+        if let Some(Seek { id: Some(earlier), .. }) = self.seek.take() {
             self.reply(earlier, Ok(ReplyBody::Done));
         }
-        self.seek(Some(id), from.saturating_add(u64::from(cycles)), None);
+        self.start_seek(Some(id), from.saturating_add(u64::from(cycles)), None);
     }
 
-    /// Sets out to a cycle, from the nearest place that is known.
-    pub(super) fn seek(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
+    /// Starts a seek to a cycle, from the present cycle or from a keyframe, whichever is nearer before it.
+    pub(super) fn start_seek(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
         self.cancel_seek("another way was asked for");
-        let target = cycle.min(self.stage.until);
-        (self.state, self.errand) = (SessionState::Seeking, Some(Seek { id, target, then }));
-        let here = self.cycle();
-        let Some((at, checkpoint)) = self.memory.keyframes.before(target) else { return };
-        if target < here || at > here {
-            let run = self.stage.run.as_mut();
-            self.viewer.drain(run, &mut self.memory.log, Instant::now());
-            // A bug ends the session, with its message.
+        let target = cycle.min(self.open_run.until);
+        self.state = SessionState::Seeking;
+        self.seek = Some(Seek { id, target, then });
+        let present = self.cycle();
+        let Some((at, checkpoint)) = self.history.keyframes.before(target) else { return };
+        if target < present || at > present {
+            let run = self.open_run.run.as_mut();
+            self.page_view.drain(run, &mut self.history.log, Instant::now());
+            // A keyframe that cannot be restored is a bug: the panic ends the session, with its message.
             run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
             self.digest = None;
-            self.viewer.mark_moved();
+            self.page_view.mark_moved();
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::fleet_feed::FleetFeed;
-use sidestep::kernel::Simulation;
-use sidestep::kernel::view::FrameOptions;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
 use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus, NodeStatus};
 
 const AT: &str = "tcp/127.0.0.1:7600";
@@ -13,7 +13,7 @@ struct RemoteFlight {
     run: Box<dyn Simulation>,
     screen: Arc<FleetFeed>,
     number: u64,
-    events: Vec<sidestep::kernel::view::LogEvent>,
+    events: Vec<sidestep_kernel::view::LogEvent>,
 }
 
 impl RemoteFlight {
@@ -48,9 +48,8 @@ impl RemoteFlight {
 
     fn page(&self) -> Page {
         let folder = tempfile::tempdir().expect("a folder");
-        let means = SessionDeps { screens: vec![self.screen.clone()], ..means(folder.path(), 1) };
-        let (page, opened) =
-            Page::open_target(means, OpenTarget::Fleet { path: AT.into() }, folder);
+        let deps = SessionDeps { fleets: vec![self.screen.clone()], ..deps(folder.path(), 1) };
+        let (page, opened) = Page::open_target(deps, OpenTarget::Fleet { path: AT.into() }, folder);
         let opened = &opened["answer"];
         assert_eq!(
             (&opened["is"], &opened["scene"]["agent"]),
@@ -105,11 +104,11 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
         assert_eq!((&now["state"], &now["cycles_planned"]), (&"watched".into(), &40.0.into()));
         assert_eq!(now["fleet"]["nodes"].as_array().map(Vec::len), Some(6));
         let who = json!({ "kind": "connector", "number": 4, "part": 5 });
-        assert_eq!(now["fleet"]["nodes"][5]["who"], who);
+        assert_eq!(now["fleet"]["nodes"][5]["body"], who);
     }
     assert!(elsewhere.events.len() > 3, "there is something to tell");
     let told =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "most": 5000 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "limit": 5000 }));
     assert_eq!(told["entries"].as_array().map(Vec::len), Some(elsewhere.events.len()));
     elsewhere.publish(4, true);
     status(&mut page, |status| status["state"] == "over");
@@ -140,9 +139,9 @@ fn a_fleet_that_is_lost_cannot_be_opened_and_the_one_that_flies_there_next_can()
     elsewhere.publish(1, false);
     elsewhere.screen.mark_lost("it was not heard", "watch it again");
     let folder = tempfile::tempdir().expect("a folder");
-    let means = SessionDeps { screens: vec![elsewhere.screen.clone()], ..means(folder.path(), 1) };
+    let deps = SessionDeps { fleets: vec![elsewhere.screen.clone()], ..deps(folder.path(), 1) };
     let (mut page, refused) =
-        Page::open_target(means, OpenTarget::Fleet { path: AT.into() }, folder);
+        Page::open_target(deps, OpenTarget::Fleet { path: AT.into() }, folder);
     assert_eq!(refused["problem"]["cause"], "it was not heard");
     drop(page);
     elsewhere.restart();
@@ -169,7 +168,7 @@ fn a_fleet_that_is_over_stays_to_be_seen_until_another_one_flies_there() {
 fn a_fleet_that_the_command_line_did_not_name_is_no_fleet() {
     let folder = tempfile::tempdir().expect("a folder");
     let what = OpenTarget::Fleet { path: AT.into() };
-    let (_, refused) = Page::open_target(means(folder.path(), 1), what, folder);
+    let (_, refused) = Page::open_target(deps(folder.path(), 1), what, folder);
     assert_eq!(
         refused["problem"]["remedy"],
         format!("start the studio with it: sidestep studio {AT}")

@@ -1,7 +1,7 @@
 //! Recordings: computed again by the build that made them, otherwise shown from their own tables.
 
 use super::*;
-use sidestep::kernel::view::{BodyId as Body, Frame, FrameOptions, Vec3};
+use sidestep_kernel::view::{BodyId as Body, Frame, FrameOptions, Vec3};
 use sidestep_record::{McapFooter, McapProvenance, McapRecorder, Provenance, Status};
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun};
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ fn recorded(text: &str) -> tempfile::TempDir {
     let (run, source) = (folder.path().join("r"), Source::new("s.toml", text, ""));
     let compiled = WORLDS.compile(&source).expect("valid");
     let keep = OutputPaths { folder: Some(&run), ..OutputPaths::default() };
-    let journey = ManagedRun::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+    let journey = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, keep).expect("started");
     journey.run_to_end(&NoWatcher).expect("recorded");
     folder
 }
@@ -32,7 +32,7 @@ fn made_by_another(folder: &tempfile::TempDir) {
 
 fn opened(folder: tempfile::TempDir) -> (Page, Value) {
     let what = OpenTarget::Recording { path: path(&folder).display().to_string() };
-    Page::open_target(means(folder.path(), 2), what, folder)
+    Page::open_target(deps(folder.path(), 2), what, folder)
 }
 
 fn banner(status: &Value) -> String {
@@ -52,7 +52,7 @@ fn places(frame: &Frame) -> Vec<(Body, [i64; 3])> {
 fn a_recording_of_another_build_shows_everybody_where_they_were() {
     for (text, cycles) in [(ROBOTS, 600), (CHAINS, 150), (AIRPLANES, 40)] {
         let folder = recorded(text);
-        let open = || RecordedRun::open(WORLDS, &path(&folder)).expect("a recording");
+        let open = || RecordedRun::open(&WORLDS, &path(&folder)).expect("a recording");
         let mut again = open().start(1).expect("of this build");
         made_by_another(&folder);
         assert!(open().start(1).is_err(), "it is not computed again");
@@ -116,7 +116,7 @@ fn a_film_of_another_build_shows_everybody_where_they_were_and_says_so() {
         filmed_by_another(text, cycles, &film);
         let source = Source::new("s.toml", text, "");
         let mut again = WORLDS.compile(&source).expect("valid").start(&source, 1);
-        let recorded = RecordedRun::open(WORLDS, &film).expect("a film");
+        let recorded = RecordedRun::open(&WORLDS, &film).expect("a film");
         assert!(recorded.start(1).is_err(), "it is not computed again");
         let mut shown = recorded.start_for_viewing(1).expect("its messages are there");
         for cycle in [0, cycles / 5, cycles / 2, cycles] {
@@ -151,7 +151,7 @@ fn a_film_of_another_build_has_its_events() {
         again.advance(1);
         then.extend(told(again.frame(FrameOptions::WITHOUT_SCANS)));
     }
-    let recorded = RecordedRun::open(WORLDS, &path(&folder)).expect("a film");
+    let recorded = RecordedRun::open(&WORLDS, &path(&folder)).expect("a film");
     let mut shown = recorded.start_for_viewing(1).expect("its messages are there");
     shown.advance(200);
     let shown = told(shown.frame(FrameOptions::WITHOUT_SCANS));
@@ -173,14 +173,14 @@ fn a_recording_of_another_build_says_so_and_has_its_events_but_no_inspection_and
     let status = page.state("over");
     assert!(status["digest"].is_null() && banner(&status) == words, "{status}");
     let who = json!({ "kind": "robot", "number": 0, "part": null });
-    let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+    let id = page.send(json!({ "do": "inspect", "session": 1, "body": who }));
     assert!(page.wait(id).get("problem").is_some());
     one.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
-    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "most": 5000 });
+    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "limit": 5000 });
     let happened = |page: &mut Page| -> Vec<Value> {
         let told = page.ask(ask.clone())["entries"].clone();
         let entries = told.as_array().expect("events").iter();
-        entries.map(|e| json!([e["cycle"], e["kind"], e["who"]])).collect()
+        entries.map(|e| json!([e["cycle"], e["kind"], e["body"]])).collect()
     };
     let (now, then) = (happened(&mut one), happened(&mut page));
     assert!(!now.is_empty());
@@ -201,13 +201,13 @@ fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
         told.then_some(())
     });
     let events =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 }));
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 }));
     assert_eq!(events["known_until"], 600.0);
     let (mut plain_page, _) = Page::open(ROBOTS, 1);
     plain_page.digest_at(600);
     assert_eq!(
         plain_page
-            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 })),
+            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "limit": 9999 })),
         events
     );
     assert_eq!(page.digest_at(600), plain(ROBOTS, 600));

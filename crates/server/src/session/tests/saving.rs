@@ -33,7 +33,7 @@ fn page() -> (Page, PathBuf) {
     let folder = places();
     let inside = folder.path().join("in");
     let (page, opened) =
-        Page::open_target(means(&inside, 1), scenario(&inside.join("s.toml")), folder);
+        Page::open_target(deps(&inside, 1), scenario(&inside.join("s.toml")), folder);
     assert!(opened.get("problem").is_none(), "{opened}");
     (page, inside)
 }
@@ -42,7 +42,7 @@ impl Page {
     fn save(&mut self, text: &str, to: Option<&Path>, base: Option<&str>, over: bool) -> Value {
         let to = to.map(|path| path.display().to_string());
         let call = json!({
-            "do": "save", "session": 1, "text": text, "to": to, "base": base, "over": over
+            "do": "save", "session": 1, "text": text, "to": to, "base": base, "overwrite": over
         });
         let id = self.send(call);
         self.wait(id)
@@ -62,14 +62,14 @@ fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
     let reply = page.save(&naming("../../out/secret.map"), Some(&deep), None, false);
     assert_eq!(reply["problem"]["place"], "../../out/secret.map", "{reply}");
     fs::write(&stolen, naming("../out/secret.map")).expect("written");
-    let open = |means: SessionDeps| {
-        Page::open_target(means, scenario(&stolen), tempfile::tempdir().expect("a folder")).1
+    let open = |deps: SessionDeps| {
+        Page::open_target(deps, scenario(&stolen), tempfile::tempdir().expect("a folder")).1
     };
-    let reply = open(means(&inside, 1));
+    let reply = open(deps(&inside, 1));
     assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
-    let reads = SessionDeps { read_only: true, ..means(&inside, 1) };
+    let reads = SessionDeps { read_only: true, ..deps(&inside, 1) };
     assert_eq!(open(reads)["answer"]["is"], "opened", "no page can have written it");
-    let own = means(&inside, 1);
+    let own = deps(&inside, 1);
     let named = SessionDeps { files: own.files.with_files_named_by([&*stolen].into_iter()), ..own };
     assert_eq!(open(named)["answer"]["is"], "opened", "it was named at start");
 }
@@ -84,7 +84,7 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
     }
     let deep = inside.join("deep/x.toml");
     fs::write(&deep, naming("../m.map")).expect("written");
-    let (mut page, opened) = Page::open_target(means(&inside, 1), scenario(&deep), folder);
+    let (mut page, opened) = Page::open_target(deps(&inside, 1), scenario(&deep), folder);
     assert_eq!(opened["answer"]["is"], "opened");
     let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), None, false);
     assert_eq!(saved["answer"]["is"], "saved");

@@ -60,7 +60,7 @@ fn clearance<const D: usize>(run: &TestRun<D>, slot: usize, balls: &[([f64; D], 
 
 /// All balls of a world at a cycle.
 pub(super) fn balls<const D: usize>(run: &TestRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
-    use sidestep::worlds::chain::geometry::Core;
+    use sidestep::rods::geometry::Core;
     let world = run.world();
     let moving: Vec<_> = world.movers.at(world.start_time_s(cycle)).collect();
     let all = world.obstacles.still().iter().chain(&moving);

@@ -173,7 +173,7 @@ impl Compiler<'_> {
             leaves_s,
             orders,
             track: None,
-            is_non_cooperative: s.intruder,
+            is_non_cooperative: s.is_non_cooperative(self.source)?,
         })
     }
 
@@ -198,7 +198,8 @@ impl Compiler<'_> {
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
         }
         let callsign = section.get_ref().callsign(self.source)?;
-        let airplane = replayed_airplane(track, model, replay, section.get_ref().intruder);
+        let is_non_cooperative = section.get_ref().is_non_cooperative(self.source)?;
+        let airplane = replayed_airplane(track, model, replay, is_non_cooperative);
         Ok(Airplane { callsign, ..airplane })
     }
 

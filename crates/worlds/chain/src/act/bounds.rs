@@ -4,10 +4,10 @@ use super::joints::ArmFollower;
 use super::{ActState, ChainContext};
 use crate::events::{Event, EventKind};
 use crate::motion::escape::Escaper;
-use crate::rods::geometry::{Bounds, Point, distance, with_dimensions};
-use crate::rods::veto::{Veto, VetoReason};
 use crate::scratch::PositionBuffer;
 use crate::state::Body;
+use sidestep_rods::geometry::{Bounds, Point, distance, with_dimensions};
+use sidestep_rods::{Veto, VetoReason};
 
 /// Relative tolerance for ways at exactly the greatest speed.
 const ROUNDING: f64 = 1e-9;

@@ -4,12 +4,12 @@
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, distance};
-use crate::rods::rebuild::{MovableEnd, ReformResult, reform};
 use crate::state::{Body, ScatterState, flatten};
 use crate::world::{Change, ChangeKind, MAX_THROW_SIGMAS, purpose};
 use sidestep_kernel::distr::normal;
+use sidestep_rods::Chain;
+use sidestep_rods::geometry::{Point, add, distance};
+use sidestep_rods::rebuild::{MovableEnd, ReformResult, reform};
 use std::ops::RangeInclusive;
 
 /// Attempts to find a free place where a part may fall.

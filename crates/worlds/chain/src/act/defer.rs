@@ -4,10 +4,9 @@ use super::situation::goal_distance_m;
 use super::{ChainContext, Initiator};
 use crate::driver::{Task, TaskKind};
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::chain::{Chain, MAX_COORDINATE_M};
-use crate::rods::geometry::{Point, distance};
-use crate::rods::veto::CompletedMotion;
 use crate::state::Body;
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Chain, CompletedMotion, MAX_COORDINATE_M};
 
 /// Returns whether the chain may follow the initiator's motion of this cycle later. The first cycle
 /// measures all rods, so that later only those count that move.

@@ -10,11 +10,11 @@ use crate::driver::external::Orders;
 use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::events::EventKind;
-use crate::rods::geometry::{Point, add_scaled, distance, move_toward, with_dimensions};
 use crate::script::ScriptMotion;
 use crate::state::Body;
 use crate::swarm::leader::Decision;
 use crate::world::purpose;
+use sidestep_rods::geometry::{Point, add_scaled, distance, move_toward, with_dimensions};
 
 /// A driver's wish in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]

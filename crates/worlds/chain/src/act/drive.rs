@@ -9,9 +9,9 @@ use super::tasks::{end_event, start_next_task};
 use super::wheels::{drive_on_wheels, turn_robot};
 use super::{ActState, ChainContext, Initiator};
 use crate::driver::step_motion::StepMotion;
-use crate::rods::geometry::with_dimensions;
 use crate::state::Body;
 use crate::trace::IntendedMove;
+use sidestep_rods::geometry::with_dimensions;
 
 /// The words for a wish that is put off.
 const WAIT: &str = "wait for what moves";

@@ -1,10 +1,10 @@
 //! The books of a cycle.
 
 use crate::events::{Event, EventKind};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::with_dimensions;
 use crate::trace::InspectionTrace;
 use sidestep_kernel::{Cycle, Slot};
+use sidestep_rods::Chain;
+use sidestep_rods::geometry::with_dimensions;
 
 /// The books of a chain's cycle: its events, and notes.
 pub(super) struct EventSink<'a, const D: usize> {

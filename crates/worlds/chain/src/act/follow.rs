@@ -5,13 +5,13 @@ use super::wheels::HEADING_TOLERANCE_RAD;
 use super::{ActState, ChainContext};
 use crate::events::EventKind;
 use crate::formation::{Robot, Robots};
-use crate::rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
-use crate::rods::obstacle::Obstacles;
 use crate::state::Body;
 use crate::swarm::drive::Pose2;
 use crate::swarm::follower::{Follower, TrackingTarget};
 use crate::swarm::laser::RobotBody as Seen;
 use sidestep_kernel::math::{atan2, wrap_angle};
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
 
 /// The circumstances in which the robots of a chain follow.
 #[derive(Clone, Copy)]

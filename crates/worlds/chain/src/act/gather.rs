@@ -3,13 +3,9 @@
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::rods::TOLERANCE_M;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, move_toward};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::sweep::Sweep;
-use crate::rods::tunneling::blocking_obstacle;
 use crate::state::{Body, ScatterState};
+use sidestep_rods::geometry::{Point, move_toward};
+use sidestep_rods::{Chain, Obstacles, Sweep, TOLERANCE_M, blocking_obstacle};
 use std::ops::Range;
 
 /// Parts of a step that are tried one after the other where something is in the way.

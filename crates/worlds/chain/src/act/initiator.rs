@@ -4,8 +4,8 @@ use super::outcome::{MoveResult, record_result};
 use super::situation::{out_of_range_veto, situation};
 use super::{ActState, FollowMode, Initiator, defer, joints, negotiation};
 use crate::motion::recovery::{RecoveryLadder, RecoveryOutcome};
-use crate::rods::geometry::{Point, distance, norm, sub};
-use crate::rods::veto::{Motion, Request, VetoEffect};
+use sidestep_rods::geometry::{Point, distance, norm, sub};
+use sidestep_rods::{Motion, Request, VetoEffect};
 
 /// Moves the initiator, as it wants or as the ladder allows.
 pub(super) fn move_initiator<const D: usize>(

@@ -6,19 +6,19 @@ mod tests;
 
 use super::situation::is_held;
 use super::{ActState, ChainContext, Initiator};
-use crate::arms::arm::Arm;
-use crate::arms::kinematics::ConnectorTarget;
-use crate::arms::plan::JointSpace;
 use crate::clearance::min_clearance;
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::TOLERANCE_M;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, distance, lerp};
-use crate::rods::tunneling::find_tunneling;
-use crate::rods::veto::{CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason};
 use crate::scratch::PositionBuffer;
 use crate::state::Body;
+use sidestep_arms::Arm;
+use sidestep_arms::kinematics::ConnectorTarget;
+use sidestep_arms::plan::JointSpace;
+use sidestep_rods::geometry::{Point, distance, lerp};
+use sidestep_rods::{
+    Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
+};
 
 /// Parts of a motion that are tried, each half of the one before.
 const MAX_TRIES: usize = 6;

@@ -5,10 +5,9 @@ use super::desired_move::DesiredMove;
 use super::situation::is_held;
 use crate::driver::Task;
 use crate::motion::escape::{Escaper, LeadMotion};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{sub, with_dimensions};
-use crate::rods::veto::RequestSource;
 use crate::state::Body;
+use sidestep_rods::geometry::{sub, with_dimensions};
+use sidestep_rods::{Chain, RequestSource};
 
 /// Returns whether an initiator gives way to what approaches, because roll-outs tell that the chain is then inside
 /// for less time.

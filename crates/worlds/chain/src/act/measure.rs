@@ -4,8 +4,8 @@ use super::{ActState, ChainContext};
 use crate::clearance::{min_clearance, self_gap_m};
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_THRESHOLD_M;
-use crate::rods::geometry::distance;
-use crate::rods::rod_bvh::RodBvh;
+use sidestep_rods::RodBvh;
+use sidestep_rods::geometry::distance;
 
 /// Most rods of a chain whose own parts are measured in each cycle.
 const MAX_MEASURED_RODS: usize = 32;

@@ -43,10 +43,6 @@ mod wheels;
 use super::deploy::Deployment;
 use super::driver::{Task, VetoRecord};
 use super::events::{Event, EventKind};
-use super::rods::geometry::{Bounds, Point, distance};
-use super::rods::obstacle::Obstacles;
-use super::rods::propagate::Propagator;
-use super::rods::veto::Veto;
 use super::scratch::PositionBuffer;
 use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
@@ -56,6 +52,8 @@ use event_sink::EventSink;
 use negotiation::Negotiation;
 use sidestep_kernel::stream::{Draws, Purpose};
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
+use sidestep_rods::geometry::{Bounds, Point, distance};
+use sidestep_rods::{Obstacles, Propagator, Veto};
 
 /// The setting in which a chain acts: nothing changes it during the cycle.
 #[derive(Clone, Copy)]

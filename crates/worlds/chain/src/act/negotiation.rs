@@ -10,9 +10,9 @@ use crate::agents::{ChainControls, Intention, LeaderOutcome, Role};
 use crate::deploy::{SensingContext, final_positions};
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::geometry::Point;
-use crate::rods::serde_point::WirePoint;
 use crate::state::{Body, MissingNeighbors};
+use sidestep_rods::geometry::Point;
+use sidestep_rods::serde_point::WirePoint;
 use std::collections::BTreeMap;
 
 /// The talk of a chain's agents in a cycle.

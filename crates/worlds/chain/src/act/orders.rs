@@ -7,10 +7,9 @@ use crate::driver::external::{OrderOutcome, Orders, Target};
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::execute_request;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{norm, normalized, sub, with_dimensions};
-use crate::rods::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
 use crate::state::Body;
+use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
+use sidestep_rods::{Chain, Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
 
 /// Number of times that the way is halved to find how far it goes: to 1/256 of it.
 const BISECTIONS: usize = 8;

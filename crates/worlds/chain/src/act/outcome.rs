@@ -5,11 +5,11 @@ use super::{ActState, Initiator};
 use crate::driver::TaskKind;
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::geometry::{Point, first_axis, normalized, with_dimensions};
-use crate::rods::veto::CompletedMotion;
 use crate::state::Body;
 use crate::world::purpose;
 use sidestep_kernel::distr::normal;
+use sidestep_rods::CompletedMotion;
+use sidestep_rods::geometry::{Point, first_axis, normalized, with_dimensions};
 
 /// Whether an initiator went where it wanted, or near it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,17 +1,17 @@
 //! Ways that are planned once local rules come no nearer to a target.
 
 use super::{ActState, ChainContext, Initiator};
-use crate::arms::plan::{
-    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
-};
 use crate::driver::Targets;
 use crate::events::EventKind;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::tunneling::find_tunneling;
 use crate::scratch::PositionBuffer;
 use crate::state::{Body, MotionPlan};
 use crate::world::purpose;
+use sidestep_arms::plan::{
+    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
+};
 use sidestep_kernel::InputError;
+use sidestep_rods::find_tunneling;
+use sidestep_rods::geometry::{Point, distance};
 use std::collections::VecDeque;
 
 /// Least part of a piece of the way that a cycle is worth.

@@ -3,11 +3,9 @@
 use super::Initiator;
 use crate::driver::{Task, TaskKind};
 use crate::motion::recovery::Situation;
-use crate::rods::chain::{Chain, Connector, Mobility};
-use crate::rods::geometry::distance;
-use crate::rods::obstacle::Obstacle;
-use crate::rods::veto::{Veto, VetoReason};
 use crate::state::Body;
+use sidestep_rods::geometry::distance;
+use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Veto, VetoReason};
 
 /// Extra distance, beyond a chain's own look, at which a moving obstacle may still come near,
 /// meters.

@@ -2,16 +2,17 @@
 
 use crate::events::EventKind;
 use crate::metrics::ChainTally;
-use crate::rods::geometry::distance;
 use crate::scenario::ChainScenario;
 use crate::state::Snapshot;
-use crate::{
-    Chain, ChainRun, ChainState, Connector, Motion, Obstacle, Obstacles, Propagator, Request,
-    RequestSource, Rod, VetoEffect,
-};
+use crate::{ChainRun, ChainState};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_rods::geometry::distance;
+use sidestep_rods::{
+    Chain, Connector, Motion, Obstacle, Obstacles, Propagator, Request, RequestSource, Rod,
+    VetoEffect,
+};
 use sidestep_scenario::Source as Text;
 use sidestep_testing::root;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -6,12 +6,12 @@ use super::{ActState, Initiator};
 use crate::driver::TaskKind;
 use crate::formation::Robot;
 use crate::navigate::{NavigationGoal, Navigator};
-use crate::rods::geometry::{Point, distance, move_toward, with_dimensions};
 use crate::state::Body;
 use crate::swarm::drive::{Pose2, Wheels};
 use crate::swarm::follower::speed_fraction;
 use crate::swarm::leader::Decision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
+use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
 
 /// Time for which a leader stands and waits for a robot that is late, s.
 const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;

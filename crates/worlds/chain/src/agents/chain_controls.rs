@@ -2,9 +2,9 @@
 
 use super::control::{Control, LeaderOutcome};
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::veto::Veto;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
+use sidestep_rods::Veto;
 
 /// Decisions of a chain's agents in a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

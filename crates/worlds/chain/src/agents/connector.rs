@@ -12,11 +12,6 @@ use super::percept::{ConnectorPercept, Role};
 use super::side::{PerSide, Side};
 use super::traffic::Traffic;
 use crate::motion::recovery::RecoveryLimits;
-use crate::rods::chain::{Chain, Rod};
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::local_solver::LocalSolver;
-use crate::rods::rules::Rules;
 use crate::world::ChainWorld;
 use climb::RecoveryProgress;
 use follow::SlaveMotion;
@@ -25,6 +20,9 @@ use sidestep_kernel::network::{
     ConversationId, DropCounts, DropReason, PacketHeader, RetryPolicy, digest, parse_packet,
 };
 use sidestep_kernel::{Cycle, EntityId, InputError};
+use sidestep_rods::geometry::Point;
+use sidestep_rods::local_solver::LocalSolver;
+use sidestep_rods::{Chain, Obstacles, Rod, Rules};
 
 /// Most packets that wait for the beginning of their cycle.
 const MAX_HELD_PACKETS: usize = 64;

@@ -2,10 +2,10 @@
 
 use super::traffic::Traffic;
 use crate::motion::recovery::{RecoveryMemory, RecoveryOutcome};
-use crate::rods::geometry::Point;
-use crate::rods::veto::Veto;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::Point;
 
 /// A connector's motion in a cycle, and the outcome of its talk.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,7 +38,7 @@ pub enum ConnectorMove<const D: usize> {
         /// The number.
         request: u32,
         /// Its new place, meters.
-        #[serde(with = "crate::rods::serde_point")]
+        #[serde(with = "sidestep_rods::serde_point")]
         to: Point<D>,
     },
     /// It has consented to a motion and heard nothing further of it: it goes if its master goes.
@@ -46,7 +46,7 @@ pub enum ConnectorMove<const D: usize> {
         /// The number of the motion.
         request: u32,
         /// Its new place, meters.
-        #[serde(with = "crate::rods::serde_point")]
+        #[serde(with = "sidestep_rods::serde_point")]
         to: Point<D>,
     },
 }

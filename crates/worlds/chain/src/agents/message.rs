@@ -2,12 +2,11 @@
 //! once, before an agent sees them.
 
 use super::link::Parcel;
-use crate::rods::chain::is_in_range;
-use crate::rods::geometry::Point;
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::{Outcome, RequestSource, Veto, VetoReason};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::network::{self, DropReason, PacketBuffer};
+use sidestep_rods::geometry::Point;
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{Outcome, RequestSource, Veto, VetoReason, is_in_range};
 use std::f64::consts::PI;
 
 /// Largest packet that is read, bytes; the largest that is ever sent is a fraction of it.
@@ -78,10 +77,10 @@ pub(super) struct Prepare<const D: usize> {
     /// Number of the sub-step; the one before is accepted.
     pub(super) sub_step: u32,
     /// The master before the sub-step,
-    #[serde(with = "crate::rods::serde_point")]
+    #[serde(with = "sidestep_rods::serde_point")]
     pub(super) mo: Point<D>,
     /// and after.
-    #[serde(with = "crate::rods::serde_point")]
+    #[serde(with = "sidestep_rods::serde_point")]
     pub(super) mn: Point<D>,
     /// The connector on the master's other side, if its place is settled.
     pub(super) prev: Option<WirePoint<D>>,
@@ -97,7 +96,7 @@ pub(super) struct Prepare<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Consent<const D: usize> {
     /// The slave's place after the sub-step.
-    #[serde(with = "crate::rods::serde_point")]
+    #[serde(with = "sidestep_rods::serde_point")]
     pub(super) at: Point<D>,
     /// Number of connectors that react, from the slave outward; 0 if it need not move.
     pub(super) touched: u32,
@@ -128,7 +127,7 @@ pub(super) struct LeadOrder<const D: usize> {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     /// The target.
-    #[serde(with = "crate::rods::serde_point")]
+    #[serde(with = "sidestep_rods::serde_point")]
     pub(super) to: Point<D>,
     pub(super) source: RequestSource,
     /// Whether there is no obstacle anywhere, and whether nothing in the world can object.

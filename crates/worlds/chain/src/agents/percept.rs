@@ -1,13 +1,11 @@
 //! Perception of a connector at the start of a cycle: all that its agent is given.
 
 use crate::motion::recovery::{RecoveryMemory, Situation};
-use crate::rods::chain::is_in_range;
-use crate::rods::geometry::{Core, Cuboid, Point, distance};
-use crate::rods::obstacle::Obstacle;
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::RequestSource;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, InputError};
+use sidestep_rods::geometry::{Core, Cuboid, Point, distance};
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{Obstacle, RequestSource, is_in_range};
 use std::f64::consts::PI;
 
 /// A connector's perception at the start of a cycle.

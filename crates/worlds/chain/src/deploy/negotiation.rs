@@ -4,13 +4,13 @@
 //! Its faults are those of any network ([`sidestep_kernel::network`]).
 
 use crate::agents::{ConnectorAgent, ConnectorPercept, Control};
-use crate::rods::geometry::distance;
 use crate::world::{ChainWorld, purpose};
 use sidestep_kernel::network::{
     AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyTiming,
 };
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
+use sidestep_rods::geometry::distance;
 
 /// The network of a chain for the talk of a cycle.
 #[derive(Debug, Clone, Copy)]

@@ -1,9 +1,8 @@
 //! The outcome of the decisions of a chain's connectors.
 
 use crate::agents::{ConnectorMove, Control, ExecutedMotion};
-use crate::rods::chain::{Chain, is_in_range};
-use crate::rods::geometry::{Point, distance};
-use crate::rods::motion_context::is_length_allowed;
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Chain, is_in_range, is_length_allowed};
 
 /// Returns the new places of a chain's connectors. At most one motion is carried out, all of it: where
 /// a participant's decision is missing, is another one, or would tear a rod, no connector moves.

@@ -3,12 +3,12 @@
 use crate::agents::side::Side;
 use crate::agents::{ConnectorPercept, Role, SensedObstacle};
 use crate::driver::Task;
-use crate::rods::obstacle::{Obstacles, bounds_around};
-use crate::rods::serde_point::WirePoint;
 use crate::state::Body;
 use crate::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId};
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{Obstacles, bounds_around};
 
 /// Distance beyond that needed by any motion, meters: far more than tolerances and rounding.
 const MARGIN_M: f64 = 1e-3;

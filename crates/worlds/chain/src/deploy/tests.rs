@@ -10,19 +10,17 @@ use crate::agents::side::Side;
 use crate::agents::{
     ConnectorAgent, ConnectorPercept, Control, Intention, LeaderOutcome, Role, SensedObstacle,
 };
+use crate::fixtures::random_worlds::AnyWorld;
 use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, RecoveryOutcome, Situation};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::Propagator;
-use crate::rods::propagate::tests::random_worlds::AnyWorld;
-use crate::rods::rules::Rules;
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::{Motion, Outcome, Request, RequestSource, VetoEffect};
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
+use sidestep_rods::geometry::Point;
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{
+    Chain, Motion, Obstacles, Outcome, Propagator, Request, RequestSource, Rules, VetoEffect,
+};
 
 /// A network with some faults and all the time that talks need.
 fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {

@@ -1,12 +1,11 @@
 //! The way of a connector or a rod within one cycle.
 
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
+use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::geometry::{
     Point, add, add_scaled, angle_rad, distance, first_axis, lerp, move_toward, norm, normalized,
     perpendicular, rejection, scaled, sub,
 };
-use crate::rods::veto::Motion;
-use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::{Chain, Motion};
 
 /// One request of a cycle: the moving part, its start and its destination.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +95,7 @@ fn middle<const D: usize>([a, b]: [Point<D>; 2]) -> Point<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::chain::{Connector, Rod};
+    use sidestep_rods::{Connector, Rod};
 
     /// Goes on errands of at most `step_m` until the rod is there; returns how many that took.
     fn carried<const D: usize>(start: [Point<D>; 2], to: [Point<D>; 2], step_m: f64) -> usize {

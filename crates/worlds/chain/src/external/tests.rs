@@ -1,10 +1,10 @@
 use crate::ChainRun;
-use crate::rods::geometry::norm;
 use crate::scenario::AnyChainScenario;
 use sidestep_kernel::control::{BufferMut, OrderLog, Orders, SpaceKind, Team};
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::view::{BodyId, BodyKind, FactValue};
 use sidestep_kernel::{Cycle, Simulation};
+use sidestep_rods::geometry::norm;
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 

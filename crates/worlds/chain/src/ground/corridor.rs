@@ -1,10 +1,10 @@
 //! Corridors: straight and bent legs between two walls (slides E2, N6).
 
 use super::GroundPose;
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacle;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::Obstacle;
+use sidestep_rods::geometry::Point;
 
 /// Approximate length of a piece of wall: bends are polygons of such pieces.
 pub const WALL_PIECE_M: f64 = 0.16;
@@ -182,11 +182,13 @@ impl Corridor {
 }
 
 #[cfg(test)]
+mod pull_tests;
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::{Core, distance};
-    use crate::rods::obstacle::Obstacles;
     use proptest::prelude::*;
+    use sidestep_rods::Obstacles;
+    use sidestep_rods::geometry::{Core, distance};
 
     fn leg() -> impl Strategy<Value = Leg> {
         prop_oneof![

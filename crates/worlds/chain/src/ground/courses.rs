@@ -3,11 +3,11 @@
 //! Every course is a closed formula of time: nothing keeps a state, any worker computes any
 //! obstacle at any moment, and a checkpoint needs only the time.
 
-use crate::rods::geometry::{
+use sidestep_kernel::InputError;
+use sidestep_rods::Obstacle;
+use sidestep_rods::geometry::{
     Bounds, Point, distance, is_finite, lerp, norm, normalized, scaled, sub,
 };
-use crate::rods::obstacle::Obstacle;
-use sidestep_kernel::InputError;
 
 /// The course of a moving body.
 #[derive(Debug, Clone, PartialEq)]
@@ -216,8 +216,8 @@ impl<const D: usize> Movers<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::{Core, add};
     use proptest::prelude::*;
+    use sidestep_rods::geometry::{Core, add};
 
     const ROOM: Bounds<2> = Bounds { lo: [-5.0, -3.0], hi: [6.0, 4.0] };
 

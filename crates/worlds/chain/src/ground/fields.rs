@@ -2,10 +2,10 @@
 
 use super::courses::{Course, Mover};
 use super::purposes;
-use crate::rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
-use crate::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
+use sidestep_rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
+use sidestep_rods::{Obstacle, Obstacles};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
@@ -73,7 +73,7 @@ impl<const D: usize> Field<D> {
                 "{n} obstacles of radius {} m and length {} m for {} of its room",
                 self.radius_m, self.length_m, self.part
             ),
-            "give a room, a part from 0 on and a positive radius that make at most 1e7 obstacles",
+            "give a room, a fill_fraction from 0 on and a positive radius that make at most 1e7 obstacles",
         ))
     }
 
@@ -204,7 +204,7 @@ fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::norm;
+    use sidestep_rods::geometry::norm;
 
     fn field<const D: usize>(part: f64, length_m: f64) -> Field<D> {
         let mut tail = [0.0; D];

@@ -5,14 +5,14 @@
 //! such an edge. It is also compact: a straight wall is one segment, where a box would have four
 //! sides, and the inside of solid areas needs nothing. No chain gets there, because walls that meet
 //! share their corners bit for bit, and no motion passes through a wall, however thin (see
-//! [`sweep`](crate::rods::sweep)). The walls do not detect a chain that starts inside a solid area;
+//! [`Sweep`](sidestep_rods::Sweep)). The walls do not detect a chain that starts inside a solid area;
 //! [`Floor::is_free`] does.
 
-use crate::rods::geometry::{Bounds, Point, add, add_scaled, dot, scaled, sub};
-use crate::rods::obstacle::Obstacle;
 use sidestep_import::PixelMap;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::{Cell, UnknownPolicy};
+use sidestep_rods::Obstacle;
+use sidestep_rods::geometry::{Bounds, Point, add, add_scaled, dot, scaled, sub};
 
 /// A plane of pixels, free or solid.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,10 +178,10 @@ fn for_each_run(n: i64, is: impl Fn(i64) -> bool, mut tell: impl FnMut(i64, i64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::{Core, Cuboid, distance};
     use proptest::prelude::*;
     use sidestep_import::rosmap;
     use sidestep_kernel::view::Isometry2;
+    use sidestep_rods::geometry::{Core, Cuboid, distance};
     use sidestep_testing::shared_data as shared;
 
     /// A floor drawn at random, turned and stretched.
@@ -247,7 +247,7 @@ mod tests {
             );
             let way = [point(0), point(2)];
             let crosses = |wall: &Obstacle<2>| match wall.core {
-                Core::Segment(ends) => crate::rods::geometry::segments_cross(way, ends),
+                Core::Segment(ends) => sidestep_rods::geometry::segments_cross(way, ends),
                 _ => false,
             };
             let crossed = floor.walls(0).iter().filter(|wall| crosses(wall)).count();

@@ -18,8 +18,8 @@ pub use courses::{Course, Mover, Movers};
 pub use floor::Floor;
 pub use site::Site;
 
-use super::rods::geometry::Point;
 use sidestep_kernel::stream::Purpose;
+use sidestep_rods::geometry::Point;
 
 /// A place in the plane and a heading.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,12 +1,12 @@
 //! Room for a chain on a floor: a start for its leader, and a free way behind it.
 
 use super::{GroundPose, Site, purposes};
-use crate::rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
-use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_map::planning::{Distances, FreeSpace, STEPS};
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
 
 /// Random places that are tried.
 const MAX_PLACES: u64 = 20_000;
@@ -260,10 +260,10 @@ fn length_m(way: &[Point<2>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::chain::{Chain, Connector, Rod};
     use sidestep_import::{PixelMap, rosmap, stage};
     use sidestep_kernel::view::Isometry2;
     use sidestep_map::{Cell, UnknownPolicy};
+    use sidestep_rods::{Chain, Connector, Rod};
     use sidestep_testing::shared_data as shared;
 
     const WANTED: SpaceRequirement = SpaceRequirement {

@@ -2,11 +2,11 @@
 
 use super::GroundPose;
 use super::floor::Floor;
-use crate::rods::geometry::{Bounds, Core, Cuboid, Point};
-use crate::rods::obstacle::{Obstacle, outline};
 use sidestep_import::{PixelMap, stage};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::UnknownPolicy;
+use sidestep_rods::geometry::{Bounds, Core, Cuboid, Point};
+use sidestep_rods::{Obstacle, outline};
 
 /// Floors, and solid things that stand on them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -57,7 +57,7 @@ impl Site {
     }
 
     /// Returns whether a place is on no solid pixel. Boxes are ignored: see
-    /// [`Obstacles::clearance_m`](crate::rods::Obstacles::clearance_m).
+    /// [`Obstacles::clearance_m`](sidestep_rods::Obstacles::clearance_m).
     pub fn is_free(&self, at: Point<2>) -> bool {
         self.floors.iter().all(|floor| floor.is_free(at))
     }
@@ -83,7 +83,7 @@ fn cuboid(pose: GroundPose, size_m: [f64; 2]) -> Cuboid<2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::obstacle::Obstacles;
+    use sidestep_rods::Obstacles;
     use sidestep_testing::shared_data as shared;
 
     #[test]

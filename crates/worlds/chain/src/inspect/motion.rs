@@ -2,13 +2,13 @@
 
 use super::{ConnectorInspection, line};
 use crate::motion::recovery::RecoveryOutcome;
-use crate::rods::geometry::{Point, distance, sub, with_dimensions};
-use crate::rods::veto::CompletedMotion;
 use crate::view::obstacle_body_id;
 use sidestep_kernel::geometry::angle_rad;
 use sidestep_kernel::view::{
     BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, Quantity,
 };
+use sidestep_rods::CompletedMotion;
+use sidestep_rods::geometry::{Point, distance, sub, with_dimensions};
 use std::borrow::Cow;
 
 /// Connectors that are told, at most.

@@ -16,16 +16,12 @@ mod simultaneous;
 mod tests;
 mod threat;
 
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, norm};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::propagate::Propagator;
-use crate::rods::rules::Rules;
-use crate::rods::veto::Veto;
 use literal::LiteralEscape;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, norm};
+use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, Rules, Veto};
 pub use simultaneous::EscapePlan;
 pub(crate) use simultaneous::LeadMotion;
 use simultaneous::SimultaneousEscape;

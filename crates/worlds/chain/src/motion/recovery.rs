@@ -11,19 +11,17 @@ mod memory;
 mod tests;
 
 use super::request::execute_request;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
-    Point, add, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
-};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::Propagator;
-use crate::rods::veto::{
-    CompletedMotion, Motion, Outcome, Request, RequestSource, Veto, VetoEffect,
-};
 pub(crate) use memory::RecoveryMemory;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
+};
+use sidestep_rods::{
+    Chain, CompletedMotion, Motion, Obstacles, Outcome, Propagator, Request, RequestSource, Veto,
+    VetoEffect,
+};
 
 /// Parts of a step that are tried when the whole step is vetoed.
 const STEP_FRACTIONS: [f64; 3] = [0.5, 0.25, 0.125];

@@ -1,15 +1,12 @@
 //! One motion of a chain: by propagation, or by a reach if a held connector objects.
 
-use crate::arms::ik::{ChainIkGoal, Engine, IkSolver};
-use crate::rods::chain::{Chain, Connector, Mobility};
-use crate::rods::geometry::{Point, distance, lerp};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::propagate::Propagator;
-use crate::rods::reach::{ReachOutcome, ReachRequest, reach};
-use crate::rods::rules::Rules;
-use crate::rods::tunneling::find_tunneling;
-use crate::rods::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoReason};
+use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver};
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, distance, lerp};
+use sidestep_rods::{
+    Chain, CompletedMotion, Connector, Mobility, Motion, Obstacles, Outcome, Propagator,
+    ReachOutcome, ReachRequest, Request, Rules, Veto, VetoReason, find_tunneling, reach,
+};
 
 /// Moves a chain as requested; if a connector objects that must stay at its place, or on its line, its plane
 /// or in its box, by [`reach`].
@@ -269,8 +266,7 @@ fn motion_since<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::chain::Rod;
-    use crate::rods::veto::{RequestSource, VetoEffect};
+    use sidestep_rods::{RequestSource, Rod, VetoEffect};
 
     /// An arm of two rods, bent a little; the base is fixed.
     fn arm() -> Chain<2> {
@@ -290,7 +286,7 @@ mod tests {
         let mut most_m = 0.0;
         for _ in 0..400 {
             let (before, at) = (chain.points().to_vec(), chain.points()[2]);
-            let to = crate::rods::geometry::move_toward(at, [1.199_94, 1.599_92], step_m);
+            let to = sidestep_rods::geometry::move_toward(at, [1.199_94, 1.599_92], step_m);
             let motion = Motion::Connector { k: 2, to };
             let request =
                 Request { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
@@ -312,7 +308,7 @@ mod tests {
             let target = [0.5 * n_rods as f64, 0.0];
             for _ in 0..4000 {
                 let before = arm.points().to_vec();
-                let to = crate::rods::geometry::move_toward(before[n_rods], target, 0.04);
+                let to = sidestep_rods::geometry::move_toward(before[n_rods], target, 0.04);
                 let request = Request::exact(n_rods, to);
                 execute_request(
                     &mut Propagator::new(rules),
@@ -350,7 +346,7 @@ mod tests {
         for place in places {
             for _ in 0..2000 {
                 let before = chain.points().to_vec();
-                let to = crate::rods::geometry::move_toward(before[k], *place, 0.01);
+                let to = sidestep_rods::geometry::move_toward(before[k], *place, 0.01);
                 let request = Request::exact(k, to);
                 let came = execute_request(
                     &mut Propagator::new(rules),

@@ -1,10 +1,10 @@
 //! Arms from URDF files.
 
-use super::super::arms::arm::Arm;
-use super::super::arms::kinematics::SerialChain;
 use super::Compiler;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_arms::Arm;
+use sidestep_arms::kinematics::SerialChain;
 use sidestep_import::urdf::Model;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_kernel::InputError;

@@ -1,14 +1,10 @@
 //! Chains: their shape, their limits, and their start.
 
-use super::super::arms::arm::Arm;
 use super::super::driver::{Task, TaskKind};
 use super::super::formation::Robots;
 use super::super::ground::Site;
 use super::super::ground::route::{SpaceRequirement, find_placement};
 use super::super::motion::escape::{EscapeMethod, EscapeRules};
-use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
-use super::super::rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
-use super::super::rods::obstacle::Obstacles;
 use super::super::world::{ChainSpec, Change, ChangeKind};
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
@@ -19,7 +15,10 @@ use super::tasks::TaskSection;
 use super::{BoxSection, Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_arms::Arm;
 use sidestep_kernel::{InputError, Seed, math};
+use sidestep_rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacles, Rod};
 use sidestep_scenario::{NumberRange, Sections, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
@@ -636,7 +635,7 @@ fn folded<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::distance;
+    use sidestep_rods::geometry::distance;
 
     #[test]
     fn a_folded_chain_has_rods_of_one_length_and_lies_in_its_room() {

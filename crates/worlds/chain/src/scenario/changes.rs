@@ -1,13 +1,13 @@
 //! Changes to a chain during a run.
 
-use super::super::rods::chain::Chain;
-use super::super::rods::rebuild::MovableEnd;
 use super::super::world::{Change, ChangeKind};
 use super::mobility::MobilitySection;
 use super::{Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
+use sidestep_rods::Chain;
+use sidestep_rods::rebuild::MovableEnd;
 use sidestep_scenario::{NonNegative, Number, Open, Spanned};
 use std::ops::Range;
 

@@ -3,10 +3,9 @@
 use super::{ChainSpec, Compiler};
 use crate::deploy::deployment::Deployment;
 use crate::driver::TaskKind;
-use crate::rods::chain::Mobility;
-use crate::rods::rules::Rules;
 use crate::world::ChangeKind;
 use sidestep_kernel::InputError;
+use sidestep_rods::{Mobility, Rules};
 
 /// A key, the reason why its value needs a view of the whole chain, and the remedy.
 type NonLocalKey = (String, String, &'static str);

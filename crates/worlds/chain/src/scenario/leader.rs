@@ -1,13 +1,13 @@
 //! Refusals of tasks that their connector can never do.
 
-use super::super::arms::arm::Arm;
 use super::super::driver::{Task, TaskKind};
-use super::super::rods::chain::{Chain, Mobility};
-use super::super::rods::geometry::distance;
 use super::Compiler;
 use super::chains::ChainSection;
 use super::tasks::TaskSection;
+use sidestep_arms::Arm;
 use sidestep_kernel::InputError;
+use sidestep_rods::geometry::distance;
+use sidestep_rods::{Chain, Mobility};
 use sidestep_scenario::Spanned;
 
 impl<const D: usize> Compiler<'_, D> {

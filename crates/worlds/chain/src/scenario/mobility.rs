@@ -1,9 +1,9 @@
 //! Constraints on the places of a connector.
 
-use super::super::rods::chain::Mobility;
 use super::PointValue;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_rods::Mobility;
 
 /// The places where a connector may be.
 #[derive(Debug, Deserialize, JsonSchema)]

@@ -2,9 +2,6 @@
 
 use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
-use super::super::rods::chain::Chain;
-use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
-use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::{ChainSpec, push_parts};
 use super::{Compiler, MAX_VALUE, Measure, PointValue};
 use schemars::JsonSchema;
@@ -12,6 +9,8 @@ use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
+use sidestep_rods::geometry::{Bounds, Core, Cuboid, Point};
+use sidestep_rods::{Chain, Obstacle, Obstacles, outline};
 use sidestep_scenario::{NumberRange, Spanned};
 use std::ops::{Range, RangeInclusive};
 
@@ -95,6 +94,8 @@ pub(super) struct FieldSection<const D: usize> {
     lo_m: PointValue<D>,
     /// Upper corner of the field.
     hi_m: PointValue<D>,
+    fill_fraction: Option<f64>,
+    /// Earlier name of fill_fraction.
     part: Option<f64>,
     /// Number of balls that move.
     n: Option<u32>,
@@ -389,7 +390,11 @@ impl<const D: usize> Compiler<'_, D> {
         // Every field has its own places.
         let seed = Seed(self.head.seed.wrapping_add(number << 32));
         let NumberRange { low: least, high: greatest } = s.radius_m;
-        match (s.part, s.n, s.speed_m_s) {
+        if s.fill_fraction.is_some() && s.part.is_some() {
+            let cause = "`part` is an earlier name of `fill_fraction`, which is also given";
+            return Err(self.source.error(section.span(), cause, "leave out `part`"));
+        }
+        match (s.fill_fraction.or(s.part), s.n, s.speed_m_s) {
             (Some(part), None, None) if least == greatest => {
                 let length_m = s.length_m.unwrap_or(0.0);
                 let field = Field { room, part, radius_m: least, length_m, keep_clear, keep_m };
@@ -403,7 +408,7 @@ impl<const D: usize> Compiler<'_, D> {
                 all.next_id += n;
             }
             _ => {
-                let remedy = "give part, one radius_m and maybe length_m for obstacles that stand \
+                let remedy = "give fill_fraction, one radius_m and maybe length_m for obstacles that stand \
                               still, or n and speed_m_s for balls that move";
                 let cause = "a field that is neither still nor moving";
                 return Err(self.source.error(section.span(), cause, remedy));

@@ -1,13 +1,12 @@
 //! Checks that chains have their places to themselves at the start.
 
 use super::super::metrics::PENETRATION_THRESHOLD_M;
-use super::super::rods::chain::Chain;
-use super::super::rods::geometry::Bounds;
-use super::super::rods::obstacle::{Obstacle, Obstacles};
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
 use super::Compiler;
 use super::obstacles::Ground;
 use sidestep_kernel::{InputError, Slot};
+use sidestep_rods::geometry::Bounds;
+use sidestep_rods::{Chain, Obstacle, Obstacles};
 use std::ops::Range;
 
 /// A part of a chain that is inside a solid.

@@ -129,3 +129,17 @@ fn keys_that_have_no_effect_are_refused() {
     let chain = format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\n{task}");
     assert_refused(&format!("{corridor}{chain}"), &["`unknown` does nothing", "ground.map"]);
 }
+
+#[test]
+fn a_field_may_be_given_by_the_earlier_name_of_its_fill_fraction() {
+    let field = |keys: &str| {
+        format!(
+            "[[fields]]\nlo_m = [1, 1]\nhi_m = [9, 9]\nradius_m = 0.5\n{keys}\n\
+             [[chains]]\nconnectors = 2\nat_m = [0, 0]\nrod_m = 0.5\n[[chains.tasks]]\nkind = \"wander\"\n"
+        )
+    };
+    assert_valid(&field("fill_fraction = 0.1"));
+    assert_valid(&field("part = 0.1"));
+    let words = ["earlier name of `fill_fraction`", "leave out `part`"];
+    assert_refused(&field("part = 0.1\nfill_fraction = 0.1"), &words);
+}

@@ -1,9 +1,9 @@
 //! Two driven wheels on one axle.
 
-use crate::rods::geometry::Point;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
+use sidestep_rods::geometry::Point;
 use std::f64::consts::FRAC_PI_4;
 
 /// Place and heading of a robot.
@@ -135,8 +135,8 @@ fn sine_ratio(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::distance;
     use proptest::prelude::*;
+    use sidestep_rods::geometry::distance;
 
     fn drive() -> DifferentialDrive {
         DifferentialDrive::new(0.4, 1.0).unwrap()

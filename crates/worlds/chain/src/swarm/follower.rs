@@ -8,10 +8,10 @@
 use super::drive::{DifferentialDrive, Pose2, Wheels};
 use super::laser::RobotBody;
 use super::proximity::{Gaps, SECTOR_RAD, SensorRing, safe_speed_m_s};
-use crate::rods::geometry::{Point, add_scaled, dot, norm, sub};
-use crate::rods::obstacle::Obstacles;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{Point, add_scaled, dot, norm, sub};
 use std::f64::consts::PI;
 
 /// A follower: its wheels, its sensors and the parameters of its behavior.
@@ -176,9 +176,9 @@ pub(crate) fn speed_fraction(worst_lag_m: f64, limit_m: f64) -> f64 {
 mod tests {
     use super::super::ray::tests::any_core;
     use super::*;
-    use crate::rods::geometry::distance;
-    use crate::rods::obstacle::{Obstacle, Obstacles};
     use proptest::prelude::*;
+    use sidestep_rods::geometry::distance;
+    use sidestep_rods::{Obstacle, Obstacles};
 
     const DT_S: f64 = 0.02;
 

@@ -2,12 +2,12 @@
 
 use super::drive::Pose2;
 use super::ray;
-use crate::rods::geometry::{Bounds, Core, Point};
-use crate::rods::obstacle::{Obstacle, Obstacles, bounds_around};
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
 use sidestep_kernel::stream::{Draws, Purpose};
+use sidestep_rods::geometry::{Bounds, Core, Point};
+use sidestep_rods::{Obstacle, Obstacles, bounds_around};
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
@@ -307,11 +307,11 @@ fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
 mod tests {
     use super::super::ray::tests::{any_core, marched_m};
     use super::*;
-    use crate::rods::geometry::add_scaled;
-    use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
     use sidestep_kernel::stream::Streams;
+    use sidestep_rods::Obstacle;
+    use sidestep_rods::geometry::add_scaled;
 
     fn draws() -> Draws {
         Streams::new(Seed(5)).draws(0, 0, LASER_NOISE)

@@ -15,11 +15,11 @@
 use super::drive::{Pose2, Wheels, steer};
 use super::laser::{Laser, RobotBody, Scan};
 use super::ray;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::obstacle::Obstacles;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{Point, distance};
 
 /// One of the six layers, with the number that the slides give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -476,8 +476,8 @@ mod tests {
 
     #[test]
     fn a_target_behind_a_wall_is_seen_by_who_may_see_through_it() {
-        use crate::rods::obstacle::Obstacle;
         use sidestep_kernel::{Seed, stream::Streams};
+        use sidestep_rods::Obstacle;
         let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
         let around = Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
@@ -496,8 +496,8 @@ mod tests {
 
     #[test]
     fn what_moves_is_waited_for_and_is_no_wall_until_patience_ends() {
-        use crate::rods::obstacle::Obstacle;
         use sidestep_kernel::{Seed, stream::Streams};
+        use sidestep_rods::Obstacle;
         let leader = leader(WallLossRule::Latched);
         let sees = |at, velocity_m_s, is_patient| {
             let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };

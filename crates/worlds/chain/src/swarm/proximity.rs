@@ -4,9 +4,9 @@
 use super::drive::Pose2;
 use super::laser::RobotBody;
 use super::ray;
-use crate::rods::geometry::{Core, sub};
-use crate::rods::obstacle::{Obstacles, bounds_around};
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
+use sidestep_rods::geometry::{Core, sub};
+use sidestep_rods::{Obstacles, bounds_around};
 use std::f64::consts::TAU;
 
 /// Number of sensors. The first looks ahead, the others follow counterclockwise.
@@ -100,8 +100,8 @@ pub(crate) fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, hori
 mod tests {
     use super::super::ray::tests::any_core;
     use super::*;
-    use crate::rods::obstacle::Obstacle;
     use proptest::prelude::*;
+    use sidestep_rods::Obstacle;
 
     const RING: SensorRing = SensorRing { radius_m: 0.25, range_m: 0.15 };
 

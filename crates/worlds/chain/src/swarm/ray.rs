@@ -1,9 +1,9 @@
 //! Exact distances from a point along a ray to the first obstacle, in the plane.
 
-use crate::rods::geometry::{
+use sidestep_rods::Obstacles;
+use sidestep_rods::geometry::{
     Bounds, Core, Point, add, cross_2d, distance, dot, normalized, perpendicular, scaled, sub,
 };
-use crate::rods::obstacle::Obstacles;
 
 /// Returns the distance at which a ray from `from` along the unit vector `u` enters the region
 /// within `radius_m` of a core; 0 from inside, `None` if it never does.
@@ -97,9 +97,9 @@ pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::rods::geometry::{Cuboid, add_scaled};
     use proptest::prelude::*;
     use sidestep_kernel::math::{cos, sin};
+    use sidestep_rods::geometry::{Cuboid, add_scaled};
 
     /// Marches along the ray by the distance to the core, which never oversteps.
     pub(crate) fn marched_m(
@@ -163,7 +163,7 @@ pub(super) mod tests {
             a in prop::array::uniform2(-3.0..3.0f64), b in prop::array::uniform2(-3.0..3.0f64),
             part in 0.01..0.99f64,
         ) {
-            let at = crate::rods::geometry::lerp(a, b, part);
+            let at = sidestep_rods::geometry::lerp(a, b, part);
             let Some(u) = normalized(sub(at, from)) else { return Ok(()) };
             prop_assume!(cross_2d(u, sub(b, a)).abs() > 1e-3);
             let hit_m = distance_m(from, u, &Core::Segment([a, b]), 0.0).unwrap();

@@ -48,13 +48,13 @@ impl Behaviour for StallDetector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decide::{Random, UNSEEN};
+    use crate::decide::{RandomPolicy, UNSEEN};
     use sidestep_kernel::Seed;
     use sidestep_kernel::stream::{Purpose, Streams};
 
     #[test]
     fn vain_steps_count_as_a_contact_and_steps_that_lead_on_do_not() {
-        let patient = StallDetector { inner: Arc::new(Random::bounce()) };
+        let patient = StallDetector { inner: Arc::new(RandomPolicy::bounce()) };
         let turns = |stride: u32| {
             let (mut memory, streams) = (Memory::default(), Streams::new(Seed(1)));
             let action = |now: u32| {

@@ -4,7 +4,7 @@ use super::MarkovModel;
 use super::markov_chain::total_variation;
 use super::obstacle::GridPose;
 use crate::RobotsRun;
-use crate::decide::Random;
+use crate::decide::RandomPolicy;
 use crate::purpose;
 use crate::scenario::Compiled;
 use crate::world::{RobotsWorld, Role};
@@ -49,7 +49,7 @@ pub struct Comparison {
 pub fn compare(
     compiled: &Compiled,
     source: &Source,
-    policy: &Random,
+    policy: &RandomPolicy,
     cycles: u64,
     runs: u32,
 ) -> Result<Comparison, InputError> {
@@ -103,7 +103,7 @@ pub fn sampling_limit(distribution: &[f64], samples: f64, significance: f64) -> 
 fn count_final_poses(
     compiled: &Compiled,
     source: &Source,
-    policy: &Random,
+    policy: &RandomPolicy,
     cycles: u64,
     runs: u32,
 ) -> BTreeMap<GridPose, u32> {
@@ -127,7 +127,7 @@ fn run_seed(seed: u64, run: u64) -> Seed {
 }
 
 /// Gives the robots another behavior.
-fn set_policy(world: &mut RobotsWorld, policy: &Random) {
+fn set_policy(world: &mut RobotsWorld, policy: &RandomPolicy) {
     for ty in &mut world.types {
         if let Role::Robot(model) = &mut ty.role {
             model.behaviour = Arc::new(policy.clone());

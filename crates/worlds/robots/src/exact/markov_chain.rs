@@ -4,7 +4,7 @@
 use super::obstacle::GridPose;
 use super::sparse::SparseMatrix;
 use super::{MarkovModel, ModelTransition};
-use crate::decide::Random;
+use crate::decide::RandomPolicy;
 use serde::Serialize;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
@@ -55,7 +55,7 @@ const CONVERGENCE_TOLERANCE: f64 = 1e-13;
 const MAX_MULTIPLICATIONS: usize = 5_000_000_000;
 
 impl MarkovChain {
-    pub(super) fn new(model: &MarkovModel, policy: &Random) -> Result<Self, InputError> {
+    pub(super) fn new(model: &MarkovModel, policy: &RandomPolicy) -> Result<Self, InputError> {
         check_actions(model, policy)?;
         let mut index_of = BTreeMap::from([((0, false), 0)]);
         let mut found = vec![(0, false)];
@@ -162,7 +162,7 @@ pub fn total_variation(p: &[f64], q: &[f64]) -> f64 {
     0.5 * p.iter().zip(q).map(|(a, b)| (a - b).abs()).sum::<f64>()
 }
 
-fn check_actions(model: &MarkovModel, policy: &Random) -> Result<(), InputError> {
+fn check_actions(model: &MarkovModel, policy: &RandomPolicy) -> Result<(), InputError> {
     let known = model.actions().len();
     let unknown = |row: &[f64]| row.iter().skip(known).any(|&p| p > 0.0);
     if !unknown(policy.probabilities(false)) && !unknown(policy.probabilities(true)) {
@@ -175,7 +175,7 @@ fn check_actions(model: &MarkovModel, policy: &Random) -> Result<(), InputError>
 /// Returns the states after one action chosen by the policy, unmerged.
 fn successors<'a>(
     model: &'a MarkovModel,
-    policy: &'a Random,
+    policy: &'a RandomPolicy,
     pose: u32,
     after_contact: bool,
 ) -> impl Iterator<Item = ((u32, bool), f64)> + 'a {

@@ -3,10 +3,9 @@
 use super::MarkovModel;
 use super::obstacle::GridPose;
 use super::static_map::StaticMap;
-use crate::ray::{Crossing, crossings, turn_crossing};
-use crate::sensor::Reading;
-use crate::state::FREE;
+use crate::sensor::{FREE, Reading};
 use crate::world::MountedSensor;
+use sidestep_error_models::ray::{Crossing, crossings, turn_crossing};
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
 

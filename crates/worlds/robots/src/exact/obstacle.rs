@@ -4,7 +4,7 @@
 //! coordinates, where the simulator walks lists of prepared offsets. The tests compare the two.
 
 use crate::effector::{ObstacleRule, Side, Transition};
-use crate::state::FREE;
+use crate::sensor::FREE;
 use std::collections::BTreeMap;
 
 /// Place and heading of a body.

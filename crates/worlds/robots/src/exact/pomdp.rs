@@ -14,9 +14,7 @@ mod text;
 use super::observe::{Beam, MountedBeam, forward_beam};
 use super::sparse::SparseMatrix;
 use super::{MarkovModel, ModelTransition, names};
-use crate::effector::Side;
-use crate::perceive::reading_names;
-use crate::rows::HEADING_NAMES;
+use crate::effector::{HEADING_NAMES, Side};
 use crate::sensor::Reading;
 use serde::Serialize;
 use sidestep_kernel::InputError;
@@ -277,7 +275,7 @@ fn observation_name(
     let felt = contact.map_or("free".into(), |(kind, side)| contact_name(model, kind, side));
     let readings = readings.iter().zip(beams).map(|(&(observation, class), beam)| {
         let reading = Reading { observation, class };
-        match reading_names(reading, &beam.sensor.model) {
+        match beam.sensor.model.names_of(reading) {
             (seen, _) if observation == 0 => seen.to_string(),
             (seen, class) => format!("{seen}-{class}"),
         }

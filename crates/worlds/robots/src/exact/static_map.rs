@@ -3,7 +3,7 @@
 use super::obstacle::GridPose;
 use crate::effector::{ActionId, Transition};
 use crate::scenario::Compiled;
-use crate::state::{FREE, WALL};
+use crate::sensor::{FREE, WALL};
 use crate::world::{Body, Door, RobotBody, RobotModel, Role};
 use sidestep_kernel::distr::Bernoulli;
 use sidestep_kernel::{EntityId, InputError};

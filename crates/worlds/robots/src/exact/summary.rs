@@ -2,7 +2,7 @@
 
 use super::markov_chain::{Convergence, StationaryDistribution};
 use super::{Comparison, MarkovChain, MarkovModel, PomdpSize};
-use crate::decide::Random;
+use crate::decide::RandomPolicy;
 use serde::Serialize;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
@@ -46,7 +46,12 @@ impl MarkovModel {
     ///
     /// # Errors
     /// When the policy does not fit the robot.
-    pub fn summary(&self, name: &str, policy: &Random, top: usize) -> Result<Summary, InputError> {
+    pub fn summary(
+        &self,
+        name: &str,
+        policy: &RandomPolicy,
+        top: usize,
+    ) -> Result<Summary, InputError> {
         let chain = self.chain(policy)?;
         let stationary = chain.stationary();
         Ok(Summary {

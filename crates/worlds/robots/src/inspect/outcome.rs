@@ -3,7 +3,8 @@
 use super::Inspector;
 use crate::Scratch;
 use crate::act::WalkResult;
-use crate::effector::{Action, ObstacleRule, StepPath};
+use crate::action::{Action, StepPath};
+use crate::effector::ObstacleRule;
 use crate::world::Role;
 use sidestep_kernel::Slot;
 use sidestep_kernel::space::BoxWord;

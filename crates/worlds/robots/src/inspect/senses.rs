@@ -77,7 +77,7 @@ impl<T: BoxWord> Inspector<'_, T> {
     fn row(&self, beam: &BeamReading<'_, T>) -> [FactValue; 10] {
         let BeamReading { sensor, truth, reported, .. } = *beam;
         let sector = ["ahead", "left", "behind", "right"][beam.sector as usize];
-        let names = |reading| crate::perceive::reading_names(reading, &sensor.model);
+        let names = |reading| sensor.model.names_of(reading);
         let row = sensor.model.reading_row(truth, sensor.is_reliable());
         let chance = row.iter().filter(|(reading, _)| *reading == reported).map(|(_, p)| p).sum();
         [
@@ -110,7 +110,7 @@ impl<T: BoxWord> Inspector<'_, T> {
             let end_m = [x_m + reach_m * cos(toward_rad), y_m + reach_m * sin(toward_rad), z_m];
             MarkShape::Line { points_m: vec![[x_m, y_m, z_m], end_m] }
         };
-        let name = |reading| crate::perceive::reading_names(reading, &beam.sensor.model).0;
+        let name = |reading| beam.sensor.model.names_of(reading).0;
         let true_m = self.true_range_m(beam);
         let weight = |is_there: bool| if is_there { 1.0 } else { 0.25 };
         let (is_met, is_reported) = (true_m.is_finite(), beam.reported.observation != NOTHING);

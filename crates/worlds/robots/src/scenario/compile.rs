@@ -20,13 +20,12 @@ use super::{
     BehaviourSection, DoorSection, EffectorSection, MapSection, MoverSection, ProfileFile,
     RecordSection, RobotSection, RobotsFile, SensorSection,
 };
+use crate::action::{Action, own_boxes};
 use crate::decide::{
     Announce, Avoidance, Behaviour, External, Goto, Planner, Replay, Sector, SensorTrust, Shuttle,
     StallDetector, Wander,
 };
-use crate::effector::{
-    Action, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition, own_boxes,
-};
+use crate::effector::{EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;

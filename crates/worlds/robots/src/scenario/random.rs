@@ -1,7 +1,7 @@
 //! The behavior `random` of a scenario: weights by the actions' names.
 
 use super::BehaviourSection;
-use crate::decide::Random;
+use crate::decide::RandomPolicy;
 use sidestep_scenario::suggestion;
 use std::collections::BTreeMap;
 
@@ -13,10 +13,10 @@ pub(super) type UnlocatedError = (String, String);
 pub(super) fn behaviour(
     s: &BehaviourSection,
     actions: &[String],
-) -> Result<Random, UnlocatedError> {
+) -> Result<RandomPolicy, UnlocatedError> {
     let Some(usual) = &s.weights else {
         return match &s.weights_after_contact {
-            None => Ok(Random::uniform()),
+            None => Ok(RandomPolicy::uniform()),
             Some(_) => Err((
                 "`weights_after_contact` without `weights`".into(),
                 "add weights = { forward = 1 }".into(),
@@ -24,7 +24,7 @@ pub(super) fn behaviour(
         };
     };
     let after_contact = s.weights_after_contact.as_ref().unwrap_or(usual);
-    let random = Random::new(row(usual, actions)?, row(after_contact, actions)?);
+    let random = RandomPolicy::new(row(usual, actions)?, row(after_contact, actions)?);
     Ok(random.expect("the rows were brought to sum to 1"))
 }
 
@@ -54,7 +54,7 @@ pub(super) fn action_id(name: &str, actions: &[String]) -> Result<usize, Unlocat
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Random, UnlocatedError> {
+    fn read(text: &str) -> Result<RandomPolicy, UnlocatedError> {
         let section: BehaviourSection = toml::from_str(text).expect("a section");
         behaviour(&section, &["forward", "left", "right", "stay", "spin"].map(String::from))
     }
@@ -64,7 +64,7 @@ mod tests {
         let random = read("kind = 'random'\nweights = { forward = 3, spin = 1 }").expect("fits");
         assert_eq!(random.probabilities(false), [0.75, 0.0, 0.0, 0.0, 0.25]);
         assert_eq!(random.probabilities(true), [0.75, 0.0, 0.0, 0.0, 0.25]);
-        assert_eq!(read("kind = 'random'").expect("fits"), Random::uniform());
+        assert_eq!(read("kind = 'random'").expect("fits"), RandomPolicy::uniform());
     }
 
     #[test]

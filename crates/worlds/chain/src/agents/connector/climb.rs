@@ -11,9 +11,9 @@ use crate::agents::message::{LeadOrder, Message};
 use crate::agents::percept::Intention;
 use crate::agents::side::Side;
 use crate::motion::recovery::{ChainEnd, ChainMover, RecoveryLadder, RecoveryOutcome, farther_end};
-use crate::rods::geometry::{Point, normalized, sub};
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::{Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
+use sidestep_rods::geometry::{Point, normalized, sub};
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
 
 /// A leader's climb.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,12 +3,10 @@
 use super::ConnectorAgent;
 use crate::agents::message::{Consent, Message, Prepare, VetoMessage};
 use crate::agents::side::Side;
-use crate::rods::chain::Rod;
-use crate::rods::geometry::distance;
-use crate::rods::motion_context::PendingVeto;
-use crate::rods::propagate::local_solver::{LocalSolver, MasterMotion, Reaction};
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::VetoReason;
+use sidestep_rods::geometry::distance;
+use sidestep_rods::local_solver::{LocalSolver, MasterMotion, Reaction};
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{PendingVeto, Rod, VetoReason};
 
 /// A motion in which a connector is a slave.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,10 +5,9 @@ use super::ConnectorAgent;
 use crate::agents::control::ExecutedMotion;
 use crate::agents::message::{Consent, LeadOrder, Message, Prepare, VetoMessage};
 use crate::agents::side::{PerSide, Side};
-use crate::rods::geometry::{Point, lerp};
-use crate::rods::motion_context::PendingVeto;
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::{CompletedMotion, Outcome, Veto};
+use sidestep_rods::geometry::{Point, lerp};
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{CompletedMotion, Outcome, PendingVeto, Veto};
 
 /// A motion that a connector leads.
 #[derive(Debug, Clone, PartialEq)]

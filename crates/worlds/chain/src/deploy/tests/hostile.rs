@@ -3,18 +3,15 @@
 use super::{network, sights};
 use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol};
 use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, Situation};
-use crate::rods::chain::{Chain, Connector, Rod};
-use crate::rods::geometry::Point;
-use crate::rods::obstacle::Obstacles;
-use crate::rods::rules::Rules;
-use crate::rods::serde_point::WirePoint;
-use crate::rods::veto::RequestSource;
 use proptest::prelude::*;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::network::{
     ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketBuffer, PacketHeader,
     parse_packet,
 };
+use sidestep_rods::geometry::Point;
+use sidestep_rods::serde_point::WirePoint;
+use sidestep_rods::{Chain, Connector, Obstacles, RequestSource, Rod, Rules};
 
 const N: usize = 5;
 

@@ -5,14 +5,12 @@ use super::{compared_on, network, talked};
 use crate::agents::{ConnectorMove, LeaderOutcome};
 use crate::chain_run;
 use crate::deploy::final_positions;
-use crate::rods::chain::LENGTH_TOLERANCE_M;
-use crate::rods::propagate::tests::random_worlds::AnyWorld;
-use crate::rods::rules::Rules;
-use crate::rods::veto::{Motion, Request, RequestSource};
+use crate::fixtures::random_worlds::AnyWorld;
 use proptest::prelude::*;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::network::{Network, RadioOutage, TimeWindow, UnidirectionalLink};
 use sidestep_kernel::view::{FrameOptions, LogEventKind};
+use sidestep_rods::{LENGTH_TOLERANCE_M, Motion, Request, RequestSource, Rules};
 use sidestep_scenario::Source as Text;
 
 /// A chain of slack or fixed rods that is led along, with a network of some keys.

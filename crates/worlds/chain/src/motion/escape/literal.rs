@@ -7,17 +7,15 @@
 
 use super::threat::{Nearness, Threat, collect, gap_m, nearness};
 use super::{ChainPart, EscapeReport, EscapeRules, EscapeTick, Margin, TrappedPart};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
-    Point, add_scaled, distance, dot, normalized, perpendicular, scaled, sub,
-};
-use crate::rods::motion_context::TOLERANCE_M;
-use crate::rods::obstacle::Obstacle;
-use crate::rods::reach::{ReachOutcome, ReachRequest, reach};
-use crate::rods::rod_bvh::RodBvh;
-use crate::rods::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::{InputError, interrupt};
+use sidestep_rods::geometry::{
+    Point, add_scaled, distance, dot, normalized, perpendicular, scaled, sub,
+};
+use sidestep_rods::{
+    Chain, Motion, Obstacle, Outcome, ReachOutcome, ReachRequest, Request, RequestSource, RodBvh,
+    TOLERANCE_M, Veto, VetoEffect, VetoReason, reach,
+};
 use std::ops::Range;
 
 /// Leads parts out of the way one after the other.

@@ -1,10 +1,7 @@
 use super::*;
 use crate::fixtures::{TestRng, clearance_m};
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{distance, normalized, scaled};
-use crate::rods::motion_context::TOLERANCE_M;
-use crate::rods::rules::Rules;
-use crate::rods::veto::VetoReason;
+use sidestep_rods::geometry::{distance, normalized, scaled};
+use sidestep_rods::{Connector, Mobility, Rod, Rules, TOLERANCE_M, VetoReason};
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };

@@ -1,9 +1,9 @@
 //! The parts of a chain near a moving obstacle, with their distances.
 
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, Point, distance, first_axis, normalized, perpendicular, sub};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::rod_bvh::RodBvh;
+use sidestep_rods::geometry::{
+    Bounds, Point, distance, first_axis, normalized, perpendicular, sub,
+};
+use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
 use std::ops::Range;
 
 /// A part of a chain; the order breaks ties between equally deep violations.

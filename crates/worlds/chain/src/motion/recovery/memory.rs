@@ -1,10 +1,10 @@
 //! The memory of a ladder from tick to tick.
 
 use super::RecoveryLimits;
-use crate::rods::geometry::Point;
-use crate::rods::veto::RequestSource;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::atan2;
+use sidestep_rods::RequestSource;
+use sidestep_rods::geometry::Point;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 

@@ -1,9 +1,6 @@
 use super::*;
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::distance;
-use crate::rods::obstacle::Obstacle;
-use crate::rods::rules::Rules;
-use crate::rods::veto::VetoReason;
+use sidestep_rods::geometry::distance;
+use sidestep_rods::{Connector, Mobility, Obstacle, Rod, Rules, VetoReason};
 
 const STEP_M: f64 = 0.04;
 

@@ -1,11 +1,9 @@
 //! Boxes that beams report: the places around a robot where it cannot stand now.
 
 use super::super::Percept;
-use crate::ray::crossings;
-use crate::ray::turn_crossing;
-use crate::sensor::{NOTHING, Reading};
-use crate::state::WALL;
+use crate::sensor::{NOTHING, Reading, WALL};
 use crate::world::{MountedSensor, RobotBody};
+use sidestep_error_models::ray::{crossings, turn_crossing};
 use sidestep_map::planning::FreeSpace;
 use std::sync::Arc;
 

@@ -23,7 +23,7 @@ mod tests;
 use super::pass_request::PassRequest;
 use super::{Memory, Percept};
 use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
-use crate::state::WALL;
+use crate::sensor::WALL;
 use crate::world::RobotBody;
 use detour::StepCosts;
 use local_costmap::{BeamModel, LocalBoxSet, LocalCostmap};

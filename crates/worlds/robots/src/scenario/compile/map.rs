@@ -69,7 +69,7 @@ fn read_map(
 
 /// Returns the map with its border, one byte per box, in the form in which states start.
 pub(super) fn padded(map: &GridMap, border: u32, stride: u32, rows: u32) -> Vec<u8> {
-    use crate::state::{FREE, WALL};
+    use crate::sensor::{FREE, WALL};
     let mut grid = vec![WALL; stride as usize * rows as usize];
     let width = map.width() as usize;
     for (row, cells) in map.cells().chunks(width.max(1)).enumerate() {

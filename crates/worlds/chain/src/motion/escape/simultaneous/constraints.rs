@@ -4,11 +4,9 @@ use super::super::threat::ChainPart;
 use super::contacts::{Contacts, nearest};
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::SolveInput;
-use crate::rods::chain::{Chain, LENGTH_TOLERANCE_M};
-use crate::rods::geometry::{Point, angle_rad, distance, normalized, sub};
-use crate::rods::motion_context::{BEND_TOLERANCE_RAD, TOLERANCE_M};
-use crate::rods::sweep::Sweep;
 use sidestep_kernel::math::cos;
+use sidestep_rods::geometry::{Point, angle_rad, distance, normalized, sub};
+use sidestep_rods::{BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, Sweep, TOLERANCE_M};
 
 /// A bend limit: that of a connector, or its bend before the tick where that was sharper.
 #[derive(Debug, Clone, Copy)]

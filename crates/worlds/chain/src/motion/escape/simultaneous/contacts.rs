@@ -3,10 +3,8 @@
 use super::super::threat::{Threat, collect};
 use super::super::{ChainPart, Margin};
 use super::posture::ends;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, Core, NearestPoints, Point, between_segments, distance};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::rod_bvh::RodBvh;
+use sidestep_rods::geometry::{Bounds, Core, NearestPoints, Point, between_segments, distance};
+use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
 
 /// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]

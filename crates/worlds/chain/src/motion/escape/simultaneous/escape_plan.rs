@@ -11,11 +11,11 @@ use super::posture::ends;
 use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
 use super::solve::{EscapeSolver, direction_away};
 use super::solve_input::{ExitDirection, SolveInput};
-use crate::rods::geometry::{
-    Point, add, add_scaled, cross, normalized, perpendicular, scaled, with_dimensions,
-};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, cross, normalized, perpendicular, scaled, with_dimensions,
+};
 use std::f64::consts::FRAC_PI_6;
 use std::ops::RangeInclusive;
 
@@ -196,7 +196,7 @@ fn endangered_connectors<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::{dot, norm};
+    use sidestep_rods::geometry::{dot, norm};
 
     #[test]
     fn ways_are_unit_vectors_that_differ() {

@@ -5,8 +5,8 @@
 //! need as many passes as there are rods to get from one end of the chain to the other.
 
 use super::posture::TrialPosture;
-use crate::rods::chain::Rod;
-use crate::rods::geometry::{Point, add_scaled, dot, norm, sub};
+use sidestep_rods::Rod;
+use sidestep_rods::geometry::{Point, add_scaled, dot, norm, sub};
 
 /// Brings rods back within their limits; owns its buffers.
 #[derive(Debug, Clone, Default)]

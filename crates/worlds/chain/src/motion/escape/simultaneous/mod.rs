@@ -29,13 +29,10 @@ mod tests;
 
 use super::threat::Threat;
 use super::{EscapeReport, EscapeRules, Margin, TrappedPart};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::rules::Rules;
-use crate::rods::veto::{Veto, VetoReason};
 pub use escape_plan::EscapePlan;
 use leader_choice::should_rest;
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Chain, Obstacles, Rules, Veto, VetoReason};
 use solve::EscapeSolver;
 pub(crate) use solve_input::LeadMotion;
 use solve_input::{ExitDirection, SoftConstraints, SolveInput};

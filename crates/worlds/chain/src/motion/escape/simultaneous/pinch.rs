@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::fixtures::{TestRng, clearance_m};
-use crate::rods::obstacle::Obstacle;
 use crate::scenario::ChainScenario;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::math::{cos, sin};
+use sidestep_rods::Obstacle;
 use sidestep_scenario::Source;
 use sidestep_testing::root;
 use std::collections::VecDeque;

@@ -1,7 +1,7 @@
 //! Positions under trial, and the ease with which each gives way.
 
 use super::super::threat::ChainPart;
-use crate::rods::geometry::{Point, add_scaled};
+use sidestep_rods::geometry::{Point, add_scaled};
 
 /// Positions under trial.
 pub(super) struct TrialPosture<'a, const D: usize> {

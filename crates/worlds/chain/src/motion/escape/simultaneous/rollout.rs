@@ -4,12 +4,8 @@ use super::super::{EscapeRules, Margin};
 use super::solve::EscapeSolver;
 use super::solve_input::{ExitDirection, LeadMotion, SoftConstraints, SolveInput};
 use super::{PRESSED_SPEED_FRACTION, TOUCH_M};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, add, distance, norm};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::propagate::Propagator;
-use crate::rods::rules::Rules;
-use crate::rods::veto::Request;
+use sidestep_rods::geometry::{Point, add, distance, norm};
+use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, Request, Rules};
 use std::ops::RangeInclusive;
 
 /// A part of a chain, and the obstacles that may come near it.

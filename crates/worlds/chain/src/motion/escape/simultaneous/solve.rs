@@ -11,11 +11,11 @@ use super::contacts::{Contacts, fraction_along, nearest, radius_m};
 use super::lengths::LengthSolver;
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::{ExitDirection, SoftConstraints, SolveInput};
-use crate::rods::geometry::{
+use sidestep_rods::Obstacle;
+use sidestep_rods::geometry::{
     NearestPoints, Point, add_scaled, distance, first_axis, lerp, normalized, perpendicular,
     scaled, sub,
 };
-use crate::rods::obstacle::Obstacle;
 use std::f64::consts::PI;
 
 /// Finds places for all connectors. It owns its buffers.

@@ -1,10 +1,8 @@
 //! The givens of a solve, and its wishes.
 
 use super::super::Margin;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Point, distance};
-use crate::rods::obstacle::Obstacles;
-use crate::rods::rules::Rules;
+use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{Chain, Obstacles, Rules};
 
 /// The givens of a solve.
 #[derive(Clone, Copy)]

@@ -1,16 +1,14 @@
 use super::super::Escaper;
 use super::*;
 use crate::fixtures::{TestRng, clearance_m};
-use crate::rods::chain::{Connector, Mobility, Rod};
-use crate::rods::geometry::{Core, normalized, scaled, segments_cross};
-use crate::rods::obstacle::Obstacle;
-use crate::rods::propagate::Propagator;
 use proptest::prelude::*;
+use sidestep_rods::geometry::{Core, normalized, scaled, segments_cross};
+use sidestep_rods::{Connector, Mobility, Obstacle, Propagator, Rod};
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
 const SOLID: Rules = Rules {
-    rotation: crate::rods::rules::Rotation::Union,
+    rotation: sidestep_rods::Rotation::Union,
     self_collision: true,
     slave_step_max_m: f64::INFINITY,
     joint_step_max_m: f64::INFINITY,

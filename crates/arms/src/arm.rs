@@ -1,0 +1,84 @@
+//! An arm of joints as a chain of rods (slides K1 to K4).
+
+use super::kinematics::{ArmGoal, JointTracker, SerialChain, Skeleton, Vector};
+use sidestep_kernel::InputError;
+use sidestep_rods::geometry::{Point, sub, with_dimensions};
+use sidestep_rods::{Chain, Connector, Mobility, Rod};
+use std::f64::consts::PI;
+
+/// Least length of rods with a joint that can bring their ends together.
+const MIN_ROD_M: f64 = 1e-6;
+/// Greatest length of rods with a joint without limits.
+const MAX_ROD_M: f64 = 1e6;
+
+/// An arm: its joints, its connectors, and the place of its base.
+#[derive(Debug)]
+pub struct Arm {
+    /// Joints from base to tip.
+    pub serial: SerialChain,
+    /// Connectors and rods.
+    pub skeleton: Skeleton,
+    /// Position of the base's frame; its axes are those of the world.
+    pub at_m: Vector,
+    /// Joint values at the start, rad or m.
+    pub values: Vec<f64>,
+    /// Finds joint values that follow its connectors.
+    pub follower: JointTracker,
+}
+
+impl Arm {
+    /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
+    pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
+        let skeleton = serial.skeleton();
+        let follower = JointTracker::new(&serial, &skeleton);
+        Self { values: follower.clamp(values), skeleton, serial, at_m, follower }
+    }
+
+    /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if
+    /// those are equivalent; the joints themselves keep to all of them.
+    ///
+    /// # Errors
+    /// When its connectors make no chain, e.g. because a rod has length 0.
+    pub fn chain(&self, radius_m: f64, rod_radius_m: f64) -> Result<Chain<3>, InputError> {
+        let points: Vec<Vector> = self.connector_positions(&self.values);
+        let limits = self.serial.bend_limits(&self.skeleton);
+        let connector = |k: usize| {
+            let exact = limits[k].as_ref().filter(|limit| limit.is_exact && k > 0);
+            let max_bend_rad = exact.map_or(PI, |limit| limit.max_bend_rad.max(1e-9));
+            let mobility = if k == 0 { Mobility::Fixed } else { Mobility::Free };
+            Connector { mobility, max_bend_rad, ..Connector::free(radius_m) }
+        };
+        let rods = self.skeleton.rods.iter().map(|rod| Rod {
+            min_m: rod.min_m.max(MIN_ROD_M),
+            max_m: rod.max_m.clamp(MIN_ROD_M, MAX_ROD_M),
+            radius_m: rod_radius_m,
+        });
+        Chain::new(points.clone(), (0..points.len()).map(connector).collect(), rods.collect())
+    }
+
+    /// Returns the places of the connectors in the world at these joint values.
+    pub fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
+        let in_world = |p: &Vector| with_dimensions(self.to_world(*p));
+        self.follower.connector_positions(values).iter().map(in_world).collect()
+    }
+
+    /// Returns a place of the world in the frame of the base.
+    pub fn to_base<const D: usize>(&self, p: Point<D>) -> Vector {
+        sub(with_dimensions(p), self.at_m)
+    }
+
+    /// Returns a goal for connector `k` at a place of the world, and the arm up to it.
+    pub fn goal<const D: usize>(
+        &self,
+        k: usize,
+        at: Point<D>,
+        tolerance_m: f64,
+    ) -> (SerialChain, ArmGoal) {
+        let goal = ArmGoal { tolerance_m, ..ArmGoal::new(self.to_base(at)) };
+        (self.serial.up_to(&self.skeleton, k), goal)
+    }
+
+    fn to_world(&self, p: Vector) -> Vector {
+        [0, 1, 2].map(|i| p[i] + self.at_m[i])
+    }
+}

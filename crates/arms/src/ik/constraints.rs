@@ -1,0 +1,170 @@
+//! A check that a posture is good in itself: rods, bends, mobilities, obstacles and the chain's own
+//! body, as propagation judges them, but without a motion that led there.
+
+use sidestep_rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
+use sidestep_rods::{
+    BEND_TOLERANCE_RAD, Chain, Obstacle, Obstacles, Veto, VetoReason, contact_distance_m,
+    is_length_allowed,
+};
+use std::f64::consts::PI;
+
+/// A chain and its constraints.
+#[derive(Clone, Copy)]
+pub(crate) struct ConstraintChecker<'a, const D: usize> {
+    pub(crate) chain: &'a Chain<D>,
+    pub(crate) obstacles: &'a Obstacles<D>,
+    pub(crate) self_collision: bool,
+}
+
+impl<const D: usize> ConstraintChecker<'_, D> {
+    /// Returns the first objection to a posture, in the order of the connectors. Parts at their old
+    /// places in the chain are not judged.
+    pub(crate) fn find_veto(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
+        let veto =
+            |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
+        (0..points.len())
+            .find_map(|i| self.check_connector(points, i))
+            .or_else(|| (0..self.chain.rods().len()).find_map(|i| self.check_rod(points, i)))
+            .map(veto)
+    }
+
+    fn has_moved(&self, points: &[Point<D>], i: usize) -> bool {
+        points[i] != self.chain.points()[i]
+    }
+
+    fn check_connector(
+        &self,
+        points: &[Point<D>],
+        i: usize,
+    ) -> Option<(usize, VetoReason, Option<u32>)> {
+        let connector = &self.chain.connectors()[i];
+        if self.has_moved(points, i) {
+            if connector.is_still() {
+                let reason = if connector.failed { VetoReason::Failed } else { VetoReason::Fixed };
+                return Some((i, reason, None));
+            }
+            if !connector.mobility.allows(points[i], points[i]) {
+                return Some((i, VetoReason::Mobility, None));
+            }
+        }
+        let around = i.saturating_sub(1)..(i + 2).min(points.len());
+        let bends = connector.max_bend_rad < PI
+            && around.len() == 3
+            && around.clone().any(|j| self.has_moved(points, j));
+        (bends && bend_rad(points, i) > connector.max_bend_rad + BEND_TOLERANCE_RAD).then_some((
+            i,
+            VetoReason::BendLimit,
+            None,
+        ))
+    }
+
+    fn check_rod(&self, points: &[Point<D>], i: usize) -> Option<(usize, VetoReason, Option<u32>)> {
+        if !self.has_moved(points, i) && !self.has_moved(points, i + 1) {
+            return None;
+        }
+        if !is_length_allowed(self.chain.rods()[i], distance(points[i], points[i + 1])) {
+            return Some((i + 1, VetoReason::Mobility, None));
+        }
+        let mut hit: Option<u32> = None;
+        self.visit_near(&points[i..i + 2], i, 0.0, |o| {
+            if hit.is_none_or(|id| o.id < id) && self.touches(points, i, o) {
+                hit = Some(o.id);
+            }
+        });
+        if hit.is_some() {
+            return Some((i + 1, VetoReason::BothSidesBlocked, hit));
+        }
+        let hits_itself = self.self_collision
+            && self.own_pairs(points, i, 0.0).any(|pair| pair.depth_m() > pair.slack_m());
+        hits_itself.then_some((i + 1, VetoReason::SelfCollision, None))
+    }
+
+    fn touches(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
+        let rod = self.chain.rods()[i];
+        let end = |j: usize| {
+            let keep_m = contact_distance_m(o.radius_m + self.chain.connectors()[j].radius_m);
+            self.has_moved(points, j) && !o.core.is_clear_of_point(points[j], keep_m)
+        };
+        let keep_m = contact_distance_m(o.radius_m + rod.radius_m);
+        !o.core.is_clear_of_segment([points[i], points[i + 1]], keep_m) || end(i) || end(i + 1)
+    }
+
+    /// Visits the obstacles that rod `i` and its connectors at `ends` may meet.
+    pub(super) fn visit_near<'a>(
+        &'a self,
+        ends: &[Point<D>],
+        i: usize,
+        margin_m: f64,
+        look: impl FnMut(&'a Obstacle<D>),
+    ) {
+        let connectors = self.chain.connectors();
+        let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
+        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), look);
+    }
+
+    /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
+    /// more than two apart, connectors more than one.
+    pub(super) fn own_pairs<'a>(
+        &'a self,
+        points: &'a [Point<D>],
+        i: usize,
+        margin_m: f64,
+    ) -> impl Iterator<Item = OwnPair<D>> + 'a {
+        let near = self.bounds(points, i).grown(margin_m);
+        (i + 1..self.chain.rods().len())
+            .filter(move |&j| self.bounds(points, j).meets(&near))
+            .flat_map(move |j| self.own_pairs_of(points, i, j))
+    }
+
+    fn bounds(&self, points: &[Point<D>], i: usize) -> Bounds<D> {
+        let connectors = self.chain.connectors();
+        let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m);
+        Bounds::from_points(&[points[i], points[i + 1]]).grown(by_m)
+    }
+
+    fn own_pairs_of(
+        &self,
+        points: &[Point<D>],
+        i: usize,
+        j: usize,
+    ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
+        let (rods, connectors) = (self.chain.rods(), self.chain.connectors());
+        let rod = |r: usize| ([r, r + 1], [points[r], points[r + 1]], rods[r].radius_m);
+        let ball = |c: usize| ([c, c], [points[c]; 2], connectors[c].radius_m);
+        let pair = |(a, at_a, ra): ([usize; 2], [Point<D>; 2], f64),
+                    (b, at_b, rb): ([usize; 2], [Point<D>; 2], f64)| {
+            OwnPair { ends: [a, b], at: [at_a, at_b], keep_m: ra + rb }
+        };
+        [
+            (j > i + 2).then(|| pair(rod(i), rod(j))),
+            (j > i + 1).then(|| pair(rod(i), ball(j + 1))),
+            (j > i + 1).then(|| pair(ball(i), rod(j))),
+            Some(pair(ball(i), ball(j + 1))),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// Two parts of a chain: rods, or connectors as rods without length.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OwnPair<const D: usize> {
+    pub(super) ends: [[usize; 2]; 2],
+    pub(super) at: [[Point<D>; 2]; 2],
+    pub(super) keep_m: f64,
+}
+
+impl<const D: usize> OwnPair<D> {
+    fn depth_m(&self) -> f64 {
+        self.keep_m - between_segments(self.at[0], self.at[1]).distance_m
+    }
+
+    fn slack_m(&self) -> f64 {
+        self.keep_m - contact_distance_m(self.keep_m)
+    }
+}
+
+/// Returns the angle between the directions of the rods at an inner connector.
+pub(super) fn bend_rad<const D: usize>(points: &[Point<D>], i: usize) -> f64 {
+    angle_rad(sub(points[i], points[i - 1]), sub(points[i + 1], points[i]))
+}

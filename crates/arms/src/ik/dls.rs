@@ -1,0 +1,185 @@
+//! Damped least squares without a matrix: the nearest posture whose tip is at the target.
+//!
+//! Of all rod vectors `v'` within their lengths whose sum is the target `t`, the wanted ones have the
+//! least sum of `|v' - v|^2`, where `v` are the present ones. With one multiplier `y` for the sum,
+//! every rod can be solved alone: `v'` is the vector within the rod's lengths that is nearest to
+//! `v + y`. It remains to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that is the
+//! gradient of a convex function: damped Newton steps get there from anywhere, each in O(n). Its matrix
+//! is the `J J^T` of damped least squares, and, as in that method, the damping falls by 0.3 after a
+//! step that helped, and rises by 4 after one that did not. In contrast to damped least squares, the
+//! posture is not linearized anew at every step, so steps need no limit, and rods of variable length
+//! are no special case.
+//!
+//! If the convex function has its least value at a kink (`v + y = 0` for some rod: it might turn
+//! anywhere), steps stop helping; then the posture reached becomes the new `v`, and the answer is
+//! the nearest to that. A limb that is almost straight, and might buckle to any side, is bowed
+//! first if it has far to go.
+
+use super::limb::Span;
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, first_axis, norm, normalized, perpendicular, scaled, sub,
+};
+
+/// Newton steps with hardly any gain before the posture becomes the new reference.
+const MAX_POOR_STEPS: usize = 3;
+/// Largest part of the error that a good step leaves.
+const GOOD_STEP_FRACTION: f64 = 0.5;
+/// New references before the search is given up.
+const MAX_REFERENCES: usize = 32;
+/// Number of references after which the limb is bowed anew, in case it is in line with the target.
+const BOW_INTERVAL: usize = 6;
+/// The first damping, in parts of the mean of the matrix's diagonal.
+const INITIAL_DAMPING: f64 = 1e-3;
+/// Least part to which a step that did not help is shortened.
+const MIN_STEP_FRACTION: f64 = 0.1;
+/// Part of the greatest length beyond which a limb is straight, and may buckle to any side.
+const STRAIGHT_FRACTION: f64 = 0.9;
+/// Distance to go, as a part of the greatest length, from which on a straight limb is bowed first.
+const FAR_FRACTION: f64 = 0.03;
+
+/// The tip's position for a multiplier.
+struct TipPosition<const D: usize> {
+    /// The remaining vector to the target.
+    error: Point<D>,
+    error_m: f64,
+    /// The derivative of the tip by the multiplier: the lower half of a symmetric matrix.
+    slope: [[f64; D]; D],
+}
+
+/// Brings the sum of `vectors` to `target`. Returns the number of steps and the remaining error;
+/// the vectors are then within their lengths.
+pub(super) fn solve<const D: usize>(
+    vectors: &mut [Point<D>],
+    spans: &[Span],
+    target: Point<D>,
+    tolerance_m: f64,
+) -> (usize, f64) {
+    let longest_m: f64 = spans.iter().map(|s| s.max_m).sum();
+    let mut steps = 0;
+    let mut error_m = f64::INFINITY;
+    for reference in 0..MAX_REFERENCES {
+        let mut start = tip_position(vectors, spans, [0.0; D], target);
+        let is_straight = norm(sub(target, start.error)) > STRAIGHT_FRACTION * longest_m
+            && start.error_m > FAR_FRACTION * longest_m;
+        let is_stuck = reference % BOW_INTERVAL == BOW_INTERVAL / 2;
+        if is_stuck || (reference == 0 && is_straight) {
+            bow(vectors, target);
+            start = tip_position(vectors, spans, [0.0; D], target);
+        }
+        let (y, left_m) = solve_multiplier(vectors, spans, target, tolerance_m, start, &mut steps);
+        adopt(vectors, spans, y);
+        error_m = left_m;
+        if error_m <= tolerance_m {
+            break;
+        }
+    }
+    (steps, error_m)
+}
+
+/// Applies Newton's method to the multiplier.
+fn solve_multiplier<const D: usize>(
+    vectors: &[Point<D>],
+    spans: &[Span],
+    target: Point<D>,
+    tolerance_m: f64,
+    start: TipPosition<D>,
+    steps: &mut usize,
+) -> (Point<D>, f64) {
+    let (mut y, mut at, mut damping) = ([0.0; D], start, INITIAL_DAMPING);
+    let mut step = solve_damped(&at.slope, at.error, damping);
+    let mut poor = 0;
+    while at.error_m > tolerance_m && poor < MAX_POOR_STEPS {
+        *steps += 1;
+        let next_y = add(y, step);
+        let next = tip_position(vectors, spans, next_y, target);
+        poor += usize::from(next.error_m > GOOD_STEP_FRACTION * at.error_m);
+        if next.error_m < at.error_m {
+            (y, at, damping) = (next_y, next, 0.3 * damping);
+            step = solve_damped(&at.slope, at.error, damping);
+        } else {
+            let (before, after) = (at.error_m * at.error_m, next.error_m * next.error_m);
+            step = scaled(step, (before / (before + after)).max(MIN_STEP_FRACTION));
+        }
+    }
+    (y, at.error_m)
+}
+
+#[inline]
+fn tip_position<const D: usize>(
+    vectors: &[Point<D>],
+    spans: &[Span],
+    y: Point<D>,
+    target: Point<D>,
+) -> TipPosition<D> {
+    let mut tip = [0.0; D];
+    let mut slope = [[0.0; D]; D];
+    for (v, span) in vectors.iter().zip(spans) {
+        let w = add(*v, y);
+        let r = norm(w).max(f64::MIN_POSITIVE);
+        let length_m = span.nearest_m(r);
+        let per_m = 1.0 / r;
+        let u = scaled(w, per_m);
+        tip = add_scaled(tip, u, length_m);
+        // A rod within its limits follows in every direction, one at a limit only across itself.
+        let across = length_m * per_m;
+        let lengthwise = if span.min_m < r && r < span.max_m { 1.0 } else { 0.0 };
+        for i in 0..D {
+            for j in 0..=i {
+                slope[i][j] += (lengthwise - across) * u[i] * u[j];
+            }
+            slope[i][i] += across;
+        }
+    }
+    let error = sub(target, tip);
+    TipPosition { error, error_m: norm(error), slope }
+}
+
+/// Solves `(slope + damping) x = error` by Cholesky decomposition.
+#[inline]
+fn solve_damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping: f64) -> Point<D> {
+    let mean = (0..D).map(|i| slope[i][i]).sum::<f64>() / D as f64;
+    let floor = f64::MIN_POSITIVE.sqrt().max(1e-14 * mean);
+    let mut l = *slope;
+    let mut x = error;
+    for i in 0..D {
+        l[i][i] += damping * mean;
+        for j in 0..=i {
+            for k in 0..j {
+                l[i][j] -= l[i][k] * l[j][k];
+            }
+            l[i][j] = if i == j { l[i][i].max(floor).sqrt() } else { l[i][j] / l[j][j] };
+        }
+        for k in 0..i {
+            x[i] -= l[i][k] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    for i in (0..D).rev() {
+        for k in i + 1..D {
+            x[i] -= l[k][i] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    x
+}
+
+/// Adopts the posture of a multiplier.
+fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
+    for (v, span) in vectors.iter_mut().zip(spans) {
+        let w = add(*v, y);
+        let r = norm(w);
+        let u = if r > 0.0 { scaled(w, 1.0 / r) } else { normalized(*v).unwrap_or(first_axis()) };
+        *v = scaled(u, span.nearest_m(r));
+    }
+}
+
+/// Bends the limb to an arc, to the side given by `perpendicular`.
+pub(super) fn bow<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
+    let total = vectors.iter().fold([0.0; D], |sum, v| add(sum, *v));
+    let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(first_axis()));
+    let n = vectors.len() as f64;
+    for (i, v) in vectors.iter_mut().enumerate() {
+        let lean = 1.0 - (2 * i + 1) as f64 / n;
+        *v = add_scaled(*v, side, lean * norm(*v));
+    }
+}

@@ -1,0 +1,125 @@
+//! Motion of an arm to a target by the chain's rules: at once if possible, otherwise step by step,
+//! with other headings if one is blocked. The result is a motion: every state was checked.
+
+use super::ChainIkGoal;
+use sidestep_kernel::{InputError, math};
+use sidestep_rods::geometry::{
+    Point, add, add_scaled, distance, first_axis, normalized, perpendicular, scaled, sub,
+};
+use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach};
+
+/// Headings to either side of the target's, in rad.
+const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
+/// Steps without approach of the tip before the motion is given up.
+const MAX_IDLE_STEPS: usize = 10;
+/// Most attempts to move, over all steps.
+const MAX_ATTEMPTS: usize = 120;
+/// Length of a step of the tip, as a part of the shortest rod.
+const STEP_FRACTION: f64 = 0.5;
+
+/// Result of a motion; the chain is where it got.
+pub(super) struct MotionResult<const D: usize> {
+    pub(super) arrived: bool,
+    pub(super) attempts: usize,
+    /// The last objection to the straight way.
+    pub(super) veto: Option<Veto<D>>,
+}
+
+/// Moves connector `goal.k` of `chain` toward the target.
+pub(super) fn move_to_goal<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    goal: &ChainIkGoal<D>,
+) -> Result<MotionResult<D>, InputError> {
+    let mut walk =
+        StepwiseMotion { propagator, obstacles, goal, attempts: 0, veto: None, side: 1.0 };
+    if walk.step(chain, goal.target, goal.tolerance_m)? {
+        return Ok(walk.result(true));
+    }
+    let step_m = STEP_FRACTION * chain.rods().iter().map(|r| r.min_m).fold(f64::INFINITY, f64::min);
+    let (mut best, mut idle) = (chain.clone(), 0);
+    let left_m = |chain: &Chain<D>| distance(chain.points()[goal.k], goal.target);
+    while idle < MAX_IDLE_STEPS && walk.attempts < MAX_ATTEMPTS {
+        if left_m(chain) <= step_m && walk.step(chain, goal.target, goal.tolerance_m)? {
+            return Ok(walk.result(true));
+        }
+        if !walk.try_fan(chain, step_m.min(left_m(chain)))? {
+            break;
+        }
+        idle += 1;
+        if left_m(chain) < left_m(&best) - 0.01 * step_m {
+            (best, idle) = (chain.clone(), 0);
+        }
+    }
+    *chain = best;
+    Ok(walk.result(false))
+}
+
+struct StepwiseMotion<'a, const D: usize> {
+    propagator: &'a mut Propagator<D>,
+    obstacles: &'a Obstacles<D>,
+    goal: &'a ChainIkGoal<D>,
+    attempts: usize,
+    veto: Option<Veto<D>>,
+    /// The side that worked last, which is tried first.
+    side: f64,
+}
+
+impl<const D: usize> StepwiseMotion<'_, D> {
+    fn result(self, arrived: bool) -> MotionResult<D> {
+        MotionResult { arrived, attempts: self.attempts, veto: self.veto }
+    }
+
+    fn step(
+        &mut self,
+        chain: &mut Chain<D>,
+        target: Point<D>,
+        tolerance_m: f64,
+    ) -> Result<bool, InputError> {
+        self.attempts += 1;
+        let ChainIkGoal { k, base, .. } = *self.goal;
+        let order = ReachRequest { k, target, base, tolerance_m };
+        match reach(self.propagator, chain, self.obstacles, &order)? {
+            ReachOutcome::There { .. } => Ok(true),
+            ReachOutcome::Short { veto, .. } => {
+                self.veto = veto.or(self.veto);
+                Ok(false)
+            }
+        }
+    }
+
+    /// Makes one step toward the target, or along the first heading of the fan that works.
+    fn try_fan(&mut self, chain: &mut Chain<D>, step_m: f64) -> Result<bool, InputError> {
+        let from = chain.points()[self.goal.k];
+        let ahead = normalized(sub(self.goal.target, from)).unwrap_or(first_axis());
+        let tolerance_m = (0.01 * step_m).max(self.goal.tolerance_m);
+        if self.step(chain, add_scaled(from, ahead, step_m), tolerance_m)? {
+            return Ok(true);
+        }
+        let sides = sides(ahead, self.side);
+        for turn_rad in FAN_RAD {
+            for (i, side) in sides.iter().flatten().enumerate() {
+                let (c, s) = (math::cos(turn_rad), math::sin(turn_rad));
+                let u = add(scaled(ahead, c), scaled(*side, s));
+                if self.step(chain, add_scaled(from, u, step_m), tolerance_m)? {
+                    self.side *= if i % 2 == 0 { 1.0 } else { -1.0 };
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Returns directions across `u`: two in the plane, four in space; the one named by `sign` first.
+fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
+    let e = scaled(perpendicular(u), sign);
+    let other = (D == 3).then(|| -> Point<D> {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % D, (i + 2) % D);
+            u[j] * e[k] - u[k] * e[j]
+        })
+    });
+    [Some(e), Some(scaled(e, -1.0)), other, other.map(|o| scaled(o, -1.0))]
+}

@@ -1,0 +1,204 @@
+//! Relaxation to a posture that meets all constraints: every part that breaks one is pushed out of
+//! it, and then the nearest posture with whole rods and the tip at the target is taken ([`dls`]),
+//! which takes all other parts along. Pushes go a little farther than they must, so that the step back
+//! to whole rods leaves them good; the result is judged without these margins.
+
+use super::constraints::{ConstraintChecker, OwnPair, bend_rad};
+use super::limb::{self, Limb};
+use super::{ChainIkGoal, dls, follow_beyond};
+use sidestep_kernel::math;
+use sidestep_rods::Veto;
+use sidestep_rods::geometry::{
+    NearestPoints, Point, add, add_scaled, between_segments, distance, dot, first_axis, norm,
+    normalized, perpendicular, scaled, sub,
+};
+use std::f64::consts::PI;
+
+/// Most rounds before relaxation is given up.
+const MAX_ROUNDS: usize = 400;
+/// Rounds without a new best before relaxation is given up.
+const MAX_IDLE_ROUNDS: usize = 60;
+/// Extra distance by which bodies are pushed, in parts of the longest rod.
+const MARGIN: f64 = 1e-3;
+/// Margin below its limit to which a bend is pushed.
+const BEND_MARGIN_RAD: f64 = 2e-3;
+/// Length of a push as a part of the way; more than 1, because the step back undoes some of it.
+const PUSH_FACTOR: f64 = 1.3;
+
+/// Result of a start.
+pub(super) struct RelaxResult<const D: usize> {
+    pub(super) rounds: usize,
+    /// The objection to the best posture; `None` if it is good.
+    pub(super) veto: Option<Veto<D>>,
+}
+
+/// Changes `points` from a start to a good posture, or returns the objection to the best one.
+pub(super) fn relax<const D: usize>(
+    judge: &ConstraintChecker<D>,
+    limb: &mut Limb<D>,
+    points: &mut [Point<D>],
+    goal: &ChainIkGoal<D>,
+) -> RelaxResult<D> {
+    let longest_m = judge.chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
+    let home = points[goal.base];
+    let mut pusher = Pusher { judge, goal, margin_m: MARGIN * longest_m, broken_m: 0.0 };
+    let (mut best, mut best_round) = (f64::INFINITY, 0);
+    let mut veto = None;
+    for round in 0..MAX_ROUNDS {
+        limb.read(judge.chain, points, goal.base, goal.k);
+        let target = sub(goal.target, home);
+        let Limb { spans, vectors } = limb;
+        let (_, left_m) = dls::solve(vectors, spans, target, 0.5 * goal.tolerance_m);
+        lay_out(limb, points, judge, goal);
+        veto = judge.find_veto(points, goal.k);
+        if (veto.is_none() && left_m <= goal.tolerance_m) || round - best_round > MAX_IDLE_ROUNDS {
+            return RelaxResult { rounds: round + 1, veto };
+        }
+        pusher.push(points);
+        if pusher.broken_m < 0.98 * best {
+            (best, best_round) = (pusher.broken_m, round);
+        }
+    }
+    RelaxResult { rounds: MAX_ROUNDS, veto }
+}
+
+fn lay_out<const D: usize>(
+    limb: &Limb<D>,
+    points: &mut [Point<D>],
+    judge: &ConstraintChecker<D>,
+    goal: &ChainIkGoal<D>,
+) {
+    let mut at = points[goal.base];
+    for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&limb.vectors) {
+        at = add(at, *v);
+        points[i] = at;
+    }
+    follow_beyond(points, judge.chain, goal);
+}
+
+/// A round of pushes that move parts out of obstacles and bends.
+struct Pusher<'a, const D: usize> {
+    judge: &'a ConstraintChecker<'a, D>,
+    goal: &'a ChainIkGoal<D>,
+    margin_m: f64,
+    /// The sum of all violations in a round, in meters.
+    broken_m: f64,
+}
+
+impl<const D: usize> Pusher<'_, D> {
+    fn push(&mut self, points: &mut [Point<D>]) {
+        self.broken_m = 0.0;
+        for i in 1..points.len() - 1 {
+            self.unbend(points, i);
+        }
+        for i in 0..points.len() - 1 {
+            self.push_out_of_obstacles(points, i);
+            if self.judge.self_collision {
+                self.push_apart(points, i);
+            }
+        }
+    }
+
+    /// Returns whether a connector may be pushed, as a weight: not on the base's far side, nor the
+    /// tip.
+    fn weight(&self, i: usize) -> f64 {
+        let ChainIkGoal { k, base, .. } = *self.goal;
+        let is_before_base = if k > base { i <= base } else { i >= base };
+        if is_before_base || i == k { 0.0 } else { 1.0 }
+    }
+
+    /// Moves the neighbors of a connector apart until its bend is within its limit.
+    fn unbend(&mut self, points: &mut [Point<D>], i: usize) {
+        let limit_rad = self.judge.chain.connectors()[i].max_bend_rad;
+        if limit_rad >= PI || bend_rad(points, i) <= limit_rad {
+            return;
+        }
+        let allowed_rad = (limit_rad - BEND_MARGIN_RAD).max(0.5 * limit_rad);
+        let (a, b) = (distance(points[i - 1], points[i]), distance(points[i], points[i + 1]));
+        let chord_m = (a * a + b * b + 2.0 * a * b * math::cos(allowed_rad)).max(0.0).sqrt();
+        let between = sub(points[i + 1], points[i - 1]);
+        let u = normalized(between).unwrap_or(perpendicular(
+            normalized(sub(points[i], points[i - 1])).unwrap_or([1.0; D]),
+        ));
+        let weights = [self.weight(i - 1), self.weight(i + 1)];
+        let missing_m = chord_m - norm(between);
+        self.broken_m += missing_m.max(0.0);
+        let sum = weights[0] + weights[1];
+        if sum > 0.0 {
+            points[i - 1] =
+                add_scaled(points[i - 1], u, -PUSH_FACTOR * missing_m * weights[0] / sum);
+            points[i + 1] =
+                add_scaled(points[i + 1], u, PUSH_FACTOR * missing_m * weights[1] / sum);
+        }
+    }
+
+    fn push_out_of_obstacles(&mut self, points: &mut [Point<D>], i: usize) {
+        let (judge, margin_m) = (self.judge, self.margin_m);
+        let (rods, connectors) = (judge.chain.rods(), judge.chain.connectors());
+        let before = [points[i], points[i + 1]];
+        judge.visit_near(&before, i, margin_m, |o| {
+            let nearest = o.core.nearest_to_segment([points[i], points[i + 1]]);
+            self.shift_rod(points, [i, i + 1], before, &nearest, o.radius_m + rods[i].radius_m);
+            for j in [i, i + 1] {
+                let nearest = o.core.nearest_to_point(points[j]);
+                let keep_m = o.radius_m + connectors[j].radius_m;
+                self.shift_rod(points, [j, j], before, &nearest, keep_m);
+            }
+        });
+    }
+
+    fn push_apart(&mut self, points: &mut [Point<D>], i: usize) {
+        let judge = self.judge;
+        let snapshot = points.to_owned();
+        for OwnPair { ends: [a, b], at, keep_m } in judge.own_pairs(&snapshot, i, self.margin_m) {
+            let nearest = between_segments(at[0], at[1]);
+            self.shift_rod(points, a, at[0], &nearest, keep_m);
+            let back =
+                NearestPoints { on_body: nearest.on_core, on_core: nearest.on_body, ..nearest };
+            self.shift_rod(points, b, at[1], &back, keep_m);
+        }
+    }
+
+    /// Moves a rod (or one connector, given twice) so that its nearest point keeps its distance.
+    fn shift_rod(
+        &mut self,
+        points: &mut [Point<D>],
+        [i, j]: [usize; 2],
+        rod: [Point<D>; 2],
+        nearest: &NearestPoints<D>,
+        keep_m: f64,
+    ) {
+        let depth_m = keep_m + self.margin_m - nearest.distance_m;
+        if depth_m <= 0.0 {
+            return;
+        }
+        let away =
+            normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| across_rod(rod));
+        let part =
+            if i == j { 0.0 } else { fraction_along(nearest.on_body, [points[i], points[j]]) };
+        let weights = [self.weight(i) * (1.0 - part), self.weight(j) * part];
+        let square = weights[0] * (1.0 - part) + weights[1] * part;
+        if nearest.distance_m < keep_m {
+            self.broken_m += depth_m;
+        }
+        if square > 1e-3 {
+            points[i] = add_scaled(points[i], away, PUSH_FACTOR * depth_m * weights[0] / square);
+            if j != i {
+                points[j] =
+                    add_scaled(points[j], away, PUSH_FACTOR * depth_m * weights[1] / square);
+            }
+        }
+    }
+}
+
+/// Returns a direction across a rod.
+fn across_rod<const D: usize>(rod: [Point<D>; 2]) -> Point<D> {
+    perpendicular(normalized(sub(rod[1], rod[0])).unwrap_or(first_axis()))
+}
+
+/// Returns the position of a point along a segment.
+fn fraction_along<const D: usize>(p: Point<D>, [a, b]: [Point<D>; 2]) -> f64 {
+    let d = sub(b, a);
+    let square = dot(d, d);
+    if square > 0.0 { (dot(sub(p, a), scaled(d, 1.0 / square))).clamp(0.0, 1.0) } else { 0.0 }
+}

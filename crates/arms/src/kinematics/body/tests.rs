@@ -1,0 +1,166 @@
+use super::*;
+use crate::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, Sphere};
+use proptest::prelude::*;
+use sidestep_import::urdf::srdf::Semantics;
+use sidestep_testing::robot_model as shared;
+use std::path::Path;
+
+/// Three bars of 1 m that turn in a plane, 0.1 m thick, on a column, with a tool of two fingers of
+/// which the second follows the first.
+const BARS: &str = "<robot name='bars'>\
+    <link name='floor'/>\
+    <link name='column'><collision><origin xyz='0 0 -0.5'/>\
+        <geometry><cylinder radius='0.1' length='0.8'/></geometry></collision></link>\
+    <joint name='stand' type='fixed'><parent link='floor'/><child link='column'/>\
+        <origin xyz='0 0 1'/></joint>\
+    <link name='a'><collision><origin xyz='0.5 0 0'/>\
+        <geometry><box size='0.8 0.1 0.1'/></geometry></collision></link>\
+    <link name='b'><collision><origin xyz='0.5 0 0' rpy='0 1.5707963267948966 0'/>\
+        <geometry><cylinder radius='0.05' length='0.8'/></geometry></collision></link>\
+    <link name='c'><collision><origin xyz='0.9 0 0'/>\
+        <geometry><sphere radius='0.1'/></geometry></collision></link>\
+    <joint name='ja' type='revolute'><parent link='column'/><child link='a'/>\
+        <axis xyz='0 0 1'/><limit lower='-3' upper='3'/></joint>\
+    <joint name='jb' type='revolute'><parent link='a'/><child link='b'/><origin xyz='1 0 0'/>\
+        <axis xyz='0 0 1'/><limit lower='-3' upper='3'/></joint>\
+    <joint name='jc' type='revolute'><parent link='b'/><child link='c'/><origin xyz='1 0 0'/>\
+        <axis xyz='0 0 1'/><limit lower='-3' upper='3'/></joint>\
+    <link name='tip'/><joint name='mount' type='fixed'><parent link='c'/><child link='tip'/>\
+        <origin xyz='1 0 0'/></joint>\
+    <link name='left'/><link name='right'><collision><geometry><sphere radius='0.02'/></geometry>\
+        </collision></link>\
+    <joint name='jl' type='prismatic'><parent link='tip'/><child link='left'/><axis xyz='0 1 0'/>\
+        <limit lower='0' upper='0.1'/></joint>\
+    <joint name='jr' type='prismatic'><parent link='tip'/><child link='right'/><axis xyz='0 -1 0'/>\
+        <limit lower='0' upper='0.1'/><mimic joint='jl'/></joint></robot>";
+
+fn bars(tip: &str) -> (Model, SerialChain) {
+    let model = Model::parse("bars", BARS).expect("a model");
+    let link = model.link("tip", tip).expect("a link");
+    let chain = SerialChain::new(&model, model.root, link, "tip").expect("a chain");
+    (model, chain)
+}
+
+fn body_of(model: &Model, chain: &SerialChain, may_touch: &[(usize, usize)]) -> ArmBody {
+    ArmBody::new(model, chain, &model.solids(Path::new("bars.urdf")).solids, may_touch)
+}
+
+#[test]
+fn neighbors_rigid_links_and_masked_pairs_may_touch() {
+    let (model, chain) = bars("left");
+    let all = body_of(&model, &chain, &[]).pairs().len();
+    // column-b, column-c, column-right, a-c, a-right, b-right; the tool is rigid but for its joints.
+    assert_eq!(all, 6);
+    let link = |name: &str| model.link("", name).expect("a link");
+    let masked = body_of(&model, &chain, &[(link("c"), link("a")), (link("b"), link("right"))]);
+    assert_eq!(
+        masked.pairs(),
+        [("a", "right"), ("column", "b"), ("column", "c"), ("column", "right")]
+    );
+}
+
+#[test]
+fn overlaps_are_as_deep_as_computed_by_hand() {
+    let (model, chain) = bars("left");
+    let body = body_of(&model, &chain, &[]);
+    assert!(body.overlaps(&chain, &[0.0, 0.3, 0.3, 0.0]).is_empty());
+    // An equilateral triangle: the ball of the last bar stands 0.1 m before the first joint.
+    let turn = 2.0 * std::f64::consts::PI / 3.0;
+    let overlaps = body.overlaps(&chain, &[0.0, turn, turn, 0.0]);
+    // Its center is 0.0866 m beside the axis of the first bar, which is 0.05 m thick, at 0.05 m:
+    // 0.05 m before the bar's end at 0.1 m.
+    let gap = norm([0.1 * 3f64.sqrt() / 2.0 - 0.05, 0.05]);
+    let of_a: Vec<_> = overlaps.iter().filter(|(a, b, _)| (*a, *b) == ("a", "c")).collect();
+    let [(_, _, depth_m)] = of_a[..] else { panic!("{overlaps:?}") };
+    assert!((depth_m - (0.1 - gap)).abs() < 1e-6, "{depth_m} {gap}");
+}
+
+#[test]
+fn what_hangs_beside_the_arm_follows_its_joints() {
+    let (model, chain) = bars("left");
+    let body = body_of(&model, &chain, &[]);
+    let right = body.parts.iter().find(|part| part.link == "right").expect("a finger");
+    let values = [0.0, 0.0, 0.0, 0.07];
+    let at = right.mount.transform(&chain.forward(&values).links, &values);
+    assert!(apart_m(at.origin_m, [3.0, -0.07, 1.0]) < 1e-12, "{at:?}");
+    // From the bar `a` out, the column stands behind it.
+    let [base, tip] = ["a", "tip"].map(|name| model.link("", name).expect("a link"));
+    let outer = SerialChain::new(&model, base, tip, "tip").expect("a chain");
+    let body = body_of(&model, &outer, &[]);
+    let column = body.parts.iter().find(|part| part.link == "column").expect("a column");
+    let at = column.mount.transform(&outer.forward(&[0.0, 0.0]).links, &[0.0, 0.0]);
+    assert!(apart_m(at.origin_m, [0.0, 0.0, -0.5]) < 1e-12, "{at:?}");
+}
+
+proptest! {
+    #[test]
+    fn answers_keep_links_off_each_other_and_off_obstacles(
+        there in prop::array::uniform3(-1.8..1.8f64),
+        at in prop::array::uniform3(-2.0..2.0f64),
+    ) {
+        let (model, chain) = bars("tip");
+        let body = body_of(&model, &chain, &[]);
+        let target = chain.forward(&there).tip.origin_m;
+        let sphere = Sphere { center_m: [at[0], at[1], 1.0], radius_m: 0.2 };
+        let is_clear = |values: &[f64]| {
+            let mut placed = Vec::new();
+            body.place_shapes(&chain.forward(values), values, &mut placed);
+            let Sphere { center_m, radius_m } = sphere;
+            let in_ball =
+                |part| body.ball_proximity(&placed, part, center_m, radius_m, 0.0).is_some();
+            body.overlaps(&chain, values).is_empty() && !(0..body.len()).any(in_ball)
+        };
+        let goal = ArmGoal {
+            body: Some(body.clone()),
+            own_body: true,
+            spheres: vec![sphere],
+            restarts: 50,
+            ..ArmGoal::new(target)
+        };
+        let answer = chain.solve(&goal, &chain.rest_values()).expect("right");
+        // The posture that the target came from is an answer, if it is clear.
+        prop_assert!(answer.reached || !is_clear(&there), "{:?}", answer.reason);
+        prop_assert!(!answer.reached || is_clear(&answer.values));
+    }
+}
+
+#[test]
+fn the_link_that_is_in_the_way_is_named() {
+    let (model, chain) = bars("tip");
+    let body = Some(body_of(&model, &chain, &[]));
+    let target = chain.forward(&[0.0; 3]).tip.origin_m;
+    // Straight, there is no other posture. The bar is 0.05 m thick, so that its rod is not hit.
+    let sphere = Sphere { center_m: [0.5, 0.14, 1.0], radius_m: 0.1 };
+    let goal = ArmGoal { spheres: vec![sphere], ..ArmGoal::new(target) };
+    assert!(chain.solve(&goal, &chain.rest_values()).expect("right").reached);
+    let answer = chain.solve(&ArmGoal { body, ..goal }, &chain.rest_values()).expect("right");
+    let Some(IkFailure::Blocked(hit)) = answer.reason else { panic!("{answer:?}") };
+    assert_eq!((hit.part, hit.against), (HitPart::Link("a".into()), CollidesWith::Sphere(0)));
+    assert!((hit.depth_m - 0.01).abs() < 1e-3);
+}
+
+#[test]
+fn shared_arms_have_bodies_or_remarks_why_not() {
+    for (name, parts) in
+        [("iiwa14_primitive_collision.urdf", 6), ("pendulum5.urdf", 5), ("ur5_robot.urdf", 1)]
+    {
+        let Some(path) = shared(name) else { return };
+        let model = Model::load(&path).expect(name);
+        let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect(name);
+        let solids = model.solids(&path);
+        let body = ArmBody::new(&model, &chain, &solids.solids, &[]);
+        assert_eq!(body.len(), parts, "{name}: {:?}", solids.remarks);
+        let has_meshes = name != "pendulum5.urdf";
+        assert_eq!(solids.remarks.len(), usize::from(has_meshes), "{name}: {:?}", solids.remarks);
+    }
+    let (Some(urdf), Some(srdf)) = (shared("chain/panda.urdf"), shared("chain/panda.srdf")) else {
+        return;
+    };
+    let model = Model::load(&urdf).expect("a model");
+    let masks = Semantics::load(&srdf, &model).expect("an SRDF").disabled_collisions;
+    let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("an arm");
+    let masks: Vec<_> = masks.iter().map(|mask| mask.links).collect();
+    let body = ArmBody::new(&model, &chain, &model.solids(&urdf).solids, &masks);
+    // Boxes of two fingers, which may touch each other.
+    assert_eq!((body.len(), body.pairs().len()), (8, 0));
+}

@@ -1,0 +1,368 @@
+//! Joint values for the places of connectors: the demands of a chain's motion on an arm's joints within one cycle.
+//!
+//! A chain of rods moves in more ways than most arms: its motion is a guide. First all connectors are brought as near
+//! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
+//! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
+
+use super::super::serial::{JointMotion, MovingJoint, SerialChain};
+use super::super::skeleton::{Anchor, Skeleton};
+use super::super::transform::Vector;
+use super::fast_fk::{FastFk, LinkTransforms};
+use super::step::{JointRanges, Stepper};
+use sidestep_kernel::geometry::{norm, sub};
+use std::f64::consts::PI;
+
+/// Speed of joints without one in the model.
+const DEFAULT_SPEED_RAD_S: f64 = PI;
+const DEFAULT_SPEED_M_S: f64 = 1.0;
+/// Weight of a connector's place in the guide.
+const GUIDE_WEIGHT: f64 = 0.3;
+/// Most steps toward the guide, and to the places of those that lead.
+const MAX_GUIDE_STEPS: usize = 4;
+const MAX_LEAD_STEPS: usize = 24;
+/// First damping of both, in parts of the mean of the matrix's diagonal.
+const GUIDE_DAMPING: f64 = 1e-2;
+const LEAD_DAMPING: f64 = 1e-4;
+/// Factors of the damping after a step that helped, and after one that did not.
+const DAMPING_DECREASE: f64 = 0.1;
+const DAMPING_INCREASE: f64 = 10.0;
+/// Steps in a row that do not help, after which the descent ends.
+const MAX_IDLE_STEPS: usize = 4;
+/// Distance from its place, in parts of the reach, at which a connector counts as being there.
+const ARRIVAL_TOLERANCE: f64 = 1e-13;
+
+/// An arm whose joints follow the places of its connectors.
+#[derive(Debug)]
+pub struct JointTracker {
+    quick: FastFk,
+    anchors: Vec<Anchor>,
+    limits: JointRanges,
+    /// Highest speed of each variable, in rad/s or m/s.
+    speeds: Vec<f64>,
+    /// Bound on the way of any connector per unit of each variable, in m.
+    levers_m: Vec<f64>,
+    /// Length of the stretched arm, in m.
+    reach_m: f64,
+    blank: LinkTransforms,
+}
+
+/// A place for a connector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConnectorTarget {
+    /// Index of the connector.
+    pub connector: usize,
+    /// Its place in m, in the base's frame.
+    pub at_m: Vector,
+}
+
+impl JointTracker {
+    /// Returns the tracker of an arm.
+    pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
+        let anchors = skeleton.connectors.clone();
+        Self {
+            quick: FastFk::new(chain),
+            limits: JointRanges::from_chain(chain),
+            speeds: speeds(chain),
+            levers_m: levers_m(chain, &anchors),
+            reach_m: skeleton.reach_m,
+            blank: LinkTransforms::from_chain(chain),
+            anchors,
+        }
+    }
+
+    /// Returns a bound on the way of any connector per unit of each variable, in m.
+    pub fn levers_m(&self) -> &[f64] {
+        &self.levers_m
+    }
+
+    /// Returns the distance at which a connector that leads counts as being at its place, in m.
+    pub fn arrival_tolerance_m(&self) -> f64 {
+        1e4 * ARRIVAL_TOLERANCE * self.reach_m
+    }
+
+    /// Returns the highest speed of each variable, in rad/s or m/s.
+    pub fn speeds(&self) -> &[f64] {
+        &self.speeds
+    }
+
+    /// Returns the range of each variable.
+    pub fn limits(&self) -> &[[f64; 2]] {
+        &self.limits.ranges
+    }
+
+    /// Returns values inside the limits: those that are beyond by rounding are put at their ends.
+    pub fn clamp(&self, mut values: Vec<f64>) -> Vec<f64> {
+        self.limits.clamp(&mut values);
+        values
+    }
+
+    /// Returns the places of all connectors in m, in the base's frame.
+    pub fn connector_positions(&self, values: &[f64]) -> Vec<Vector> {
+        let mut placed = self.blank.clone();
+        self.quick.compute(values, &mut placed);
+        self.anchors
+            .iter()
+            .map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m))
+            .collect()
+    }
+
+    /// Returns the range of each variable within `dt_s` seconds from these values.
+    pub fn reachable_ranges(&self, values: &[f64], dt_s: f64) -> Vec<[f64; 2]> {
+        let of_one = |((value, speed), [lower, upper]): ((&f64, &f64), &[f64; 2])| {
+            [(value - speed * dt_s).max(*lower), (value + speed * dt_s).min(*upper)]
+        };
+        values.iter().zip(&self.speeds).zip(&self.limits.ranges).map(of_one).collect()
+    }
+
+    /// Returns the part, at most 1, of the way from one posture to another that all joints can go in `dt_s` seconds.
+    pub fn reachable_fraction(&self, from: &[f64], to: &[f64], dt_s: f64) -> f64 {
+        let ways = from.iter().zip(to).zip(&self.speeds);
+        ways.fold(1.0, |part, ((a, b), speed)| match (b - a).abs() {
+            0.0 => part,
+            way => part.min(speed * dt_s / way),
+        })
+    }
+
+    /// Returns whether a variable is at an end of its limits.
+    pub fn is_at_limit(&self, values: &[f64]) -> bool {
+        let ends = values.iter().zip(&self.limits.ranges);
+        ends.into_iter().any(|(value, range)| range.contains(value))
+    }
+
+    /// Returns values in their `room` at which the connectors are near the guide's places, if there is one, and those
+    /// that lead as near to theirs as the room allows.
+    pub fn track(
+        &self,
+        start: &[f64],
+        room: &[[f64; 2]],
+        guide: Option<&[Vector]>,
+        led: &[ConnectorTarget],
+    ) -> Vec<f64> {
+        if start.is_empty() {
+            return Vec::new();
+        }
+        let room = JointRanges { ranges: room.to_vec() };
+        let mut fit = TrackingDescent::new(self, start);
+        if let Some(guide) = guide {
+            let weight = |k: &usize| {
+                if led.iter().any(|aim| aim.connector == *k) { 1.0 } else { GUIDE_WEIGHT }
+            };
+            let all = (0..guide.len()).filter(|k| self.anchors[*k].first > 0);
+            let aims = all
+                .map(|k| (ConnectorTarget { connector: k, at_m: guide[k] }, weight(&k)))
+                .collect();
+            fit.descend(aims, &room, MAX_GUIDE_STEPS, GUIDE_DAMPING);
+        }
+        if !led.is_empty() {
+            let aims = led.iter().map(|aim| (*aim, 1.0)).collect();
+            fit.descend(aims, &room, MAX_LEAD_STEPS, LEAD_DAMPING);
+        }
+        fit.values
+    }
+}
+
+/// Joint values on their way to places.
+struct TrackingDescent<'a> {
+    arm: &'a JointTracker,
+    values: Vec<f64>,
+    placed: LinkTransforms,
+    stepper: Stepper,
+}
+
+impl<'a> TrackingDescent<'a> {
+    fn new(arm: &'a JointTracker, start: &[f64]) -> Self {
+        let (values, placed) = (start.to_vec(), arm.blank.clone());
+        Self { arm, values, placed, stepper: Stepper::default() }
+    }
+
+    /// Makes damped steps until the connectors are there or it gets no better.
+    fn descend(
+        &mut self,
+        aims: Vec<(ConnectorTarget, f64)>,
+        room: &JointRanges,
+        steps: usize,
+        mut damping: f64,
+    ) {
+        let (mut next, mut next_placed) = (self.values.clone(), self.placed.clone());
+        let mut wanted = self.residuals(&self.values.clone(), &aims, None);
+        let (mut is_new, mut since) = (true, 0);
+        for _ in 0..steps {
+            if merit(&wanted).sqrt() <= ARRIVAL_TOLERANCE * self.arm.reach_m
+                || since >= MAX_IDLE_STEPS
+            {
+                break;
+            }
+            if is_new {
+                self.update_jacobian(&aims);
+            }
+            self.stepper.step(&self.values, &wanted, damping, room, &mut next);
+            let next_wanted = self.residuals(&next.clone(), &aims, Some(&mut next_placed));
+            is_new = merit(&next_wanted) < merit(&wanted);
+            if is_new {
+                std::mem::swap(&mut self.values, &mut next);
+                std::mem::swap(&mut self.placed, &mut next_placed);
+                (wanted, since) = (next_wanted, 0);
+                damping *= DAMPING_DECREASE;
+            } else {
+                since += 1;
+                damping *= DAMPING_INCREASE;
+            }
+        }
+    }
+
+    /// Returns the weighted ways from the connectors to their places at these values.
+    fn residuals(
+        &mut self,
+        values: &[f64],
+        aims: &[(ConnectorTarget, f64)],
+        placed: Option<&mut LinkTransforms>,
+    ) -> Vec<f64> {
+        let placed = placed.unwrap_or(&mut self.placed);
+        self.arm.quick.compute(values, placed);
+        let way = |(aim, weight): &(ConnectorTarget, f64)| {
+            let anchor = &self.arm.anchors[aim.connector];
+            let at_m = placed.links[anchor.first].transform_point(anchor.point_m);
+            sub(aim.at_m, at_m).map(|x| weight * x)
+        };
+        aims.iter().flat_map(way).collect()
+    }
+
+    /// Computes the weighted velocities of connectors per unit of each variable.
+    fn update_jacobian(&mut self, aims: &[(ConnectorTarget, f64)]) {
+        let n = self.values.len();
+        let rows = &mut self.stepper.rows;
+        rows.clear();
+        rows.resize(3 * aims.len() * n, 0.0);
+        for ((aim, weight), rows) in aims.iter().zip(rows.chunks_exact_mut(3 * n)) {
+            let anchor = &self.arm.anchors[aim.connector];
+            let at_m = self.placed.links[anchor.first].transform_point(anchor.point_m);
+            let lines = &self.placed.lines;
+            self.arm.quick.for_each_joint(lines, anchor.first, at_m, |variable, moves| {
+                for (axis, x) in moves.into_iter().enumerate() {
+                    rows[axis * n + variable] += weight * x;
+                }
+            });
+        }
+    }
+}
+
+fn merit(wanted: &[f64]) -> f64 {
+    wanted.iter().map(|x| x * x).sum()
+}
+
+/// Returns the highest speed of each variable: joints that mimic another narrow its own.
+fn speeds(chain: &SerialChain) -> Vec<f64> {
+    let usual =
+        |motion| if motion == JointMotion::Turn { DEFAULT_SPEED_RAD_S } else { DEFAULT_SPEED_M_S };
+    let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(usual(v.motion)));
+    let mut speeds: Vec<f64> = own.collect();
+    for joint in &chain.joints {
+        let (drive, usual) = (joint.drive, usual(joint.motion));
+        if drive.multiplier != 0.0 {
+            let most = joint.max_speed.unwrap_or(usual) / drive.multiplier.abs();
+            speeds[drive.variable] = speeds[drive.variable].min(most);
+        }
+    }
+    speeds
+}
+
+/// Returns bounds on the way of any connector per unit of each variable: the lengths of all links between its joints
+/// and the connector.
+fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
+    let mut levers_m = vec![0.0; chain.variables.len()];
+    for (i, joint) in chain.joints.iter().enumerate() {
+        let lever_m = |anchor: &Anchor| {
+            let links = chain.joints[i + 1..anchor.first].iter();
+            let links_m = links.map(|link| norm(link.origin.origin_m) + max_slide_m(link));
+            if joint.motion == JointMotion::Slide {
+                1.0
+            } else {
+                norm(anchor.point_m) + links_m.sum::<f64>()
+            }
+        };
+        let beyond = anchors.iter().filter(|anchor| anchor.first > i);
+        let lever_m = beyond.map(lever_m).fold(0.0, f64::max);
+        levers_m[joint.drive.variable] += lever_m * joint.drive.multiplier.abs();
+    }
+    levers_m
+}
+
+/// Returns the longest way of a joint that slides; of one without limits 1 m.
+fn max_slide_m(joint: &MovingJoint) -> f64 {
+    match (joint.motion, joint.limits) {
+        (JointMotion::Turn, _) => 0.0,
+        (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+        (JointMotion::Slide, None) => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_import::urdf::Model;
+    use sidestep_kernel::geometry::add;
+    use sidestep_testing::robot_model;
+
+    fn arm(model: &str) -> Option<(SerialChain, JointTracker)> {
+        let model = Model::load(&robot_model(model)?).expect("a model");
+        let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
+        let follower = JointTracker::new(&chain, &chain.skeleton());
+        Some((chain, follower))
+    }
+
+    const ARMS: [&str; 4] =
+        ["iiwa14_primitive_collision.urdf", "ur5_robot.urdf", "panda.urdf", "RSNAKE_snake.urdf"];
+
+    #[test]
+    fn places_are_those_of_forward_kinematics() {
+        for (chain, follower) in ARMS.into_iter().filter_map(arm) {
+            let values = chain.rest_values();
+            let expected = chain.connectors(&chain.skeleton(), &chain.forward(&values));
+            for (a, b) in follower.connector_positions(&values).into_iter().zip(expected) {
+                assert!(norm(sub(a, b)) < 1e-12, "{}", chain.tip);
+            }
+        }
+    }
+
+    /// Leads each arm's tool along a straight line: wherever the room allows it, the tool is there exactly, and no
+    /// joint leaves its room.
+    #[test]
+    fn a_tool_is_where_it_is_led_or_a_joint_is_at_the_end_of_its_room() {
+        for (chain, follower) in ARMS.into_iter().filter_map(arm) {
+            let mut values: Vec<f64> =
+                follower.clamp(chain.rest_values().iter().map(|x| x + 0.3).collect());
+            let tip = follower.connector_positions(&values).len() - 1;
+            let mut led = 0;
+            for _ in 0..100 {
+                let mut places = follower.connector_positions(&values);
+                places[tip] = add(places[tip], [-0.001, 0.001, -0.0005]);
+                let aim = ConnectorTarget { connector: tip, at_m: places[tip] };
+                let room = follower.reachable_ranges(&values, 0.02);
+                let next = follower.track(&values, &room, Some(&places), &[aim]);
+                assert!(
+                    next.iter().zip(&room).all(|(x, [a, b])| (a..=b).contains(&x)),
+                    "{}",
+                    chain.tip
+                );
+                let off_m = norm(sub(follower.connector_positions(&next)[tip], aim.at_m));
+                led += usize::from(off_m <= follower.arrival_tolerance_m());
+                values = next;
+            }
+            assert!(led >= 90, "{}: {led}", chain.tip);
+        }
+    }
+
+    #[test]
+    fn no_connector_goes_farther_than_the_levers_say() {
+        for (chain, follower) in ARMS.into_iter().filter_map(arm) {
+            let rest = follower.clamp(chain.rest_values().iter().map(|x| x - 0.2).collect());
+            for i in 0..rest.len() {
+                let mut turned = rest.clone();
+                turned[i] += 0.1;
+                let [a, b] = [&rest, &turned].map(|values| follower.connector_positions(values));
+                let way_m = a.iter().zip(&b).map(|(a, b)| norm(sub(*a, *b))).fold(0.0, f64::max);
+                assert!(way_m <= 0.1 * follower.levers_m()[i] + 1e-12, "{} {i}", chain.tip);
+            }
+        }
+    }
+}

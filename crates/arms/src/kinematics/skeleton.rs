@@ -1,0 +1,224 @@
+//! Connectors from joint axes, and the rods between them.
+//!
+//! Every connector is fixed in a range of links: a point on the axis of joint j is fixed in links j
+//! and j + 1, a point where three axes meet in four links. From the base on, the next connector is
+//! the one farthest out that shares a link with the last one, so that points between which no joint
+//! bends (such as the elbow offsets of a Panda) drop out.
+
+use super::serial::{Frames, JointMotion, SerialChain};
+use super::transform::{Line, Transform, Vector};
+use sidestep_kernel::geometry::{add, dot, norm, rejection, scaled, sub};
+
+/// Points nearer to each other than this share of the arm's reach count as one.
+const SAME_POINT_TOLERANCE: f64 = 1e-9;
+
+/// An arm as a chain of rods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Skeleton {
+    /// The connectors, one more than rods; the last is the tip.
+    pub(super) connectors: Vec<Anchor>,
+    /// The rods between them.
+    pub rods: Vec<SkeletonRod>,
+    /// Unit vector in the base's frame along the first joint's axis, from which the bend at the
+    /// first connector is measured. None if that joint slides or the connector is not on it.
+    pub base_direction: Option<Vector>,
+    /// The sum of the links' lengths in m, an upper bound of the arm's reach.
+    pub reach_m: f64,
+}
+
+/// Lengths that a rod can have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkeletonRod {
+    /// Shortest length in m. It is zero if a prismatic joint can bring its ends together.
+    pub min_m: f64,
+    /// Longest length in m; infinite if a prismatic joint has no limits.
+    pub max_m: f64,
+}
+
+/// A point that is fixed in the links `first..=last`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Anchor {
+    /// Its position in the frame of link `first`, in m.
+    pub(super) point_m: Vector,
+    pub(super) first: usize,
+    pub(super) last: usize,
+}
+
+impl Anchor {
+    pub(super) fn position_m(&self, frames: &Frames) -> Vector {
+        frames.links[self.first].transform_point(self.point_m)
+    }
+}
+
+impl SerialChain {
+    /// Returns the arm's connectors and rods. They do not depend on the posture.
+    pub fn skeleton(&self) -> Skeleton {
+        let frames = self.forward(&vec![0.0; self.variables.len()]);
+        let reach_m = self.reach_m();
+        let builder = SkeletonBuilder { chain: self, lines: self.lines(&frames), frames, reach_m };
+        let connectors = builder.connectors();
+        let rods = connectors.windows(2).map(|pair| builder.rod(&pair[0], &pair[1])).collect();
+        Skeleton { rods, base_direction: builder.base_direction(&connectors), reach_m, connectors }
+    }
+
+    /// Returns the positions of the connectors of `skeleton` (this chain's) at `frames`, in m in
+    /// the base's frame.
+    pub fn connectors(&self, skeleton: &Skeleton, frames: &Frames) -> Vec<Vector> {
+        skeleton.connectors.iter().map(|anchor| anchor.position_m(frames)).collect()
+    }
+
+    /// Returns the arm up to connector `k` of `skeleton` (this chain's), as if that were its tip, with all its
+    /// variables.
+    pub fn up_to(&self, skeleton: &Skeleton, k: usize) -> Self {
+        let anchor = &skeleton.connectors[k];
+        Self {
+            tip: format!("connector {k}"),
+            joints: self.joints[..anchor.first].to_vec(),
+            to_tip: Transform::from_translation(anchor.point_m),
+            ..self.clone()
+        }
+    }
+
+    /// Returns the joints' axes at `frames`.
+    fn lines(&self, frames: &Frames) -> Vec<Line> {
+        self.joints.iter().zip(&frames.links).map(|(joint, before)| joint.line(before)).collect()
+    }
+
+    fn reach_m(&self) -> f64 {
+        let slide = |j: &super::serial::MovingJoint| match (j.motion, j.limits) {
+            (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+            _ => 0.0,
+        };
+        let links = self.joints.iter().map(|joint| norm(joint.origin.origin_m) + slide(joint));
+        links.sum::<f64>() + norm(self.to_tip.origin_m)
+    }
+}
+
+struct SkeletonBuilder<'a> {
+    chain: &'a SerialChain,
+    /// The posture in which points are compared.
+    frames: Frames,
+    lines: Vec<Line>,
+    reach_m: f64,
+}
+
+impl SkeletonBuilder<'_> {
+    fn connectors(&self) -> Vec<Anchor> {
+        let tip_link = self.chain.joints.len();
+        let tip = self.anchor(self.frames.tip.origin_m, tip_link);
+        let candidates = self.candidates();
+        let Some(&base) = candidates.iter().filter(|c| c.first == 0).reduce(outer_anchor) else {
+            return self.without_joints(tip);
+        };
+        let mut connectors = vec![base];
+        let mut last = base;
+        while !self.is_adjacent(&last, &tip) {
+            let next =
+                candidates.iter().filter(|c| c.last > last.last && self.is_adjacent(&last, c));
+            // Far from the origin rounding may part a connector from its axis; the rest of the arm is then one rod.
+            let Some(next) = next.reduce(outer_anchor) else { break };
+            last = *next;
+            connectors.push(last);
+        }
+        if !self.is_coincident(&last, &tip) {
+            connectors.push(tip);
+        }
+        connectors
+    }
+
+    /// Returns the anchors of a single rigid body: its base and its tip.
+    fn without_joints(&self, tip: Anchor) -> Vec<Anchor> {
+        let base = self.anchor([0.0; 3], 0);
+        if self.is_coincident(&base, &tip) { vec![tip] } else { vec![base, tip] }
+    }
+
+    /// Returns points on the axes, from the base out: feet of the common perpendiculars of
+    /// neighbors.
+    fn candidates(&self) -> Vec<Anchor> {
+        let Some(first) = self.lines.first() else { return Vec::new() };
+        let mut candidates = Vec::new();
+        let mut entry = first.through_m;
+        let is_slide = |joint: usize| self.chain.joints[joint].motion == JointMotion::Slide;
+        if self.lines.len() == 1 || is_slide(0) {
+            candidates.push(self.anchor(entry, 0));
+        }
+        for (joint, pair) in self.lines.windows(2).enumerate() {
+            let (near, far) =
+                pair[0].common_perpendicular(&pair[1]).unwrap_or((entry, pair[1].nearest(entry)));
+            candidates.push(self.anchor(near, joint + 1));
+            candidates.push(self.anchor(far, joint + 1));
+            entry = far;
+        }
+        candidates
+    }
+
+    /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
+    fn anchor(&self, p_m: Vector, link: usize) -> Anchor {
+        let on_axis = |joint: usize| {
+            self.chain.joints[joint].motion == JointMotion::Turn
+                && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
+        };
+        let (mut first, mut last) = (link, link);
+        while first > 0 && on_axis(first - 1) {
+            first -= 1;
+        }
+        while last < self.lines.len() && on_axis(last) {
+            last += 1;
+        }
+        Anchor { point_m: self.frames.links[first].inverse_transform_point(p_m), first, last }
+    }
+
+    /// Returns whether a rod can join two points: fixed in one link, or on either side of a slide.
+    fn is_adjacent(&self, inner: &Anchor, outer: &Anchor) -> bool {
+        outer.first <= inner.last || self.slide_between(inner, outer).is_some()
+    }
+
+    fn slide_between(&self, inner: &Anchor, outer: &Anchor) -> Option<usize> {
+        let slides = outer.first == inner.last + 1
+            && self.chain.joints[inner.last].motion == JointMotion::Slide;
+        slides.then_some(inner.last)
+    }
+
+    fn between_m(&self, inner: &Anchor, outer: &Anchor) -> Vector {
+        sub(outer.position_m(&self.frames), inner.position_m(&self.frames))
+    }
+
+    fn is_coincident(&self, inner: &Anchor, outer: &Anchor) -> bool {
+        self.slide_between(inner, outer).is_none()
+            && norm(self.between_m(inner, outer)) <= SAME_POINT_TOLERANCE * self.reach_m
+    }
+
+    fn rod(&self, inner: &Anchor, outer: &Anchor) -> SkeletonRod {
+        let v = self.between_m(inner, outer);
+        let Some(joint) = self.slide_between(inner, outer) else {
+            return SkeletonRod { min_m: norm(v), max_m: norm(v) };
+        };
+        let axis = self.lines[joint].along;
+        let offset_m = norm(rejection(v, axis));
+        let joint = &self.chain.joints[joint];
+        // The frames of the builder have every variable at zero, a mimic joint at its offset.
+        let zero = joint.drive.offset;
+        let length_m = |q: f64| norm([offset_m, dot(v, axis) + q - zero, 0.0]);
+        let Some(limits) = joint.limits else {
+            return SkeletonRod { min_m: offset_m, max_m: f64::INFINITY };
+        };
+        let ends = [length_m(limits.lower), length_m(limits.upper)];
+        let passes = (limits.lower..=limits.upper).contains(&(zero - dot(v, axis)));
+        SkeletonRod {
+            min_m: if passes { offset_m } else { ends[0].min(ends[1]) },
+            max_m: ends[0].max(ends[1]),
+        }
+    }
+
+    fn base_direction(&self, connectors: &[Anchor]) -> Option<Vector> {
+        let first = connectors.first().filter(|c| c.first == 0 && c.last > 0)?;
+        let axis = self.lines[0].along;
+        let outward = connectors.get(1).map_or(0.0, |next| dot(self.between_m(first, next), axis));
+        Some(if outward < 0.0 { scaled(axis, -1.0) } else { add(axis, [0.0; 3]) })
+    }
+}
+
+/// Returns the anchor that is fixed farther out; of several the first.
+fn outer_anchor<'a>(a: &'a Anchor, b: &'a Anchor) -> &'a Anchor {
+    if b.last > a.last { b } else { a }
+}

@@ -1,0 +1,10 @@
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
+
+mod arm;
+pub mod ik;
+pub mod kinematics;
+pub mod plan;
+
+pub use arm::Arm;
+pub use sidestep_kernel::InputError;

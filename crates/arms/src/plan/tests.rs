@@ -1,0 +1,118 @@
+//! Ways among obstacles, each checked posture by posture by another measure than the planner's.
+
+use super::*;
+use sidestep_kernel::Seed;
+use sidestep_kernel::interrupt::Interrupt;
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_rods::{Connector, Mobility, Obstacle, Rod};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+fn draws(seed: u64) -> Draws {
+    Streams::new(Seed(seed)).draws(0, 0, Purpose(9))
+}
+
+/// Returns the least clearance of any connector and any rod from obstacles, up to 1 m.
+fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f64 {
+    let points = chain.points();
+    let tip = |i: usize| obstacles.clearance_m([points[i]; 2], chain.connectors()[i].radius_m, 1.0);
+    let rod =
+        |i: usize| obstacles.clearance_m([points[i], points[i + 1]], chain.rods()[i].radius_m, 1.0);
+    let tips = (0..points.len()).map(tip).fold(1.0, f64::min);
+    (0..chain.rods().len()).map(rod).fold(tips, f64::min)
+}
+
+/// An arm of five rods along the first axis.
+fn arm() -> Chain<2> {
+    let rod = Rod::fixed(0.4, 0.02);
+    let mut arm = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
+    arm.set_mobility(0, Mobility::Fixed).unwrap();
+    arm
+}
+
+/// A wall beside the arm, with a hole near the base: the tool must be drawn back to come behind it.
+fn wall() -> Obstacles<2> {
+    let wall = Obstacle::capsule(0, [[0.5, 0.35], [2.5, 0.35]], 0.05);
+    Obstacles::new(vec![wall], 1.0).unwrap()
+}
+
+const BEHIND: PlanningQuery<2> = PlanningQuery { k: 5, target: [1.0, 0.9], tolerance_m: 1e-3 };
+
+#[test]
+fn a_way_round_a_wall_is_found_and_free_all_along() {
+    let (chain, obstacles) = (arm(), wall());
+    for seed in 0..20 {
+        let way = plan(&chain, &obstacles, Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+        let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
+        let space = RodSpace::new(&chain, &obstacles, false, 5).unwrap();
+        let mut at = chain.clone();
+        for next in &way {
+            let from = at.points().to_vec();
+            for part in 1..=200 {
+                at.points_mut().copy_from_slice(&space.interpolate(
+                    &from,
+                    next,
+                    f64::from(part) / 200.0,
+                ));
+                assert!(clearance_m(&at, &obstacles) > -5e-3, "{seed}");
+                assert!(at.max_rod_violation_m() < 1e-9 && at.points()[0] == [0.0; 2], "{seed}");
+            }
+        }
+        let left_m = sidestep_rods::geometry::distance(at.points()[5], BEHIND.target);
+        assert!(left_m <= BEHIND.tolerance_m, "{seed}: {left_m}");
+    }
+}
+
+/// Three rods folded like a Z beside the target: the postures near the present one are cut off from it
+/// by the chain's own body.
+#[test]
+fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
+    let points = vec![[0.0, 0.0], [0.69383, 0.72014], [-0.29946, 0.83574], [0.70042, 0.82014]];
+    let rods: Vec<_> = points
+        .windows(2)
+        .map(|w| Rod::fixed(sidestep_rods::geometry::distance(w[0], w[1]), 0.03))
+        .collect();
+    let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
+    arm.set_mobility(0, Mobility::Fixed).unwrap();
+    let rules = Rules { self_collision: true, ..Rules::default() };
+    let errand = PlanningQuery { k: 3, target: [0.630_251_8, 0.731_368_6], tolerance_m: 5e-4 };
+    for seed in 0..10 {
+        let way = plan(&arm, &Obstacles::default(), rules, &errand, &mut draws(seed)).unwrap();
+        assert!(way.is_some(), "{seed}: no way");
+    }
+}
+
+#[test]
+fn the_same_draws_give_the_same_way() {
+    let once = |seed| plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+    assert_eq!(once(3), once(3));
+    assert_ne!(once(3), once(4));
+}
+
+#[test]
+fn no_way_leads_into_an_obstacle_or_out_of_reach() {
+    for target in [[1.0, 0.35], [0.0, 3.0]] {
+        let errand = PlanningQuery { target, ..BEHIND };
+        let way = plan(&arm(), &wall(), Rules::default(), &errand, &mut draws(1)).unwrap();
+        assert_eq!(way, None);
+    }
+}
+
+#[test]
+fn a_chain_without_a_base_has_no_plan() {
+    let rod = Rod::fixed(0.4, 0.02);
+    let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
+    let error = plan(&chain, &wall(), Rules::default(), &BEHIND, &mut draws(1)).unwrap_err();
+    assert_eq!(error.place(), "planner");
+}
+
+#[test]
+fn a_search_heeds_an_interrupt() {
+    let interrupt = Interrupt::default();
+    interrupt.raise();
+    let search = || {
+        let _heeded = interrupt.attach();
+        plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(1))
+    };
+    let payload = catch_unwind(AssertUnwindSafe(search)).expect_err("it unwinds");
+    assert!(interrupt.caused(payload.as_ref()));
+}

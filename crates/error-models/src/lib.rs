@@ -1,0 +1,9 @@
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
+
+pub mod effector;
+mod policy;
+pub mod ray;
+pub mod sensor;
+
+pub use policy::RandomPolicy;

@@ -1,0 +1,55 @@
+//! Options of a summary.
+
+use sidestep_scenario::MetricInfo;
+use sidestep_statistics::Bootstrap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Options of a summary.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SummaryOptions {
+    /// Metrics to show, in this order; `None` for the default order of the module.
+    pub metrics: Option<Vec<String>>,
+    /// Largest number of metrics shown if none are requested.
+    pub max_metrics: usize,
+    /// The baseline of variants; `None` for the first variant, but for nothing in grids of
+    /// several parameters and in scattered designs, where the first is like no other.
+    pub against: Option<BaselineChoice>,
+    /// Names of the variants, where the table has their numbers.
+    pub names: Option<Vec<String>>,
+    /// Variants in which seeds change nothing: their one value has no interval.
+    pub seedless: BTreeSet<String>,
+    /// Options of bootstrap intervals.
+    pub bootstrap: Bootstrap,
+    /// The metrics in words.
+    pub meanings: &'static [MetricInfo],
+}
+
+/// The baseline of variants.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BaselineChoice {
+    /// The variant of this name.
+    Variant(String),
+    /// Each with a variant of its own.
+    Matched {
+        /// The name of these in tables.
+        name: String,
+        /// The names of variants, and of those that they are compared with.
+        of: BTreeMap<String, String>,
+        /// Number of variants to which none corresponds.
+        alone: usize,
+    },
+}
+
+impl Default for SummaryOptions {
+    fn default() -> Self {
+        Self {
+            metrics: None,
+            names: None,
+            max_metrics: 12,
+            against: None,
+            seedless: BTreeSet::new(),
+            bootstrap: Bootstrap::default(),
+            meanings: &[],
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! The cells of a sweep, and their shares.
+
+use super::baseline::{Baseline, BaselineMatcher};
+use super::file::{Precision, Sweep};
+use super::variant::{BaseScenario, Setting, Variant};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use sidestep_kernel::InputError;
+use sidestep_scenario::SeedEffect;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// All runs of a sweep: variants times replicates.
+///
+/// A cell has the number `variant * replicates + replicate`, so rows sorted by cell are sorted by
+/// variant. Cells are run replicate by replicate, so that the first results are a small complete
+/// experiment.
+///
+/// A plan that is read back is checked ([`Plan::check`]): all other code may trust it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
+pub struct Plan {
+    /// Name of the sweep; may be empty.
+    pub name: String,
+    /// Name of the world.
+    pub world: String,
+    /// Keys that differ between variants, in the order of their columns.
+    pub parameters: Vec<String>,
+    /// The variants.
+    pub variants: Vec<Variant>,
+    /// Largest number of runs of each variant.
+    pub replicates: u32,
+    /// The seed of replicate 0; replicate `k` has this plus `k`.
+    pub first_seed: u64,
+    /// The precision at which a variant has had enough runs, if it is not run for all replicates.
+    pub until: Option<Precision>,
+    /// The metrics to report; all that vary if empty.
+    pub metrics: Vec<String>,
+    /// The baseline that the variants are compared with.
+    pub baseline: Option<Baseline>,
+    /// Number of agents of the largest variant.
+    pub agents: u64,
+    /// Whether every run is recorded in a folder of its own.
+    pub record: bool,
+}
+
+/// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
+const MAX_SWEEP_RUNS: u64 = 10_000_000;
+
+impl Serialize for Plan {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Plan {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let plan = Self::deserialize(from)?;
+        plan.check().map_err(D::Error::custom)?;
+        Ok(plan)
+    }
+}
+
+/// The unit of work: a variant with a seed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Cell {
+    /// Its number.
+    pub id: u64,
+    /// Number of its variant.
+    pub variant: u32,
+    /// Number of the run among those of its variant.
+    pub replicate: u32,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// Returns a plan of these variants, which are known to be valid.
+    ///
+    /// # Errors
+    /// When seeds overflow, or the baseline is no variant.
+    pub fn new(
+        sweep: &Sweep,
+        variants: Vec<Variant>,
+        base: BaseScenario<'_>,
+    ) -> Result<Self, InputError> {
+        let mut parameters: Vec<String> = Vec::new();
+        for setting in variants.iter().flat_map(|v| &v.settings) {
+            if !parameters.contains(&setting.key) {
+                parameters.push(setting.key.clone());
+            }
+        }
+        let first_seed = sweep.first_seed.unwrap_or(base.seed);
+        check_seeds(first_seed, sweep.replicates.into())
+            .map_err(|cause| InputError::new(&sweep.place, cause, "begin with a smaller seed"))?;
+        let mut plan = Self {
+            name: sweep.name.clone(),
+            world: base.world.into(),
+            parameters,
+            variants,
+            replicates: sweep.replicates,
+            first_seed,
+            until: sweep.until.clone(),
+            metrics: sweep.metrics.clone(),
+            baseline: None,
+            agents: 0,
+            record: sweep.record,
+        };
+        plan.baseline = plan.baseline_of(sweep, base)?;
+        Ok(plan)
+    }
+
+    /// Returns the baseline that is asked for, among the plan's variants.
+    fn baseline_of(
+        &self,
+        sweep: &Sweep,
+        base: BaseScenario<'_>,
+    ) -> Result<Option<Baseline>, InputError> {
+        let search = BaselineMatcher {
+            wanted: &sweep.baseline,
+            variants: &self.variants,
+            parameters: &self.parameters,
+            base,
+            place: &sweep.place,
+        };
+        search.baseline(|k| self.names().swap_remove(k), |setting| self.short_setting(setting))
+    }
+
+    /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
+    ///
+    /// # Errors
+    /// The cause, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let (variants, replicates) = (self.variants.len(), u64::from(self.replicates));
+        if variants == 0 || replicates == 0 {
+            return Err(format!("a plan of {variants} variants with {replicates} runs each"));
+        }
+        if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MAX_SWEEP_RUNS) {
+            return Err(format!("{variants} variants with {replicates} runs each are too many"));
+        }
+        check_seeds(self.first_seed, replicates)?;
+        self.until.iter().try_for_each(Precision::check)?;
+        self.variants.iter().try_for_each(|variant| variant.check(&self.parameters))?;
+        self.baseline.iter().try_for_each(|baseline| baseline.check(variants))
+    }
+
+    /// Returns the names of the variants in tables and figures: their parameters, in short
+    /// (`method=pc, n=8`).
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            self.variants.iter().map(|v| v.label(|s| self.short_setting(s))).collect();
+        let plain = if names.len() == 1 { "all runs" } else { "as in the scenario" };
+        names.iter_mut().filter(|name| name.is_empty()).for_each(|name| *name = plain.into());
+        number_duplicates(&mut names);
+        names
+    }
+
+    /// Returns a setting in short, `method=pc`: with the whole path of its key only where another
+    /// parameter ends like it.
+    fn short_setting(&self, Setting { key, value }: &Setting) -> String {
+        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
+        let alike = self.parameters.iter().filter(|k| last(k) == last(key)).count();
+        let key = if alike > 1 { key.clone() } else { last(key) };
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        format!("{key}={value}")
+    }
+
+    /// Checks that there are not too many runs for the memory of a machine.
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub fn check_size(variants: usize, replicates: u32, place: &str) -> Result<(), InputError> {
+        let runs = variants as u64 * u64::from(replicates);
+        if runs <= MAX_SWEEP_RUNS {
+            return Ok(());
+        }
+        let remedy = format!("sweep over less: up to {MAX_SWEEP_RUNS} runs, or several sweeps");
+        Err(InputError::new(place, format!("there are {runs} runs"), remedy))
+    }
+
+    /// Returns the effect of seeds on the runs of a variant.
+    pub(super) fn seeds(&self, variant: u32) -> SeedEffect {
+        self.variants[variant as usize].seeds
+    }
+
+    /// Returns the number of runs of a variant, at most: one where seeds change nothing.
+    pub fn runs_of(&self, variant: u32) -> u32 {
+        if self.seeds(variant) == SeedEffect::Nothing { 1 } else { self.replicates }
+    }
+
+    /// Returns the number of runs, at most.
+    pub fn runs(&self) -> u64 {
+        (0..self.variants.len() as u32).map(|v| u64::from(self.runs_of(v))).sum()
+    }
+
+    /// Returns the number of cells; not all are run where seeds change nothing.
+    pub fn len(&self) -> u64 {
+        self.variants.len() as u64 * u64::from(self.replicates)
+    }
+
+    /// Returns whether there are no cells; a plan always has some.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns the cell of a variant and a replicate.
+    pub fn cell(&self, variant: u32, replicate: u32) -> Cell {
+        Cell {
+            id: u64::from(variant) * u64::from(self.replicates) + u64::from(replicate),
+            variant,
+            replicate,
+            seed: self.first_seed + u64::from(replicate),
+        }
+    }
+
+    /// Returns the cell with this number, if it exists.
+    pub fn cell_of(&self, id: u64) -> Option<Cell> {
+        let replicates = u64::from(self.replicates);
+        let cell = || self.cell((id / replicates) as u32, (id % replicates) as u32);
+        (id < self.len()).then(cell)
+    }
+
+    /// Returns the cells of a share, in the order in which they are run: every `count`-th cell,
+    /// counted over variants and replicates alike, so that no share gets all the expensive
+    /// variants.
+    pub fn shard_cells(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
+        let (index, count) = (u64::from(shard.index), u64::from(shard.count));
+        let variants = self.variants.len() as u32;
+        let cells = (0..self.replicates)
+            .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
+        let cells = cells.filter(|c| c.replicate < self.runs_of(c.variant));
+        cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
+    }
+}
+
+/// Checks that runs with seeds from `first` on have seeds that scenarios can have, up to 2^63 - 1.
+///
+/// # Errors
+/// The cause, in words.
+pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
+    match first.checked_add(runs.saturating_sub(1)).is_some_and(|last| last <= i64::MAX as u64) {
+        true => Ok(()),
+        false => Err(format!("{runs} seeds from {first} on exceed 2^63 - 1")),
+    }
+}
+
+/// Numbers equal names from the second on, because samples of whole numbers may coincide.
+fn number_duplicates(names: &mut [String]) {
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    for name in names {
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            *name = format!("{name} ({count})");
+        }
+    }
+}
+
+/// A share of the cells: number `index` of `count`, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Shard {
+    /// Its number.
+    pub index: u32,
+    /// The number of shares.
+    pub count: u32,
+}
+
+impl Shard {
+    /// The share of all cells.
+    pub const ALL: Self = Self { index: 0, count: 1 };
+}
+
+/// Parses `0/4`, the first of four shares.
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is no share: write I/N with I from 0 to N-1, e.g. 0/4");
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let number = |t: &str| t.trim().parse::<u32>().map_err(|_| wrong());
+        let shard = Self { index: number(index)?, count: number(count)? };
+        if shard.index < shard.count { Ok(shard) } else { Err(wrong()) }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::Factor;
+    use proptest::prelude::*;
+    use sidestep_scenario::Source;
+    use std::collections::BTreeSet;
+
+    fn plan(variants: usize, replicates: u32) -> Plan {
+        let values = (0..variants).map(|n| n.to_string()).collect::<Vec<_>>().join(",");
+        let mut sweep = Sweep::from_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse(&format!("n={values}")).expect("valid")];
+        sweep.replicates = replicates;
+        let variants = sweep.design.variants("test").expect("valid");
+        let source = Source::new("s.toml", "", "");
+        let base = BaseScenario { world: "robots", seed: 7, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
+    }
+
+    proptest! {
+        #[test]
+        fn shares_are_disjoint_and_together_are_all_cells(
+            variants in 1usize..12, replicates in 1u32..12, count in 1u32..9,
+        ) {
+            let plan = plan(variants, replicates);
+            let mut seen = BTreeSet::new();
+            for index in 0..count {
+                for cell in plan.shard_cells(Shard { index, count }) {
+                    prop_assert_eq!(plan.cell_of(cell.id), Some(cell));
+                    prop_assert!(seen.insert(cell.id), "cell {} is in two shares", cell.id);
+                }
+            }
+            prop_assert_eq!(seen.len() as u64, plan.len());
+            prop_assert_eq!(plan.cell_of(plan.len()), None);
+        }
+    }
+
+    #[test]
+    fn replicates_of_all_variants_have_the_same_seeds() {
+        let plan = plan(3, 4);
+        for cell in plan.shard_cells(Shard::ALL) {
+            assert_eq!(cell.seed, 7 + u64::from(cell.replicate));
+        }
+        let first: Vec<u32> = plan.shard_cells(Shard::ALL).take(3).map(|c| c.replicate).collect();
+        assert_eq!(first, [0, 0, 0], "the first replicate of every variant comes first");
+    }
+
+    #[test]
+    fn a_share_has_variants_and_replicates_of_all_kinds() {
+        let plan = plan(2, 6);
+        let half: Vec<Cell> = plan.shard_cells(Shard { index: 0, count: 2 }).collect();
+        assert_eq!(half.iter().filter(|c| c.variant == 0).count(), 3);
+        assert_eq!(half.len(), 6);
+    }
+
+    #[test]
+    fn shares_are_written_as_index_of_count() {
+        assert_eq!("1/4".parse(), Ok(Shard { index: 1, count: 4 }));
+        for bad in ["4/4", "1", "a/2", "-1/2", "0/0", ""] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+    }
+}

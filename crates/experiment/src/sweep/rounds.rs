@@ -1,0 +1,270 @@
+//! The next cells to run, if a requested precision decides when a variant has had enough runs.
+
+use super::cell::Outcome;
+use super::file::Precision;
+use super::plan::{Cell, Plan};
+use super::table::RunTable;
+use serde::Serialize;
+use sidestep_statistics::{StopDecision, StopReason, StoppingRule};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Number of runs of each variant before the first check.
+const MIN_RUNS: usize = 10;
+
+/// The metrics of the variants so far: the decision depends on nothing else.
+///
+/// They are a function of the outcomes alone, in any order, so the number of workers does not
+/// matter, nor whether the sweep was killed in between.
+#[derive(Debug)]
+pub struct Rounds<'a> {
+    plan: &'a Plan,
+    until: &'a Precision,
+    /// Values by replicate of each variant, by metric.
+    values: Vec<BTreeMap<String, Values>>,
+    /// Replicates of each variant that have an outcome.
+    done: Vec<BTreeSet<u32>>,
+}
+
+/// The reason why a variant is no longer run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct VariantStop {
+    /// Number of the variant.
+    pub variant: u32,
+    /// Number of its runs.
+    pub runs: usize,
+    /// The reason why they are enough.
+    pub reason: StopReason,
+}
+
+/// Returns the reasons why the variants of a plan stopped, if a precision ended them.
+pub fn variant_stops(plan: &Plan, runs: &RunTable) -> Vec<VariantStop> {
+    let Some(until) = &plan.until else { return Vec::new() };
+    let mut rounds = Rounds::new(plan, until);
+    runs.for_each_outcome(|outcome| rounds.add(&outcome));
+    rounds.variant_stops()
+}
+
+impl<'a> Rounds<'a> {
+    /// Returns the rounds before any run.
+    pub fn new(plan: &'a Plan, until: &'a Precision) -> Self {
+        let n = plan.variants.len();
+        Self { plan, until, values: vec![BTreeMap::new(); n], done: vec![BTreeSet::new(); n] }
+    }
+
+    /// Adds an outcome.
+    pub fn add(&mut self, outcome: &Outcome) {
+        let Some(cell) = self.plan.cell_of(outcome.cell) else { return };
+        let variant = cell.variant as usize;
+        self.done[variant].insert(cell.replicate);
+        for (name, value) in &outcome.metrics {
+            if self.until.metrics.is_empty() || self.until.metrics.contains(name) {
+                let number = value.as_f64().or_else(|| value.as_bool().map(f64::from));
+                let of_metric = self.values[variant].entry(name.clone()).or_default();
+                of_metric.insert(cell.replicate, number);
+            }
+        }
+    }
+
+    /// Returns the cells of the next round that have no outcome yet; empty if all variants are
+    /// done.
+    pub fn next_cells(&self) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for variant in 0..self.plan.variants.len() as u32 {
+            if let StopDecision::Run(total) = self.decide(variant) {
+                let done = &self.done[variant as usize];
+                let open = (0..total as u32).filter(|replicate| !done.contains(replicate));
+                cells.extend(open.map(|replicate| self.plan.cell(variant, replicate)));
+            }
+        }
+        cells.sort_by_key(|c| (c.replicate, c.variant));
+        cells
+    }
+
+    /// Returns the reasons why variants are done.
+    pub fn variant_stops(&self) -> Vec<VariantStop> {
+        let of = |variant: u32| match self.decide(variant) {
+            StopDecision::Enough(runs, reason) => Some(VariantStop { variant, runs, reason }),
+            StopDecision::Run(_) => None,
+        };
+        (0..self.plan.variants.len() as u32).filter_map(of).collect()
+    }
+
+    fn decide(&self, variant: u32) -> StopDecision {
+        if self.plan.runs_of(variant) == 1 && !self.done[variant as usize].is_empty() {
+            return StopDecision::Enough(1, StopReason::Seedless);
+        }
+        let rule = StoppingRule {
+            half_width: self.until.half_width,
+            relative: self.until.is_relative,
+            min_runs: MIN_RUNS,
+            max_runs: self.plan.runs_of(variant) as usize,
+        };
+        let done = &self.done[variant as usize];
+        // Only runs without a gap count: an interrupted round is completed first.
+        let whole = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
+        let column = |values: &Values| -> Vec<Option<f64>> {
+            (0..whole as u32).map(|k| values.get(&k).copied().flatten()).collect()
+        };
+        let of_variant = &self.values[variant as usize];
+        let named = !self.until.metrics.is_empty();
+        let there: Vec<_> = of_variant
+            .iter()
+            .filter(|(_, values)| named || first_round(values).any(is_present))
+            .collect();
+        let asks = |name: &str| named || self.varies(name);
+        // If nothing varies, it takes as many runs to believe that as for a single metric.
+        let any_asks = there.iter().any(|(name, _)| asks(name));
+        let asking = there.iter().filter(|(name, _)| !any_asks || asks(name));
+        let columns: Vec<Vec<Option<f64>>> = asking.map(|(_, values)| column(values)).collect();
+        if columns.is_empty() {
+            let first = MIN_RUNS.min(rule.max_runs);
+            return match whole >= first {
+                true => StopDecision::Enough(first, StopReason::NoValues),
+                false => StopDecision::Run(first),
+            };
+        }
+        let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
+        rule.decide_columns(&columns)
+    }
+
+    /// Returns whether a metric differs between two runs of a variant's first round, for any variant: a
+    /// rare event is then looked for also in variants that have not had it.
+    fn varies(&self, name: &str) -> bool {
+        let differ = |values: &Values| {
+            let mut all = first_round(values);
+            let one = all.next();
+            all.any(|value| Some(value) != one)
+        };
+        self.values.iter().filter_map(|of_variant| of_variant.get(name)).any(differ)
+    }
+}
+
+/// Values of a metric, by replicate.
+type Values = BTreeMap<u32, Option<f64>>;
+
+/// Returns the values of the first round.
+fn first_round(values: &Values) -> impl Iterator<Item = &Option<f64>> {
+    (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
+}
+
+fn is_present(value: &Option<f64>) -> bool {
+    value.is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::{BaseScenario, Factor, Sweep};
+    use serde_json::json;
+    use sidestep_scenario::Source;
+
+    fn plan(max_runs: u32) -> Plan {
+        let mut sweep = Sweep::from_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
+        sweep.replicates = max_runs;
+        let variants = sweep.design.variants("test").expect("valid");
+        let source = Source::new("s.toml", "", "");
+        let base = BaseScenario { world: "robots", seed: 1, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
+    }
+
+    /// Variant 0 is sure at once, variant 1 varies a lot.
+    fn outcome(cell: Cell) -> Outcome {
+        let wave = f64::from(cell.replicate * 7 % 10) - 4.5;
+        let value = 100.0 + if cell.variant == 0 { 0.1 } else { 10.0 } * wave;
+        let mut outcome = Outcome::from_failure(cell, "");
+        outcome.metrics.insert("m".into(), json!(value));
+        outcome.metrics.insert("constant".into(), json!(3));
+        outcome
+    }
+
+    fn until(metrics: &[&str]) -> Precision {
+        let metrics = metrics.iter().map(ToString::to_string).collect();
+        Precision { metrics, ..("ci=0.05".parse().expect("valid")) }
+    }
+
+    /// Runs rounds until none is left; how many runs each variant had.
+    fn all(plan: &Plan, until: &Precision, order: impl Fn(&mut Vec<Cell>)) -> [usize; 2] {
+        let mut rounds = Rounds::new(plan, until);
+        loop {
+            let mut cells = rounds.next_cells();
+            if cells.is_empty() {
+                let stopped = rounds.variant_stops();
+                assert_eq!(stopped.len(), 2);
+                return [stopped[0].runs, stopped[1].runs];
+            }
+            order(&mut cells);
+            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
+        }
+    }
+
+    #[test]
+    fn a_variant_that_varies_more_is_run_more_often() {
+        let plan = plan(1000);
+        let runs = all(&plan, &until(&[]), |_| ());
+        assert!(runs[0] == MIN_RUNS && (60..400).contains(&runs[1]), "{runs:?}");
+        assert_eq!(runs, all(&plan, &until(&["m"]), |_| ()), "what is constant asks for nothing");
+    }
+
+    #[test]
+    fn what_one_variant_has_seen_is_looked_for_in_the_others_too() {
+        let plan = plan(1000);
+        let until = Precision { half_width: 0.3, ..until(&[]) };
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next_cells()
+            && !cells.is_empty()
+        {
+            for cell in cells {
+                let rare = u32::from(cell.variant == 1 && cell.replicate % 2 == 0);
+                let mut outcome = Outcome::from_failure(cell, "");
+                outcome.metrics.insert("rare".into(), json!(rare));
+                rounds.add(&outcome);
+            }
+        }
+        let told = rounds.variant_stops();
+        assert_eq!((told[0].runs, told[0].reason), (60, StopReason::Constant), "0 of 10 is not 0");
+        assert_eq!(told[1].reason, StopReason::Reached);
+    }
+
+    #[test]
+    fn runs_that_come_to_nothing_are_not_made_for_ever() {
+        let plan = plan(1000);
+        let until = until(&[]);
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next_cells()
+            && !cells.is_empty()
+        {
+            cells.iter().for_each(|c| rounds.add(&Outcome::from_failure(*c, "no start")));
+        }
+        let told = rounds.variant_stops();
+        assert_eq!((told[0].runs, told[0].reason), (MIN_RUNS, StopReason::NoValues));
+    }
+
+    #[test]
+    fn order_and_interruptions_change_no_decision() {
+        let plan = plan(1000);
+        let straight = all(&plan, &until(&[]), |_| ());
+        assert_eq!(straight, all(&plan, &until(&[]), |cells| cells.reverse()));
+        // Killed in the middle of every round: only some cells of it are done.
+        let some = |cells: &mut Vec<Cell>| {
+            let n = cells.len().div_ceil(2);
+            cells.reverse();
+            cells.truncate(n);
+        };
+        assert_eq!(straight, all(&plan, &until(&[]), some));
+    }
+
+    #[test]
+    fn the_limit_ends_what_is_never_precise_and_says_so() {
+        let plan = plan(20);
+        let until = until(&["m"]);
+        let mut rounds = Rounds::new(&plan, &until);
+        while let cells = rounds.next_cells()
+            && !cells.is_empty()
+        {
+            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
+        }
+        let told = rounds.variant_stops();
+        assert_eq!((told[1].runs, told[1].reason), (20, StopReason::Maximum));
+    }
+}

@@ -1,0 +1,417 @@
+//! Outcomes -> a table of runs, the same for any order of arrival.
+
+use super::cell::Outcome;
+use super::column_schema::{
+    CYCLES, ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text,
+    widened,
+};
+use super::plan::{Plan, Shard};
+use super::seeds::PilotRuns;
+use super::table::{Role, RunColumn, RunTable};
+use super::variant::Variant;
+use serde_json::Value;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{ColumnType, Values};
+use std::collections::BTreeMap;
+
+/// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
+/// into less than half a gigabyte.
+#[derive(Debug, Default)]
+pub struct RunTableBuilder {
+    cells: Vec<u64>,
+    columns: Vec<ColumnBuilder>,
+    /// Indices of the columns, by role and name.
+    index: BTreeMap<(Role, String), usize>,
+}
+
+/// A column, filled up to some row.
+#[derive(Debug)]
+struct ColumnBuilder {
+    column: RunColumn,
+    first: ColumnOrder,
+}
+
+impl RunTableBuilder {
+    /// Returns the number of outcomes.
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Returns whether there are no outcomes.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// Adds an outcome.
+    pub fn push(&mut self, outcome: &Outcome) {
+        self.cells.push(outcome.cell);
+        for_each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
+    }
+
+    /// Sets a field of the last row.
+    fn set(&mut self, role: Role, name: &str, value: &Value, place: usize) {
+        let row = self.cells.len() - 1;
+        let cell = self.cells[row];
+        let key = (role, name.to_string());
+        let k = *self.index.entry(key).or_insert_with(|| {
+            let values = Values::empty(ColumnType::F64);
+            let column = RunColumn { name: name.into(), role, values };
+            let first = ColumnOrder { cell: u64::MAX, place: usize::MAX };
+            self.columns.push(ColumnBuilder { column, first });
+            self.columns.len() - 1
+        });
+        let growing = &mut self.columns[k];
+        let cell = if value.is_null() { u64::MAX } else { cell };
+        growing.first = growing.first.min(ColumnOrder { cell, place });
+        growing.column.values.resize(row);
+        push_value(&mut growing.column.values, value);
+    }
+
+    /// Returns the table of all runs, sorted by cell: numbers of cell, variant and replicate, seed,
+    /// parameters, metrics, digest, costs. Outcomes of cells that are not in the plan are left out.
+    ///
+    /// # Errors
+    /// When a cell has two outcomes that differ, because they come from different programs or
+    /// machines.
+    pub fn build(self, plan: &Plan) -> Result<RunTable, InputError> {
+        let (shape, mut trials) = (self.schema(), PilotRuns::new(plan));
+        let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
+        for (row, cell) in self.cells.iter().enumerate() {
+            let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
+            trials.add_digest(Some(*cell), end);
+        }
+        self.build_block(plan, &shape, &trials)
+    }
+
+    /// Returns the columns of these outcomes alone.
+    fn schema(&self) -> ColumnSchema {
+        let mut shape = ColumnSchema::default();
+        for ColumnBuilder { column, first } in &self.columns {
+            let values = &column.values;
+            let has_values = (0..values.len()).any(|row| !values.is_missing(row));
+            shape.add_column(column.role, &column.name, has_values.then(|| values.ty()), *first);
+        }
+        shape
+    }
+
+    /// Returns a part of the table of all runs: the rows of these outcomes, sorted by cell, in the columns of all
+    /// outcomes. Outcomes of cells that are not in the plan are left out, and runs beyond trials that settle their
+    /// variant.
+    ///
+    /// # Errors
+    /// See [`RunTableBuilder::build`].
+    pub fn build_block(
+        mut self,
+        plan: &Plan,
+        shape: &ColumnSchema,
+        trials: &PilotRuns<'_>,
+    ) -> Result<RunTable, InputError> {
+        let rows = self.cells.len();
+        self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
+        let mut order: Vec<usize> = (0..rows).collect();
+        order.retain(|&row| plan.cell_of(self.cells[row]).is_some());
+        order.sort_by_key(|&row| (self.cells[row], row));
+        self.check_duplicates(&order)?;
+        order.dedup_by_key(|row| self.cells[*row]);
+        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.needs(&c)));
+        let mut columns = identity_columns(plan, order.iter().map(|&row| self.cells[row]));
+        for (role, name, ty) in shape.columns() {
+            let mut values = match self.index.get(&(role, name.to_string())) {
+                // Let go of at once, so that no value stands in the memory twice.
+                Some(k) => std::mem::replace(
+                    &mut self.columns[*k].column.values,
+                    Values::empty(ColumnType::F64),
+                )
+                .pick(&order),
+                None => Values::empty(ty),
+            };
+            values.resize(order.len());
+            columns.push(RunColumn { name: name.into(), role, values: widened(values, ty) });
+        }
+        Ok(RunTable { columns })
+    }
+
+    /// Checks that cells that were run twice have the same outcome.
+    fn check_duplicates(&self, order: &[usize]) -> Result<(), InputError> {
+        let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
+        let Some(digest) = digest else { return Ok(()) };
+        let text = |row: usize| digest.column.values.text(row);
+        for pair in order.windows(2) {
+            let cell = self.cells[pair[0]];
+            if cell == self.cells[pair[1]] && text(pair[0]) != text(pair[1]) {
+                let cause = format!("two runs of cell {cell} differ");
+                let remedy = "run all shares with the same build of the program";
+                return Err(InputError::new("the shares", cause, remedy));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RunTable {
+    /// Returns the columns without the times that runs took: it is the same when runs are made again.
+    pub fn results(&self) -> Vec<&RunColumn> {
+        self.columns.iter().filter(|c| c.role != Role::Cost).collect()
+    }
+
+    /// Returns the times that each run took.
+    pub fn timings(&self) -> Vec<&RunColumn> {
+        self.columns.iter().filter(|c| matches!(c.role, Role::Cell | Role::Cost)).collect()
+    }
+
+    /// Passes on the outcomes that the rows of a share's table stand for.
+    pub fn for_each_outcome(&self, mut each: impl FnMut(Outcome)) {
+        let number = |row: usize, column: Option<&RunColumn>| match column.map(|c| &c.values) {
+            Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
+            _ => None,
+        };
+        let cell = self.columns_with_role(Role::Cell).next();
+        let digest = self.columns_with_role(Role::Digest).next();
+        let failure = self.column(FAILURE);
+        for row in 0..self.runs() {
+            let Some(cell) = number(row, cell) else { continue };
+            let fields = |role: Role| {
+                let own = |c: &&RunColumn| ![CYCLES, FAILURE].contains(&c.name.as_str());
+                let columns = self.columns_with_role(role).filter(own);
+                columns.map(|c| (c.name.clone(), c.values.json(row))).collect()
+            };
+            each(Outcome {
+                cell,
+                cycles: number(row, self.column(CYCLES)).unwrap_or(0),
+                digest: digest.map_or_else(String::new, |c| c.values.text(row)),
+                failure: failure.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
+                metrics: fields(Role::Metric),
+                costs: fields(Role::Cost),
+            });
+        }
+    }
+}
+
+/// Returns the table of all cells of a plan: one row for each future run.
+pub fn cell_table(plan: &Plan) -> RunTable {
+    let mut cells: Vec<u64> = plan.shard_cells(Shard::ALL).map(|cell| cell.id).collect();
+    cells.sort_unstable();
+    RunTable { columns: identity_columns(plan, cells.into_iter()) }
+}
+
+/// Returns the identity of runs: the columns that follow from their cells.
+fn identity_columns(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
+    let cells: Vec<_> = cells.filter_map(|id| plan.cell_of(id)).collect();
+    let ints = |name: &str, role, value: fn(&super::Cell) -> u64| RunColumn {
+        name: name.into(),
+        role,
+        values: Values::I64(cells.iter().map(|c| value(c) as i64).collect()),
+    };
+    let mut columns = vec![
+        ints("cell", Role::Cell, |c| c.id),
+        ints("variant", Role::Variant, |c| c.variant.into()),
+        ints("replicate", Role::Replicate, |c| c.replicate.into()),
+        ints("seed", Role::Seed, |c| c.seed),
+    ];
+    for name in &plan.parameters {
+        let levels = levels(plan, name);
+        let ty = levels.iter().map(type_of).fold(None, common_type).unwrap_or(ColumnType::F64);
+        let mut values = Values::empty(ColumnType::F64);
+        cells.iter().for_each(|cell| push_value(&mut values, &levels[cell.variant as usize]));
+        let values = widened(values, ty);
+        columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
+    }
+    columns
+}
+
+/// Returns the parameter's value in every variant: if numbers and words mix, all are words.
+fn levels(plan: &Plan, name: &str) -> Vec<Value> {
+    let of = |variant: &Variant| variant.value(name).map_or(Value::Null, json);
+    let levels: Vec<Value> = plan.variants.iter().map(of).collect();
+    let has_words = levels.iter().any(Value::is_string);
+    let level = |v: Value| if has_words && !v.is_null() { value_text(&v).into() } else { v };
+    levels.into_iter().map(level).collect()
+}
+
+/// Returns numbers, truth values and text unchanged; anything else as TOML.
+fn json(value: &toml::Value) -> Value {
+    match value {
+        toml::Value::Integer(n) => (*n).into(),
+        toml::Value::Float(x) => (*x).into(),
+        toml::Value::Boolean(b) => (*b).into(),
+        toml::Value::String(s) => s.clone().into(),
+        other => other.to_string().into(),
+    }
+}
+
+/// Appends a value; the column gets a wider type if necessary.
+fn push_value(values: &mut Values, value: &Value) {
+    if value.is_null() {
+        return values.resize(values.len() + 1);
+    }
+    widen(values, value);
+    match values {
+        Values::I64(v) => v.push(value.as_i64()),
+        Values::F64(v) => v.push(value.as_f64()),
+        Values::Bool(v) => v.push(value.as_bool()),
+        Values::Text(v) => v.push(Some(&value_text(value))),
+        _ => unreachable!("`widen` makes columns of these four types"),
+    }
+}
+
+/// Widens the column's type so that it can hold the value.
+fn widen(values: &mut Values, value: &Value) {
+    if type_of(value) == Some(values.ty()) {
+        return;
+    }
+    let has_values = (0..values.len()).any(|row| !values.is_missing(row));
+    let own = has_values.then(|| values.ty());
+    let ty = common_type(own, type_of(value)).unwrap_or(ColumnType::F64);
+    if ty != values.ty() {
+        *values = widened(std::mem::replace(values, Values::empty(ty)), ty);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::{BaseScenario, Factor, Sweep};
+    use proptest::prelude::*;
+    use serde_json::json;
+    use sidestep_scenario::Source;
+
+    fn plan() -> Plan {
+        let mut sweep = Sweep::from_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse("n=1,2.5,word").expect("valid")];
+        sweep.replicates = 4;
+        let variants = sweep.design.variants("test").expect("valid");
+        let source = Source::new("s.toml", "", "");
+        let base = BaseScenario { world: "robots", seed: 7, source: &source };
+        Plan::new(&sweep, variants, base).expect("valid")
+    }
+
+    /// Outcomes with fields that differ in number and type from cell to cell.
+    fn outcome(cell: u64) -> Outcome {
+        let mut metrics = serde_json::Map::new();
+        metrics.insert("always".into(), json!(cell));
+        metrics.insert("wider".into(), if cell == 5 { json!(0.5) } else { json!(cell) });
+        if cell % 2 == 1 {
+            metrics.insert("sometimes".into(), json!(cell > 4));
+        }
+        metrics.insert("none".into(), Value::Null);
+        let costs = [("run_wall_s".to_string(), json!(0.25))].into_iter().collect();
+        let digest = format!("digest {cell}");
+        Outcome { cell, cycles: 10, digest, failure: None, metrics, costs }
+    }
+
+    fn table(cells: impl IntoIterator<Item = u64>) -> RunTable {
+        let mut rows = RunTableBuilder::default();
+        cells.into_iter().for_each(|cell| rows.push(&outcome(cell)));
+        rows.build(&plan()).expect("no twins that differ")
+    }
+
+    #[test]
+    fn rows_have_identity_parameters_metrics_and_costs() {
+        let table = table(0..12);
+        let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+        let expected = [
+            "cell",
+            "variant",
+            "replicate",
+            "seed",
+            "n",
+            "cycles_run",
+            "always",
+            "wider",
+            "sometimes",
+            "none",
+            "digest",
+            "run_wall_s",
+        ];
+        assert_eq!(names, expected);
+        let text = |name: &str, row| table.column(name).expect(name).values.text(row);
+        assert_eq!([text("n", 0), text("n", 4), text("n", 8)], ["1", "2.5", "word"]);
+        assert_eq!((text("seed", 3), text("seed", 5)), ("10".into(), "8".into()));
+        assert!(matches!(table.column("wider").expect("there").values, Values::F64(_)));
+        assert!(matches!(table.column("sometimes").expect("there").values, Values::Bool(_)));
+        assert!(table.results().iter().all(|c| c.name != "run_wall_s"));
+        assert_eq!(table.timings().len(), 2);
+        assert_eq!(table.check(), Ok(()));
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_in_which_outcomes_come_does_not_matter(
+            cells in proptest::sample::subsequence((0..12u64).collect::<Vec<_>>(), 0..12).prop_shuffle(),
+        ) {
+            let mut sorted = cells.clone();
+            sorted.sort_unstable();
+            prop_assert_eq!(table(cells), table(sorted));
+        }
+    }
+
+    #[test]
+    fn outcomes_survive_the_table_of_their_share() {
+        let whole = table(0..12);
+        let mut rows = RunTableBuilder::default();
+        whole.for_each_outcome(|outcome| rows.push(&outcome));
+        assert_eq!(rows.build(&plan()), Ok(whole));
+    }
+
+    proptest! {
+        #[test]
+        fn shares_join_to_the_table_of_one_process(count in 1u64..7) {
+            let mut rows = RunTableBuilder::default();
+            for index in (0..count).rev() {
+                let share = table((0..12).filter(|cell| cell % count == index));
+                share.for_each_outcome(|outcome| rows.push(&outcome));
+            }
+            prop_assert_eq!(rows.build(&plan()), Ok(table(0..12)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_one_below_the_other_are_the_table(size in 1u64..9, step in 1u64..12) {
+            let (plan, mut shape) = (plan(), ColumnSchema::default());
+            let arrived: Vec<Outcome> = (0..12).map(|k| outcome((k * step + k / 3) % 12)).collect();
+            let mut trials = PilotRuns::new(&plan);
+            for outcome in &arrived {
+                shape.add(outcome);
+                trials.add(outcome);
+            }
+            let mut joined: Option<RunTable> = None;
+            for first in (0..12).step_by(size as usize) {
+                let mut rows = RunTableBuilder::default();
+                arrived.iter().filter(|o| (first..first + size).contains(&o.cell)).for_each(|o| rows.push(o));
+                let block = rows.build_block(&plan, &shape, &trials).expect("no twins that differ");
+                match &mut joined {
+                    None => joined = Some(block),
+                    Some(table) => for (column, more) in table.columns.iter_mut().zip(&block.columns) {
+                        prop_assert_eq!((&column.name, column.role), (&more.name, more.role));
+                        column.values.append(&more.values);
+                    }
+                }
+            }
+            prop_assert_eq!(joined, Some(table(arrived.iter().map(|o| o.cell))));
+        }
+    }
+
+    #[test]
+    fn a_cell_that_was_run_twice_counts_once_and_must_agree() {
+        assert_eq!(table([3, 1, 3]), table([1, 3]));
+        let mut rows = RunTableBuilder::default();
+        rows.push(&outcome(3));
+        rows.push(&Outcome { digest: "another".into(), ..outcome(3) });
+        assert!(rows.build(&plan()).expect_err("they differ").cause().contains("cell 3"));
+    }
+
+    #[test]
+    fn a_failed_run_has_a_row_that_says_why() {
+        let mut rows = RunTableBuilder::default();
+        rows.push(&outcome(0));
+        rows.push(&Outcome::from_failure(plan().cell(0, 1), "index out of bounds"));
+        let table = rows.build(&plan()).expect("no twins");
+        let text = |name: &str, row| table.column(name).expect(name).values.text(row);
+        assert_eq!(
+            (text("failure", 0), text("failure", 1)),
+            ("".into(), "index out of bounds".into())
+        );
+        assert_eq!(text("always", 1), "");
+    }
+}

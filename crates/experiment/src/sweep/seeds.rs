@@ -1,0 +1,247 @@
+//! Variants in which seeds change nothing: one run says all.
+//!
+//! Where a scenario draws no random number, its world says so, and there is one run. Where draws
+//! only guide a search, the first two runs decide: if they end in the same state to the bit, with
+//! the same cycles, seeds are taken to change nothing, and there are no more runs.
+
+use super::cell::Outcome;
+use super::plan::{Cell, Plan};
+use super::table::{Role, RunTable};
+use sidestep_scenario::{SeedEffect, WorldType};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Number of runs of a variant before the others, where its world cannot tell.
+const PILOT_RUNS: u32 = 2;
+
+/// The first runs of variants where their world cannot tell.
+#[derive(Debug)]
+pub struct PilotRuns<'a> {
+    plan: &'a Plan,
+    /// The ends of trials, by variant.
+    ends: BTreeMap<u32, BTreeMap<u32, String>>,
+}
+
+impl<'a> PilotRuns<'a> {
+    /// Returns the trials before any run.
+    pub fn new(plan: &'a Plan) -> Self {
+        Self { plan, ends: BTreeMap::new() }
+    }
+
+    /// Returns the trials of a table of runs.
+    pub(super) fn from_table(plan: &'a Plan, runs: &RunTable) -> Self {
+        let mut trials = Self::new(plan);
+        if let (Some(cells), Some(digests)) =
+            (runs.columns_with_role(Role::Cell).next(), runs.columns_with_role(Role::Digest).next())
+        {
+            for row in 0..runs.runs() {
+                let cell = cells.values.number(row).map(|id| id as u64);
+                trials.add_digest(cell, digests.values.text(row));
+            }
+        }
+        trials
+    }
+
+    /// Adds an outcome.
+    pub fn add(&mut self, outcome: &Outcome) {
+        self.add_digest(Some(outcome.cell), outcome.digest.clone());
+    }
+
+    pub(super) fn add_digest(&mut self, cell: Option<u64>, digest: String) {
+        let Some(cell) = cell.and_then(|id| self.plan.cell_of(id)) else { return };
+        let asks =
+            self.plan.until.is_none() && self.plan.seeds(cell.variant) == SeedEffect::Perhaps;
+        if asks && cell.replicate < PILOT_RUNS && !digest.is_empty() {
+            self.ends.entry(cell.variant).or_default().insert(cell.replicate, digest);
+        }
+    }
+
+    /// Returns whether all trials of a variant ended alike.
+    pub fn is_settled(&self, variant: u32) -> bool {
+        let Some(ends) = self.ends.get(&variant) else { return false };
+        let mut ends = ends.values();
+        let first = ends.next();
+        ends.len() + 1 == PILOT_RUNS as usize && ends.all(|end| Some(end) == first)
+    }
+
+    /// Returns whether a cell is of use: it is not where its variant is settled without it.
+    pub fn needs(&self, cell: &Cell) -> bool {
+        cell.replicate < PILOT_RUNS || !self.is_settled(cell.variant)
+    }
+
+    /// Returns the cells to run next: those of which the others may depend, if there are any.
+    pub fn next_cells(&self, open: Vec<Cell>) -> Vec<Cell> {
+        let cannot_tell = |v: u32| self.plan.seeds(v) == SeedEffect::Perhaps;
+        if !open.iter().any(|c| c.replicate < PILOT_RUNS && cannot_tell(c.variant)) {
+            return open.into_iter().filter(|c| self.needs(c)).collect();
+        }
+        open.into_iter().filter(|c| c.replicate < PILOT_RUNS).collect()
+    }
+}
+
+/// Returns for each variant whether seeds change nothing in it.
+pub(super) fn seedless_variants(plan: &Plan, runs: &RunTable) -> Vec<bool> {
+    let trials = PilotRuns::from_table(plan, runs);
+    let is_same = |v: u32| plan.seeds(v) == SeedEffect::Nothing || trials.is_settled(v);
+    (0..plan.variants.len() as u32).map(is_same).collect()
+}
+
+/// Returns the notes that a reader must know about the seeds of these runs.
+pub(super) fn seed_notes(
+    plan: &Plan,
+    runs: &RunTable,
+    world: Option<&dyn WorldType>,
+) -> Vec<String> {
+    let trials = PilotRuns::from_table(plan, runs);
+    let all = plan.variants.len() as u32;
+    let count = |holds: &dyn Fn(u32) -> bool| (0..all).filter(|v| holds(*v)).count();
+    let of_all = |n: usize| match n == all as usize {
+        true => String::new(),
+        false => format!(" in {n} of {all} variants"),
+    };
+    let mut notes = Vec::new();
+    let undrawn = count(&|v| plan.seeds(v) == SeedEffect::Nothing);
+    if undrawn > 0 {
+        notes.push(format!(
+            "Seeds change nothing{}: no random number is drawn. So there is one run of each, and no \
+             interval.",
+            of_all(undrawn)
+        ));
+    }
+    let settled = count(&|v| trials.is_settled(v));
+    if settled > 0 {
+        let seeds = [plan.first_seed, plan.first_seed + 1];
+        notes.push(format!(
+            "Seeds are taken to change nothing{}: the runs with the seeds {} and {} ended in the same \
+             state, to the bit. So there are no more runs, and no interval.",
+            of_all(settled),
+            seeds[0],
+            seeds[1]
+        ));
+    }
+    let unchanged = unchanged_variants(plan, runs);
+    if unchanged > 0 {
+        notes.push(format!(
+            "All runs{} ended in the same state, to the bit: seeds changed nothing there, and \
+             intervals say nothing.",
+            of_all(unchanged)
+        ));
+    }
+    if !notes.is_empty() {
+        notes.extend(world.and_then(seed_remedy));
+    }
+    notes
+}
+
+/// Returns the features to ask for in a scenario of a world so that its seeds change something; `None` where the
+/// world lists none.
+pub fn seed_remedy(world: &dyn WorldType) -> Option<String> {
+    let draws = world.random_quantities();
+    (!draws.is_empty()).then(|| format!("Seeds change what is drawn: {draws}."))
+}
+
+/// Returns the number of variants of which all runs ended alike, although seeds might decide.
+fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
+    let (Some(cells), Some(digests)) =
+        (runs.columns_with_role(Role::Cell).next(), runs.columns_with_role(Role::Digest).next())
+    else {
+        return 0;
+    };
+    let mut ends: BTreeMap<u32, (BTreeSet<String>, usize)> = BTreeMap::new();
+    for row in 0..runs.runs() {
+        let cell = cells.values.number(row).and_then(|id| plan.cell_of(id as u64));
+        let decided = |cell: &Cell| plan.seeds(cell.variant) == SeedEffect::Decide;
+        let digest = digests.values.text(row);
+        // A failed run has no end.
+        if let Some(cell) = cell.filter(decided).filter(|_| !digest.is_empty()) {
+            let (different, count) = ends.entry(cell.variant).or_default();
+            different.insert(digest);
+            *count += 1;
+        }
+    }
+    ends.values().filter(|(different, count)| different.len() == 1 && *count > 1).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::{BaseScenario, Factor, RunTableBuilder, Sweep};
+    use crate::testing::worlds;
+    use sidestep_scenario::Source;
+
+    /// A plan of two variants with four runs each.
+    fn plan(seeds: [SeedEffect; 2]) -> Plan {
+        let mut sweep = Sweep::from_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
+        sweep.replicates = 4;
+        let mut variants = sweep.design.variants("test").expect("valid");
+        variants.iter_mut().zip(seeds).for_each(|(v, seeds)| v.seeds = seeds);
+        let source = Source::new("s.toml", "", "");
+        Plan::new(&sweep, variants, BaseScenario { world: "chain", seed: 7, source: &source })
+            .expect("valid")
+    }
+
+    fn outcome(cell: Cell, digest: &str) -> Outcome {
+        Outcome { digest: digest.into(), failure: None, ..Outcome::from_failure(cell, "") }
+    }
+
+    #[test]
+    fn what_draws_nothing_is_planned_once() {
+        let plan = plan([SeedEffect::Nothing, SeedEffect::Decide]);
+        let cells: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
+        assert_eq!((plan.runs(), cells.len()), (5, 5));
+        assert_eq!(cells.iter().filter(|c| c.variant == 0).count(), 1);
+    }
+
+    #[test]
+    fn two_equal_ends_settle_a_variant_whose_world_cannot_tell_and_no_other() {
+        for (digests, settled) in [(["a", "a"], true), (["a", "b"], false), (["", ""], false)] {
+            let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
+            let mut trials = PilotRuns::new(&plan);
+            let open: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
+            let first = trials.next_cells(open.clone());
+            assert!(
+                first.len() == 4 && first.iter().all(|c| c.replicate < PILOT_RUNS),
+                "{first:?}"
+            );
+            for (replicate, digest) in (0..).zip(digests) {
+                (0..2).for_each(|v| trials.add(&outcome(plan.cell(v, replicate), digest)));
+            }
+            assert_eq!([trials.is_settled(0), trials.is_settled(1)], [settled, false]);
+            assert_eq!(trials.needs(&plan.cell(0, 2)), !settled);
+        }
+    }
+
+    #[test]
+    fn the_table_has_no_runs_beyond_trials_that_settle_and_readers_are_told() {
+        let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
+        let mut rows = RunTableBuilder::default();
+        for cell in plan.shard_cells(crate::sweep::Shard::ALL) {
+            rows.push(&outcome(cell, "the same"));
+        }
+        let table = rows.build(&plan).expect("no twins");
+        assert_eq!(table.runs(), 2 + 4);
+        assert_eq!(seedless_variants(&plan, &table), [true, false]);
+        let told = seed_notes(&plan, &table, worlds().find("chain"));
+        assert!(
+            told[0].contains("in 1 of 2 variants: the runs with the seeds 7 and 8"),
+            "{told:?}"
+        );
+        assert!(
+            told[1].contains("All runs in 1 of 2 variants ended in the same state"),
+            "{told:?}"
+        );
+        assert!(told[2].starts_with("Seeds change what is drawn: fields"), "{told:?}");
+    }
+
+    #[test]
+    fn where_seeds_decide_nothing_is_said_of_what_they_could_change() {
+        let plan = plan([SeedEffect::Decide, SeedEffect::Decide]);
+        let mut rows = RunTableBuilder::default();
+        for (k, cell) in plan.shard_cells(crate::sweep::Shard::ALL).enumerate() {
+            rows.push(&outcome(cell, &format!("end {k}")));
+        }
+        let table = rows.build(&plan).expect("no twins");
+        assert!(seed_notes(&plan, &table, worlds().find("chain")).is_empty());
+        assert!(worlds().iter().all(|world| seed_remedy(world).is_some()));
+    }
+}

@@ -1,0 +1,201 @@
+//! The summary of a table of runs, as plain data.
+
+use super::Label;
+use super::compare::Comparison;
+use super::groups::{Level, Parameter};
+use serde::Serialize;
+use sidestep_document::{Estimate, Figure, Table};
+use sidestep_statistics::{Correlation, Interval, QuantileInterval};
+
+/// The quantiles that are reported.
+pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// The reason why a metric is not shown if others were requested.
+pub(super) const NOT_REQUESTED: &str = "not asked for";
+
+/// Runs that differ by their seeds alone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VariantSummary {
+    /// Its name.
+    pub name: String,
+    /// Number of its runs.
+    pub runs: usize,
+    /// Its values of the [`Summary::parameters`].
+    pub levels: Vec<Level>,
+}
+
+/// A quantile of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quantile {
+    /// Its probability, from 0 to 1.
+    pub q: f64,
+    /// Its estimate.
+    pub value: f64,
+    /// Its confidence interval; absent with fewer runs than
+    /// [`runs_for_quantile`](sidestep_statistics::runs_for_quantile).
+    pub interval: Option<QuantileInterval>,
+}
+
+/// A numeric metric of a variant.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct NumericSummary {
+    /// Arithmetic mean.
+    pub mean: Option<f64>,
+    /// Standard deviation of the runs (divisor `n - 1`).
+    pub sd: Option<f64>,
+    /// Student's 95 % confidence interval of the mean.
+    pub interval: Option<Interval>,
+    /// The bootstrap's (BCa) 95 % confidence interval of the mean.
+    pub bootstrap: Option<Interval>,
+    /// The [`QUANTILES`], if there is any run.
+    pub quantiles: Vec<Quantile>,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+    /// Number of runs that would give an interval of 5 % of the mean to either side, if runs vary
+    /// as now.
+    pub runs_for_5_percent: Option<u64>,
+}
+
+/// A share of the runs of a variant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Proportion {
+    /// Number of runs for which it is true.
+    pub yes: usize,
+    /// Their share; absent without runs.
+    pub share: Option<f64>,
+    /// Wilson's 95 % confidence interval; absent where seeds change nothing.
+    pub interval: Option<Interval>,
+}
+
+/// The values of a metric, by kind.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MetricValues {
+    /// Numbers.
+    Numbers(NumericSummary),
+    /// Yes or no.
+    Share(Proportion),
+}
+
+/// A metric in a variant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VariantMetric {
+    /// The variant.
+    pub variant: String,
+    /// Number of runs with a value.
+    pub n: usize,
+    /// Number of runs, among those without a value, with a value that is infinite or not a number.
+    pub missing: usize,
+    /// Number of those runs without a value that have an infinite one, or one that is not a number.
+    pub not_finite: usize,
+    /// Whether seeds change nothing in the variant.
+    pub seedless: bool,
+    /// The description of the values.
+    pub values: MetricValues,
+}
+
+/// The marginal mean of a metric at one level of a parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectLevel {
+    /// The level.
+    pub level: Level,
+    /// Number of variants that have it.
+    pub variants: usize,
+    /// Mean over these, of each replicate, and over replicates: `n` is the number of replicates.
+    pub estimate: Estimate,
+}
+
+/// The main effect of a parameter: means over all others, in a full grid.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    /// The parameter.
+    pub parameter: String,
+    /// Its levels.
+    pub levels: Vec<EffectLevel>,
+}
+
+/// The summary of a metric.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MetricSummary {
+    /// Name of its column.
+    pub name: String,
+    /// Its label, with its unit.
+    pub label: Label,
+    /// The thing counted or measured; empty where the world does not say.
+    pub meaning: &'static str,
+    /// Whether it is a share of runs.
+    pub is_share: bool,
+    /// Share of its variance that lies between variants, adjusted; at least 0. It is used as a
+    /// rank, not as a result.
+    pub explained: Option<f64>,
+    /// Its values in each variant.
+    pub variants: Vec<VariantMetric>,
+    /// Comparison of each other variant with the baseline.
+    pub comparisons: Vec<Comparison>,
+    /// Main effects, if there are several parameters in a full grid.
+    pub effects: Vec<Effect>,
+}
+
+/// The correlation of a metric with a parameter over samples of a box.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trend {
+    /// Name of the metric's column.
+    pub metric: String,
+    /// The parameter.
+    pub parameter: String,
+    /// Spearman's rank correlation over the variants, with its 95 % interval; absent where one of both
+    /// is constant.
+    pub rank_correlation: Option<Correlation>,
+    /// Number of variants that have a mean of the metric.
+    pub n: usize,
+}
+
+/// A metric that is not shown.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OmittedMetric {
+    /// Its column.
+    pub metric: String,
+    /// The reason.
+    pub reason: String,
+}
+
+/// The summary of a table of runs, as plain data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of runs.
+    pub runs: usize,
+    /// The variants.
+    pub variants: Vec<VariantSummary>,
+    /// The parameters that differ between variants.
+    pub parameters: Vec<Parameter>,
+    /// The name of the baseline of the variants; each comparison has the variant itself.
+    pub baseline: Option<String>,
+    /// The metrics shown.
+    pub metrics: Vec<MetricSummary>,
+    /// The metrics that are not shown.
+    pub left_out: Vec<OmittedMetric>,
+    /// Correlations of metrics with parameters, if the variants are samples of a box of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trends: Vec<Trend>,
+    /// Remarks that a reader must know.
+    pub notes: Vec<String>,
+    #[serde(skip)]
+    pub(super) figures: Vec<(String, Figure)>,
+}
+
+/// The part of the summary about one metric.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MetricSection {
+    /// Name of its column.
+    pub name: String,
+    /// The metric as text.
+    pub title: String,
+    /// The thing counted or measured; may be empty.
+    pub meaning: &'static str,
+    /// Its figures.
+    pub figures: Vec<Figure>,
+    /// Its tables.
+    pub tables: Vec<Table>,
+}

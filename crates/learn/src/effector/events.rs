@@ -1,0 +1,308 @@
+//! Measured moves and turns, from any kind of log, and their counts.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use super::grid_displacement::{
+    FORWARD_CLASSES, forward_class, grid_displacements, phase_average, round_half_up,
+};
+use super::report::{EffectorReport, ForwardShares, TurnReport};
+use super::transitions::{
+    self, EffectorProfile, ProfileTransition, TURN_CLASSES, intended_displacement, turn_class,
+};
+use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::{CountTable, EstimateOptions};
+use sidestep_statistics::Moments;
+
+/// One commanded box ahead, and the motion that followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MoveEvent {
+    pub(super) ahead_boxes: f64,
+    pub(super) left_boxes: f64,
+    /// True turn minus commanded turn.
+    pub(super) turn_error_rad: f64,
+    /// `None` where the log does not say.
+    pub(super) duration_s: Option<f64>,
+}
+
+/// One commanded turn, and the motion that followed; both in rad, + to the left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TurnEvent {
+    pub(super) commanded_rad: f64,
+    pub(super) true_rad: f64,
+    /// `None` where the log does not say.
+    pub(super) duration_s: Option<f64>,
+}
+
+impl TurnEvent {
+    /// Creates a turn; see [`nearest_turn`].
+    pub(super) fn new(commanded_rad: f64, true_rad: f64, duration_s: Option<f64>) -> Self {
+        Self { commanded_rad, true_rad: nearest_turn(commanded_rad, true_rad), duration_s }
+    }
+
+    fn ratio(&self) -> f64 {
+        self.true_rad / self.commanded_rad
+    }
+
+    /// Returns the degrees turned in the direction of the command.
+    fn along_deg(&self) -> f64 {
+        (self.true_rad * self.commanded_rad.signum()).to_degrees()
+    }
+
+    fn error_deg(&self) -> f64 {
+        self.along_deg() - self.commanded_rad.abs().to_degrees()
+    }
+
+    fn is_left(&self) -> bool {
+        self.commanded_rad > 0.0
+    }
+}
+
+/// Returns, of all turns that end like `true_rad`, the one nearest to the command. A log knows
+/// headings only: a commanded turn of -90 degrees that ends at 180 has overshot.
+pub(super) fn nearest_turn(commanded_rad: f64, true_rad: f64) -> f64 {
+    let error_rad = true_rad - commanded_rad;
+    // Half a turn off is ambiguous, so the log's own sign stays.
+    match error_rad.abs() <= PI + 1e-9 {
+        true => true_rad,
+        false => true_rad - TAU * error_rad.signum(),
+    }
+}
+
+/// All moves and turns of a robot's log.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Events {
+    pub(super) moves: Vec<MoveEvent>,
+    pub(super) turns: Vec<TurnEvent>,
+}
+
+impl Events {
+    /// Returns the parts of a report that follow from moves and turns; the rest is left empty.
+    pub(super) fn report(&self, source: &str, options: &EstimateOptions) -> EffectorReport {
+        let all: Vec<&MoveEvent> = self.moves.iter().collect();
+        let (forward, turns) = (forward_counts(&all), self.turn_counts());
+        let tables = [&forward, &turns];
+        EffectorReport {
+            source: source.to_owned(),
+            events: self.moves.len() as u64,
+            transitions: ForwardShares::from_counts(forward.row(0)),
+            transitions_rounded: ForwardShares::from_counts(rounded_counts(&all).row(0)),
+            outcomes: box_shares(&all),
+            rounded_counts: rounded_box_counts(&all),
+            moments: self.moments(),
+            turns: self.turn_report(),
+            probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
+            thin: tables
+                .iter()
+                .flat_map(|table| table.low_count_rows(options.thin_below))
+                .collect(),
+            hold_out: self.holdout_tests(options),
+            estimate: *options,
+            ..EffectorReport::default()
+        }
+    }
+
+    /// Returns the transitions of all three actions.
+    pub(super) fn profile(&self, rule: &str, options: &EstimateOptions) -> EffectorProfile {
+        let forward = forward_counts(&self.moves.iter().collect::<Vec<_>>());
+        let mut assumed = Vec::new();
+        let left = self.turn_transitions("left", options.alpha, &mut assumed);
+        let right = self.turn_transitions("right", options.alpha, &mut assumed);
+        let actions = [
+            ("forward", transitions::forward_transitions(&forward, options.alpha)),
+            ("left", left),
+            ("right", right),
+        ];
+        EffectorProfile {
+            box_m: None,
+            actions: actions.map(|(name, list)| (name.to_string(), list)).to_vec(),
+            assumed,
+            rule: rule.to_owned(),
+        }
+    }
+
+    fn moments(&self) -> BTreeMap<String, Moments> {
+        let of = |value: fn(&MoveEvent) -> f64| Moments::from_values(self.moves.iter().map(value));
+        let named = [
+            ("ahead_boxes", of(|m| m.ahead_boxes)),
+            ("left_boxes", of(|m| m.left_boxes)),
+            ("dtheta_minus_cmd_rad", of(|m| m.turn_error_rad)),
+            ("duration_s", Moments::from_values(self.moves.iter().filter_map(|m| m.duration_s))),
+        ];
+        named.into_iter().filter_map(|(name, moments)| Some((name.to_string(), moments?))).collect()
+    }
+
+    fn holdout_tests(&self, options: &EstimateOptions) -> Vec<HoldoutTest> {
+        let (train, held) = split(&self.moves, options.hold_out_every);
+        let moves = holdout_test(&forward_counts(&train), &forward_counts(&held), options.alpha);
+        let (train, held) = split(&self.turns, options.hold_out_every);
+        let part = |turns: Vec<&TurnEvent>| turn_counts(turns.into_iter());
+        vec![moves, holdout_test(&part(train), &part(held), options.alpha)]
+    }
+
+    fn turn_counts(&self) -> CountTable {
+        turn_counts(self.turns.iter())
+    }
+
+    /// Returns the transitions of turns to one side; without any, those to the other side mirrored;
+    /// without any at all, turns that never fail.
+    fn turn_transitions(
+        &self,
+        action: &str,
+        alpha: f64,
+        assumed: &mut Vec<String>,
+    ) -> Vec<ProfileTransition> {
+        let counts = self.turn_counts();
+        let (own, other, side) = if action == "left" { (0, 1, 1) } else { (1, 0, -1) };
+        if counts.total(own) > 0.0 {
+            return transitions::turn_transitions(&counts, own, side, alpha);
+        }
+        if counts.total(other) > 0.0 {
+            assumed.push(format!("{action}: mirrored from turns to the other side"));
+            return transitions::turn_transitions(&counts, other, side, alpha);
+        }
+        assumed.push(format!("{action}: never fails"));
+        transitions::certain_transition(intended_displacement(action))
+    }
+
+    fn turn_report(&self) -> Option<TurnReport> {
+        let turns = &self.turns;
+        let n_left = turns.iter().filter(|turn| turn.is_left()).count();
+        let of = |value: fn(&TurnEvent) -> f64| Moments::from_values(turns.iter().map(value));
+        (!turns.is_empty()).then(|| TurnReport {
+            n: turns.len(),
+            n_left,
+            n_right: turns.len() - n_left,
+            true_over_commanded: of(TurnEvent::ratio),
+            error_deg_along_turn: of(TurnEvent::error_deg),
+            duration_s: Moments::from_values(turns.iter().filter_map(|turn| turn.duration_s)),
+            hist_15deg: histogram(turns.iter().map(TurnEvent::along_deg), 15),
+            error_hist_5deg: histogram(turns.iter().map(TurnEvent::error_deg), 5),
+        })
+    }
+}
+
+/// Counts the phase-averaged classes of moves ahead.
+fn forward_counts(moves: &[&MoveEvent]) -> CountTable {
+    let mut counts = empty_forward_counts();
+    for (outcome, weight) in
+        moves.iter().flat_map(|m| grid_displacements(m.ahead_boxes, m.left_boxes, 0.0))
+    {
+        counts.add(0, forward_class(outcome.ahead, outcome.left), weight);
+    }
+    counts
+}
+
+/// Counts the classes of moves ahead by rounding.
+fn rounded_counts(moves: &[&MoveEvent]) -> CountTable {
+    let mut counts = empty_forward_counts();
+    for m in moves {
+        counts.add(
+            0,
+            forward_class(round_half_up(m.ahead_boxes), round_half_up(m.left_boxes)),
+            1.0,
+        );
+    }
+    counts
+}
+
+fn empty_forward_counts() -> CountTable {
+    CountTable::new("moves", &["forward".to_string()], &FORWARD_CLASSES.map(String::from))
+}
+
+/// Counts turns by side, phase-averaged: the ratio of true to commanded turn gives the result of a
+/// turn of 90 degrees in quarters.
+fn turn_counts<'t>(turns: impl Iterator<Item = &'t TurnEvent>) -> CountTable {
+    let rows = ["left", "right"].map(String::from);
+    let mut counts = CountTable::new("turns", &rows, &TURN_CLASSES.map(String::from));
+    for turn in turns {
+        for (quarters, weight) in phase_average(turn.ratio()) {
+            counts.add(usize::from(!turn.is_left()), turn_class(quarters), weight);
+        }
+    }
+    counts
+}
+
+/// Returns the phase-averaged share of each box, `"ahead,left"`.
+fn box_shares(moves: &[&MoveEvent]) -> BTreeMap<String, f64> {
+    let mut shares = BTreeMap::new();
+    for (outcome, weight) in
+        moves.iter().flat_map(|m| grid_displacements(m.ahead_boxes, m.left_boxes, 0.0))
+    {
+        let name = format!("{},{}", outcome.ahead, outcome.left);
+        *shares.entry(name).or_insert(0.0) += weight / moves.len() as f64;
+    }
+    shares
+}
+
+fn rounded_box_counts(moves: &[&MoveEvent]) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for m in moves {
+        let name = format!("{},{}", round_half_up(m.ahead_boxes), round_half_up(m.left_boxes));
+        *counts.entry(name).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Returns the number of values by their nearest multiple of `width`.
+fn histogram(values: impl Iterator<Item = f64>, width: i32) -> BTreeMap<i32, u64> {
+    let mut bins = BTreeMap::new();
+    for value in values {
+        *bins.entry(round_half_up(value / f64::from(width)) * width).or_insert(0) += 1;
+    }
+    bins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_4;
+
+    fn turn(ratio: f64, side: f64) -> TurnEvent {
+        let commanded_rad = side * FRAC_PI_4;
+        TurnEvent { commanded_rad, true_rad: commanded_rad * ratio, duration_s: None }
+    }
+
+    #[test]
+    fn a_turn_too_short_fails_as_often_as_it_is_short() {
+        let events = Events { moves: vec![], turns: vec![turn(0.75, 1.0), turn(1.25, 1.0)] };
+        let counts = events.turn_counts();
+        assert_eq!(counts.row(0), [1.5, 0.25, 0.25, 0.0]);
+        let options = EstimateOptions { alpha: 0.0, ..Default::default() };
+        let profile = events.profile("", &options);
+        let p: Vec<_> = profile.action("left").unwrap().iter().map(|t| (t.turn_deg, t.p)).collect();
+        assert_eq!(p, [(90, 0.75), (0, 0.125), (180, 0.125)]);
+        assert_eq!(profile.action("right").unwrap()[0].turn_deg, -90);
+        assert_eq!(profile.assumed, ["right: mirrored from turns to the other side"]);
+    }
+
+    #[test]
+    fn a_wide_turn_that_overshoots_past_half_a_turn_has_not_turned_back() {
+        // 170 degrees were commanded; 190 were made, which a heading shows as -170.
+        let turn = TurnEvent::new(170_f64.to_radians(), (-170_f64).to_radians(), None);
+        assert!((turn.error_deg() - 20.0).abs() < 1e-9);
+        assert_eq!(
+            TurnEvent::new(1.0, -1.0, None).true_rad,
+            -1.0,
+            "it may have turned the other way"
+        );
+    }
+
+    #[test]
+    fn without_turns_an_exact_turn_is_assumed_and_said() {
+        let profile = Events::default().profile("", &EstimateOptions::default());
+        let left = profile.action("left").unwrap();
+        assert_eq!((left.len(), left[0].p), (1, 1.0));
+        assert_eq!(profile.assumed, ["left: never fails", "right: never fails"]);
+        assert_eq!(Events::default().turn_report(), None);
+    }
+
+    #[test]
+    fn histograms_tell_degrees_along_the_turn() {
+        let events = Events { moves: vec![], turns: vec![turn(0.9, -1.0), turn(1.0, 1.0)] };
+        let report = events.turn_report().unwrap();
+        assert_eq!((report.n_left, report.n_right), (1, 1));
+        assert_eq!(report.hist_15deg, BTreeMap::from([(45, 2)]));
+        assert_eq!(report.error_hist_5deg, BTreeMap::from([(-5, 1), (0, 1)]));
+    }
+}

@@ -1,0 +1,78 @@
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
+
+pub mod effector;
+pub mod sensor;
+
+mod counts;
+mod display;
+pub mod holdout;
+pub mod profile;
+mod track;
+
+#[cfg(test)]
+mod oracle;
+
+pub use counts::{CountMatrix, CountTable, Estimate, LowCountRow};
+
+use serde::Serialize;
+
+use sidestep_kernel::InputError;
+
+/// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows overflow.
+pub const MAX_ALPHA: f64 = 1e9;
+
+/// The rule by which counts become probabilities.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EstimateOptions {
+    /// Count added to every cell of a row before the row is normalized. The default, 0.5, is
+    /// Jeffreys' prior: an outcome is not impossible because it was not seen, and a hundred counts
+    /// outweigh it.
+    pub alpha: f64,
+    /// Rows with fewer counts than this are reported as thin.
+    pub thin_below: u32,
+    /// Every `hold_out_every`-th event is held out; 2 compares odd with even.
+    pub hold_out_every: usize,
+}
+
+impl Default for EstimateOptions {
+    fn default() -> Self {
+        Self { alpha: 0.5, thin_below: 30, hold_out_every: 2 }
+    }
+}
+
+impl EstimateOptions {
+    /// Checks that the options are valid.
+    ///
+    /// # Errors
+    /// When `alpha` is negative or above [`MAX_ALPHA`], or `hold_out_every` is below 2.
+    pub fn check(&self) -> Result<(), InputError> {
+        if !(0.0..=MAX_ALPHA).contains(&self.alpha) {
+            let cause = format!("{:?} cannot be added to a count", self.alpha);
+            let remedy = format!("give a number from 0 to {MAX_ALPHA}, such as 0.5");
+            return Err(InputError::new("alpha", cause, remedy));
+        }
+        if self.hold_out_every < 2 {
+            let cause = format!("holding out every {}th event leaves none", self.hold_out_every);
+            return Err(InputError::new("hold-out", cause, "give 2 or more"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_that_mean_nothing_are_refused() {
+        let refused = [
+            EstimateOptions { alpha: -0.1, ..Default::default() },
+            EstimateOptions { alpha: f64::NAN, ..Default::default() },
+            EstimateOptions { alpha: 1e308, ..Default::default() },
+            EstimateOptions { hold_out_every: 1, ..Default::default() },
+        ];
+        assert!(refused.iter().all(|options| options.check().is_err()));
+        assert!(EstimateOptions::default().check().is_ok());
+    }
+}

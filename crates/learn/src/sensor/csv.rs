@@ -1,0 +1,322 @@
+//! A sensor learned from readings with known true values.
+
+use std::collections::BTreeMap;
+
+use super::LearnedSensor;
+use super::camera::{NOTHING, NamedRow, SensorProfile, certain_row, distance_rows};
+use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
+use super::readings::{LabeledReading, read};
+use super::report::{ErrorMoments, SensorReport};
+use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::{CountMatrix, CountTable};
+use sidestep_import::table::CsvTable;
+use sidestep_kernel::InputError;
+use sidestep_statistics::Moments;
+
+/// Learns the sensor; `classes` come from `options`.
+pub(super) fn learn(
+    table: &CsvTable,
+    options: &SensorOptions,
+    classes: &DistanceClasses,
+) -> Result<LearnedSensor, InputError> {
+    let (observations, readings) = read(table, options.sensor.as_deref(), classes)?;
+    Ok(ReadingLog { observations, classes, readings, rule: RULE }.model(table.place(), options))
+}
+
+/// The rule by which counts become rows.
+const RULE: &str = "counts of true against reported, every count plus alpha";
+
+/// All readings of one sensor.
+pub(super) struct ReadingLog<'a> {
+    /// `nothing`, then the others by name.
+    pub(super) observations: Vec<String>,
+    pub(super) classes: &'a DistanceClasses,
+    pub(super) readings: Vec<LabeledReading>,
+    /// The rule in words, for the profile.
+    pub(super) rule: &'static str,
+}
+
+impl ReadingLog<'_> {
+    /// Returns the sensor that the readings describe.
+    pub(super) fn model(&self, source: &str, options: &SensorOptions) -> LearnedSensor {
+        LearnedSensor { report: self.report(source, options), profile: self.profile(options) }
+    }
+
+    fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
+        let n = self.readings.len() as u64;
+        let all: Vec<&LabeledReading> = self.readings.iter().collect();
+        let (confusion, distance) = (self.confusion(&all), self.distance(&all, self.classes));
+        let by_class = self.by_class();
+        let tables: Vec<&CountTable> =
+            [&confusion, &distance].into_iter().chain(&by_class).collect();
+        SensorReport {
+            source: source.to_owned(),
+            measurements: n,
+            sightings: n,
+            skipped: 0,
+            skipped_by_cause: BTreeMap::new(),
+            correct: all.iter().filter(|r| r.truth == r.reported).count() as u64,
+            nearest_agrees: None,
+            unknown_codes: BTreeMap::new(),
+            kinds: None,
+            distance_edges_m: self.classes.edges_from_zero_m(),
+            distance_classes: self.classes.names.clone(),
+            distance_counts_robots: None,
+            distance_counts_landmarks: None,
+            distance3_edges_m: THREE_EDGES_M,
+            distance3_counts: self.three_classes(),
+            errors: self.errors(),
+            per_observer: BTreeMap::new(),
+            detection: None,
+            against_map: None,
+            probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
+            thin: tables
+                .iter()
+                .flat_map(|t| t.low_count_rows(options.estimate.thin_below))
+                .collect(),
+            hold_out: self.holdout_tests(options),
+            estimate: options.estimate,
+            warnings: Vec::new(),
+            distance_counts: CountMatrix(distance.clone()),
+            confusion,
+        }
+    }
+
+    fn confusion(&self, readings: &[&LabeledReading]) -> CountTable {
+        let mut counts = CountTable::new("confusion", &self.observations, &self.observations);
+        readings.iter().for_each(|r| counts.add(r.truth, r.reported, 1.0));
+        counts
+    }
+
+    /// Counts the confusion of objects in each distance class; `nothing` has none.
+    fn by_class(&self) -> Vec<CountTable> {
+        let table = |class: &String| {
+            CountTable::new(
+                &format!("confusion_{class}"),
+                &self.observations[1..],
+                &self.observations,
+            )
+        };
+        let mut tables: Vec<CountTable> = self.classes.names.iter().map(table).collect();
+        for reading in &self.readings {
+            if let Some(distance) = reading.true_at {
+                tables[distance.class].add(reading.truth - 1, reading.reported, 1.0);
+            }
+        }
+        tables
+    }
+
+    fn distance(&self, readings: &[&LabeledReading], classes: &DistanceClasses) -> CountTable {
+        let mut counts = CountTable::new("distance", &classes.names, &classes.names);
+        for (truth, reported) in readings.iter().filter_map(|r| r.correct_distances()) {
+            counts.add(truth.class, reported.class, 1.0);
+        }
+        counts
+    }
+
+    fn three_classes(&self) -> Option<CountMatrix> {
+        let classes = DistanceClasses::three_classes();
+        let mut counts = CountTable::new("distance3", &classes.names, &classes.names);
+        for (truth_m, reported_m) in self.correct_ranges_m() {
+            counts.add(classes.class_of(truth_m), classes.class_of(reported_m), 1.0);
+        }
+        (counts.cells().iter().flatten().sum::<f64>() > 0.0).then_some(CountMatrix(counts))
+    }
+
+    fn correct_ranges_m(&self) -> impl Iterator<Item = (f64, f64)> {
+        let right = self.readings.iter().filter_map(LabeledReading::correct_distances);
+        right.filter_map(|(truth, reported)| Some((truth.range_m?, reported.range_m?)))
+    }
+
+    fn errors(&self) -> ErrorMoments {
+        let in_class = |class: usize| {
+            let ranges =
+                self.correct_ranges_m().filter(move |r| self.classes.class_of(r.0) == class);
+            Moments::from_values(ranges.map(|(truth_m, reported_m)| reported_m - truth_m))
+        };
+        ErrorMoments {
+            range_error_m: Moments::from_values(self.correct_ranges_m().map(|(t, r)| r - t)),
+            range_error_by_true_class: (0..self.classes.len()).map(in_class).collect(),
+            bearing_error_rad: None,
+        }
+    }
+
+    /// Counts the classes of reports where nothing was.
+    fn beyond(&self) -> CountTable {
+        let mut counts = CountTable::new(BEYOND, &[BEYOND.to_string()], &self.classes.names);
+        let spurious = self.readings.iter().filter(|r| r.truth == 0);
+        spurious.filter_map(|r| r.reported_at).for_each(|at| counts.add(0, at.class, 1.0));
+        counts
+    }
+
+    fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
+        let alpha = options.estimate.alpha;
+        let (train, held) = split(&self.readings, options.estimate.hold_out_every);
+        let distance = |part: &[&LabeledReading]| self.distance(part, self.classes);
+        vec![
+            holdout_test(&self.confusion(&train), &self.confusion(&held), alpha),
+            holdout_test(&distance(&train), &distance(&held), alpha),
+        ]
+    }
+
+    fn profile(&self, options: &SensorOptions) -> SensorProfile {
+        let alpha = options.estimate.alpha;
+        let mut assumed = Vec::new();
+        let all: Vec<&LabeledReading> = self.readings.iter().collect();
+        let confusion = self.confusion_rows(&self.confusion(&all), alpha, &mut assumed);
+        let distance = self.distance(&all, self.classes);
+        SensorProfile {
+            bearings_deg: options.bearings_deg.clone(),
+            range_m: options.range_m,
+            observations: self.observations.clone(),
+            designates: self.unseen_kinds(),
+            distance_edges_m: self.classes.edges_m.clone(),
+            distance_classes: self.classes.names.clone(),
+            confusion_by_class: self.rows_by_class(&confusion, alpha),
+            confusion,
+            distance_confusion: distance_rows(&distance, &self.beyond(), alpha, &mut assumed),
+            assumed,
+            rule: self.rule.to_string(),
+        }
+    }
+
+    /// Returns the standard kinds that the sensor was never shown: it takes them for nothing.
+    fn unseen_kinds(&self) -> Vec<(String, String)> {
+        let known = |kind: &&str| self.observations.iter().any(|name| name == kind);
+        let kinds = ["wall", "door", "person", "robot"].into_iter();
+        let unseen = kinds.filter(|kind| !known(kind));
+        unseen.map(|kind| (kind.to_string(), NOTHING.to_string())).collect()
+    }
+
+    fn confusion_rows(
+        &self,
+        counts: &CountTable,
+        alpha: f64,
+        assumed: &mut Vec<String>,
+    ) -> Vec<NamedRow> {
+        let row = |(index, name): (usize, &String)| {
+            let row = counts.smoothed(index, alpha).unwrap_or_else(|| {
+                assumed.push(format!("confusion of {name}: reported truly"));
+                certain_row(self.observations.len(), index)
+            });
+            NamedRow::new(name, &row)
+        };
+        self.observations.iter().enumerate().map(row).collect()
+    }
+
+    /// Returns the rows for each class; without counts in a class, that of all classes. `pooled`
+    /// has them in the order of the observations. Empty where the file gives no distances.
+    fn rows_by_class(&self, pooled: &[NamedRow], alpha: f64) -> Vec<(String, Vec<NamedRow>)> {
+        if self.readings.iter().all(|reading| reading.true_at.is_none()) {
+            return Vec::new();
+        }
+        let rows = |counts: &CountTable| {
+            let row = |index: usize| match counts.smoothed(index, alpha) {
+                Some(row) => NamedRow::new(&counts.rows()[index], &row),
+                None => pooled[index + 1].clone(),
+            };
+            (0..counts.rows().len()).map(row).collect()
+        };
+        self.classes.names.iter().cloned().zip(self.by_class().iter().map(rows)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn learned(text: &str, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
+        learn(&CsvTable::parse(&"f.csv", text)?, options, &options.check()?)
+    }
+
+    const METERS: &str = "true,reported,true_distance_m,reported_distance_m\n\
+        robot,robot,1.0,1.2\nrobot,nothing,2.0,\nrobot,robot,1.4,1.6\n\
+        nothing,robot,,1.0\nnothing,nothing,,\nnothing,nothing,beyond,beyond\n";
+
+    #[test]
+    fn readings_in_meters_become_rows_by_class() {
+        let options = SensorOptions {
+            estimate: crate::EstimateOptions { alpha: 0.0, ..Default::default() },
+            distance_edges_m: vec![1.5],
+            ..Default::default()
+        };
+        let model = learned(METERS, &options).unwrap();
+        assert_eq!(model.report.correct, 4);
+        assert_eq!(model.report.distance_counts.0.cells(), [[1.0, 1.0], [0.0, 0.0]]);
+        let profile = model.profile;
+        assert_eq!(profile.observations, ["nothing", "robot"]);
+        assert_eq!(profile.confusion[1].probabilities, [0.333_333_333, 0.666_666_667]);
+        let (name, rows) = &profile.confusion_by_class[1];
+        assert_eq!((name.as_str(), rows[0].probabilities.as_slice()), ("d1", &[1.0, 0.0][..]));
+        let beyond = profile.distance_confusion.last().unwrap();
+        assert_eq!((beyond.name.as_str(), beyond.probabilities[0]), ("beyond", 1.0));
+        assert_eq!(profile.assumed, ["distance d1: reported truly"]);
+    }
+
+    #[test]
+    fn readings_by_class_need_the_names_of_the_classes() {
+        let text = "true,reported,true_class,reported_class\nrobot,robot,near,far\n";
+        let options = SensorOptions {
+            distance_edges_m: vec![2.0],
+            distance_classes: ["near", "far"].map(String::from).to_vec(),
+            ..Default::default()
+        };
+        let model = learned(text, &options).unwrap();
+        assert_eq!(model.report.distance_counts.0.row(0), [0.0, 1.0]);
+        assert_eq!(model.report.distance3_counts, None);
+        let error = learned(text, &SensorOptions::default()).unwrap_err();
+        assert_eq!(error.position(), Some((2, 13)));
+        assert!(error.remedy().contains("d0, d1"));
+    }
+
+    #[test]
+    fn one_of_several_sensors_must_be_chosen() {
+        let text = "sensor,true,reported,true_distance_m,reported_distance_m\n\
+            a,robot,robot,1,1\nb,wall,wall,1,1\n";
+        let chosen = |sensor: Option<&str>| SensorOptions {
+            sensor: sensor.map(String::from),
+            ..Default::default()
+        };
+        assert!(learned(text, &chosen(None)).unwrap_err().cause().contains("a, b"));
+        assert!(learned(text, &chosen(Some("c"))).unwrap_err().remedy().contains("a, b"));
+        let model = learned(text, &chosen(Some("b"))).unwrap();
+        assert_eq!(model.profile.observations, ["nothing", "wall"]);
+    }
+
+    #[test]
+    fn damaged_rows_name_line_and_column() {
+        let head = "true,reported,true_distance_m,reported_distance_m\n";
+        let cases = [
+            ("robot,robot,-1,1\n", (2, 13)),
+            ("robot,robot,1,x\n", (2, 15)),
+            ("robot,,1,1\n", (2, 7)),
+            ("robot,robot,1\n", (2, 1)),
+        ];
+        for (row, position) in cases {
+            let error = learned(&format!("{head}{row}"), &SensorOptions::default()).unwrap_err();
+            assert_eq!(error.position(), Some(position), "{row}");
+        }
+        assert!(learned(head, &SensorOptions::default()).is_err(), "no readings");
+        assert!(learned("true,reported\na,a\n", &SensorOptions::default()).is_err());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_rows_are_learned_or_refused(
+            rows in "((nothing|wall|robot),(nothing|wall|robot),[0-9]{0,2},(beyond|[0-9]{0,2}|x)\n){0,9}",
+            alpha in 0.0..2.0_f64,
+        ) {
+            let estimate = crate::EstimateOptions { alpha, ..Default::default() };
+            let options = SensorOptions { estimate, ..Default::default() };
+            let head = "true,reported,true_distance_m,reported_distance_m\n";
+            if let Ok(model) = learned(&format!("{head}{rows}"), &options) {
+                let by_class = model.profile.confusion_by_class.iter().flat_map(|(_, rows)| rows);
+                let rows = model.profile.confusion.iter().chain(&model.profile.distance_confusion);
+                for row in rows.chain(by_class) {
+                    let sum: f64 = row.probabilities.iter().sum();
+                    proptest::prop_assert!((sum - 1.0).abs() < 1e-9, "{:?}", row);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! A camera learned from an MRCLAM folder.
+
+use std::collections::BTreeMap;
+
+use super::LearnedSensor;
+use super::camera::{CameraCounts, camera};
+use super::detection::{Detection, views};
+use super::options::{DistanceClasses, SensorOptions, THREE_EDGES_M};
+use super::report::{ErrorMoments, SensorReport};
+use super::sighting::{Sighting, SkipReason, associate_all};
+use super::tables::{LANDMARK, ROBOT, SubjectLabels, beyond, distance};
+use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::{CountMatrix, CountTable, Estimate};
+use sidestep_import::mrclam::Dataset;
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::wrap_angle;
+use sidestep_statistics::Moments;
+
+/// Learns the camera; `classes` come from `options`.
+pub(super) fn learn(
+    source: &str,
+    dataset: &Dataset,
+    options: &SensorOptions,
+    classes: &DistanceClasses,
+) -> Result<LearnedSensor, InputError> {
+    let log = AssociatedLog::associate(source, dataset, classes)?;
+    let report = log.report(source, options);
+    let looks = CameraCounts {
+        kinds: &log.labels.kinds(&log.sightings),
+        detection: &log.detection(),
+        distance: &distance("distance", &log.sightings, classes),
+        beyond: &beyond(&log.sightings, classes),
+    };
+    Ok(LearnedSensor { report, profile: camera(&looks, options, classes) })
+}
+
+/// A data set after every reading and every bin has been judged.
+struct AssociatedLog<'a> {
+    labels: SubjectLabels,
+    classes: &'a DistanceClasses,
+    sightings: Vec<Sighting>,
+    skipped: BTreeMap<SkipReason, u64>,
+    views: Vec<super::detection::SubjectView>,
+    looks: u64,
+}
+
+impl<'a> AssociatedLog<'a> {
+    fn associate(
+        source: &str,
+        dataset: &Dataset,
+        classes: &'a DistanceClasses,
+    ) -> Result<Self, InputError> {
+        let (sightings, skipped) = associate_all(dataset);
+        if sightings.is_empty() {
+            let cause = "no barcode reading could be judged by ground truth";
+            let remedy = "check that measurements and ground truth share one clock";
+            return Err(InputError::new(source, cause, remedy));
+        }
+        let (views, looks) = views(dataset, classes);
+        Ok(Self {
+            labels: SubjectLabels::from_dataset(dataset),
+            classes,
+            sightings,
+            skipped,
+            views,
+            looks,
+        })
+    }
+
+    fn detection(&self) -> Detection {
+        Detection::from_views(&self.views, self.looks, self.classes)
+    }
+
+    fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
+        let skipped = self.skipped.values().sum();
+        let sightings = &self.sightings;
+        let confusion = self.labels.confusion(sightings);
+        let kinds = self.labels.kinds(sightings);
+        let detection = self.detection();
+        let all_distances = distance("distance", sightings, self.classes);
+        let [all, robots, landmarks] = detection.tables();
+        let tables = [&kinds, &all_distances, all, robots, landmarks];
+        SensorReport {
+            source: source.to_owned(),
+            measurements: sightings.len() as u64 + skipped,
+            sightings: sightings.len() as u64,
+            skipped,
+            skipped_by_cause: self.skipped.iter().map(|(k, v)| (k.name().into(), *v)).collect(),
+            correct: count(sightings, |s| s.correct_candidate().is_some()),
+            nearest_agrees: Some(count(sightings, |s| {
+                s.nearest.is_some() && s.nearest == s.decoded
+            })),
+            unknown_codes: self.unknown_codes(),
+            distance_edges_m: self.classes.edges_from_zero_m(),
+            distance_classes: self.classes.names.clone(),
+            distance_counts_robots: Some(self.distance_counts(ROBOT)),
+            distance_counts_landmarks: Some(self.distance_counts(LANDMARK)),
+            distance3_edges_m: THREE_EDGES_M,
+            distance3_counts: Some(three_classes(sightings)),
+            errors: errors(sightings, Some(self.classes)),
+            per_observer: self.per_observer(),
+            probabilities: nonzero_estimates(&confusion)
+                .chain(tables.iter().flat_map(|t| t.estimates()))
+                .collect(),
+            thin: tables
+                .iter()
+                .flat_map(|t| t.low_count_rows(options.estimate.thin_below))
+                .collect(),
+            hold_out: self.holdout_tests(options),
+            estimate: options.estimate,
+            warnings: Vec::new(),
+            distance_counts: CountMatrix(all_distances.clone()),
+            detection: Some(detection.clone()),
+            against_map: None,
+            kinds: Some(kinds.clone()),
+            confusion,
+        }
+    }
+
+    fn unknown_codes(&self) -> BTreeMap<u32, u64> {
+        let mut codes = BTreeMap::new();
+        for sighting in self.sightings.iter().filter(|s| s.decoded.is_none()) {
+            *codes.entry(sighting.barcode).or_insert(0) += 1;
+        }
+        codes
+    }
+
+    fn distance_counts(&self, kind: usize) -> CountMatrix {
+        let of_kind = self.sightings.iter().filter(|s| self.labels.is_of_kind(s, kind));
+        CountMatrix(distance("distance", of_kind, self.classes))
+    }
+
+    fn per_observer(&self) -> BTreeMap<u32, ErrorMoments> {
+        let mut by_observer: BTreeMap<u32, Vec<&Sighting>> = BTreeMap::new();
+        for sighting in &self.sightings {
+            by_observer.entry(sighting.observer).or_default().push(sighting);
+        }
+        by_observer.into_iter().map(|(observer, seen)| (observer, errors(seen, None))).collect()
+    }
+
+    fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
+        let (every, alpha) = (options.estimate.hold_out_every, options.estimate.alpha);
+        let (train, held) = split(&self.sightings, every);
+        let kinds = |part: &[&Sighting]| self.labels.kinds(part.iter().copied());
+        let far = |part: &[&Sighting]| distance("distance", part.iter().copied(), self.classes);
+        let (train_views, held_views) = split(&self.views, every);
+        let seen = |part: &[&_]| Detection::from_views(part.iter().copied(), 0, self.classes).all;
+        vec![
+            holdout_test(&kinds(&train), &kinds(&held), alpha),
+            holdout_test(&far(&train), &far(&held), alpha),
+            holdout_test(&seen(&train_views), &seen(&held_views), alpha),
+        ]
+    }
+}
+
+fn count(sightings: &[Sighting], is_counted: impl Fn(&Sighting) -> bool) -> u64 {
+    sightings.iter().filter(|sighting| is_counted(sighting)).count() as u64
+}
+
+/// Returns the estimates of cells with counts.
+pub(super) fn nonzero_estimates(table: &CountTable) -> impl Iterator<Item = Estimate> {
+    table.estimates().into_iter().filter(|estimate| estimate.count > 0.0)
+}
+
+fn three_classes(sightings: &[Sighting]) -> CountMatrix {
+    CountMatrix(distance("distance3", sightings, &DistanceClasses::three_classes()))
+}
+
+/// Returns errors over the correct readings; by class of the true range where `classes` are given.
+fn errors<'s>(
+    sightings: impl IntoIterator<Item = &'s Sighting>,
+    classes: Option<&DistanceClasses>,
+) -> ErrorMoments {
+    let correct: Vec<(f64, f64, f64)> = sightings
+        .into_iter()
+        .filter_map(|s| {
+            let truth = s.correct_candidate()?;
+            let off_rad = wrap_angle(s.bearing_rad - truth.bearing_rad);
+            Some((truth.range_m, s.range_m - truth.range_m, off_rad))
+        })
+        .collect();
+    let in_class = |class: usize, classes: &DistanceClasses| {
+        Moments::from_values(correct.iter().filter(|c| classes.class_of(c.0) == class).map(|c| c.1))
+    };
+    ErrorMoments {
+        range_error_m: Moments::from_values(correct.iter().map(|c| c.1)),
+        range_error_by_true_class: classes.map_or(Vec::new(), |classes| {
+            (0..classes.len()).map(|i| in_class(i, classes)).collect()
+        }),
+        bearing_error_rad: Moments::from_values(correct.iter().map(|c| c.2)),
+    }
+}

@@ -1,0 +1,526 @@
+//! Possible places of a slave when its master has moved: push, pull, resize, rotate (slides A1 to
+//! A8).
+
+use super::chain::{Mobility, Rod};
+use super::geometry::{
+    Core, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
+    normalized, scaled, sub,
+};
+use super::interval::{
+    self, AngleInterval, MasterRod, TurnDirection, bend_forbidden_arc, block_rod, block_tip,
+    min_turn_rad,
+};
+use super::motion_context::{
+    Block, BlockOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep, is_length_allowed,
+};
+use super::obstacle::bounds_around;
+use super::rules::Rotation;
+use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
+use super::veto::VetoReason;
+use std::f64::consts::PI;
+
+/// A possible place for a slave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Candidate<const D: usize> {
+    pub(super) at: Point<D>,
+    /// Whether the rod turned from the guide line.
+    pub(super) rotated: bool,
+    turn_rad: f64,
+}
+
+/// Buffers that live from one slave to the next.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CandidateScratch<const D: usize> {
+    blocks: Vec<Block<D>>,
+    arcs: BlockedArcs,
+    /// Whether a rod that turns tries all its lengths, or others only if its present one is
+    /// blocked.
+    pub(super) all_lengths: bool,
+    /// Whether a plane rod looks for a way on both sides, or on the farther one only if the nearer
+    /// has none.
+    pub(super) both_sides: bool,
+    /// Places found by [`MotionContext::candidates`], best first.
+    pub(super) found: Vec<Candidate<D>>,
+    /// Whether one side has not been examined yet.
+    pub(super) has_other_side: bool,
+    /// Whether any rod has found a way by turning since this was last reset; if none has, trying all
+    /// lengths finds the same places.
+    pub(super) has_turned: bool,
+}
+
+/// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
+#[inline]
+pub(super) fn guide<const D: usize>(
+    [mo, mn, so]: [Point<D>; 3],
+    rod: Rod,
+    min_move_m: f64,
+) -> Point<D> {
+    let g = sub(so, mn);
+    let d = norm(g);
+    let t = clamped(d, rod.min_m, rod.max_m);
+    if (t - d).abs() <= min_move_m {
+        so
+    } else if d > 0.0 {
+        add_scaled(mn, g, t / d)
+    } else {
+        add_scaled(mn, normalized(sub(so, mo)).unwrap_or(first_axis()), t)
+    }
+}
+
+/// Returns the length within a rod's limits that is nearest to `d`. Unlike `f64::clamp` it does not
+/// handle NaN, and so takes only two instructions.
+#[inline]
+pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
+    let t = if d > min_m { d } else { min_m };
+    if t < max_m { t } else { max_m }
+}
+
+/// Most rounds of bringing a place into a box and back to an allowed length of the rod.
+const MAX_BOX_ROUNDS: usize = 200;
+
+/// Relative rounding of ways.
+const ROUNDING: f64 = 1e-9;
+
+/// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
+fn guide_line<const D: usize>(step: &SlaveStep<D>) -> Point<D> {
+    normalized(sub(step.so, step.mn)).or(normalized(sub(step.so, step.mo))).unwrap_or(first_axis())
+}
+
+impl<const D: usize> MotionContext<'_, D> {
+    /// Puts all good places for a slave, best first, into `work.found`; only the one on the guide
+    /// line if it is good.
+    pub(super) fn candidates(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        work.found.clear();
+        work.has_other_side = false;
+        let connector = &self.chain.connectors()[step.slave];
+        if connector.is_still() {
+            return self.place_fixed(step, work);
+        }
+        if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
+            return self.place_on_line(step, work);
+        }
+        let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+        let refusal = match self.check_place(step, guided) {
+            Ok(()) => {
+                work.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
+                return Ok(());
+            }
+            Err(refusal) => refusal,
+        };
+        if refusal.reason == VetoReason::Mobility
+            && let Some(at) = self.place_in_box(step, guided)
+            && self.check_slave(step, at).is_ok()
+        {
+            work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
+            return Ok(());
+        }
+        match self.rules.rotation {
+            Rotation::Never => Err(refusal),
+            Rotation::Literal => self.rotate_once(step, guided, work),
+            Rotation::Union => self.rotate(step, guided, refusal, work),
+        }
+    }
+
+    /// Returns a place that the rod allows for a slave confined to a box, by alternating between
+    /// the box and the rod's lengths.
+    fn place_in_box(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
+        let mobility = &self.chain.connectors()[step.slave].mobility;
+        let mut at = guided;
+        for _ in 0..MAX_BOX_ROUNDS {
+            at = mobility.project(at, step.so);
+            let d = distance(at, step.mn);
+            if is_length_allowed(step.rod, d) {
+                return Some(at);
+            }
+            let t = d.max(step.rod.min_m).min(step.rod.max_m);
+            at = add_scaled(step.mn, sub(at, step.mn), t / d.max(f64::MIN_POSITIVE));
+        }
+        None
+    }
+
+    fn check_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
+        if !self.may_be_at(step.slave, at) {
+            return Err(PendingVeto::new(VetoReason::Mobility));
+        }
+        self.check_slave(step, at)
+    }
+
+    /// Handles a slave that never moves: it objects unless the rod is good as it is.
+    fn place_fixed(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        if !is_length_allowed(step.rod, distance(step.mn, step.so)) {
+            return Err(PendingVeto::new(self.chain.connectors()[step.slave].still_reason()));
+        }
+        self.check_slave(step, step.so)?;
+        work.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
+        Ok(())
+    }
+
+    /// Handles a slave on a line or in a plane: finds the nearest places there that the rod allows.
+    fn place_on_line(
+        &self,
+        step: &SlaveStep<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        let d = distance(step.mn, step.so);
+        let t = d.max(step.rod.min_m).min(step.rod.max_m);
+        let places = if (t - d).abs() <= self.chain.min_move_m() {
+            [Some(step.so), None]
+        } else {
+            match self.chain.connectors()[step.slave].mobility {
+                Mobility::OnSegment(ends) => segment_points_at(step.mn, t, ends),
+                Mobility::OnPlane { normal, offset_m } => {
+                    plane_points_at(step.mn, t, step.so, normal, offset_m)
+                }
+                _ => [None; 2],
+            }
+        };
+        let mut refusal = PendingVeto::new(VetoReason::Mobility);
+        for at in places.into_iter().flatten() {
+            match self.check_slave(step, at) {
+                Ok(()) => work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
+                Err(objection) => refusal = objection,
+            }
+        }
+        sort(step, &mut work.found);
+        if work.found.is_empty() { Err(refusal) } else { Ok(()) }
+    }
+
+    /// Applies the slides' rule literally: one turn to the tangent of the obstacle nearest to the
+    /// master.
+    fn rotate_once(
+        &self,
+        step: &SlaveStep<D>,
+        guided: Point<D>,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        self.collect_blocks(step, distance(step.mn, guided), work);
+        let rod = [step.mn, guided];
+        let hit = work
+            .blocks
+            .iter()
+            .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m, b.name))
+            .filter(|(nearest, radius_m, _)| nearest.distance_m < *radius_m)
+            .min_by(|(a, _, a_name), (b, _, b_name)| {
+                let (a_m, b_m) = (distance(a.on_body, step.mn), distance(b.on_body, step.mn));
+                a_m.total_cmp(&b_m).then(a_name.cmp(b_name))
+            });
+        let length_m = distance(step.mn, guided);
+        let at = hit
+            .and_then(|(nearest, radius_m, _)| {
+                let to = sub(nearest.on_core, step.mn);
+                let cosine = cosine_of_half_angle(norm(to), radius_m, length_m, false)?;
+                let u = direction_off(guide_line(step), normalized(to)?, cosine);
+                Some(add_scaled(step.mn, u, length_m))
+            })
+            .unwrap_or(guided);
+        if !self.may_be_at(step.slave, at) {
+            return Err(PendingVeto::new(VetoReason::Mobility));
+        }
+        work.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
+        Ok(())
+    }
+
+    /// Applies the union rule: for the rod's length, and for others it may have, finds the nearest
+    /// directions free of all obstacles.
+    fn rotate(
+        &self,
+        step: &SlaveStep<D>,
+        guided: Point<D>,
+        refusal: PendingVeto,
+        work: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        let Rod { min_m, max_m, .. } = step.rod;
+        self.collect_blocks(step, max_m, work);
+        let own_m = distance(step.mn, guided);
+        let lengths_m = [own_m, min_m, max_m, 0.5 * (min_m + max_m)];
+        let n = if min_m < max_m { 4 } else { 1 };
+        let mut why = None;
+        let mut inside = None;
+        for &length_m in &lengths_m[..n] {
+            if work.found.is_empty() || work.all_lengths {
+                inside = inside.or(self.add_turns(step, length_m, work, &mut why));
+            }
+        }
+        sort(step, &mut work.found);
+        if !work.found.is_empty() {
+            work.has_turned = true;
+            return Ok(());
+        }
+        let inside = inside.map(|name| PendingVeto::from_owner(VetoReason::Inside, name));
+        Err(why.or(inside).unwrap_or(refusal))
+    }
+
+    /// Adds the good places for one length of the rod; returns the block that contains the master.
+    fn add_turns(
+        &self,
+        step: &SlaveStep<D>,
+        length_m: f64,
+        work: &mut CandidateScratch<D>,
+        why: &mut Option<PendingVeto>,
+    ) -> Option<BlockOwner> {
+        let u0 = guide_line(step);
+        let CandidateScratch { blocks, arcs, found, has_other_side, .. } = work;
+        let look_on = work.all_lengths || work.both_sides;
+        let mut add = |u: Point<D>, why: &mut Option<PendingVeto>| {
+            let at = add_scaled(step.mn, u, length_m);
+            match self.check_place(step, at) {
+                Ok(()) => {
+                    found.push(Candidate { at, rotated: true, turn_rad: angle_rad(u0, u) });
+                    true
+                }
+                Err(refusal) => {
+                    keep_informative(why, refusal);
+                    false
+                }
+            }
+        };
+        if D == 2 {
+            let plane = PlanarRod { step, length_m, u0: to_plane(u0), blocks };
+            let mut sides = plane.free_directions(arcs);
+            while let Some(u) = sides
+                .next(|u| why.is_some() && self.is_too_far(step, add_scaled(step.mn, u, length_m)))
+            {
+                if add(u, why) && !look_on {
+                    *has_other_side = sides.has_more();
+                    break;
+                }
+            }
+            return arcs.inside;
+        }
+        // A master inside an obstacle cannot turn out of it.
+        let inside = blocks.iter().filter(|b| contains_master(step, b)).map(|b| b.name).min();
+        blocks.retain(|b| !contains_master(step, b));
+        let search = DirectionSearch { step, length_m, blocks };
+        let turned = search.turn_away(u0);
+        if !turned.is_some_and(|u| add(u, why)) {
+            let is_good = |u| self.check_place(step, add_scaled(step.mn, u, length_m)).is_ok();
+            if let Some(u) = search.rings(u0, is_good) {
+                add(u, why);
+            }
+        }
+        inside
+    }
+
+    /// Returns whether a place is surely farther from the slave than it may go in one step.
+    fn is_too_far(&self, step: &SlaveStep<D>, at: Point<D>) -> bool {
+        distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
+    }
+
+    /// Collects all blocks that a rod of a length may meet on any side. The order is that of the grid
+    /// or the tree, and must not matter, so ties go to the lower name.
+    fn collect_blocks(&self, step: &SlaveStep<D>, length_m: f64, work: &mut CandidateScratch<D>) {
+        let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
+        work.blocks.clear();
+        let rod = step.master.min(step.slave);
+        self.visit_blocks(&bounds_around(step.mn, reach_m), Some(rod), step.slave, |block| {
+            if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
+                work.blocks.push(*block);
+            }
+        });
+    }
+}
+
+/// Keeps the first refusal that is more informative than the first objection: a free direction that fails
+/// for another reason.
+#[inline]
+fn keep_informative(why: &mut Option<PendingVeto>, refusal: PendingVeto) {
+    if !matches!(refusal.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
+        why.get_or_insert(refusal);
+    }
+}
+
+fn contains_master<const D: usize>(step: &SlaveStep<D>, block: &Block<D>) -> bool {
+    let radius_m = block.radius_m + step.rod.radius_m;
+    block.stops_rod && block.core.nearest_to_point(step.mn).distance_m < radius_m
+}
+
+fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [Candidate<D>]) {
+    // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
+    // first.
+    found.sort_by(|a, b| {
+        let way = |c: &Candidate<D>| distance(c.at, step.so);
+        way(a).total_cmp(&way(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
+    });
+}
+
+/// Blocked directions, computed only where needed.
+#[derive(Debug, Clone, Default)]
+struct BlockedArcs {
+    arcs: Vec<AngleInterval>,
+    /// Whether the arcs of each block have been computed.
+    known: Vec<bool>,
+    /// The block that contains the master.
+    inside: Option<BlockOwner>,
+}
+
+/// A plane rod of one length that looks for a free direction near `u0`.
+struct PlanarRod<'a, const D: usize> {
+    step: &'a SlaveStep<D>,
+    length_m: f64,
+    u0: Point<2>,
+    blocks: &'a [Block<D>],
+}
+
+impl<const D: usize> PlanarRod<'_, D> {
+    /// Returns the nearest free directions to the left and to the right, the nearer one first.
+    fn free_directions<'a>(&'a self, known: &'a mut BlockedArcs) -> FreeDirections<'a, D> {
+        known.arcs.clear();
+        known.known.clear();
+        known.known.resize(self.blocks.len(), false);
+        known.inside = None;
+        let step = self.step;
+        if let Some(prev) = step.prev.filter(|_| step.max_bend_rad < PI) {
+            known.arcs.push(bend_forbidden_arc(to_plane(sub(step.mn, prev)), step.max_bend_rad));
+        }
+        let start_rad = interval::direction_rad(self.u0);
+        FreeDirections { plane: self, known, start_rad, is_open: [true; 2] }
+    }
+
+    /// Adds the arcs of all blocks that a rod in a direction meets; returns whether there were any.
+    fn add_arcs_at(&self, u: Point<D>, known: &mut BlockedArcs) -> bool {
+        let s = add_scaled(self.step.mn, u, self.length_m);
+        let mut learns = false;
+        for (k, block) in self.blocks.iter().enumerate() {
+            if !known.known[k] && self.meets(s, block) {
+                known.known[k] = true;
+                self.add_block(block, known);
+                learns = true;
+            }
+        }
+        learns
+    }
+
+    fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
+        let near_m = block.radius_m + 2.0 * SKIN_M;
+        let rod = [self.step.mn, s];
+        block.stops_rod && !block.core.is_clear_of_segment(rod, near_m + self.step.rod.radius_m)
+            || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
+    }
+
+    /// Adds all directions that one block blocks.
+    fn add_block(&self, block: &Block<D>, known: &mut BlockedArcs) {
+        let step = self.step;
+        let reach = MasterRod { master: to_plane(step.mn), length_m: self.length_m };
+        let core = core_to_plane(&block.core);
+        let apart_m = core.nearest_to_point(reach.master).distance_m;
+        let rod_m = block.radius_m + step.rod.radius_m;
+        // If the master is within the skin of a surface, the half-plane behind it is blocked.
+        let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
+        if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
+            known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
+        }
+        if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
+            let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
+            block_tip(&reach, &core, tip_m, &mut known.arcs);
+        }
+    }
+}
+
+/// An iterator over the free directions on both sides, the nearer one first.
+///
+/// Only blocks that are met on the way are turned into arcs: a direction that is the first outside
+/// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
+/// all blocks.
+struct FreeDirections<'a, const D: usize> {
+    plane: &'a PlanarRod<'a, D>,
+    known: &'a mut BlockedArcs,
+    start_rad: f64,
+    /// Whether there may be a direction to the left, and one to the right.
+    is_open: [bool; 2],
+}
+
+impl<const D: usize> FreeDirections<'_, D> {
+    fn has_more(&self) -> bool {
+        self.is_open != [false; 2]
+    }
+
+    /// Returns the next free direction; none once `is_vain` says that a direction, and so any that
+    /// is farther from the start, is of no use.
+    fn next(&mut self, is_vain: impl Fn(Point<D>) -> bool) -> Option<Point<D>> {
+        loop {
+            let turns_rad = [TurnDirection::Left, TurnDirection::Right].map(|side| {
+                let is_open = self.is_open[side as usize];
+                is_open.then(|| min_turn_rad(&self.known.arcs, self.start_rad, side)).flatten()
+            });
+            self.is_open = turns_rad.map(|turn| turn.is_some());
+            let (side, turn_rad) = match turns_rad {
+                [Some(left), Some(right)] if right < left => (TurnDirection::Right, right),
+                [Some(left), _] => (TurnDirection::Left, left),
+                [None, Some(right)] => (TurnDirection::Right, right),
+                [None, None] => return None,
+            };
+            let turned = interval::turn(self.plane.u0, turn_rad, side);
+            let u: Point<D> = std::array::from_fn(|i| turned[i]);
+            if is_vain(u) {
+                return None;
+            }
+            if !self.plane.add_arcs_at(u, self.known) {
+                self.is_open[side as usize] = false;
+                return Some(u);
+            }
+        }
+    }
+}
+
+fn to_plane<const D: usize>(p: Point<D>) -> Point<2> {
+    [p[0], p[1]]
+}
+
+fn core_to_plane<const D: usize>(core: &Core<D>) -> Core<2> {
+    match core {
+        Core::Point(c) => Core::Point(to_plane(*c)),
+        Core::Segment([a, b]) => Core::Segment([to_plane(*a), to_plane(*b)]),
+        Core::Cuboid(c) => Core::Cuboid(Cuboid {
+            center: to_plane(c.center),
+            axes: [to_plane(c.axes[0]), to_plane(c.axes[1])],
+            half_m: to_plane(c.half_m),
+        }),
+    }
+}
+
+/// Returns the points of a segment at a given distance from `m`.
+fn segment_points_at<const D: usize>(
+    m: Point<D>,
+    t: f64,
+    [a, b]: [Point<D>; 2],
+) -> [Option<Point<D>>; 2] {
+    let (d, r) = (sub(b, a), sub(a, m));
+    let (dd, dr) = (dot(d, d), dot(d, r));
+    let inside = dr * dr - dd * (dot(r, r) - t * t);
+    if inside < 0.0 || dd <= 0.0 {
+        return [None; 2];
+    }
+    [-inside.sqrt(), inside.sqrt()].map(|root| {
+        let part = (-dr + root) / dd;
+        (0.0..=1.0).contains(&part).then(|| lerp(a, b, part))
+    })
+}
+
+/// Returns the points of a plane at a given distance from `m` that are nearest to and farthest from
+/// `so`.
+fn plane_points_at<const D: usize>(
+    m: Point<D>,
+    t: f64,
+    so: Point<D>,
+    normal: Point<D>,
+    offset_m: f64,
+) -> [Option<Point<D>>; 2] {
+    let height_m = offset_m - dot(normal, m);
+    let foot = add_scaled(m, normal, height_m);
+    let radius2 = t * t - height_m * height_m;
+    if radius2 < 0.0 {
+        return [None; 2];
+    }
+    let flat = sub(so, foot);
+    let flat = add_scaled(flat, normal, -dot(normal, flat));
+    let u = normalized(flat).unwrap_or_else(|| super::geometry::perpendicular(normal));
+    [1.0, -1.0].map(|side| Some(add(foot, scaled(u, side * radius2.sqrt()))))
+}

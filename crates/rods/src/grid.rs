@@ -1,0 +1,165 @@
+//! A uniform grid that finds the boxes nearby.
+
+use super::geometry::{Bounds, Point};
+
+/// Boxes, and for every cell the list of the boxes that meet it.
+#[derive(Debug, Clone, Default)]
+pub struct Grid<const D: usize> {
+    cells: CellLayout<D>,
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+    bounds: Vec<Bounds<D>>,
+    /// The lowest cell of every box.
+    first: Vec<CellIndex<D>>,
+}
+
+/// Largest mean number of entries per box; beyond it the grid gets coarser.
+const MAX_ENTRIES_PER_BOX: usize = 64;
+const MAX_CELLS_PER_BOX: usize = 64;
+
+impl<const D: usize> Grid<D> {
+    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which determines
+    /// the size of the cells, never the result.
+    pub fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
+        self.bounds.clear();
+        self.bounds.extend(bounds);
+        if !self.bounds.is_empty() {
+            self.cells = CellLayout::choose(&self.bounds, reach_m);
+            self.fill();
+        }
+    }
+
+    /// Lists the boxes of every cell by counting sort: `starts` holds the counts first, then the
+    /// next write positions, and in the end the start of each list.
+    fn fill(&mut self) {
+        let Self { cells, starts, entries, bounds, first } = self;
+        first.clear();
+        first.extend(bounds.iter().map(|b| cells.cell_at(b.lo)));
+        let n_cells = cells.len();
+        starts.clear();
+        starts.resize(n_cells + 2, 0);
+        for b in &*bounds {
+            cells.for_each(cells.range(b), |_, index| starts[index + 2] += 1);
+        }
+        for k in 0..n_cells {
+            starts[k + 2] += starts[k + 1];
+        }
+        entries.clear();
+        entries.resize(starts[n_cells + 1] as usize, 0);
+        for (k, b) in (0u32..).zip(&*bounds) {
+            cells.for_each(cells.range(b), |_, index| {
+                entries[starts[index + 1] as usize] = k;
+                starts[index + 1] += 1;
+            });
+        }
+    }
+
+    /// Visits every box that meets `near`, each once.
+    #[inline]
+    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
+        if self.bounds.is_empty() {
+            return;
+        }
+        let range = self.cells.range(near);
+        self.cells.for_each(range, |cell, index| {
+            let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
+            for &k in &self.entries[from..to] {
+                let k = k as usize;
+                // A box in several cells is reported only in the first cell that it shares with the
+                // query.
+                let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
+                if is_first && self.bounds[k].meets(near) {
+                    visit_one(k);
+                }
+            }
+        });
+    }
+}
+
+/// A cell's number along every axis.
+type CellIndex<const D: usize> = [u32; D];
+
+/// The division of space into cells. Everything outside belongs to the nearest cell.
+#[derive(Debug, Clone, Copy)]
+struct CellLayout<const D: usize> {
+    origin: Point<D>,
+    per_m: f64,
+    n: CellIndex<D>,
+}
+
+impl<const D: usize> Default for CellLayout<D> {
+    fn default() -> Self {
+        Self { origin: [0.0; D], per_m: 1.0, n: [1; D] }
+    }
+}
+
+impl<const D: usize> CellLayout<D> {
+    /// Chooses cells for boxes, of which there is at least one, and queries of about `reach_m`.
+    fn choose(bounds: &[Bounds<D>], reach_m: f64) -> Self {
+        let n = bounds.len();
+        let around = bounds.iter().fold(Bounds::empty(), |all, b| all.joined(b));
+        let extent = |b: &Bounds<D>| (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max);
+        let mean_m = bounds.iter().map(extent).sum::<f64>() / n as f64;
+        let mut cell_m = (0.5 * mean_m).max(0.7 * reach_m).max(extent(&around) * 1e-4).max(1e-6);
+        loop {
+            let per_m = 1.0 / cell_m;
+            let along = |i: usize| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1;
+            let cells = Self { origin: around.lo, per_m, n: std::array::from_fn(along) };
+            let entries = || bounds.iter().map(|b| cells.count_cells(b)).sum::<usize>();
+            if cells.len() <= MAX_CELLS_PER_BOX * (n + 1)
+                && entries() <= MAX_ENTRIES_PER_BOX * (n + 1)
+            {
+                return cells;
+            }
+            cell_m *= 1.5;
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.n.iter().map(|&n| n as usize).product()
+    }
+
+    fn count_cells(&self, b: &Bounds<D>) -> usize {
+        let [lo, hi] = self.range(b);
+        (0..D).map(|i| (hi[i] - lo[i]) as usize + 1).product()
+    }
+
+    #[inline]
+    fn cell_at(&self, p: Point<D>) -> CellIndex<D> {
+        // The cast saturates, so anything below the grid falls into its first cell.
+        std::array::from_fn(|i| (((p[i] - self.origin[i]) * self.per_m) as u32).min(self.n[i] - 1))
+    }
+
+    /// Returns the lowest and the highest cell that a box meets.
+    #[inline]
+    fn range(&self, b: &Bounds<D>) -> [CellIndex<D>; 2] {
+        [self.cell_at(b.lo), self.cell_at(b.hi)]
+    }
+
+    #[inline]
+    fn index(&self, cell: CellIndex<D>) -> usize {
+        (0..D).rev().fold(0, |index, i| index * self.n[i] as usize + cell[i] as usize)
+    }
+
+    /// Visits the cells of a block, and their indices, in the order of the indices.
+    #[inline]
+    fn for_each(
+        &self,
+        [lo, hi]: [CellIndex<D>; 2],
+        mut visit_one: impl FnMut(CellIndex<D>, usize),
+    ) {
+        let mut cell = lo;
+        loop {
+            visit_one(cell, self.index(cell));
+            let mut axis = 0;
+            while cell[axis] == hi[axis] {
+                cell[axis] = lo[axis];
+                axis += 1;
+                if axis == D {
+                    return;
+                }
+            }
+            cell[axis] += 1;
+        }
+    }
+}

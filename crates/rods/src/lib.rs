@@ -1,0 +1,46 @@
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
+
+mod candidates;
+mod chain;
+#[cfg(test)]
+mod fixtures;
+pub mod geometry;
+mod grid;
+mod interval;
+mod motion_bounds;
+mod motion_context;
+mod obstacle;
+mod open;
+mod pass;
+mod propagate;
+mod reach;
+pub mod rebuild;
+mod rod_bvh;
+mod rules;
+mod search;
+pub mod serde_point;
+mod span;
+mod sweep;
+mod tunneling;
+mod veto;
+pub mod wavefront;
+
+pub use chain::{
+    Chain, Connector, LENGTH_TOLERANCE_M, MAX_COORDINATE_M, Mobility, Rod, is_in_range,
+};
+pub use grid::Grid;
+pub use motion_context::{
+    BEND_TOLERANCE_RAD, PendingVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
+};
+pub use obstacle::{Obstacle, Obstacles, bounds_around, outline};
+pub use propagate::{Propagator, local_solver};
+pub use reach::{ReachOutcome, ReachRequest, reach};
+pub use rod_bvh::RodBvh;
+pub use rules::{Rotation, Rules};
+pub use sidestep_kernel::InputError;
+pub use sweep::Sweep;
+pub use tunneling::{TunneledRod, blocking_obstacle, find_tunneling};
+pub use veto::{
+    CompletedMotion, Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason,
+};

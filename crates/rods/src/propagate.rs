@@ -1,0 +1,647 @@
+//! Propagation of one motion through the whole chain, or not at all (slides R1 to R7).
+//!
+//! The initiator moves; from it two sweeps go outward, each slave reacting to its master and
+//! becoming the next one's master. Both sweeps write to tentative positions, which are committed
+//! only once both have succeeded: a veto leaves every bit of the chain as it was.
+
+use super::candidates::{Candidate, CandidateScratch};
+use super::chain::{Chain, is_in_range, out_of_range};
+use super::geometry::{Bounds, Point, distance, lerp};
+use super::motion_bounds::MotionBounds;
+use super::motion_context::{
+    BlockOwner, MotionContext, PendingVeto, SlaveStep, TOLERANCE_M, TentativePositions,
+    contact_distance_m, is_length_allowed,
+};
+use super::obstacle::{Obstacles, swept_bounds};
+use super::open::{self, StayRule};
+use super::pass::{Direction, MotionTally};
+use super::rod_bvh::RodBvh;
+use super::rules::{Rotation, Rules};
+use super::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
+use separation::ProofSchedule;
+use sidestep_kernel::{InputError, interrupt};
+use std::ops::Range;
+
+/// Most sub-steps of a request. One that would need more is an input error: it comes from a wrong
+/// unit or from a rod of nearly no length, and would seem to hang.
+const MAX_SUB_STEPS: f64 = 1e6;
+/// Number of sub-steps between two checks for an interrupt. On a chain of a million connectors so
+/// many take about 0.3 s.
+const INTERRUPT_CHECK_INTERVAL: usize = 16;
+
+/// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
+/// remembers nothing from one motion to the next that a result depends on.
+#[derive(Debug, Clone, Default)]
+pub struct Propagator<const D: usize> {
+    /// Rules by which chains react.
+    pub rules: Rules,
+    tentative: TentativePositions<D>,
+    own_rods: RodBvh<D>,
+    motion_bounds: MotionBounds<D>,
+    /// When to try proofs of single sub-steps.
+    proofs: ProofSchedule,
+    /// When to try proofs of all sub-steps of a request at once.
+    request_proofs: ProofSchedule,
+    scratch: CandidateScratch<D>,
+    alternatives: Vec<Alternative<D>>,
+    /// Positions before the request, of the run of connectors that have moved since: a veto in a
+    /// later sub-step takes back the earlier ones.
+    original: TentativePositions<D>,
+    tally: MotionTally,
+}
+
+/// A choice point of the depth-first search: another reaction of an earlier slave.
+#[derive(Debug, Clone, Copy)]
+enum Alternative<const D: usize> {
+    /// Another place.
+    Place { slave: usize, candidate: Candidate<D> },
+    /// A turn of its rod to the other side. It is computed only on backtracking, because that is
+    /// rare and a turn is the costly part of a reaction.
+    OtherSide { slave: usize, tried: Point<D> },
+}
+
+/// The connectors that are moved from outside: one, or the two of a rod.
+#[derive(Debug, Clone, Copy)]
+struct DrivenConnectors<const D: usize> {
+    first: usize,
+    n: usize,
+    to: [Point<D>; 2],
+}
+
+impl<const D: usize> DrivenConnectors<D> {
+    fn from_motion(motion: &Motion<D>) -> Self {
+        match *motion {
+            Motion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
+            Motion::Rod { i, to } => Self { first: i, n: 2, to },
+        }
+    }
+
+    fn indices(&self) -> Range<usize> {
+        self.first..self.first + self.n
+    }
+
+    /// Returns their positions after `k` of `n` equal sub-steps; the last one is the target, bit for bit.
+    fn positions_at(&self, from: [Point<D>; 2], [k, n]: [usize; 2]) -> [Point<D>; 2] {
+        if k == n {
+            return self.to;
+        }
+        let fraction = k as f64 / n as f64;
+        [0, 1].map(|h| lerp(from[h], self.to[h], fraction))
+    }
+
+    /// Returns their positions.
+    fn positions(&self, chain: &Chain<D>) -> [Point<D>; 2] {
+        [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
+    }
+}
+
+/// The index of the connector that objects, and its objection.
+type ConnectorVeto = (usize, PendingVeto);
+
+/// The inputs of one sweep outward from the initiator; nothing changes them before the commit.
+#[derive(Clone, Copy)]
+struct SweepContext<'a, const D: usize> {
+    chain: &'a Chain<D>,
+    obstacles: &'a Obstacles<D>,
+    direction: Direction,
+}
+
+impl<const D: usize> SweepContext<'_, D> {
+    /// Returns the connector after `i`, if the chain goes on there.
+    fn next(&self, i: usize) -> Option<usize> {
+        self.direction.next(i, self.chain.points().len())
+    }
+}
+
+impl<const D: usize> Propagator<D> {
+    /// Returns a propagator for rules.
+    pub fn new(rules: Rules) -> Self {
+        Self { rules, ..Self::default() }
+    }
+
+    /// Moves a chain as requested, in sub-steps if anything may be in the way.
+    ///
+    /// # Errors
+    /// When a target is not finite or more than 1e6 m from the origin, or the chain does not have
+    /// the index. An impossible motion is no error but a veto.
+    pub fn propagate(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        request: &Request<D>,
+    ) -> Result<Outcome<D>, InputError> {
+        let mut driven = DrivenConnectors::from_motion(&request.motion);
+        check(chain, &driven)?;
+        let from = driven.positions(chain);
+        self.tally = MotionTally::start(driven.first);
+        self.original.start(chain.points().len(), driven.first);
+        if let Err((by, objection)) = project(chain, &mut driven, request.mode) {
+            return Ok(Outcome::Vetoed(make_veto(chain, driven.first, by, objection)));
+        }
+        let n = self.sub_steps(chain, obstacles, &driven, from)?;
+        if self.pull_all_if_separated(chain, obstacles, &driven, n) {
+            return Ok(Outcome::Moved(self.completed_motion(None)));
+        }
+        for k in 1..=n {
+            if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
+                interrupt::check();
+            }
+            let driven = DrivenConnectors { to: driven.positions_at(from, [k, n]), ..driven };
+            if let Err((by, objection)) = self.sub_step(chain, obstacles, driven, k == n) {
+                let veto = make_veto(chain, driven.first, by, objection);
+                return Ok(self.stop(chain, request.mode, veto));
+            }
+        }
+        Ok(Outcome::Moved(self.completed_motion(None)))
+    }
+
+    /// Returns the number of sub-steps of a request.
+    fn sub_steps(
+        &self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: &DrivenConnectors<D>,
+        from: [Point<D>; 2],
+    ) -> Result<usize, InputError> {
+        let travel_m =
+            distance(from[0], driven.to[0]).max(distance(from[1], driven.to[driven.n - 1]));
+        count_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), travel_m)
+    }
+
+    /// Ends a request at a veto: keeps the sub-steps so far, or takes them back.
+    fn stop(&mut self, chain: &mut Chain<D>, mode: VetoEffect, veto: Veto<D>) -> Outcome<D> {
+        if mode == VetoEffect::AsFarAsPossible && self.tally.changed > 0 {
+            return Outcome::Moved(self.completed_motion(Some(veto)));
+        }
+        let run = self.original.run();
+        chain.points_mut()[run].copy_from_slice(self.original.positions());
+        Outcome::Vetoed(veto)
+    }
+
+    fn completed_motion(&self, cut_short: Option<Veto<D>>) -> CompletedMotion<D> {
+        let MotionTally { from, to, changed, rotated, max_slave_step_m } = self.tally;
+        CompletedMotion { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
+    }
+
+    /// Makes one sub-step: all of it, or nothing. `is_last` says that no later one can make the request
+    /// take it back.
+    fn sub_step(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: DrivenConnectors<D>,
+        is_last: bool,
+    ) -> Result<(), ConnectorVeto> {
+        if has_arrived(chain, &driven) {
+            return Ok(());
+        }
+        // From the cheapest motion to the dearest. Each gives the bits of the last one where it
+        // applies, so which of them runs is a matter of speed alone.
+        let is_open = is_open(chain, obstacles, &driven);
+        if is_open && !self.rules.self_collision {
+            open::pull(chain, driven.first, driven.to[0], StayRule::Exactly, &mut self.tally);
+            return Ok(());
+        }
+        if is_open && self.pull_if_separated(chain, &driven, is_last) {
+            return Ok(());
+        }
+        if self.rules.self_collision {
+            if !is_open && self.sweep_if_separated(chain, obstacles, &driven) {
+                return Ok(());
+            }
+            let rods = 0..chain.rods().len();
+            self.own_rods.refit(rods.map(|i| rod_box(chain, i, |k| chain.points()[k])));
+        }
+        let rotated = self.tally.rotated;
+        let followed = self.sweep_from(chain, obstacles, &driven);
+        match followed {
+            Ok(()) => self.commit(chain, &driven),
+            Err(_) => self.tally.rotated = rotated,
+        }
+        followed
+    }
+
+    /// Finds new places for the driven connectors and all that follow them.
+    fn sweep_from(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
+        self.tentative.start(chain.points().len(), driven.first);
+        self.place_driven(chain, obstacles, driven)?;
+        // A fixed order: the second sweep sees the new places of the first one, for the bend at the
+        // initiator and for collisions of the chain with itself.
+        let up = SweepContext { chain, obstacles, direction: Direction::Up };
+        let down = SweepContext { direction: Direction::Down, ..up };
+        self.sweep(up, driven.first + driven.n - 1)?;
+        self.sweep(down, driven.first)
+    }
+
+    fn place_driven(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
+        // Both are checked before one is placed: the ends of a driven rod move at once, so neither
+        // is an obstacle to the other at a new place.
+        for (h, k) in driven.indices().enumerate() {
+            let context = self.context(chain, obstacles);
+            context.check_initiator(k, driven.to[h]).map_err(|objection| (k, objection))?;
+        }
+        for (h, k) in driven.indices().enumerate() {
+            self.place(chain, k, driven.to[h]);
+        }
+        if driven.n == 2 {
+            self.check_driven_rod(chain, obstacles, driven)?;
+        }
+        Ok(())
+    }
+
+    /// Checks the rod between two driven connectors, as if its second end were a slave of the first.
+    fn check_driven_rod(
+        &self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
+        let slave = driven.first + 1;
+        let context = self.context(chain, obstacles);
+        let step = SlaveStep { mn: driven.to[0], ..context.step(slave, Direction::Up) };
+        if !is_length_allowed(step.rod, distance(driven.to[0], driven.to[1])) {
+            return Err((slave, PendingVeto::new(VetoReason::Mobility)));
+        }
+        // Its bends are checked by the sweeps, when the connectors on both sides are placed.
+        let without_bend = SlaveStep { prev: None, ..step };
+        context.check_slave(&without_bend, driven.to[1]).map_err(|objection| (slave, objection))
+    }
+
+    fn context<'a>(
+        &'a self,
+        chain: &'a Chain<D>,
+        obstacles: &'a Obstacles<D>,
+    ) -> MotionContext<'a, D> {
+        let Self { rules, tentative, own_rods, .. } = self;
+        MotionContext { chain, obstacles, rules, tentative, own_rods }
+    }
+
+    /// Sweeps from a driven connector outward. Rods keep their lengths when they turn, which is cheap
+    /// and nearly always enough; if that ends in a veto, the sweep is repeated with every length they
+    /// may have. Without a rod that has turned the repetition would end in the same veto.
+    fn sweep(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
+        let rotated = self.tally.rotated;
+        self.scratch.all_lengths = false;
+        self.scratch.has_turned = false;
+        let followed = self.follow(sweep, head);
+        let Some(first) = sweep.next(head) else { return followed };
+        if followed.is_ok()
+            || self.rules.rotation != Rotation::Union
+            || !self.scratch.has_turned
+            || !has_more_places(sweep.chain, head, sweep.direction)
+        {
+            return followed;
+        }
+        self.revert(sweep.chain, first, sweep.direction);
+        self.tally.rotated = rotated;
+        self.scratch.all_lengths = true;
+        self.follow(sweep, head)
+    }
+
+    /// Follows the chain from a driven connector outward, until a slave need not move or the chain ends.
+    fn follow(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
+        self.alternatives.clear();
+        let chain = sweep.chain;
+        let mut first_objection: Option<ConnectorVeto> = None;
+        let mut backtracks_left = self.rules.backtracks;
+        let mut master = head;
+        while let Some(slave) = sweep.next(master) {
+            let (at_slave, chosen) = match self.react(sweep, slave) {
+                Ok(chosen) => (slave, chosen),
+                Err(objection) => {
+                    // The first one is reported: the later ones are those of detours around it.
+                    let first = *first_objection.get_or_insert((slave, objection));
+                    self.backtrack(sweep, &mut backtracks_left, first)?
+                }
+            };
+            let so = chain.points()[at_slave];
+            let stays = distance(chosen.at, so) <= chain.min_move_m();
+            if stays && self.may_stop(sweep, at_slave) {
+                return Ok(());
+            }
+            self.place(chain, at_slave, if stays { so } else { chosen.at });
+            self.tally.rotated += usize::from(chosen.rotated);
+            master = at_slave;
+        }
+        Ok(())
+    }
+
+    /// Returns the best place for a slave; its alternatives are remembered.
+    fn react(
+        &mut self,
+        sweep: SweepContext<'_, D>,
+        slave: usize,
+    ) -> Result<Candidate<D>, PendingVeto> {
+        self.find_candidates(sweep, slave)?;
+        let Self { scratch, alternatives, .. } = self;
+        let chosen = scratch.found[0];
+        // A stack: the next best goes on top, and the side not examined yet above all.
+        let rest = scratch.found[1..].iter().rev();
+        alternatives.extend(rest.map(|&candidate| Alternative::Place { slave, candidate }));
+        if scratch.has_other_side {
+            alternatives.push(Alternative::OtherSide { slave, tried: chosen.at });
+        }
+        Ok(chosen)
+    }
+
+    /// Fills `scratch.found` with places for a slave.
+    fn find_candidates(
+        &mut self,
+        SweepContext { chain, obstacles, direction }: SweepContext<'_, D>,
+        slave: usize,
+    ) -> Result<(), PendingVeto> {
+        let Self { rules, tentative, own_rods, scratch, .. } = self;
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
+        context.candidates(&context.step(slave, direction), scratch)
+    }
+
+    /// Backtracks after an objection: the latest of the earlier slaves with an alternative takes it.
+    /// Returns that slave and its new place, or the objection if no alternative is left.
+    fn backtrack(
+        &mut self,
+        sweep: SweepContext<'_, D>,
+        backtracks_left: &mut usize,
+        objection: ConnectorVeto,
+    ) -> Result<(usize, Candidate<D>), ConnectorVeto> {
+        while let Some(alternative) = self.alternatives.pop() {
+            if *backtracks_left == 0 {
+                let (by, veto) = objection;
+                return Err((by, PendingVeto { reason: VetoReason::Limit, ..veto }));
+            }
+            *backtracks_left -= 1;
+            match alternative {
+                Alternative::Place { slave, candidate } => {
+                    self.revert(sweep.chain, slave, sweep.direction);
+                    return Ok((slave, candidate));
+                }
+                Alternative::OtherSide { slave, tried } => {
+                    self.revert(sweep.chain, slave, sweep.direction);
+                    self.scratch.both_sides = true;
+                    let result = self.find_candidates(sweep, slave);
+                    self.scratch.both_sides = false;
+                    let other = self.scratch.found.iter().find(|c| c.at != tried);
+                    if let (Ok(()), Some(&candidate)) = (result, other) {
+                        return Ok((slave, candidate));
+                    }
+                }
+            }
+        }
+        Err(objection)
+    }
+
+    /// Returns whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
+    /// and the rod beyond it are allowed as they are.
+    fn may_stop(&self, sweep: SweepContext<'_, D>, slave: usize) -> bool {
+        let Some(next) = sweep.next(slave) else { return true };
+        let step = self.context(sweep.chain, sweep.obstacles).step(next, sweep.direction);
+        // The bend counts as well: its inner rod has turned, though its outer one stays. Without this
+        // test a chain with a limit of 60 degrees stopped at 86.
+        is_length_allowed(step.rod, distance(step.so, step.mn)) && step.is_bend_allowed_at(step.so)
+    }
+
+    fn place(&mut self, chain: &Chain<D>, i: usize, at: Point<D>) {
+        self.tentative.set(i, at);
+        self.refresh_own_rods(chain, i);
+    }
+
+    /// Updates the boxes of the rods at a connector whose tentative position has changed.
+    fn refresh_own_rods(&mut self, chain: &Chain<D>, i: usize) {
+        if !self.rules.self_collision {
+            return;
+        }
+        for rod in i.saturating_sub(1)..(i + 1).min(chain.rods().len()) {
+            let at = |k: usize| self.tentative.get(k).unwrap_or(chain.points()[k]);
+            let bounds = rod_box(chain, rod, at);
+            self.own_rods.set(rod, bounds);
+        }
+    }
+
+    /// Forgets the new places from a slave outward.
+    fn revert(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
+        let Range { start, end } = self.tentative.run();
+        let reverted = match direction {
+            Direction::Up => {
+                self.tentative.to = slave.min(end);
+                slave..end
+            }
+            Direction::Down => {
+                self.tentative.from = (slave + 1).max(start);
+                start..slave + 1
+            }
+        };
+        for i in reverted {
+            self.refresh_own_rods(chain, i);
+        }
+    }
+
+    /// Writes the tentative positions into the chain.
+    fn commit(&mut self, chain: &mut Chain<D>, driven: &DrivenConnectors<D>) {
+        let run = self.tentative.run();
+        // Outward from the driven connectors, so that the run of original positions has no gap.
+        for i in (driven.first..run.end).chain((run.start..driven.first).rev()) {
+            let old = chain.points()[i];
+            let new = self.tentative.get(i).unwrap_or(old);
+            if self.original.get(i).is_none() {
+                self.original.set(i, old);
+            }
+            self.tally.changed += usize::from(old != new);
+            if !driven.indices().contains(&i) {
+                self.tally.record_slave_move(distance(old, new));
+            }
+            chain.points_mut()[i] = new;
+        }
+        self.tally.record_run(run);
+    }
+}
+
+/// Returns whether every driven connector is at its target, up to the least move.
+fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> bool {
+    driven
+        .indices()
+        .enumerate()
+        .all(|(h, k)| distance(driven.to[h], chain.points()[k]) <= chain.min_move_m())
+}
+
+/// Returns whether only the chain itself can be in the way of a motion.
+fn is_open<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    driven: &DrivenConnectors<D>,
+) -> bool {
+    obstacles.is_empty() && chain.is_plain() && driven.n == 1
+}
+
+/// Returns the number of sub-steps in which an initiator moves by `travel_m`. `is_empty` says that
+/// there is no obstacle.
+fn count_sub_steps(
+    rules: &Rules,
+    default_step_m: f64,
+    is_empty: bool,
+    travel_m: f64,
+) -> Result<usize, InputError> {
+    let step_m = match rules.step_m {
+        Some(step_m) if step_m > 0.0 => step_m,
+        // Where nothing can object, one long step is as safe as many short ones.
+        _ if is_empty && !rules.self_collision => f64::INFINITY,
+        _ => default_step_m,
+    };
+    let n = (travel_m / step_m).ceil().max(1.0);
+    if n > MAX_SUB_STEPS {
+        return Err(InputError::new(
+            "target",
+            format!("is {travel_m} m away, which takes {n} steps of {step_m} m"),
+            "go there in several requests",
+        ));
+    }
+    Ok(n as usize)
+}
+
+/// Returns whether a second try finds slaves more places: rods of other lengths, and in the plane also the
+/// other side.
+fn has_more_places<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
+    let rods = match direction {
+        Direction::Up => &chain.rods()[head..],
+        Direction::Down => &chain.rods()[..head],
+    };
+    D == 2 || rods.iter().any(|rod| rod.min_m < rod.max_m)
+}
+
+impl<const D: usize> MotionContext<'_, D> {
+    /// Returns the step of a slave whose master's new place is settled.
+    fn step(&self, slave: usize, direction: Direction) -> SlaveStep<D> {
+        let points = self.chain.points();
+        let master = direction.master(slave);
+        let behind_master = match direction {
+            Direction::Up => master.checked_sub(1),
+            Direction::Down => (master + 1 < points.len()).then_some(master + 1),
+        };
+        // In the first sweep the connector on the initiator's other side has yet to move, and the
+        // second sweep will check the bend.
+        let prev = behind_master
+            .filter(|&b| direction == Direction::Down || self.tentative.get(b).is_some());
+        SlaveStep {
+            master,
+            slave,
+            mo: points[master],
+            mn: self.position(master),
+            so: points[slave],
+            prev: prev.map(|b| self.position(b)),
+            rod: self.chain.rod_between(master, slave),
+            tip_radius_m: self.chain.connectors()[slave].radius_m,
+            max_bend_rad: self.chain.connectors()[master].max_bend_rad,
+        }
+    }
+
+    /// Checks whether the path of an initiator is free of obstacles and of the chain's own parts.
+    fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
+        if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
+            return Ok(());
+        }
+        let from = self.chain.points()[k];
+        let radius_m = self.chain.connectors()[k].radius_m;
+        let near = swept_bounds([from, from, to, to], radius_m);
+        let mut worst: Option<(f64, BlockOwner, VetoReason)> = None;
+        self.visit_blocks(&near, None, k, |block| {
+            let keep_m = block.radius_m + radius_m;
+            if !block.stops_tip
+                || block.core.is_clear_of_segment([from, to], contact_distance_m(keep_m))
+            {
+                return;
+            }
+            let before_m = keep_m - block.core.nearest_to_point(from).distance_m;
+            let after_m = keep_m - block.core.nearest_to_point(to).distance_m;
+            let was_inside = before_m > TOLERANCE_M;
+            // An initiator that starts inside, e.g. because an obstacle has moved, must be able to get
+            // out; only deeper it must not go.
+            if was_inside && after_m <= before_m {
+                return;
+            }
+            let reason = if was_inside { VetoReason::Inside } else { VetoReason::TargetBlocked };
+            // Of equal depths the lower name counts, because blocks come in no particular order.
+            let is_deeper =
+                worst.is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
+            if is_deeper {
+                worst = Some((after_m, block.name, reason));
+            }
+        });
+        worst.map_or(Ok(()), |(_, name, reason)| Err(PendingVeto::from_owner(reason, name)))
+    }
+}
+
+/// Projects the targets of driven connectors to allowed places, or returns the objection.
+fn project<const D: usize>(
+    chain: &Chain<D>,
+    driven: &mut DrivenConnectors<D>,
+    mode: VetoEffect,
+) -> Result<(), ConnectorVeto> {
+    for (h, k) in driven.indices().enumerate() {
+        let connector = &chain.connectors()[k];
+        let at = chain.points()[k];
+        if driven.to[h] == at {
+            continue;
+        }
+        if connector.is_still() && distance(driven.to[h], at) > chain.min_move_m() {
+            return Err((k, PendingVeto::new(connector.still_reason())));
+        }
+        if !connector.mobility.allows(driven.to[h], at) {
+            if mode == VetoEffect::Exact || driven.n > 1 {
+                return Err((k, PendingVeto::new(VetoReason::Mobility)));
+            }
+            driven.to[h] = connector.mobility.project(driven.to[h], at);
+        }
+    }
+    Ok(())
+}
+
+/// Returns the box around a rod and the connectors at its ends, for connectors at `at`.
+fn rod_box<const D: usize>(
+    chain: &Chain<D>,
+    i: usize,
+    at: impl Fn(usize) -> Point<D>,
+) -> Bounds<D> {
+    // Rods are no thicker than their connectors.
+    let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
+    Bounds::from_points(&[at(i), at(i + 1)]).grown(radius_m)
+}
+
+/// Returns the veto of an objection, with the chain where its motion has ended.
+fn make_veto<const D: usize>(
+    chain: &Chain<D>,
+    from: usize,
+    by: usize,
+    objection: PendingVeto,
+) -> Veto<D> {
+    let PendingVeto { reason, obstacle } = objection;
+    Veto { by, from, reason, obstacle, reached: chain.points()[from] }
+}
+
+/// Refuses a motion of connectors that the chain does not have, or to a target out of range.
+fn check<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> Result<(), InputError> {
+    if driven.first + driven.n > chain.points().len() {
+        return Err(InputError::new(
+            "initiator",
+            format!(
+                "is number {}, and the chain has {} connectors",
+                driven.first,
+                chain.points().len()
+            ),
+            "count from 0",
+        ));
+    }
+    driven.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
+}
+
+pub mod local_solver;
+mod separation;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,224 @@
+//! One connector by itself: its reaction to its master, and its checks as an initiator, by the code that
+//! propagates motions through whole chains. Its inputs are messages from its neighbors and its own
+//! surroundings, and nothing else (slide E4), so that it can run as an agent aboard a robot.
+
+use super::{DrivenConnectors, check, count_sub_steps, project};
+use crate::candidates::{CandidateScratch, guide};
+use crate::chain::{Chain, Rod};
+use crate::geometry::{Point, distance};
+use crate::motion_context::{
+    MotionContext, PendingVeto, SlaveStep, TentativePositions, is_length_allowed,
+};
+use crate::obstacle::Obstacles;
+use crate::rod_bvh::RodBvh;
+use crate::rules::{Rotation, Rules};
+use crate::veto::{Motion, VetoEffect};
+use sidestep_kernel::InputError;
+
+/// Index of the connector in a chain of its own.
+const SELF_INDEX: usize = 0;
+/// Index that its master would have in that chain. Nothing is looked up there.
+const MASTER_INDEX: usize = 1;
+
+/// A connector by itself.
+#[derive(Debug, Clone)]
+pub struct LocalSolver<const D: usize> {
+    /// A chain of this connector only. It has the least move and the step length of the whole one,
+    /// so that the connector decides as it would inside it.
+    chain: Chain<D>,
+    rules: Rules,
+    scratch: CandidateScratch<D>,
+    tentative: TentativePositions<D>,
+    own_rods: RodBvh<D>,
+}
+
+/// A master's motion, as its message to the slave describes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MasterMotion<const D: usize> {
+    /// Position of the master before the motion.
+    pub mo: Point<D>,
+    /// Position of the master after it.
+    pub mn: Point<D>,
+    /// The connector on the master's other side, if its new position is settled.
+    pub prev: Option<Point<D>>,
+    /// Bend limit of the master, rad.
+    pub max_bend_rad: f64,
+    /// Whether nothing in the world can object.
+    pub is_open: bool,
+    /// Whether a rod that turns tries all its lengths.
+    pub all_lengths: bool,
+}
+
+/// A slave's reaction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reaction<const D: usize> {
+    /// Its new position; the old one, bit for bit, if it stays.
+    pub at: Point<D>,
+    /// Whether the motion ends here, because the slave stays and everything beyond it meets its constraints.
+    pub ends: bool,
+    /// Whether its rod turned from the guide line.
+    pub rotated: bool,
+    /// Whether it could have gone elsewhere.
+    pub has_others: bool,
+    /// Whether its rod found a free direction by turning.
+    pub has_turned: bool,
+}
+
+impl<const D: usize> LocalSolver<D> {
+    /// Returns connector `k` of a chain, which reacts by the chain's rules, except that it does not
+    /// check for collisions of the chain with itself: it does not know where the other parts are.
+    pub fn new(chain: &Chain<D>, k: usize, rules: &Rules) -> Self {
+        let rules = Rules { self_collision: false, ..*rules };
+        Self {
+            chain: chain.single_connector(k),
+            rules,
+            scratch: CandidateScratch::default(),
+            tentative: TentativePositions::default(),
+            own_rods: RodBvh::default(),
+        }
+    }
+
+    /// Returns its bend limit, rad.
+    pub fn max_bend_rad(&self) -> f64 {
+        self.chain.connectors()[SELF_INDEX].max_bend_rad
+    }
+
+    /// Sets its bend limit, rad.
+    ///
+    /// # Errors
+    /// When the limit is out of range.
+    pub fn set_max_bend_rad(&mut self, max_bend_rad: f64) -> Result<(), InputError> {
+        self.chain.set_max_bend_rad(SELF_INDEX, max_bend_rad)
+    }
+
+    /// Returns whether trying all lengths could find more places than trying one, for the rod to a master.
+    pub fn has_more_places(rod: Rod) -> bool {
+        D == 2 || rod.min_m < rod.max_m
+    }
+
+    /// Returns whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
+    pub fn should_repeat(&self) -> bool {
+        self.rules.rotation == Rotation::Union
+    }
+
+    /// Returns its reaction as a slave at `so` on a rod to its master. `next` is the connector beyond
+    /// it, and the rod to that one.
+    ///
+    /// # Errors
+    /// The constraint because of which it objects.
+    pub fn react(
+        &mut self,
+        so: Point<D>,
+        rod: Rod,
+        next: Option<(Point<D>, Rod)>,
+        obstacles: &Obstacles<D>,
+        pull: &MasterMotion<D>,
+    ) -> Result<Reaction<D>, PendingVeto> {
+        if pull.is_open {
+            return Ok(self.free_reaction(so, rod, next, pull));
+        }
+        self.chain.points_mut()[SELF_INDEX] = so;
+        let Self { chain, rules, scratch, tentative, own_rods } = self;
+        scratch.all_lengths = pull.all_lengths;
+        scratch.has_turned = false;
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
+        let connector = &chain.connectors()[SELF_INDEX];
+        let step = SlaveStep {
+            master: MASTER_INDEX,
+            slave: SELF_INDEX,
+            mo: pull.mo,
+            mn: pull.mn,
+            so,
+            prev: pull.prev,
+            rod,
+            tip_radius_m: connector.radius_m,
+            max_bend_rad: pull.max_bend_rad,
+        };
+        context.candidates(&step, scratch)?;
+        let chosen = scratch.found[0];
+        let stays = distance(chosen.at, so) <= chain.min_move_m();
+        let is_next_good = |(next_at, next_rod): (Point<D>, Rod)| {
+            let next_step = SlaveStep {
+                mo: so,
+                mn: so,
+                so: next_at,
+                prev: Some(pull.mn),
+                rod: next_rod,
+                max_bend_rad: connector.max_bend_rad,
+                ..step
+            };
+            is_length_allowed(next_rod, distance(next_at, so))
+                && next_step.is_bend_allowed_at(next_at)
+        };
+        Ok(Reaction {
+            at: if stays { so } else { chosen.at },
+            ends: stays && next.is_none_or(is_next_good),
+            rotated: chosen.rotated,
+            has_others: scratch.found.len() > 1 || scratch.has_other_side,
+            has_turned: scratch.has_turned,
+        })
+    }
+
+    /// Returns its reaction where nothing can object.
+    fn free_reaction(
+        &self,
+        so: Point<D>,
+        rod: Rod,
+        next: Option<(Point<D>, Rod)>,
+        pull: &MasterMotion<D>,
+    ) -> Reaction<D> {
+        let at = guide([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
+        let is_good = |(beyond, rod): (Point<D>, Rod)| is_length_allowed(rod, distance(so, beyond));
+        let ends = at == so && next.is_none_or(is_good);
+        Reaction { at, ends, rotated: false, has_others: false, has_turned: false }
+    }
+
+    /// Returns the number of sub-steps in which it moves to a target as an initiator.
+    /// `is_empty` says that there is no obstacle anywhere.
+    ///
+    /// # Errors
+    /// When the target is out of the range of coordinates, or too far away.
+    pub fn sub_steps(
+        &self,
+        from: Point<D>,
+        to: Point<D>,
+        is_empty: bool,
+    ) -> Result<usize, InputError> {
+        check(
+            &self.chain,
+            &DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to }),
+        )?;
+        count_sub_steps(&self.rules, self.chain.step_m(), is_empty, distance(from, to))
+    }
+
+    /// Checks whether its own constraint allows it to move to a target as an initiator.
+    ///
+    /// # Errors
+    /// The constraint because of which it objects.
+    pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
+        self.chain.points_mut()[SELF_INDEX] = from;
+        let mut driven = DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to });
+        project(&self.chain, &mut driven, VetoEffect::Exact).map_err(|(_, objection)| objection)
+    }
+
+    /// Returns whether a sub-step is too short to count.
+    pub fn is_negligible(&self, from: Point<D>, to: Point<D>) -> bool {
+        distance(to, from) <= self.chain.min_move_m()
+    }
+
+    /// Checks whether its path as an initiator is free of obstacles.
+    ///
+    /// # Errors
+    /// The constraint because of which it objects.
+    pub fn check_initiator(
+        &mut self,
+        from: Point<D>,
+        to: Point<D>,
+        obstacles: &Obstacles<D>,
+    ) -> Result<(), PendingVeto> {
+        self.chain.points_mut()[SELF_INDEX] = from;
+        let Self { chain, rules, tentative, own_rods, .. } = &*self;
+        MotionContext { chain, obstacles, rules, tentative, own_rods }
+            .check_initiator(SELF_INDEX, to)
+    }
+}

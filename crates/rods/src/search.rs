@@ -1,0 +1,193 @@
+//! A search for a direction of a rod in space that is free of all obstacles nearby, because the blocked
+//! directions on a sphere have no order.
+//!
+//! First the rod turns away from the worst obstacle, again and again; that is nearly always enough.
+//! If it is not, rings of directions around the wanted one are tried from the narrowest on, and the
+//! first free direction is brought as near to the wanted one as it stays free.
+
+use super::geometry::{
+    Point, add, add_scaled, angle_rad, dot, norm, normalized, perpendicular, scaled, sub,
+};
+use super::motion_context::{Block, BlockOwner, SKIN_M, SlaveStep, contact_distance_m};
+use sidestep_kernel::math;
+use std::f64::consts::{PI, TAU};
+
+/// Most turns away from single obstacles before the rings.
+const MAX_TURNS: usize = 24;
+/// Cosine of the turn beyond which turning away counts as lost: 100 degrees.
+const LOST_COSINE: f64 = -0.173_648;
+/// Directions on a ring.
+const AZIMUTHS: usize = 24;
+/// The widest ring, rad.
+const MAX_RING_RAD: f64 = 2.0;
+/// Bisection steps that bring a free direction near the wanted one.
+const BISECTIONS: usize = 20;
+
+/// A rod of one length at its master, and the blocks that may be in its way. The master is inside
+/// none of them.
+pub(super) struct DirectionSearch<'a, const D: usize> {
+    pub(super) step: &'a SlaveStep<D>,
+    pub(super) length_m: f64,
+    pub(super) blocks: &'a [Block<D>],
+}
+
+/// The point to turn away from.
+struct WorstBlock<const D: usize> {
+    depth_m: f64,
+    point: Point<D>,
+    radius_m: f64,
+    by_tip: bool,
+    name: BlockOwner,
+}
+
+impl<const D: usize> DirectionSearch<'_, D> {
+    /// Returns a free direction near `wanted`, found by turning away from the worst block, if that
+    /// works.
+    pub(super) fn turn_away(&self, wanted: Point<D>) -> Option<Point<D>> {
+        let mut u = self.within_bend(wanted);
+        for _ in 0..MAX_TURNS {
+            let Some(hit) = self.worst_block(u) else { return Some(u) };
+            u = self.within_bend(self.turn_from(u, &hit)?);
+            if dot(u, wanted) < LOST_COSINE {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Returns the first free direction on rings around `wanted`, brought near it.
+    pub(super) fn rings(
+        &self,
+        wanted: Point<D>,
+        is_good: impl Fn(Point<D>) -> bool,
+    ) -> Option<Point<D>> {
+        let e1 = perpendicular(wanted);
+        let e2 = other_perpendicular(wanted, e1);
+        let is_free =
+            |u: Point<D>| self.is_bend_allowed(u) && self.worst_block(u).is_none() && is_good(u);
+        let (mut inner_rad, mut ring_rad) = (0.0, 0.02);
+        while ring_rad <= MAX_RING_RAD {
+            for k in 0..AZIMUTHS {
+                let azimuth_rad = TAU * k as f64 / AZIMUTHS as f64;
+                let (c, s) = (math::cos(azimuth_rad), math::sin(azimuth_rad));
+                let side = add(scaled(e1, c), scaled(e2, s));
+                let at =
+                    |rad: f64| add(scaled(wanted, math::cos(rad)), scaled(side, math::sin(rad)));
+                if is_free(at(ring_rad)) {
+                    return Some(at(nearest_free_rad(inner_rad, ring_rad, |rad| is_free(at(rad)))));
+                }
+            }
+            (inner_rad, ring_rad) = (ring_rad, ring_rad * 1.15 + 0.005);
+        }
+        None
+    }
+
+    fn is_bend_allowed(&self, u: Point<D>) -> bool {
+        self.step.is_bend_allowed_at(add_scaled(self.step.mn, u, self.length_m))
+    }
+
+    /// Returns the direction itself, or the nearest on the cone of the bend limit.
+    fn within_bend(&self, u: Point<D>) -> Point<D> {
+        let Some(prev) = self.step.prev.filter(|_| self.step.max_bend_rad < PI) else { return u };
+        let Some(into) = normalized(sub(self.step.mn, prev)) else { return u };
+        if angle_rad(into, u) <= self.step.max_bend_rad {
+            return u;
+        }
+        let side = side_of(into, u);
+        let (c, s) = (math::cos(self.step.max_bend_rad), math::sin(self.step.max_bend_rad));
+        add(scaled(into, c), scaled(side, s))
+    }
+
+    /// Returns the block that a rod in a direction is deepest in.
+    fn worst_block(&self, u: Point<D>) -> Option<WorstBlock<D>> {
+        let s = add_scaled(self.step.mn, u, self.length_m);
+        let mut worst: Option<WorstBlock<D>> = None;
+        let mut note = |hit: WorstBlock<D>| {
+            let is_worse = |w: &WorstBlock<D>| {
+                hit.depth_m > w.depth_m || hit.depth_m == w.depth_m && hit.name < w.name
+            };
+            if hit.depth_m > 0.0 && worst.as_ref().is_none_or(is_worse) {
+                worst = Some(hit);
+            }
+        };
+        for block in self.blocks {
+            let rod_m = block.radius_m + self.step.rod.radius_m;
+            if block.stops_rod
+                && !block.core.is_clear_of_segment([self.step.mn, s], contact_distance_m(rod_m))
+            {
+                let nearest = block.core.nearest_to_segment([self.step.mn, s]);
+                let depth_m = contact_distance_m(rod_m) - nearest.distance_m;
+                let (point, name) = (nearest.on_core, block.name);
+                note(WorstBlock { depth_m, point, radius_m: rod_m, by_tip: false, name });
+            }
+            let tip_m = block.radius_m + self.step.tip_radius_m;
+            if block.stops_tip && !block.core.is_clear_of_point(s, contact_distance_m(tip_m)) {
+                let nearest = block.core.nearest_to_point(s);
+                let depth_m = contact_distance_m(tip_m) - nearest.distance_m;
+                let (point, name) = (nearest.on_core, block.name);
+                note(WorstBlock { depth_m, point, radius_m: tip_m, by_tip: true, name });
+            }
+        }
+        worst
+    }
+
+    fn turn_from(&self, u: Point<D>, hit: &WorstBlock<D>) -> Option<Point<D>> {
+        let to = sub(hit.point, self.step.mn);
+        let apart_m = norm(to);
+        let radius_m = hit.radius_m + SKIN_M;
+        let cosine = cosine_of_half_angle(apart_m, radius_m, self.length_m, hit.by_tip)?;
+        Some(direction_off(u, scaled(to, 1.0 / apart_m), cosine))
+    }
+}
+
+/// Returns the direction at an angle from `d`, in the plane of both, on the side of `u`.
+pub(super) fn direction_off<const D: usize>(u: Point<D>, d: Point<D>, cosine: f64) -> Point<D> {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    let turned = add(scaled(d, cosine), scaled(side_of(d, u), sine));
+    normalized(turned).unwrap_or(u)
+}
+
+/// Returns the unit vector perpendicular to `d` on the side of `u`.
+fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
+    let across = add_scaled(u, d, -dot(u, d));
+    if norm(across) > 1e-9 { normalized(across).unwrap_or(across) } else { perpendicular(d) }
+}
+
+/// Returns the cosine of half the angle under which a ball blocks a rod or its end; `None` if there
+/// is no such direction.
+#[inline]
+pub(super) fn cosine_of_half_angle(
+    apart_m: f64,
+    radius_m: f64,
+    length_m: f64,
+    by_tip: bool,
+) -> Option<f64> {
+    if apart_m <= 0.0 {
+        return None;
+    }
+    let tangent2 = apart_m * apart_m - radius_m * radius_m;
+    if !by_tip && tangent2 <= length_m * length_m {
+        return Some(tangent2.max(0.0).sqrt() / apart_m);
+    }
+    let cosine = (length_m * length_m + tangent2) / (2.0 * apart_m * length_m);
+    (cosine >= -1.0).then_some(cosine.min(1.0))
+}
+
+fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
+    if D == 2 {
+        return scaled(e1, -1.0);
+    }
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        u[j] * e1[k] - u[k] * e1[j]
+    })
+}
+
+/// Returns the least free angle, between one that is blocked and one that is free, rad.
+fn nearest_free_rad(mut blocked_rad: f64, mut free_rad: f64, is_free: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..BISECTIONS {
+        let middle_rad = 0.5 * (blocked_rad + free_rad);
+        *(if is_free(middle_rad) { &mut free_rad } else { &mut blocked_rad }) = middle_rad;
+    }
+    free_rad
+}

@@ -1,0 +1,178 @@
+//! A test whether a rod passes through a solid between two good positions.
+//!
+//! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
+//! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
+//! In space a rod may go around anything, so only its distance counts: it is never nearer to the core
+//! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the guarantees of
+//! that and their limits.
+
+use super::geometry::{Core, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
+
+/// A moving rod: master and slave, before and after.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep<const D: usize> {
+    /// The rod before: master, slave.
+    pub from: [Point<D>; 2],
+    /// The rod after.
+    pub to: [Point<D>; 2],
+}
+
+/// The part of the distance at rest that a rod keeps on its way in space.
+const KEPT_FRACTION: f64 = 0.5;
+/// Conservative steps before a way counts as blocked.
+const MAX_ADVANCES: usize = 64;
+
+impl<const D: usize> Sweep<D> {
+    /// Returns the longest distance that any point of the rod moves, meters.
+    pub(super) fn max_travel_m(&self) -> f64 {
+        let way2 = |end: usize| {
+            let way = sub(self.to[end], self.from[end]);
+            dot(way, way)
+        };
+        way2(0).max(way2(1)).sqrt()
+    }
+
+    /// Returns whether the rod passes no point of the core on its way; in space, whether it stays half as
+    /// far away as `keep_m`, the distance that it must keep at rest.
+    pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
+        let way_m = self.max_travel_m();
+        core.is_clear_of_segment(self.to, Self::safe_distance_m(way_m, keep_m))
+            || self.is_clear_on_the_way(core, keep_m, way_m)
+    }
+
+    /// Returns the distance at the end of a move, in meters, from which on a rod whose points move
+    /// at most `way_m` is surely clear of a core: no point was nearer than its end distance less
+    /// its way.
+    pub(super) fn safe_distance_m(way_m: f64, keep_m: f64) -> f64 {
+        way_m + Self::kept_m(keep_m) + TOUCH_M
+    }
+
+    fn kept_m(keep_m: f64) -> f64 {
+        if D == 2 { 0.0 } else { KEPT_FRACTION * keep_m }
+    }
+
+    /// Returns whether the way is clear, without checking where it ends.
+    pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
+        match core {
+            Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
+            Core::Segment([a, b]) if D == 2 => {
+                !self.crosses([*a, *b]) && !self.is_crossed_by(*a) && !self.is_crossed_by(*b)
+            }
+            Core::Cuboid(cuboid) if D == 2 => {
+                cuboid.edges_2d().iter().all(|e| !self.crosses(*e) && !self.is_crossed_by(e[0]))
+            }
+            _ => self.stays_away(core, Self::kept_m(keep_m), way_m),
+        }
+    }
+
+    fn crosses(&self, wall: [Point<D>; 2]) -> bool {
+        segments_cross([self.from[1], self.to[1]], wall)
+    }
+
+    /// Returns whether a plane point lies on the rod at some time, by the roots of a parabola.
+    fn is_crossed_by(&self, p: Point<D>) -> bool {
+        let (m, r) = (sub(self.from[0], p), sub(self.from[1], self.from[0]));
+        let dm = sub(self.to[0], self.from[0]);
+        let dr = sub(sub(self.to[1], self.to[0]), r);
+        let (a, b, c) = (cross_2d(dr, dm), cross_2d(r, dm) + cross_2d(dr, m), cross_2d(r, m));
+        roots(a, b, c).into_iter().flatten().any(|time| {
+            (0.0..=1.0).contains(&time) && {
+                let rod = add_scaled(r, dr, time);
+                let to_p = sub([0.0; D], add_scaled(m, dm, time));
+                (0.0..=dot(rod, rod)).contains(&dot(to_p, rod))
+            }
+        })
+    }
+
+    /// Advances as far as is safe each time, however the ends move.
+    fn stays_away(&self, core: &Core<D>, kept_m: f64, way_m: f64) -> bool {
+        let mut time = 0.0;
+        for _ in 0..MAX_ADVANCES {
+            let rod = [0, 1].map(|end| lerp(self.from[end], self.to[end], time));
+            let spare_m = core.nearest_to_segment(rod).distance_m - kept_m;
+            if spare_m <= 0.0 {
+                return false;
+            }
+            time += spare_m.max(TOUCH_M) / way_m;
+            if time >= 1.0 {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Distance below which bodies touch, meters.
+const TOUCH_M: f64 = 1e-12;
+
+/// Returns the real roots of `a x^2 + b x + c`; none if it is zero everywhere.
+#[inline]
+fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
+    if a == 0.0 {
+        return [(b != 0.0).then(|| -c / b), None];
+    }
+    let inside = b * b - 4.0 * a * c;
+    if inside < 0.0 {
+        return [None; 2];
+    }
+    // This sum has no cancellation; the other root follows from the product of both.
+    let q = -0.5 * (b + inside.sqrt().copysign(b));
+    [Some(q / a), (q != 0.0).then(|| c / q)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Returns whether a rod crosses a wall at one of many times between.
+    fn sampled(sweep: &Sweep<2>, wall: [Point<2>; 2]) -> bool {
+        (0..=4000).any(|k| {
+            let rod = [0, 1].map(|e| lerp(sweep.from[e], sweep.to[e], f64::from(k) / 4000.0));
+            segments_cross(rod, wall)
+        })
+    }
+
+    fn point() -> impl Strategy<Value = Point<2>> {
+        prop::array::uniform2(-1.0..1.0f64)
+    }
+
+    proptest! {
+        #[test]
+        fn what_crosses_at_some_time_is_found(
+            from in [point(), point()], to in [point(), point()], wall in [point(), point()],
+        ) {
+            let sweep = Sweep { from, to };
+            // The master's own way was checked when the master was a slave.
+            let master_crosses = segments_cross([from[0], to[0]], wall);
+            let starts_crossing = segments_cross(from, wall);
+            prop_assume!(!master_crosses && !starts_crossing);
+            if sampled(&sweep, wall) {
+                prop_assert!(!sweep.is_clear(&Core::Segment(wall), 0.0));
+            }
+        }
+
+        #[test]
+        fn what_is_clear_in_space_stays_away(
+            from in [prop::array::uniform3(-1.0..1.0f64), prop::array::uniform3(-1.0..1.0f64)],
+            by in [prop::array::uniform3(-0.3..0.3f64), prop::array::uniform3(-0.3..0.3f64)],
+            center in prop::array::uniform3(-1.0..1.0f64),
+        ) {
+            let to = [0, 1].map(|e| super::super::geometry::add(from[e], by[e]));
+            let (sweep, core) = (Sweep { from, to }, Core::Point(center));
+            if sweep.is_clear(&core, 0.2) {
+                for k in 0..=100 {
+                    let rod = [0, 1].map(|e| lerp(from[e], to[e], f64::from(k) / 100.0));
+                    prop_assert!(core.nearest_to_segment(rod).distance_m >= 0.1 - 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_rod_that_turns_over_the_end_of_a_wall_is_caught() {
+        let sweep = Sweep { from: [[0.0, 0.0], [1.0, 0.5]], to: [[0.0, 0.0], [1.0, -0.5]] };
+        assert!(!sweep.is_clear(&Core::Segment([[0.5, 0.0], [0.7, 0.0]]), 0.0));
+        assert!(sweep.is_clear(&Core::Segment([[1.5, 0.0], [1.7, 0.0]]), 0.0));
+    }
+}

@@ -1,0 +1,196 @@
+//! Actions prepared for a body on the padded grid: the boxes that each transition enters and leaves.
+
+use super::effector::{HEADINGS, Side, Transition};
+use sidestep_kernel::distr::{Categorical, RowError};
+
+/// A unit step of a body of given size at a given heading, as box offsets from the anchor
+/// that the body had before the whole transition.
+#[derive(Debug, Clone)]
+pub(crate) struct Step {
+    /// Boxes that the body enters, as index offsets.
+    pub(crate) enter: Box<[i32]>,
+    /// Boxes that it leaves, as index offsets.
+    pub(crate) leave: Box<[i32]>,
+    /// Move of the anchor in columns and rows.
+    pub(crate) delta: (i32, i32),
+    /// Side of the body that moves first.
+    pub(crate) side: Side,
+}
+
+/// A transition at a heading, prepared for walking on the grid.
+#[derive(Debug, Clone)]
+pub(crate) struct StepPath {
+    /// Its steps.
+    pub(crate) steps: Vec<Step>,
+    /// Quarter turns to the left.
+    pub(crate) turn: u8,
+    /// All steps together, for the many walks that meet no obstacle.
+    pub(crate) whole: NetEffect,
+}
+
+/// The effect of a walk that meets no obstacle, as index offsets from the anchor before it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NetEffect {
+    /// Boxes entered that the body did not cover at the start; all of them must be free.
+    pub(crate) enter: Box<[i32]>,
+    /// Boxes covered at the start and not at the end.
+    pub(crate) leave: Box<[i32]>,
+    /// Boxes covered at the end and not at the start.
+    pub(crate) fill: Box<[i32]>,
+    /// Move of the anchor in columns and rows.
+    pub(crate) delta: (i32, i32),
+}
+
+impl NetEffect {
+    fn new(steps: &[Step], own: &[i32]) -> Self {
+        let delta = steps.iter().fold((0, 0), |d, s| (d.0 + s.delta.0, d.1 + s.delta.1));
+        let mut now: Vec<i32> = own.to_vec();
+        let mut enter: Vec<i32> = Vec::new();
+        for step in steps {
+            now.retain(|b| !step.leave.contains(b));
+            now.extend_from_slice(&step.enter);
+            let new = step.enter.iter().filter(|b| !own.contains(b) && !enter.contains(b));
+            enter.extend(new.copied().collect::<Vec<_>>());
+        }
+        let keep = |from: &[i32], wanted: &dyn Fn(&i32) -> bool| {
+            from.iter().copied().filter(wanted).collect::<Box<[i32]>>()
+        };
+        Self {
+            leave: keep(own, &|b| !now.contains(b)),
+            fill: keep(&enter, &|b| now.contains(b)),
+            enter: enter.into(),
+            delta,
+        }
+    }
+}
+
+/// The boxes that an action may sweep, as a tree of steps, depth first. It is a tree because boxes
+/// behind a wall need not be claimed: a blocked step leaves out its subtree.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SweptVolume {
+    /// The steps.
+    pub(crate) nodes: Box<[SweptVolumeNode]>,
+    /// Index offsets of the boxes entered, step after step.
+    pub(crate) boxes: Box<[i32]>,
+}
+
+/// One step of a [`SweptVolume`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SweptVolumeNode {
+    /// Start of its boxes in [`SweptVolume::boxes`].
+    pub(crate) first: u32,
+    /// End of its boxes there.
+    pub(crate) end: u32,
+    /// Index of the next step when a wall blocks this one: the one behind its whole subtree.
+    pub(crate) after: u32,
+}
+
+/// An action of a body type at a heading.
+#[derive(Debug, Clone)]
+pub(crate) struct Action {
+    /// Probability of each walk.
+    pub(crate) distribution: Categorical,
+    /// Probabilities as given, kept for exact computations and for rescaling.
+    pub(crate) probabilities: Vec<f64>,
+    /// The walk of each outcome.
+    pub(crate) walks: Vec<StepPath>,
+    /// The tree of everything that the action may sweep.
+    pub(crate) sweep: SweptVolume,
+    /// The boxes of `sweep`, each listed once.
+    pub(crate) claims: Box<[i32]>,
+}
+
+impl Action {
+    /// Prepares an action of a `width` x `height` body for grid rows of `stride` boxes.
+    ///
+    /// # Errors
+    /// Returns an error when the probabilities are not a distribution; scenarios check that
+    /// earlier.
+    pub(crate) fn new(
+        transitions: &[Transition],
+        heading: u8,
+        body: (u32, u32),
+        stride: u32,
+    ) -> Result<Self, RowError> {
+        let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
+        let own = own_boxes(body, stride);
+        let walks: Vec<StepPath> = transitions
+            .iter()
+            .map(|t| {
+                let steps = steps(&t.path, heading, body, stride);
+                StepPath { whole: NetEffect::new(&steps, &own), steps, turn: t.turn }
+            })
+            .collect();
+        let possible: Vec<(&[Side], &[Step])> = transitions
+            .iter()
+            .zip(&walks)
+            .filter(|(t, _)| t.p > 0.0)
+            .map(|(t, w)| (&t.path[..], &w.steps[..]))
+            .collect();
+        let (mut nodes, mut boxes) = (Vec::new(), Vec::new());
+        push_sweep(&possible, 0, &mut nodes, &mut boxes);
+        let mut claims: Vec<i32> = boxes.iter().copied().filter(|b| !own.contains(b)).collect();
+        claims.sort_unstable();
+        claims.dedup();
+        let sweep = SweptVolume { nodes: nodes.into(), boxes: boxes.into() };
+        let (claims, distribution) = (claims.into(), Categorical::new(&probabilities)?);
+        Ok(Self { distribution, probabilities, walks, sweep, claims })
+    }
+}
+
+/// Returns the offsets of the boxes that a body covers, row by row from its anchor.
+pub(crate) fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
+    let row = |y: u32| (0..body.0).map(move |x| (y * stride + x) as i32);
+    (0..body.1).flat_map(row).collect()
+}
+
+/// Appends the tree of the paths' steps from `depth` on; paths that start alike share nodes.
+fn push_sweep(
+    paths: &[(&[Side], &[Step])],
+    depth: usize,
+    nodes: &mut Vec<SweptVolumeNode>,
+    boxes: &mut Vec<i32>,
+) {
+    for side in Side::ALL {
+        let along: Vec<_> =
+            paths.iter().copied().filter(|(path, _)| path.get(depth) == Some(&side)).collect();
+        let Some((_, steps)) = along.first() else { continue };
+        let (first, node) = (boxes.len() as u32, nodes.len());
+        boxes.extend_from_slice(&steps[depth].enter);
+        nodes.push(SweptVolumeNode { first, end: boxes.len() as u32, after: 0 });
+        push_sweep(&along, depth + 1, nodes, boxes);
+        nodes[node].after = nodes.len() as u32;
+    }
+}
+
+fn steps(path: &[Side], heading: u8, body: (u32, u32), stride: u32) -> Vec<Step> {
+    let mut at = (0, 0);
+    path.iter()
+        .map(|&side| {
+            let (ux, uy) = HEADINGS[usize::from((heading + side as u8) % 4)];
+            let index = |(x, y): (i32, i32)| (at.1 + y) * stride as i32 + at.0 + x;
+            let enter = edge(body, (ux, uy), true).into_iter().map(index).collect();
+            let leave = edge(body, (ux, uy), false).into_iter().map(index).collect();
+            at = (at.0 + ux, at.1 + uy);
+            Step { enter, leave, delta: (ux, uy), side }
+        })
+        .collect()
+}
+
+/// Returns the row of boxes just outside a body in direction `u` (`ahead`), or the body's own
+/// hindmost row, from left to right as seen along `u`.
+fn edge(body: (u32, u32), (ux, uy): (i32, i32), ahead: bool) -> Vec<(i32, i32)> {
+    let (w, h) = (body.0 as i32, body.1 as i32);
+    let across = if ux != 0 { h } else { w };
+    (0..across)
+        .map(|k| {
+            let leftmost_first = across - 1 - k;
+            match (ux, uy) {
+                (1, _) => (if ahead { w } else { 0 }, leftmost_first),
+                (-1, _) => (if ahead { -1 } else { w - 1 }, k),
+                (_, 1) => (k, if ahead { h } else { 0 }),
+                _ => (leftmost_first, if ahead { -1 } else { h - 1 }),
+            }
+        })
+        .collect()
+}

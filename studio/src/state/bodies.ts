@@ -1,0 +1,66 @@
+/** The bodies behind the columns of frames, with names and lookup. */
+
+import { bodyKey, bodyLabel } from "../format";
+import type { BodyTable, BodyId } from "../protocol";
+
+export class Bodies {
+  readonly table: BodyTable;
+  readonly count: number;
+  /** Indices of the bodies that can be inspected. */
+  readonly agents: Uint32Array;
+  /** Indices of the bodies that are lines, in the order of a frame's lines. */
+  readonly lines: Uint32Array;
+  readonly #names: Map<number, string>;
+  readonly #indexByKey = new Map<string, number>();
+
+  constructor(table: BodyTable) {
+    this.table = table;
+    this.count = table.kind.length;
+    this.#names = new Map(table.names);
+    const agents: number[] = [];
+    const lines: number[] = [];
+    for (let i = 0; i < this.count; i++) {
+      if (table.is_agent[i]) agents.push(i);
+      if (table.shapes[table.shape[i]!]!.type === "line") lines.push(i);
+      this.#indexByKey.set(bodyKey(this.bodyId(i)), i);
+    }
+    this.agents = Uint32Array.from(agents);
+    this.lines = Uint32Array.from(lines);
+  }
+
+  bodyId(index: number): BodyId {
+    const part = this.table.part[index]!;
+    return {
+      kind: this.table.kinds[this.table.kind[index]!]!,
+      number: this.table.number[index]!,
+      part: part < 0 ? null : part,
+    };
+  }
+
+  /** The body's own name, or its kind and number. Parts share the name of their object. */
+  name(index: number): string {
+    const name = this.#names.get(index);
+    const part = this.table.part[index]!;
+    if (name === undefined) return bodyLabel(this.bodyId(index));
+    return part < 0 ? name : `${name} ${part}`;
+  }
+
+  /** The name of the object that a body is a part of. */
+  wholeName(index: number): string {
+    return this.#names.get(index) ?? this.name(index);
+  }
+
+  /** Agents with names of their own; an object of many parts once. */
+  get namedAgents(): [number, string][] {
+    return this.table.names.filter(([index]) => this.table.is_agent[index] && this.table.part[index]! <= 0);
+  }
+
+  nameOf(id: BodyId): string {
+    const index = this.find(id);
+    return index === undefined ? bodyLabel(id) : this.name(index);
+  }
+
+  find(id: BodyId): number | undefined {
+    return this.#indexByKey.get(bodyKey(id));
+  }
+}
