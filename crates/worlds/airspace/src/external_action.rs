@@ -50,18 +50,17 @@ impl ExternalAction {
 }
 
 fn check_ranking(actions: &[u16]) -> Result<(), String> {
-    let mut times = vec![0_usize; actions.len()];
-    actions.iter().for_each(|&action| times[usize::from(action)] += 1);
-    let with = |is: &dyn Fn(usize) -> bool| times.iter().position(|&times| is(times));
+    let mut counts = vec![0_usize; actions.len()];
+    for &action in actions {
+        counts[usize::from(action)] += 1;
+    }
     // Where no action occurs twice, none is missing.
-    let (Some(double), Some(missing)) = (with(&|times| times > 1), with(&|times| times == 0))
-    else {
-        return Ok(());
-    };
+    let Some(double) = counts.iter().position(|&count| count > 1) else { return Ok(()) };
+    let Some(missing) = counts.iter().position(|&count| count == 0) else { return Ok(()) };
     Err(format!(
         "action {double} stands in it {} times and action {missing} not at all; give each action from \
          0 to {} once, the best first",
-        times[double],
+        counts[double],
         actions.len() - 1
     ))
 }

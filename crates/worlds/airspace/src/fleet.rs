@@ -86,10 +86,13 @@ impl AirspaceWorld {
         }
         self.for_each_group(state, now, |context, flown, _| {
             for &own in &flown.ids {
-                let is_beyond =
-                    |other: &EntityId| context.state.distance_m([own, *other]) > range_m;
-                let others = flown.ids.iter().copied().filter(|&id| id != own);
-                all.push((own, others.filter(is_beyond).collect()));
+                let unreachable = flown
+                    .ids
+                    .iter()
+                    .copied()
+                    .filter(|&id| id != own && context.state.distance_m([own, id]) > range_m)
+                    .collect();
+                all.push((own, unreachable));
             }
         });
         all.sort_unstable();

@@ -24,8 +24,8 @@ impl ControlledGroup {
     /// Returns the airplanes of a group that the method flies; `group` are all in the air, by id.
     pub(super) fn from_group(context: &PhaseContext<'_>, group: &[Slot]) -> Self {
         let PhaseContext { world, now, .. } = *context;
-        let is_flown = |&slot: &Slot| !world.is_non_cooperative(slot, now);
-        let ids: Vec<Slot> = group.iter().copied().filter(is_flown).collect();
+        let ids: Vec<Slot> =
+            group.iter().copied().filter(|&slot| !world.is_non_cooperative(slot, now)).collect();
         let near = match world.groups {
             Grouping::Announced => Vec::new(),
             Grouping::Heard => ids.iter().map(|&slot| nearby(context, group, slot)).collect(),
@@ -41,20 +41,20 @@ impl ControlledGroup {
     ) -> Vec<Percept> {
         let group: Vec<SurveillanceReport> =
             self.ids.iter().map(|&slot| surveillance_report(context, slot)).collect();
-        let percept = |(k, &slot): (usize, &Slot)| {
-            let is_visible = |id: Slot| self.can_see(k, id);
-            Percept {
+        self.ids
+            .iter()
+            .enumerate()
+            .map(|(k, &slot)| Percept {
                 cycle: context.now,
                 own: ownship_state(context, slot),
-                group: group.iter().filter(|one| is_visible(one.id)).copied().collect(),
+                group: group.iter().filter(|one| self.can_see(k, one.id)).copied().collect(),
                 non_cooperative: non_cooperative
                     .iter()
-                    .filter(|one| is_visible(one.slot))
+                    .filter(|one| self.can_see(k, one.slot))
                     .cloned()
                     .collect(),
-            }
-        };
-        self.ids.iter().enumerate().map(percept).collect()
+            })
+            .collect()
     }
 
     /// Returns whether the `k`-th of them sees another airplane of the group.

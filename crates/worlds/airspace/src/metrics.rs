@@ -412,13 +412,13 @@ mod tests {
         }
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
         run.advance(run.config().cycles);
-        let named = run.collector().counters.count(super::EventKind::Intruder);
-        let told = run.metrics().too_close;
-        let mut pairs: Vec<_> = told.iter().map(|one| one.airplanes).collect();
+        let events = run.collector().counters.count(super::EventKind::Intruder);
+        let too_close = run.metrics().too_close;
+        let mut pairs: Vec<_> = too_close.iter().map(|one| one.airplanes).collect();
         pairs.sort_unstable();
         pairs.dedup();
-        assert_eq!(pairs.len(), told.len(), "{told:?}");
-        assert!(named > told.len() as u64, "one is named twice: {named}, {told:?}");
-        assert!(told.is_sorted_by_key(|one| one.at_s), "{told:?}");
+        assert_eq!(pairs.len(), too_close.len(), "{too_close:?}");
+        assert!(events > too_close.len() as u64, "one is exempt twice: {events}, {too_close:?}");
+        assert!(too_close.is_sorted_by_key(|one| one.at_s), "{too_close:?}");
     }
 }

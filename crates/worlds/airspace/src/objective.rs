@@ -467,9 +467,9 @@ mod tests {
                 let pilot =
                     Autopilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
                 let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
-                let ways = all[k as usize % 2].iter().map(predict).collect();
+                let predictions = all[k as usize % 2].iter().map(predict).collect();
                 ActionPredictions::new(
-                    ways,
+                    predictions,
                     model.separation_m * (1.0 - 0.1 * side),
                     Levels::at(0.0),
                 )

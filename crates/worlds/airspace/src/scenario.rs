@@ -272,15 +272,17 @@ mod tests {
             assert_eq!(one.interaction_range_m(0, 1), half.interaction_range_m(0, 1));
             // Two head-on airplanes, against the price of one that has left its way by 700 m.
             let price = |world: &AirspaceWorld| {
-                let way = |from_m: f64, v_m_s: f64| {
+                let straight = |from_m: f64, v_m_s: f64| {
                     let at =
                         |k: usize| [from_m + v_m_s * world.timing.dtau_s * (k + 1) as f64, 0.0];
                     let points: Vec<_> = (0..world.timing.horizon).map(at).collect();
                     crate::flight::Prediction { counted: points.len(), points }
                 };
-                let (a, b) = (way(-2000.0, 35.0), way(2000.0, -35.0));
+                let a = straight(-2000.0, 35.0);
+                let b = straight(2000.0, -35.0);
                 let [cost, _] = world.objective.collision(&a, &b, [500.0; 2]);
-                cost / world.objective.deviation(&a, &way(-1300.0, 35.0)) / world.objective.alpha
+                cost / world.objective.deviation(&a, &straight(-1300.0, 35.0))
+                    / world.objective.alpha
             };
             let ratio = price(&half) / price(&one);
             assert!((ratio - 1.0).abs() < 0.01, "{preset}: {ratio}");

@@ -161,8 +161,13 @@ fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// Takes out the memories of the airplanes of a group; nothing where airplanes have no memory. No two groups share an
 /// airplane, so no other worker asks for the same.
 fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
-    let one = |&slot: &Slot| all.get(slot as usize).map(|one| std::mem::take(&mut *lock(one)));
-    group.iter().map(|slot| one(slot).unwrap_or_default()).collect()
+    group
+        .iter()
+        .map(|&slot| match all.get(slot as usize) {
+            Some(memory) => std::mem::take(&mut *lock(memory)),
+            None => T::default(),
+        })
+        .collect()
 }
 
 /// Puts memories back.

@@ -295,10 +295,10 @@ mod tests {
         let compiled = CompiledAirspace::new(&heap("")).expect("a scenario");
         let pairs = compiled.too_close.len();
         assert!(pairs > 50, "{pairs}");
-        let told = contents(&compiled).text;
-        let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(words.matches("too close for the shield").count(), 1, "{told}");
-        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{told}");
+        let contents_text = contents(&compiled).text;
+        let words = contents_text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words.matches("too close for the shield").count(), 1, "{contents_text}");
+        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{contents_text}");
     }
 
     #[test]
@@ -325,15 +325,15 @@ mod tests {
         let head = "format = 1\nworld = \"airspace\"\ncycles = 20\n";
         let text = format!("{head}{}{}", one(0, 0), one(9000, 50));
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
-        let told = |run: &crate::AirspaceRun| {
+        let says_not_appeared = |run: &crate::AirspaceRun| {
             let lines = run.world().summary_lines(&run.metrics());
             lines.into_iter().any(|(_, words)| words.contains("1 airplane has not appeared"))
         };
         assert_eq!(run.metrics().not_appeared, 1, "the other one is there from the start");
         run.advance(10);
-        assert_eq!(run.metrics().not_appeared, 1, "it would come in with the next cycle");
-        assert!(told(&run));
+        assert_eq!(run.metrics().not_appeared, 1, "it enters with the next cycle");
+        assert!(says_not_appeared(&run));
         run.advance(1);
-        assert!(!told(&run) && run.metrics().not_appeared == 0);
+        assert!(!says_not_appeared(&run) && run.metrics().not_appeared == 0);
     }
 }

@@ -412,8 +412,8 @@ mod tests {
     fn compiled(commands: &str) -> CompiledAirspace {
         let line = |command: &str| format!("00:00:00.00>{command}\n");
         let text: String = commands.lines().map(line).collect();
-        let text = from_bluesky("told", &parse(&"told.scn", &text)).expect("it has aircraft");
-        CompiledAirspace::new(&Source::new("told", text, "")).expect("a scenario")
+        let text = from_bluesky("bluesky", &parse(&"bluesky.scn", &text)).expect("it has aircraft");
+        CompiledAirspace::new(&Source::new("bluesky", text, "")).expect("a scenario")
     }
 
     #[test]
@@ -429,8 +429,11 @@ mod tests {
             let compiled = compiled(&format!("{flights}{settings}"));
             assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
             assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
-            let told = crate::text::contents(&compiled).text;
-            assert!(told.contains(&format!("decides every 10 s, looks {s} s ahead")), "{told}");
+            let contents = crate::text::contents(&compiled).text;
+            assert!(
+                contents.contains(&format!("decides every 10 s, looks {s} s ahead")),
+                "{contents}"
+            );
         }
         // MVP that is chosen by `--set` instead of the file looks as far.
         assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
@@ -465,8 +468,8 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
         let compiled = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario");
-        let told = crate::text::contents(&compiled).text;
-        assert!(told.contains("looks 45 s ahead"), "{told}");
+        let contents = crate::text::contents(&compiled).text;
+        assert!(contents.contains("looks 45 s ahead"), "{contents}");
     }
 
     #[test]

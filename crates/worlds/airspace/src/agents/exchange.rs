@@ -293,14 +293,16 @@ impl ExchangeAgent {
     /// Returns the members with which an unheard airplane is an exempt pair, as far as they say so themselves.
     fn exempt_with(&self, place: usize) -> ExemptIds {
         let id = self.id(place);
-        let is_exempt = |other: &usize| {
-            if *other == self.me {
-                return self.aircraft.exempt.contains(&id);
-            }
-            let proposal = self.members[*other].proposal.as_ref();
-            proposal.is_some_and(|proposal| proposal.exempt.contains(&id))
-        };
-        (0..self.size()).filter(is_exempt).map(|other| self.id(other)).collect()
+        (0..self.size())
+            .filter(|&other| {
+                if other == self.me {
+                    return self.aircraft.exempt.contains(&id);
+                }
+                let proposal = self.members[other].proposal.as_ref();
+                proposal.is_some_and(|proposal| proposal.exempt.contains(&id))
+            })
+            .map(|other| self.id(other))
+            .collect()
     }
 
     /// Computes its plan, and sends it.
@@ -356,13 +358,15 @@ impl ExchangeAgent {
 
     /// Returns the members whose consent a plan of this airplane needs.
     fn consent_members(&self, plan: &SafeManeuver) -> Vec<usize> {
-        let needs = |&place: &usize| {
-            let other = &self.setup.aircraft[place].aircraft;
-            self.aircraft.is_protected_from(other)
-                && self.setup.has_priority(place, self.me)
-                && !plan.is_clear_of(other)
-        };
-        (0..self.size()).filter(|&place| place != self.me).filter(needs).collect()
+        (0..self.size())
+            .filter(|&place| {
+                let other = &self.setup.aircraft[place].aircraft;
+                place != self.me
+                    && self.aircraft.is_protected_from(other)
+                    && self.setup.has_priority(place, self.me)
+                    && !plan.is_clear_of(other)
+            })
+            .collect()
     }
 
     /// Returns whether a member has agreed to this airplane's plan.
@@ -471,17 +475,20 @@ impl link::Agent for ExchangeAgent {
 
     fn awaited_members(&self) -> Vec<usize> {
         let phase = self.phase();
-        let is_missing = |place: usize| {
-            let member = &self.members[place];
-            match phase {
-                ExchangePhase::Proposals => member.proposal.is_none(),
-                ExchangePhase::Plans => member.plan.is_none(),
-                ExchangePhase::Consent => member.accepts.is_none() && self.asked.contains(&place),
-                ExchangePhase::Over => false,
-            }
-        };
-        let others = (0..self.size()).filter(|&place| place != self.me);
-        others.filter(|&place| !self.members[place].gone && is_missing(place)).collect()
+        (0..self.size())
+            .filter(|&place| place != self.me && !self.members[place].gone)
+            .filter(|&place| {
+                let member = &self.members[place];
+                match phase {
+                    ExchangePhase::Proposals => member.proposal.is_none(),
+                    ExchangePhase::Plans => member.plan.is_none(),
+                    ExchangePhase::Consent => {
+                        member.accepts.is_none() && self.asked.contains(&place)
+                    }
+                    ExchangePhase::Over => false,
+                }
+            })
+            .collect()
     }
 
     fn wait_fraction(&self) -> f64 {

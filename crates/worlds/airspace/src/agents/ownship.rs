@@ -215,8 +215,8 @@ impl Ownship {
     /// Returns the predictions for another one that is not heard.
     pub(super) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
         let id = self.common.ids[other];
-        let filed = || &self.common.filed[other].contact;
-        self.predictions_from_state(self.contacts.get(&id).unwrap_or_else(filed))
+        let filed = &self.common.filed[other].contact;
+        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed))
     }
 
     /// Returns the same for one that was heard a moment ago.

@@ -239,14 +239,17 @@ impl Optimizer for SamplingAgent {
 
     fn missing_members(&self) -> Vec<usize> {
         let has_sent_costs = self.has_sent_costs();
-        let is_missing = |member: &SamplingMember| {
-            if has_sent_costs {
-                !member.costs.contains_key(&self.round)
-            } else {
-                !member.predictions.contains_key(&self.round)
-            }
-        };
-        self.others().filter(|(_, m)| !m.is_gone() && is_missing(m)).map(|(j, _)| j).collect()
+        self.others()
+            .filter(|(_, member)| {
+                let has_come = if has_sent_costs {
+                    member.costs.contains_key(&self.round)
+                } else {
+                    member.predictions.contains_key(&self.round)
+                };
+                !member.is_gone() && !has_come
+            })
+            .map(|(place, _)| place)
+            .collect()
     }
 
     fn step(&mut self) -> OptimizerStep<SamplingMessage> {

@@ -140,8 +140,9 @@ impl TrafficState {
         let StateBeacon { v_m_s, orbit_rad_s, .. } = self.beacon;
         let pose = orbiting.pose(air, &self.beacon, now);
         let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
-        let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at;
-        (1..=air.timing.horizon).map(point).collect()
+        (1..=air.timing.horizon)
+            .map(|k| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at)
+            .collect()
     }
 
     fn straight_points(&self, air: &Air, now: Cycle) -> Vec<Point> {
@@ -155,11 +156,12 @@ impl TrafficState {
         let [wx, wy] = air.wind_m_s;
         let elapsed_s = now.saturating_sub(self.heard_in) as f64 * air.timing.dt_s;
         let from = [at[0] + (vx + wx) * elapsed_s, at[1] + (vy + wy) * elapsed_s];
-        let point = |k: usize| {
-            let t_s = k as f64 * air.timing.dtau_s;
-            [from[0] + vx * t_s, from[1] + vy * t_s]
-        };
-        (1..=air.timing.horizon).map(point).collect()
+        (1..=air.timing.horizon)
+            .map(|k| {
+                let t_s = k as f64 * air.timing.dtau_s;
+                [from[0] + vx * t_s, from[1] + vy * t_s]
+            })
+            .collect()
     }
 }
 

@@ -21,15 +21,15 @@ struct Adder {
     me: usize,
     rounds: u32,
     round: u32,
-    told: Vec<Vec<Option<u64>>>,
+    received: Vec<Vec<Option<u64>>>,
     sum: u64,
     is_over: bool,
 }
 
 impl Adder {
     fn new(me: usize, group: usize, rounds: u32) -> Self {
-        let told = vec![vec![None; group]; rounds as usize];
-        Self { me, rounds, round: 0, told, sum: 0, is_over: false }
+        let received = vec![vec![None; group]; rounds as usize];
+        Self { me, rounds, round: 0, received, sum: 0, is_over: false }
     }
 
     fn number(&self) -> u64 {
@@ -39,7 +39,7 @@ impl Adder {
     fn go_on(&mut self) -> Vec<(u32, u64)> {
         let mut said = Vec::new();
         while self.round < self.rounds && self.awaited_members().is_empty() {
-            self.sum += self.told[self.round as usize].iter().flatten().sum::<u64>();
+            self.sum += self.received[self.round as usize].iter().flatten().sum::<u64>();
             self.sum += self.number();
             self.round += 1;
             if self.round < self.rounds {
@@ -67,21 +67,21 @@ impl Agent for Adder {
     }
 
     fn on_message(&mut self, from: usize, (round, number): Self::Message) -> Vec<Self::Message> {
-        let told = &mut self.told[round as usize][from];
-        assert!(told.is_none(), "each message comes once");
-        *told = Some(number);
+        let received = &mut self.received[round as usize][from];
+        assert!(received.is_none(), "each message comes once");
+        *received = Some(number);
         self.go_on()
     }
 
     fn awaited_members(&self) -> Vec<usize> {
-        let Some(told) = self.told.get(self.round as usize) else { return Vec::new() };
-        let others = (0..told.len()).filter(|&j| j != self.me);
-        others.filter(|&j| told[j].is_none()).collect()
+        let Some(received) = self.received.get(self.round as usize) else { return Vec::new() };
+        let others = (0..received.len()).filter(|&j| j != self.me);
+        others.filter(|&j| received[j].is_none()).collect()
     }
 
     fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Self::Message> {
-        for told in &mut self.told[self.round as usize..] {
-            told[other].get_or_insert(1000);
+        for received in &mut self.received[self.round as usize..] {
+            received[other].get_or_insert(1000);
         }
         self.go_on()
     }

@@ -110,8 +110,11 @@ impl AirspaceWorld {
 fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
-    let pilot = |(&slot, memory)| Pilot::with_memory(world.clone(), slot, memory);
-    flown.iter().zip(memories).map(pilot).collect()
+    flown
+        .iter()
+        .zip(memories)
+        .map(|(&slot, memory)| Pilot::with_memory(world.clone(), slot, memory))
+        .collect()
 }
 
 #[cfg(test)]
@@ -146,8 +149,8 @@ mod tests {
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
         for (control, _) in outcomes(pilots) {
             assert_eq!(control.maneuver, Maneuver::Orbit);
-            let told: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
-            assert_eq!(told, [EventKind::Deadline]);
+            let kinds: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
+            assert_eq!(kinds, [EventKind::Deadline]);
         }
     }
 }

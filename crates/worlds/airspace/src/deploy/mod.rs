@@ -167,9 +167,9 @@ mod tests {
             let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("valid");
             run.advance(90);
             let metrics = run.metrics();
-            let told = &metrics.too_close;
+            let too_close = &metrics.too_close;
             prop_assert!(
-                metrics.losses_of_separation == 0 || !told.is_empty(), "{metrics:?}"
+                metrics.losses_of_separation == 0 || !too_close.is_empty(), "{metrics:?}"
             );
         }
     }

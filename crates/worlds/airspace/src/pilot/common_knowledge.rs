@@ -59,13 +59,14 @@ pub(super) fn ownship(
 /// Returns a flight as it was filed.
 pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
     let orders = world.airplanes[id as usize].orders.len();
-    let way_points = |done: usize| world.segment(id, done as u32).mission.len();
+    let max_way_points =
+        (0..=orders).map(|done| world.segment(id, done as u32).mission.len()).max().unwrap_or(0);
     FiledFlight {
         model: world.airplanes[id as usize].model.clone(),
         actions: world.actions(id).to_vec(),
         contact: presumed_state(world, id),
         max_speed_m_s: world.top_m_s[id as usize],
-        max_way_points: (0..=orders).map(way_points).max().unwrap_or(0),
+        max_way_points,
         orders,
     }
 }

@@ -65,12 +65,11 @@ pub(crate) fn safe_side(
 ) -> Option<Side> {
     let others: Vec<ShieldedAircraft> =
         others.filter(|other| changed.is_protected_from(other)).collect();
-    let is_apart = |side: &Side| {
-        let orbit = changed.orbit(*side);
-        others.iter().all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.gap_m(other)))
-    };
     let other_sides = Side::BOTH.into_iter().filter(|&side| side != changed.fallback);
-    [changed.fallback].into_iter().chain(other_sides).find(is_apart)
+    [changed.fallback].into_iter().chain(other_sides).find(|&side| {
+        let orbit = changed.orbit(side);
+        others.iter().all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.gap_m(other)))
+    })
 }
 
 /// Returns for each airplane all others whose orbits might come too near its own, by rising number.

@@ -134,8 +134,8 @@ impl SafeManeuver {
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
         centers.iter().all(|&center| {
-            let is_far = |pose: &Pose2| distance_m(pose.at, center) >= gap_m + half_step_m;
-            self.poses.iter().all(is_far) && self.orbit.is_outside(center, gap_m)
+            self.poses.iter().all(|pose| distance_m(pose.at, center) >= gap_m + half_step_m)
+                && self.orbit.is_outside(center, gap_m)
         })
     }
 

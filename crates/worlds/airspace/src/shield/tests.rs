@@ -94,8 +94,8 @@ proptest! {
     ) {
         let group = with_fallbacks(group);
         let candidates: Vec<Vec<TurnProfile>> = group.iter().zip(&wishes).map(|(f, wishes)| {
-            let way = |part: &f64| TurnProfile { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
-            wishes.iter().map(way).collect()
+            let profile = |part: &f64| TurnProfile { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
+            wishes.iter().map(profile).collect()
         }).collect();
         let certainty = if mixable { PlanCertainty::Mixable } else { PlanCertainty::Sure };
         let mut decisions = filter(&group, &candidates, STEPS, DTAU_S, certainty);
@@ -156,8 +156,8 @@ proptest! {
     #[test]
     fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
         let group = [aircraft(0.0, 0.0, 0.0, 0), aircraft(x, 0.0, 3.0, 1)];
-        let way = || TurnProfile { omegas_rad_s: vec![part * group[0].orbit_rad_s; STEPS] };
-        let wishes = [vec![way()], vec![way()]];
+        let profile = || TurnProfile { omegas_rad_s: vec![part * group[0].orbit_rad_s; STEPS] };
+        let wishes = [vec![profile()], vec![profile()]];
         let decisions = filter(&group, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }

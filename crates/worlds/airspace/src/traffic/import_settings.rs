@@ -106,8 +106,8 @@ mod tests {
             .map(|line| format!("00:00:00.00>{line}\n"))
             .collect();
         let rules = import_settings("a.scn", &parse(&"a.scn", &text), 10.0);
-        let told = rules.refused.iter().map(ToString::to_string).collect();
-        (rules, told)
+        let refused = rules.refused.iter().map(ToString::to_string).collect();
+        (rules, refused)
     }
 
     #[test]
@@ -119,9 +119,9 @@ mod tests {
             ("ASAS ON\nRESO OFF", Some("none"), true),
             ("CDMETHOD STATEBASED\nRESO MVP", Some("mvp"), false),
         ] {
-            let (rules, told) = found(commands);
+            let (rules, refused) = found(commands);
             assert_eq!((rules.method, rules.is_bare), (method, is_bare), "{commands}");
-            assert_eq!(told, [""; 0], "{commands}");
+            assert_eq!(refused, [""; 0], "{commands}");
         }
         let (rules, _) = found("DTLOOK 120\nWIND 0,1,,270,36");
         assert_eq!(rules.look_ahead_s, Some(120.0));
@@ -139,8 +139,8 @@ mod tests {
             ("WIND 0,1,,270,36\nWIND 0,2,,90,36", "WIND", 3),
             ("WIND 0,1,,270,600", "WIND", 2),
         ] {
-            let (rules, told) = found(commands);
-            let [one] = &told[..] else { panic!("{commands}: {told:?}") };
+            let (rules, refused) = found(commands);
+            let [one] = &refused[..] else { panic!("{commands}: {refused:?}") };
             assert!(one.contains(&format!("{name}: ")), "{one}");
             assert_eq!(rules.refused[0].position(), Some((line, 1)), "{commands}");
             assert_eq!((rules.look_ahead_s, rules.wind_m_s), (None, None), "{commands}");

@@ -98,8 +98,9 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         if candidate.request.epoch != epoch {
             return Ok(());
         }
-        let is_newer = |copy: &StateCopy| self.copy.as_ref().is_none_or(|own| copy.at > own.at);
-        if let Some(copy) = copy.filter(is_newer) {
+        if let Some(copy) = copy
+            && self.copy.as_ref().is_none_or(|own| copy.at > own.at)
+        {
             P::decode(&copy.state, services, self.number.into())?;
             self.copy = Some(copy);
             // The hop on which it was lost is not known then.

@@ -89,13 +89,12 @@ impl Coordinator {
         let me = services.own.me;
         // This includes an airplane that was passed over because it could not be reached then.
         self.conclude(services);
-        let is_due = |airplane: &&MemberData| !airplane.is_presumed && airplane.place != me;
-        let mut left = self.data.airplanes.iter().skip(k).filter(is_due);
-        let Some(next) = left.next() else { return Some(CoordinatorStep::Done) };
-        let number = |airplane: &MemberData| airplane.place == next.place;
-        self.task =
-            CoordinatorTask::Deliver(self.data.airplanes.iter().position(number).unwrap_or(k));
-        Some(CoordinatorStep::Hop(next.place))
+        let mut remaining = self.data.airplanes.iter().enumerate().skip(k);
+        let next = remaining.find(|(_, airplane)| !airplane.is_presumed && airplane.place != me);
+        let Some((number, next)) = next else { return Some(CoordinatorStep::Done) };
+        let host = next.place;
+        self.task = CoordinatorTask::Deliver(number);
+        Some(CoordinatorStep::Hop(host))
     }
 
     fn conclude(&self, services: &mut HostedAircraft) {
@@ -144,8 +143,8 @@ impl Coordinator {
             self.task = CoordinatorTask::Collect(k);
             let hierarchy = self.update_hierarchy(services, context);
             let home = usize::from(hierarchy.epochs[k].owner);
-            let (is_here, is_lost) =
-                (home == services.own.me, hierarchy.unreachable.contains(&home));
+            let is_here = home == services.own.me;
+            let is_lost = hierarchy.unreachable.contains(&home);
             let report = services.report.clone().filter(|_| is_here && context.is_here[k]);
             if let Some(report) = report {
                 hierarchy.missing[k] = false;

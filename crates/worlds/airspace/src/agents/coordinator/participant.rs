@@ -131,7 +131,9 @@ impl WithOutcome for HostParticipant {
     type Outcome = OptimizationResult;
 
     fn finish(&mut self) -> ConversationEnd<OptimizationResult> {
-        let late = || ConversationEnd { outcome: None, unheard: Vec::new(), late: true };
-        self.host.services.end.clone().unwrap_or_else(late)
+        match &self.host.services.end {
+            Some(end) => end.clone(),
+            None => ConversationEnd { outcome: None, unheard: Vec::new(), late: true },
+        }
     }
 }

@@ -16,7 +16,6 @@ use crate::flight::KnownAircraft;
 use crate::pilot::common_knowledge::unheard_aircraft;
 use crate::pilot::control::{Maneuver, OptimizerStats};
 use crate::pilot::conversations::ConversationOutcome;
-use crate::pilot::percept::SurveillanceReport;
 
 impl Pilot {
     /// Stores the group that it has found; without an outcome it is alone.
@@ -32,8 +31,8 @@ impl Pilot {
             _ => percept.group = near.iter().filter(|one| one.id == self.id).copied().collect(),
         }
         state.members = percept.members().into();
-        let is_member = |one: &SurveillanceReport| state.members.binary_search(&one.id).is_ok();
-        state.unheard = near.into_iter().filter(|one| !is_member(one)).collect();
+        state.unheard =
+            near.into_iter().filter(|one| state.members.binary_search(&one.id).is_err()).collect();
         let unheard = state.unheard.iter().map(|one| one.id).collect();
         state.record_unheard(&self.world, unheard, &self.memory.contacts);
         self.decide(tick);

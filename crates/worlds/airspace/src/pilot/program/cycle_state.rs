@@ -161,13 +161,15 @@ impl CycleState {
     ) {
         let id = self.percept.own.id;
         let now = self.percept.cycle;
-        let heard_in = |other: &EntityId| match contacts.get(other) {
-            Some(contact) => contact.heard_in,
-            None => world.first_cycle(*other as usize),
-        };
-        let lost = unheard.into_iter().filter(|other| heard_in(other) + 1 >= now);
-        let lost: Vec<Event> =
-            lost.map(|other| Event::new_pair(now, EventKind::Unheard, id, other)).collect();
-        self.control.events.extend(lost);
+        for other in unheard {
+            let heard_in = match contacts.get(&other) {
+                Some(contact) => contact.heard_in,
+                None => world.first_cycle(other as usize),
+            };
+            // One that has been unheard for longer was recorded then.
+            if heard_in + 1 >= now {
+                self.control.events.push(Event::new_pair(now, EventKind::Unheard, id, other));
+            }
+        }
     }
 }

@@ -72,13 +72,16 @@ fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     PacketBuffer::from_bytes(message).into_packet(&header)
 }
 
-/// Lets pilots conversation in one cycle, and hands each of them `more` made of every packet before the packet itself.
-fn told_more(
+/// Runs the conversations of pilots in one cycle. Each receives, before every packet, what `more` makes of it. Returns
+/// the number of these additional packets.
+fn run_with_extra_packets(
     run: &AirspaceRun,
     pilots: &mut [Pilot],
     mut more: impl FnMut(&[u8]) -> Vec<u8>,
 ) -> u64 {
-    let (mut due, mut tick, mut told) = (VecDeque::new(), 0, 0);
+    let mut due = VecDeque::new();
+    let mut tick = 0;
+    let mut extra_packets = 0;
     for percept in run.percepts() {
         let own = percept.own.id as usize;
         pilots[own].start(percept, tick);
@@ -95,11 +98,11 @@ fn told_more(
             let pilot = &mut pilots[to as usize];
             pilot.on_packet(from, &more(&payload), tick);
             pilot.on_packet(from, &payload, tick);
-            told += 1;
+            extra_packets += 1;
         }
         let timers = pilots.iter().filter_map(Pilot::next_timer).filter(|due| *due < u64::MAX);
         match (now, timers.min()) {
-            (0, None) => return told,
+            (0, None) => return extra_packets,
             (0, Some(next)) => tick = tick.max(next),
             _ => {}
         }
@@ -117,21 +120,23 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(902));
         let run = run(KINDS[kind], THREE);
-        let (mut alone, mut avoidance) = (TestPilots::from_run(&run), TestPilots::from_run(&run));
-        told_more(&run, &mut alone.pilots, <[u8]>::to_vec);
-        let told = told_more(&run, &mut avoidance.pilots, |payload| match is_damaged {
-            true => {
+        let mut alone = TestPilots::from_run(&run);
+        let mut disturbed = TestPilots::from_run(&run);
+        run_with_extra_packets(&run, &mut alone.pilots, <[u8]>::to_vec);
+        let extra_packets = run_with_extra_packets(&run, &mut disturbed.pilots, |payload| {
+            if is_damaged {
                 let mut bytes = payload.to_vec();
                 let at = draws.uniform_below(bytes.len() as u32) as usize;
                 bytes[at] ^= 1 << draws.uniform_below(8);
                 bytes
+            } else {
+                misplaced(payload, &mut draws)
             }
-            false => misplaced(payload, &mut draws),
         });
-        let refused: u64 = avoidance.pilots.iter().map(|pilot| pilot.drop_counts().total()).sum();
-        prop_assert!(told > 0);
-        prop_assert_eq!(refused, told, "each is counted");
-        for (found, expected) in avoidance.pilots.iter().zip(&alone.pilots) {
+        let refused: u64 = disturbed.pilots.iter().map(|pilot| pilot.drop_counts().total()).sum();
+        prop_assert!(extra_packets > 0);
+        prop_assert_eq!(refused, extra_packets, "each is counted");
+        for (found, expected) in disturbed.pilots.iter().zip(&alone.pilots) {
             let (found, expected) = (found.control(), expected.control());
             let maneuver = |control: &Option<Control>| control.as_ref().map(|one| one.maneuver.clone());
             prop_assert_eq!(maneuver(&found), maneuver(&expected));
@@ -145,27 +150,27 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(903));
         let run = run(KINDS[kind], THREE);
-        let mut crew = TestPilots::from_run(&run);
+        let mut all = TestPilots::from_run(&run);
         let mut real = Vec::new();
-        told_more(&run, &mut crew.pilots, |payload| {
+        run_with_extra_packets(&run, &mut all.pilots, |payload| {
             real.push(payload.to_vec());
             forged(payload, &mut draws)
         });
         // The same again to pilots that hear nothing else, in any order.
-        let mut crew = TestPilots::from_run(&run);
+        let mut all = TestPilots::from_run(&run);
         let percepts = run.percepts();
         for percept in percepts.iter().filter(|_| is_only) {
-            crew.pilots[percept.own.id as usize].start(percept.clone(), 0);
+            all.pilots[percept.own.id as usize].start(percept.clone(), 0);
         }
         for _ in 0..200 {
             let payload = &real[draws.uniform_below(real.len() as u32) as usize];
             let bytes = forged(payload, &mut draws);
             let from = EntityId::from(payload[28]);
             let to = (from as usize + 1 + draws.uniform_below(2) as usize) % 3;
-            crew.pilots[to].on_packet(from, &bytes, 1);
+            all.pilots[to].on_packet(from, &bytes, 1);
         }
         for percept in percepts {
-            crew.pilots[percept.own.id as usize].start(percept, 1);
+            all.pilots[percept.own.id as usize].start(percept, 1);
         }
     }
 }
@@ -173,9 +178,9 @@ proptest! {
 #[test]
 fn who_floods_a_pilot_fills_no_memory() {
     let run = run("deployment = \"team\"", THREE);
-    let mut crew = TestPilots::from_run(&run);
+    let mut all = TestPilots::from_run(&run);
     let percept = run.percepts().swap_remove(0);
-    crew.pilots[0].start(percept.clone(), 0);
+    all.pilots[0].start(percept.clone(), 0);
     let header = |cycle: Cycle, sequence: u32| PacketHeader {
         fingerprint: run.world().fingerprint,
         conversation: ConversationId::new(cycle, Protocol::Shield, &percept.members()),
@@ -185,27 +190,27 @@ fn who_floods_a_pilot_fills_no_memory() {
     let large = vec![7; 1 << 18];
     for k in 0..100 {
         let packet = PacketBuffer::from_bytes(&large).into_packet(&header(u64::from(k) % 2, k));
-        crew.pilots[0].on_packet(1, &packet, 0);
+        all.pilots[0].on_packet(1, &packet, 0);
     }
-    let refused = crew.pilots[0].drop_counts();
+    let refused = all.pilots[0].drop_counts();
     assert!(refused.get(DropReason::NoRoom) > 80, "{refused:?}");
     let of_this = ConversationId::new(0, Protocol::Decision, &percept.members());
     let packet = PacketBuffer::from_bytes(&large)
         .into_packet(&PacketHeader { conversation: of_this, ..header(0, 0) });
-    crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].drop_counts().get(DropReason::TooLarge), 1);
+    all.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(all.pilots[0].drop_counts().get(DropReason::TooLarge), 1);
 }
 
 /// Each reason on its own.
 #[test]
-fn every_reason_is_told_from_the_others() {
+fn every_reason_differs_from_the_others() {
     let run = run("deployment = \"compact-team\"", THREE);
-    let mut crew = TestPilots::from_run(&run);
+    let mut all = TestPilots::from_run(&run);
     for percept in run.percepts() {
         let own = percept.own.id as usize;
-        crew.pilots[own].start(percept, 0);
+        all.pilots[own].start(percept, 0);
     }
-    let packet = crew.pilots[1].take_packets().swap_remove(0).payload;
+    let packet = all.pilots[1].take_packets().swap_remove(0).payload;
     let (header, message) =
         parse_packet::<Protocol>(&packet, run.world().fingerprint).expect("a real packet");
     let with = |change: &dyn Fn(&mut PacketHeader)| {
@@ -234,15 +239,15 @@ fn every_reason_is_told_from_the_others() {
         (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), DropReason::Unsound),
     ];
     for (bytes, why) in cases {
-        let before = crew.pilots[0].drop_counts();
-        crew.pilots[0].on_packet(1, &bytes, 0);
-        let after = crew.pilots[0].drop_counts();
+        let before = all.pilots[0].drop_counts();
+        all.pilots[0].on_packet(1, &bytes, 0);
+        let after = all.pilots[0].drop_counts();
         assert_eq!(
             (after.get(why), after.total()),
             (before.get(why) + 1, before.total() + 1),
             "{why:?}"
         );
     }
-    crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].drop_counts().total(), 11, "the real one is taken");
+    all.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(all.pilots[0].drop_counts().total(), 11, "the real one is taken");
 }

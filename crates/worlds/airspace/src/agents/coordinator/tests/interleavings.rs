@@ -58,7 +58,7 @@ impl SystemState {
         whole
     }
 
-    fn hotel(&self, k: usize) -> &TestHost {
+    fn services(&self, k: usize) -> &TestHost {
         &self.hosts[k].services
     }
 
@@ -159,9 +159,9 @@ impl SystemState {
         let rule = is_here.iter().filter(|epoch| self.is_accepted(**epoch)).count();
         assert!(rule <= 1, "{rule} coordinators are accepted by majorities");
         for k in 0..GROUP {
-            if let Some(epoch) = self.hotel(k).told {
+            if let Some(epoch) = self.services(k).concluded {
                 let had = self.accepted.get(&epoch);
-                assert!(had.is_some_and(|had| is_majority(had)), "{k} was told by {epoch:?}");
+                assert!(had.is_some_and(|had| is_majority(had)), "{k} has a result of {epoch:?}");
             }
         }
     }
@@ -176,10 +176,10 @@ impl SystemState {
     /// Checks the end: every living host has ended, and with a control if a majority is alive.
     fn check_end(&self) {
         for k in (0..GROUP).filter(|&k| self.is_alive[k]) {
-            let hotel = self.hotel(k);
-            assert!(hotel.is_done(), "{k} waits forever");
+            let services = self.services(k);
+            assert!(services.is_done(), "{k} waits forever");
             if is_majority(&self.is_alive) {
-                assert!(hotel.told.is_some(), "{k} is cut off, and a majority is alive");
+                assert!(services.concluded.is_some(), "{k} is cut off, and a majority is alive");
             }
         }
     }
@@ -195,8 +195,8 @@ impl SystemState {
         let mut bytes = Vec::with_capacity(512);
         let mut add = |piece: &dyn erased::Plain| piece.write(&mut bytes);
         for k in 0..GROUP {
-            add(&(self.is_alive[k], self.hotel(k).is_rested, self.hotel(k).is_cut_off));
-            add(&self.hotel(k).told);
+            add(&(self.is_alive[k], self.services(k).is_rested, self.services(k).is_cut_off));
+            add(&self.services(k).concluded);
             let (replica, now) = (&self.hosts[k].replicas[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
             add(&(replica.promised, replica.newest, replica.accepted, replica.candidate_number));
@@ -230,7 +230,7 @@ impl SystemState {
     }
 }
 
-/// Values that are told apart by their serialized form.
+/// Values that differ if their serialized forms do.
 mod erased {
     use serde::Serialize;
 
