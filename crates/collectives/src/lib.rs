@@ -20,7 +20,7 @@
 //! optimize.rs  the rounds: estimate, update, cool, until no distribution moves
 //! ```
 //!
-//! Nothing here knows of airplanes; `examples/graph_coloring.rs` colors a graph.
+//! The crate is independent of air traffic; `examples/graph_coloring.rs` colors a graph.
 //!
 //! **Two estimators.** [`Estimator::Sampled`] is the paper's: blocks of joint samples, with
 //! older blocks weighing less. [`Estimator::Exact`] computes the expectation where the cost is

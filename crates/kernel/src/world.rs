@@ -21,7 +21,7 @@ use serde_json::Value;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A worker's turn in one phase of one cycle: its inputs and its own buffers.
+/// The context of a worker in one phase of one cycle: its inputs and its own buffers.
 pub struct PhaseContext<'a, W: Phases> {
     /// The immutable world.
     pub world: &'a W,
@@ -65,23 +65,23 @@ pub trait Phases: Sync + Sized {
     /// Number of bodies, which is the number of tasks in a pool.
     fn bodies(&self, state: &Self::State) -> usize;
 
-    /// Moves bodies to other slots now and then between cycles, so that neighbors in the world are
+    /// Moves bodies to other slots, occasionally between cycles, so that neighbors in the world are
     /// neighbors in memory and each worker stays in one part of both. No result may depend on it.
     fn arrange(&self, _: &mut Self::State) {}
 
     /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
-    /// decide alone), and publishes everything it may need. Writes only the intents and claims of
+    /// decide alone), and claims everything that its action may need. Writes only the intents and claims of
     /// these bodies.
-    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>);
+    fn claim(context: &mut PhaseContext<'_, Self>, bodies: Range<usize>);
 
     /// *Join*: joins each body of `bodies` with every other whose claims meet its own. Writes
     /// only `groups`.
-    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups);
+    fn join(context: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups);
 
     /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
     /// order that depends on state and seed alone. Writes only things that the group has claimed.
     /// The order of `group` itself is arbitrary.
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
+    fn act(context: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
     fn auction(&self) -> Option<&dyn Auction<Self>> {
@@ -93,19 +93,19 @@ pub trait Phases: Sync + Sized {
 /// the highest bid on everything they claim act, until all have acted. This runs in parallel even
 /// inside a large group, and the outcome is the same as acting in the order of the bids.
 pub trait Auction<W: Phases> {
-    /// Bids for everything that a body claims, and notes it in the scratch.
-    fn bid(&self, turn: &mut PhaseContext<'_, W>, body: Slot);
+    /// Bids for everything that a body claims, and adds the bids to the scratch.
+    fn bid(&self, context: &mut PhaseContext<'_, W>, body: Slot);
 
     /// Lets the bodies of `pending` with the highest bids act, and removes them from the list.
-    fn act_on_bids(&self, turn: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
+    fn act_on_bids(&self, context: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
 
-    /// Withdraws all bids noted in the scratch.
-    fn retract_bids(&self, turn: &mut PhaseContext<'_, W>);
+    /// Withdraws all bids of the scratch.
+    fn retract_bids(&self, context: &mut PhaseContext<'_, W>);
 }
 
 /// A world that [`crate::Run`] runs: its phases, and everything else a run needs.
 ///
-/// `state` holds everything that changes and that results depend on; `books` hold the rest of a
+/// `state` holds everything that changes and that results depend on; `collector` hold the rest of a
 /// run: sums for metrics, and rows and events that wait to be handed over.
 pub trait World: Phases<State: Send> + Send + 'static {
     /// Name of the world, as scenarios write it.
@@ -119,7 +119,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// The sums, rows and events that a run keeps beside the state.
     type Collector: Send;
-    /// The content of a checkpoint: the state and those books on which results depend, by entity
+    /// The content of a checkpoint: the state and those collector on which results depend, by entity
     /// id.
     type Snapshot: Serialize + DeserializeOwned;
     /// The measurements of a run.
@@ -144,17 +144,17 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Takes over the results of one worker from one or more cycles. The share of each worker
     /// differs from run to run.
-    fn collect(&self, books: &mut Self::Collector, scratch: &mut Self::Scratch);
+    fn collect(&self, collector: &mut Self::Collector, scratch: &mut Self::Scratch);
 
     /// Books the gathered results of all workers, in an order that does not depend on each worker's
     /// share.
-    fn commit(&self, books: &mut Self::Collector);
+    fn commit(&self, collector: &mut Self::Collector);
 
     /// Starts to keep the rows that [`World::record`] hands over.
-    fn start_recording(&self, state: &mut Self::State, books: &mut Self::Collector, now: Cycle);
+    fn start_recording(&self, state: &mut Self::State, collector: &mut Self::Collector, now: Cycle);
 
     /// Starts to keep events for frames.
-    fn enable_events(&self, books: &mut Self::Collector);
+    fn enable_events(&self, collector: &mut Self::Collector);
 
     /// Starts to keep odometry for frames, in worlds with wheels that err.
     fn enable_odometry(&self, _: &mut Self::Collector) {}
@@ -164,7 +164,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn prepare(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
 
     /// The tables that are recorded.
-    fn schemas(&self, books: &Self::Collector) -> Vec<TableSchema>;
+    fn schemas(&self, collector: &Self::Collector) -> Vec<TableSchema>;
 
     /// Hands over the rows of all cycles before `now` that were not handed over yet.
     ///
@@ -173,7 +173,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn record(
         &self,
         state: &mut Self::State,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
         now: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError>;
@@ -182,16 +182,16 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
     /// Returns the content of a checkpoint.
-    fn save(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Self::Snapshot;
+    fn save(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Self::Snapshot;
 
-    /// Returns the state that was saved; the books take over their part.
+    /// Returns the state that was saved; the collector take over their part.
     ///
     /// # Errors
     /// When it does not fit this world.
     fn restore(
         &self,
         saved: Self::Snapshot,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
     ) -> Result<Self::State, CheckpointError>;
 
     /// Returns the scenery: everything that stays the same during the run.
@@ -201,7 +201,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn frame(
         &self,
         state: &Self::State,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
         now: Cycle,
         look: FrameOptions,
     ) -> Frame;
@@ -232,7 +232,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
         Ok(())
     }
 
-    /// Notes an order for the next turn of its agent. It was checked.
+    /// Notes an order for the next context of its agent. It was checked.
     fn order(&self, _: &mut Self::State, _: &Order<'_>) {}
 
     /// Notes the actions of agents in cycle `now`, for which none were noted yet: they have decided outside of the
@@ -268,13 +268,13 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn metrics(
         &self,
         state: &Self::State,
-        books: &Self::Collector,
+        collector: &Self::Collector,
         now: Cycle,
         effort: &RunStats,
     ) -> Self::Metrics;
 
     /// Returns the metrics of each agent, as a JSON array.
-    fn agent_metrics(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Value;
+    fn agent_metrics(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Value;
 
     /// Returns the metrics of pairs of agents, in worlds that have any.
     fn pair_metrics(&self, _: &Self::Collector) -> Value {

@@ -57,7 +57,7 @@ fn point(p: &Point) -> sidestep_draw::Point {
 
 /// Returns a plot with axes that span the same length around the middle of the drawing.
 fn trajectory_plot(figure: &Figure) -> Plot {
-    let plot = plot(figure, Mark::Way);
+    let plot = plot(figure, Mark::Path);
     let points = || figure.series.iter().flat_map(|s| &s.points);
     let (x, y) = (extent(points().map(|p| p.x)), extent(points().map(|p| p.y)));
     let (Some(x), Some(y)) = (x, y) else { return plot };

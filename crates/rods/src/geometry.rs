@@ -111,28 +111,30 @@ impl<const D: usize> Cuboid<D> {
     pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> NearestPoints<D> {
         let (from, to) = (self.to_local(p), self.to_local(q));
         let d = sub(to, from);
-        let part = self.min_slope_fraction(from, d);
-        let local = add_scaled(from, d, part);
+        let fraction = self.min_slope_fraction(from, d);
+        let local = add_scaled(from, d, fraction);
         let clamped: Point<D> =
             std::array::from_fn(|i| local[i].clamp(-self.half_m[i], self.half_m[i]));
         NearestPoints {
             distance_m: distance(local, clamped),
-            on_body: lerp(p, q, part),
+            on_body: lerp(p, q, fraction),
             on_core: self.to_world(clamped),
         }
     }
 
-    /// Returns half the slope of the squared distance at one part of the way.
-    fn slope(&self, from: Point<D>, d: Point<D>, part: f64) -> f64 {
+    /// Returns half the slope of the squared distance at a fraction of the segment.
+    fn slope(&self, from: Point<D>, d: Point<D>, fraction: f64) -> f64 {
         let outside = |i: usize| {
-            let x = from[i] + d[i] * part;
+            let x = from[i] + d[i] * fraction;
             x - x.clamp(-self.half_m[i], self.half_m[i])
         };
         (0..D).map(|i| outside(i) * d[i]).sum()
     }
 
+    /// Returns the fraction of the segment at which the squared distance is least.
     fn min_slope_fraction(&self, from: Point<D>, d: Point<D>) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
+        let mut low = 0.0;
+        let mut high = 1.0;
         if self.slope(from, d, low) >= 0.0 {
             return low;
         }
@@ -143,8 +145,11 @@ impl<const D: usize> Cuboid<D> {
             for side in [-self.half_m[i], self.half_m[i]] {
                 let joint = (side - from[i]) / d[i];
                 if joint > low && joint < high {
-                    let falls = self.slope(from, d, joint) < 0.0;
-                    *(if falls { &mut low } else { &mut high }) = joint;
+                    if self.slope(from, d, joint) < 0.0 {
+                        low = joint;
+                    } else {
+                        high = joint;
+                    }
                 }
             }
         }
@@ -276,16 +281,18 @@ impl<const D: usize> Core<D> {
 #[inline]
 fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
     let (d, r) = (sub(q, p), sub(c, p));
-    let (part, whole, reach2) = (dot(r, d), dot(d, d), reach_m * reach_m);
-    if part <= 0.0 {
+    let along = dot(r, d);
+    let length2 = dot(d, d);
+    let reach2 = reach_m * reach_m;
+    if along <= 0.0 {
         return dot(r, r) >= reach2;
     }
-    if part >= whole {
+    if along >= length2 {
         let r = sub(c, q);
         return dot(r, r) >= reach2;
     }
     let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm_squared(cross(d, r)) };
-    across2 >= reach2 * whole
+    across2 >= reach2 * length2
 }
 
 /// Returns whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.

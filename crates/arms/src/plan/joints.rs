@@ -22,7 +22,7 @@ const MIN_STEP: f64 = 1e-3;
 pub struct JointSpace<'a, const D: usize> {
     arm: &'a Arm,
     present: &'a [f64],
-    judge: ConstraintChecker<'a, D>,
+    checker: ConstraintChecker<'a, D>,
     k: usize,
     /// Longest way of a connector between two postures that are checked, meters.
     step_m: f64,
@@ -39,14 +39,14 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         self_collision: bool,
         k: usize,
     ) -> Self {
-        let judge = ConstraintChecker { chain, obstacles, self_collision };
+        let checker = ConstraintChecker { chain, obstacles, self_collision };
         let step_m = chain.step_m().max(MIN_STEP * arm.skeleton.reach_m);
-        Self { arm, present, judge, k, step_m }
+        Self { arm, present, checker, k, step_m }
     }
 
     /// Returns the objection to the places of an arm's connectors, if there is one.
     pub fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
-        self.judge.find_veto(points, self.k)
+        self.checker.find_veto(points, self.k)
     }
 
     /// Returns good postures that reach the target, those nearest to the present one first.

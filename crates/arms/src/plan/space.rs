@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
 pub struct RodSpace<'a, const D: usize> {
-    judge: ConstraintChecker<'a, D>,
+    checker: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
     k: usize,
@@ -43,16 +43,16 @@ impl<'a, const D: usize> RodSpace<'a, D> {
                 return Err(InputError::new("planner", "the chain has no fixed base", remedy));
             }
         };
-        let judge = ConstraintChecker { chain, obstacles, self_collision };
-        Ok(Self { judge, limb, k, step_m: chain.step_m() })
+        let checker = ConstraintChecker { chain, obstacles, self_collision };
+        Ok(Self { checker, limb, k, step_m: chain.step_m() })
     }
 
     pub(super) fn chain(&self) -> &'a Chain<D> {
-        self.judge.chain
+        self.checker.chain
     }
 
     pub(super) fn obstacles(&self) -> &'a Obstacles<D> {
-        self.judge.obstacles
+        self.checker.obstacles
     }
 
     pub(super) fn base(&self) -> usize {
@@ -64,12 +64,12 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     type Posture = ChainPosture<D>;
 
     fn present(&self) -> ChainPosture<D> {
-        self.judge.chain.points().to_vec()
+        self.checker.chain.points().to_vec()
     }
 
     fn length_m(&self) -> f64 {
         let rods = self.limb.windows(2);
-        rods.map(|pair| self.judge.chain.rod_between(pair[0], pair[1]).max_m).sum()
+        rods.map(|pair| self.checker.chain.rod_between(pair[0], pair[1]).max_m).sum()
     }
 
     fn distance_m(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
@@ -98,7 +98,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     }
 
     fn is_free(&self, posture: &ChainPosture<D>) -> bool {
-        self.judge.find_veto(posture, self.k).is_none()
+        self.checker.find_veto(posture, self.k).is_none()
     }
 
     fn is_path_free(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> bool {
@@ -120,7 +120,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
         let mut u: Point<D> = direction(draws);
         for pair in self.limb.windows(2) {
             let [inner, outer] = [pair[0], pair[1]];
-            let rod = self.judge.chain.rod_between(inner, outer);
+            let rod = self.checker.chain.rod_between(inner, outer);
             let length_m = rod.min_m + draws.uniform() * (rod.max_m - rod.min_m);
             posture[outer] = add_scaled(posture[inner], u, length_m);
             let side = scaled(direction(draws), stiffness * PI);

@@ -22,7 +22,8 @@ impl AtomicBitSet {
     /// time; of several that mark the same box, exactly one gets `true`.
     #[inline]
     pub fn insert(&self, index: usize) -> bool {
-        let (word, bit) = (&self.0[index / 64], 1 << (index % 64));
+        let word = &self.0[index / 64];
+        let bit = 1 << (index % 64);
         // Read first, because the box is almost always marked already and a load is far cheaper
         // than an atomic exchange.
         word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0

@@ -236,9 +236,10 @@ fn read_files(
         let path = entry.map_err(failed(folder))?.path();
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
         let name = format!("{under}{}", name.unwrap_or_default());
-        match path.is_dir() {
-            true => read_files(&path, &format!("{name}/"), files)?,
-            false => files.push((name, fs::read(&path).map_err(failed(&path))?)),
+        if path.is_dir() {
+            read_files(&path, &format!("{name}/"), files)?;
+        } else {
+            files.push((name, fs::read(&path).map_err(failed(&path))?));
         }
     }
     Ok(())

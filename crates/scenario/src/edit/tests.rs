@@ -271,9 +271,9 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
     let source = Source::new("s.toml", TEXT, "");
     let infinite = serde_json::Number::from_f64(f64::NAN).map_or(Value::Null, Value::Number);
     for (edit, cause, remedy) in [
-        (set("robots.count", json!(1)), "does not stand in a table", "by its number"),
+        (set("robots.count", json!(1)), "is not in a table", "the number of an element"),
         (set("robots.7.count", json!(1)), "no element 7, as there are 2", "count from 0"),
-        (set("seed.x", json!(1)), "does not stand in a table", "number"),
+        (set("seed.x", json!(1)), "is not in a table", "number"),
         (set("at.2", json!(1)), "no element 2", "count from 0"),
         (set("seed", Value::Null), "null", "leave the key out"),
         (set("seed", infinite), "null", "NaN"),
@@ -292,7 +292,7 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
         (rename("seed", "at"), "`at` already", "another name"),
         (rename("seed", ""), "empty", "give a name"),
         (rename("robots.0", "x"), "no name", "name a key"),
-        (paint("seed", &[]), "no drawing", "map.ascii"),
+        (paint("seed", &[]), "no map drawn in text", "map.ascii"),
     ] {
         let edits = [set("seed", json!(5)), edit.clone()];
         let error = source.edited(&edits).expect_err("it does not fit");

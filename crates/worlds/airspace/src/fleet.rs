@@ -117,8 +117,8 @@ impl AirspaceWorld {
         let mut read = BTreeMap::new();
         for (id, bytes) in controls {
             let refused = |cause: String| {
-                let who = format!("airplane {}", self.display_name(*id));
-                OrderError::Control { who, cause }
+                let agent = format!("airplane {}", self.display_name(*id));
+                OrderError::Control { agent, cause }
             };
             let control =
                 self.read_control(*id, bytes, percepts.get(id).copied()).map_err(refused)?;

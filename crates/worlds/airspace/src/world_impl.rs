@@ -17,7 +17,9 @@ use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
 };
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_kernel::{
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
@@ -42,7 +44,8 @@ impl CompiledAirspace {
         let collector =
             Collector { counters, rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, state, collector, &source.text, workers)
+        let start = RunStart { config: plan, state, collector };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

@@ -119,7 +119,7 @@ pub struct TaskProgress {
     /// Smallest distance to its present target so far, meters.
     pub nearest_m: f64,
     /// Kind of the last event reported since a motion went as wished.
-    pub told: Option<EventKind>,
+    pub last_event: Option<EventKind>,
     /// The last objection in this part of the task.
     pub objection: Option<VetoRecord>,
     /// Its rung on the ladder after vetoes.
@@ -161,7 +161,7 @@ impl TaskProgress {
             start: Turtle { position_m: [0.0; 3], ahead: [0.0; 3], left: [0.0; 3] },
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
-            told: None,
+            last_event: None,
             objection: None,
             ladder: RecoveryMemory::default(),
             leader: None,
@@ -177,7 +177,7 @@ impl TaskProgress {
         self.ahead = self.start.ahead;
         (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
         (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
-        (self.told, self.objection) = (None, None);
+        (self.last_event, self.objection) = (None, None);
         (self.ladder, self.way_m) = (RecoveryMemory::default(), TravelStats::default());
     }
 
@@ -185,7 +185,7 @@ impl TaskProgress {
     pub fn advance_part(&mut self) {
         self.next += 1;
         (self.rested, self.idle) = (0, 0);
-        (self.told, self.objection) = (None, None);
+        (self.last_event, self.objection) = (None, None);
         (self.nearest_m, self.late) = (f64::INFINITY, 0);
     }
 

@@ -132,10 +132,10 @@ impl<const D: usize> ChainWorld<D> {
             let near = |slot: &Slot| {
                 *slot != id && boxes[*slot as usize].meets(&boxes[id as usize].grown(self.look_m))
             };
-            scratch.around.gather(self, state, now, (0..state.len() as Slot).filter(near));
+            scratch.nearby.gather(self, state, now, (0..state.len() as Slot).filter(near));
             let body = &state.body(id as usize);
             let mut row = ObservationRow { row, rooms: room.iter_mut() };
-            self.observe_body(id, body, &scratch.around.all, &mut row);
+            self.observe_body(id, body, &scratch.nearby.all, &mut row);
             if !ordered.is_empty() {
                 self.observe_order_result(id, body, &mut row);
             }

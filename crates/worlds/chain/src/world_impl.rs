@@ -19,7 +19,7 @@ use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
 };
 use sidestep_kernel::{
-    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, Simulation, World,
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, Simulation, World,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -49,7 +49,8 @@ impl<const D: usize> ChainScenario<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
         let books = Collector { rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, state, books, &source.text, workers)
+        let start = RunStart { config: plan, state, collector: books };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

@@ -13,7 +13,9 @@ use sidestep_kernel::control::{BufferMut, Order, Teams};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_kernel::{
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
@@ -35,7 +37,8 @@ impl Compiled {
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let (plan, books) = (self.plan(), Collector::new(self.record));
-        Run::new(self.world, plan, state, books, &source.text, workers)
+        let start = RunStart { config: plan, state, collector: books };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

@@ -53,7 +53,7 @@ struct ReferenceMotion<'b, const D: usize> {
 
 /// An arm whose joints come along with its chain.
 pub(super) struct ArmFollower<'a, const D: usize> {
-    setting: ChainContext<'a, D>,
+    context: ChainContext<'a, D>,
     before: &'a PositionBuffer<D>,
     arm: &'a Arm,
     chain: &'a mut Chain<D>,
@@ -63,10 +63,10 @@ pub(super) struct ArmFollower<'a, const D: usize> {
 /// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
 /// passes bring it only so near.
 pub(super) fn arrival_tolerance_m<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     chain: &Chain<D>,
 ) -> f64 {
-    match setting.spec.arm.as_deref() {
+    match context.spec.arm.as_deref() {
         Some(arm) => arm.follower.arrival_tolerance_m(),
         None if !chain.is_plain() && is_held(chain) => TOLERANCE_M,
         None => chain.min_move_m(),
@@ -75,15 +75,16 @@ pub(super) fn arrival_tolerance_m<const D: usize>(
 
 /// Lets the joints come along with an initiator's motion; what they cannot do is vetoed.
 pub(super) fn follow_initiator<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     to: Point<D>,
     climbed: RecoveryOutcome<D>,
 ) -> RecoveryOutcome<D> {
-    let Some(mut arm) = ArmFollower::from_body(who.setting, acting.before, acting.body) else {
+    let Some(mut arm) = ArmFollower::from_body(initiator.context, acting.before, acting.body)
+    else {
         return climbed;
     };
-    let k = who.task.agent;
+    let k = initiator.task.agent;
     let (has_moved, at) = match climbed {
         // The chain reaches a place to some tolerance, the joints exactly.
         RecoveryOutcome::Straight(_) => (true, to),
@@ -93,7 +94,7 @@ pub(super) fn follow_initiator<const D: usize>(
         _ => (false, to),
     };
     let followed = arm.follow(&[LeadTarget { k, to: at }], MAX_TRIES).or_else(|veto| {
-        let decides = who.task.source() == RequestSource::Autonomous;
+        let decides = initiator.task.source() == RequestSource::Autonomous;
         if decides && arm.approach(LeadTarget { k, to }) { Ok(()) } else { Err(veto) }
     });
     match followed {
@@ -109,29 +110,29 @@ pub(super) fn follow_initiator<const D: usize>(
 impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the arm that a chain represents, if it does.
     pub(super) fn from_body(
-        setting: ChainContext<'a, D>,
+        context: ChainContext<'a, D>,
         before: &'a PositionBuffer<D>,
         body: &'a mut Body<D>,
     ) -> Option<Self> {
-        let (arm, joints) = (setting.spec.arm.as_deref()?, body.joints.as_mut()?);
-        Some(Self { setting, before, arm, chain: &mut body.chain, joints })
+        let (arm, joints) = (context.spec.arm.as_deref()?, body.joints.as_mut()?);
+        Some(Self { context, before, arm, chain: &mut body.chain, joints })
     }
 
     /// Lets the joints carry out an order: all of it, or nothing.
     pub(super) fn execute_order(
         &mut self,
-        errand: &StepMotion<D>,
+        step: &StepMotion<D>,
         part: f64,
         outcome: Outcome<D>,
     ) -> Outcome<D> {
-        let followed = match errand.motion(part) {
+        let followed = match step.motion(part) {
             Motion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
             Motion::Rod { i, to: [to, next] } => {
                 self.follow(&[LeadTarget { k: i, to }, LeadTarget { k: i + 1, to: next }], 1)
             }
         };
         match (followed, outcome) {
-            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(errand.first)),
+            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(step.first)),
             (Ok(()), moved) => moved,
             // Where the chain itself objects, it says more than its joints do.
             (Err(_), vetoed @ Outcome::Vetoed(_)) => vetoed,
@@ -235,7 +236,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         let aim =
             |led: &LeadTarget<D>| ConnectorTarget { connector: led.k, at_m: arm.to_base(led.to) };
         let aims: Vec<ConnectorTarget> = led.iter().map(aim).collect();
-        let room = arm.follower.reachable_ranges(&self.before.joints, self.setting.world.dt_s);
+        let room = arm.follower.reachable_ranges(&self.before.joints, self.context.world.dt_s);
         let joints = arm.follower.track(self.joints, &room, guide.as_deref(), &aims);
         let points = arm.connector_positions(&joints);
         ArmPosture { joints, points, led }
@@ -261,7 +262,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         if let Some(by) = (0..from.len()).find(is_fast) {
             return Some(veto(by, VetoReason::StepLimit));
         }
-        let ChainContext { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.context;
         let is_solid = world.rules.self_collision;
         let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
         let objection = space.find_veto(&posed.points);
@@ -272,7 +273,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
     /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
-        let world = self.setting.world;
+        let world = self.context.world;
         let escape_m = world.escape.as_ref().map(|e| e.speed_max_m_s * world.dt_s);
         let is_beyond = |from, most_m: f64| distance(from, to) > most_m * (1.0 + ROUNDING);
         is_beyond(from, world.rules.joint_step_max_m)
@@ -282,14 +283,14 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the rod's outer connector and the obstacle that it would pass through on the way to a posture, if any.
     fn find_tunneling(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<(usize, u32)> {
         self.chain.points_mut().copy_from_slice(&posed.points);
-        let passed = find_tunneling(self.chain, from, self.setting.obstacles, 0.0);
+        let passed = find_tunneling(self.chain, from, self.context.obstacles, 0.0);
         self.chain.points_mut().copy_from_slice(from);
         passed.map(|passed| (passed.rod + 1, passed.obstacle))
     }
 
     /// Returns the least clearance that the chain has, or would have, at some places.
     fn clearance_m(&mut self, points: &[Point<D>]) -> f64 {
-        let ChainContext { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.context;
         let was = self.chain.points().to_vec();
         self.chain.points_mut().copy_from_slice(points);
         let (least_m, _) = min_clearance(self.chain, obstacles, world.look_m, true);

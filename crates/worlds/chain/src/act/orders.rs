@@ -25,12 +25,12 @@ pub(super) fn take_orders<const D: usize>(body: &mut Body<D>) -> Orders {
 
 /// Returns the errand on which orders send a chain in this cycle, if they have a target.
 pub(super) fn step_from_orders<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     chain: &Chain<D>,
     orders: Orders,
 ) -> Option<StepMotion<D>> {
     let Orders { connector, rod, target, goes_far } = orders;
-    let agent = who.task.agent;
+    let agent = initiator.task.agent;
     let motion = match target? {
         Target::Connector(to) => {
             let k = connector.map_or(agent, |k| k as usize);
@@ -46,7 +46,7 @@ pub(super) fn step_from_orders<const D: usize>(
             Motion::Rod { i, to: to.map(with_dimensions) }
         }
     };
-    Some(StepMotion::new(chain, &motion, who.step_m()))
+    Some(StepMotion::new(chain, &motion, initiator.step_m()))
 }
 
 /// The manner of going on an errand.
@@ -60,43 +60,43 @@ pub(super) struct StepOptions {
 
 /// Goes on an errand, unless parts have to get out of the way.
 pub(super) fn execute_step<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
-    manner: StepOptions,
+    step: &StepMotion<D>,
+    options: StepOptions,
 ) {
-    let at = acting.body.chain.points()[errand.first];
-    acting.body.driving.way_m.wanted += norm(sub(errand.to[0], at));
-    let climbed = match manner.gives_way {
+    let at = acting.body.chain.points()[step.first];
+    acting.body.driving.way_m.wanted += norm(sub(step.to[0], at));
+    let climbed = match options.gives_way {
         true => RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) },
-        false => request_or_bisect(who.setting, acting, errand, manner.goes_far),
+        false => request_or_bisect(initiator.context, acting, step, options.goes_far),
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
-    acting.told.trace(|notes| notes.climbed = Some(climbed));
-    let way = sub(body.chain.points()[errand.first], at);
+    acting.sink.trace(|trace| trace.climbed = Some(climbed));
+    let displacement = sub(body.chain.points()[step.first], at);
     let driving = &mut body.driving;
-    driving.way_m.gone += norm(way);
-    driving.idle = if way == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
-    if let Some(ahead) = normalized(way).filter(|_| errand.first == who.task.agent) {
+    driving.way_m.gone += norm(displacement);
+    driving.idle = if displacement == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
+    if let Some(ahead) = normalized(displacement).filter(|_| step.first == initiator.task.agent) {
         driving.ahead = with_dimensions(ahead);
     }
-    body.tally.way_m += norm(way);
+    body.tally.way_m += norm(displacement);
 }
 
 /// Requests all of the way and, where that is vetoed and as much as goes is wanted, halves of what is
 /// left; tells the objection to the rest.
 fn request_or_bisect<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     goes_far: bool,
 ) -> RecoveryOutcome<D> {
-    let mut veto = match request_fraction(setting, acting, errand, 1.0) {
+    let mut veto = match request_fraction(context, acting, step, 1.0) {
         Outcome::Moved(moved) => {
             match &moved.cut_short {
                 Some(veto) => record_veto(acting, veto),
-                None => acting.body.driving.told = None,
+                None => acting.body.driving.last_event = None,
             }
             return RecoveryOutcome::Straight(moved);
         }
@@ -104,7 +104,7 @@ fn request_or_bisect<const D: usize>(
     };
     let (mut done, mut half, mut last) = (0.0, 0.5, None);
     for _ in 0..if goes_far { BISECTIONS } else { 0 } {
-        match request_fraction(setting, acting, errand, done + half) {
+        match request_fraction(context, acting, step, done + half) {
             Outcome::Moved(moved) => {
                 done += half;
                 last = Some(moved);
@@ -122,19 +122,19 @@ fn request_or_bisect<const D: usize>(
 
 /// Requests a part of an errand's way, counted from its start: all of that part, or nothing.
 fn request_fraction<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     part: f64,
 ) -> Outcome<D> {
-    let motion = errand.motion(part);
+    let motion = step.motion(part);
     let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let ActState { body, before, propagator, .. } = acting;
-    let outcome = execute_request(propagator, &mut body.chain, setting.obstacles, &request);
+    let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
     let outcome =
-        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, errand.first)));
-    let outcome = match ArmFollower::from_body(setting, before, body) {
-        Some(mut arm) => arm.execute_order(errand, part, outcome),
+        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
+    let outcome = match ArmFollower::from_body(context, before, body) {
+        Some(mut arm) => arm.execute_order(step, part, outcome),
         None => outcome,
     };
     if let Outcome::Moved(moved) = &outcome {
@@ -159,14 +159,14 @@ pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto
 /// Completes the answer at the end of the chain's motions.
 pub(super) fn complete_result<const D: usize>(
     body: &mut Body<D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     gives_way: bool,
 ) {
     let chain = &body.chain;
-    let done_share = errand.done_fraction(chain);
-    let reached = chain.points()[errand.first];
+    let done_share = step.done_fraction(chain);
+    let reached = chain.points()[step.first];
     let answer = &mut body.external.answer;
-    answer.wish_m = errand.to.map(with_dimensions);
+    answer.wish_m = step.to.map(with_dimensions);
     answer.came = match answer.veto {
         None if gives_way => OrderOutcome::Waited,
         None => OrderOutcome::Moved,

@@ -17,7 +17,7 @@ const MAX_LISTED_CONNECTORS: usize = 64;
 impl<const D: usize> ConnectorInspection<'_, D> {
     /// Tells the rung of the ladder on which the initiator ended.
     pub(super) fn add_recovery(&self, told: &mut Inspection) {
-        let Some(climbed) = &self.notes.climbed else { return };
+        let Some(climbed) = &self.trace.climbed else { return };
         let section = FactSection::new("Ladder");
         let (rung, moved) = match climbed {
             RecoveryOutcome::Straight(moved) => ("as wanted".into(), Some(moved)),
@@ -80,7 +80,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         told.add_section(
             FactSection::new("Moves")
                 .fact("connectors", FactValue::count(moved.len()))
-                .fact("motions out of the way", FactValue::count(self.notes.escapes))
+                .fact("motions out of the way", FactValue::count(self.trace.escapes))
                 .table(table),
         );
     }

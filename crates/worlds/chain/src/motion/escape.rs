@@ -193,9 +193,9 @@ impl<const D: usize> Escaper<D> {
         obstacles: &Obstacles<D>,
         rules: &Rules,
         lead: &LeadMotion<D>,
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) {
-        way_out.set_resting(self.simultaneous.should_rest(chain, obstacles, rules, lead));
+        escape_plan.set_resting(self.simultaneous.should_rest(chain, obstacles, rules, lead));
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
@@ -210,7 +210,7 @@ impl<const D: usize> Escaper<D> {
         obstacles: &Obstacles<D>,
         propagator: &mut Propagator<D>,
         start: &[Point<D>],
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) -> Result<EscapeReport<D>, InputError> {
         self.rules.check()?;
         if start.len() != chain.points().len() {
@@ -219,7 +219,7 @@ impl<const D: usize> Escaper<D> {
         }
         if self.rules.method == EscapeMethod::Simultaneous {
             let rules = propagator.rules;
-            return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, way_out));
+            return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, escape_plan));
         }
         let step_max_m = propagator.rules.slave_step_max_m;
         propagator.rules.slave_step_max_m = step_max_m.min(self.rules.max_step_m());

@@ -68,20 +68,20 @@ impl<const D: usize> SimultaneousEscape<D> {
         obstacles: &Obstacles<D>,
         rules: &Rules,
         start: &[Point<D>],
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) -> EscapeReport<D> {
         let thinnest_m = 4.0 * chain.step_m();
         let most_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (most_m / thinnest_m).ceil().max(1.0);
         let mut told = EscapeReport::default();
-        way_out.tick();
+        escape_plan.tick();
         for step in 1..=steps as usize {
             let most_m = most_m * step as f64 / steps;
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
             let given = SolveInput { chain, obstacles, rules, start: &at, most_m };
-            let goes_on = self.find_step(&given, way_out, &mut told);
+            let goes_on = self.find_step(&given, escape_plan, &mut told);
             if goes_on {
                 chain.points_mut().copy_from_slice(&self.best);
             }
@@ -93,7 +93,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         let ways_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
         let longest_m = ways_m.fold(0.0, f64::max);
         told.is_pressed = told.left.is_some()
-            || way_out.is_exiting()
+            || escape_plan.is_exiting()
             || longest_m > PRESSED_SPEED_FRACTION * most_m;
         told
     }
@@ -115,22 +115,22 @@ impl<const D: usize> SimultaneousEscape<D> {
     fn find_step(
         &mut self,
         given: &SolveInput<'_, D>,
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
         told: &mut EscapeReport<D>,
     ) -> bool {
         let margin = self.rules.look_ahead_margin();
         if !self.solver.find_contacts(given, margin) {
-            way_out.clear();
+            escape_plan.clear();
             return false;
         }
-        way_out.clear_if_passed(given, &self.solver);
+        escape_plan.clear_if_passed(given, &self.solver);
         let (before_m, nearest) = self.solver.min_gap(given, given.chain.points());
-        if before_m >= margin_around(given, margin, nearest) && !way_out.is_exiting() {
+        if before_m >= margin_around(given, margin, nearest) && !escape_plan.is_exiting() {
             return false;
         }
-        let mut gap_m = self.attempt(given, way_out.exit_direction(), before_m);
-        if way_out.plan(&self.rules, given, &self.solver, gap_m) {
-            gap_m = self.attempt(given, way_out.exit_direction(), before_m);
+        let mut gap_m = self.attempt(given, escape_plan.exit_direction(), before_m);
+        if escape_plan.plan(&self.rules, given, &self.solver, gap_m) {
+            gap_m = self.attempt(given, escape_plan.exit_direction(), before_m);
         }
         self.report(given, gap_m, nearest, told)
     }
