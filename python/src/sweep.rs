@@ -17,7 +17,7 @@ use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::world::Method;
+use sidestep::worlds::airspace::settings::Method;
 use sidestep_papers::methods;
 use sidestep_session::sweep::{
     self, CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task,

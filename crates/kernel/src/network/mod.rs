@@ -5,18 +5,23 @@
 //! faulty_transport.rs   a transport with the faults of a network
 //! fault_injector.rs     the same for the packets of one agent, in a process of its own
 //! packet.rs             packets: the envelope of every message
+//! retry.rs              when an agent asks again for what it misses
+//! agent.rs              the programs of agents, and the loop that runs several of them
 //! ```
 //!
 //! The network identifies agents by ids alone; worlds give them a meaning.
 
+mod agent;
 mod fault_injector;
 mod faulty_transport;
 mod links;
 mod packet;
+mod retry;
 
 use crate::math;
 use crate::ports::Faults;
 use crate::units::EntityId;
+pub use agent::{AgentLoop, NetworkAgent, OutgoingPacket, ReplyTiming};
 pub use fault_injector::FaultInjector;
 pub use faulty_transport::{Distances, FaultyTransport};
 pub use links::{
@@ -26,6 +31,7 @@ pub use packet::{
     ConversationId, DropCounts, DropReason, HEADER_BYTES, PacketBuffer, PacketHeader, Protocol,
     digest, fingerprint, parse_packet,
 };
+pub use retry::RetryTimer;
 
 /// Probability of giving up an agent that can be reached: one in a billion conversations.
 const FALSE_GIVE_UP_PROBABILITY: f64 = 1e-9;

@@ -87,17 +87,6 @@ struct RadioTimeouts {
     ticks: u64,
 }
 
-/// An outgoing packet.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutgoingPacket {
-    /// Id of the neighbor that it is for.
-    pub to: EntityId,
-    /// Its number among the sender's of the cycle.
-    pub sequence: u32,
-    /// Its bytes.
-    pub payload: Vec<u8>,
-}
-
 /// A position while a motion is prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TentativePosition<const D: usize> {
@@ -215,11 +204,6 @@ impl<const D: usize> ConnectorAgent<D> {
         Self { radio, ..self }
     }
 
-    /// Returns its id on the network.
-    pub fn id(&self) -> EntityId {
-        self.first_id + self.me
-    }
-
     /// Returns the name of its role in the present cycle, for display.
     pub fn role_name(&self) -> &'static str {
         if self.is_done() {
@@ -310,15 +294,6 @@ impl<const D: usize> ConnectorAgent<D> {
                 _ => {}
             }
         }
-    }
-
-    /// Receives a packet. One that is not from a neighbor, cannot be read or is invalid is counted and dropped.
-    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        self.now = self.now.max(tick);
-        let Err(reason) = self.receive(from, bytes) else { return };
-        self.dropped.record(reason);
-        // A late packet is of no use, but it is not the sender's fault, so it is not counted as traffic dropped.
-        self.traffic.dropped += u64::from(reason != DropReason::Stale);
     }
 
     fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), DropReason> {

@@ -33,7 +33,7 @@ pub(crate) mod side;
 pub(crate) mod traffic;
 
 pub use chain_controls::ChainControls;
-pub use connector::{ConnectorAgent, OutgoingPacket};
+pub use connector::ConnectorAgent;
 pub use control::{ConnectorMove, Control, ExecutedMotion, LeaderOutcome};
 pub use message::MotionProtocol;
 pub use percept::{ChainPercepts, ConnectorPercept, Intention, Role, SensedObstacle};

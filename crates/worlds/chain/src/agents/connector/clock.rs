@@ -1,15 +1,33 @@
 //! The timers of an agent, its outgoing packets, and the end of its cycle.
 
-use super::{ConnectorAgent, OutgoingPacket};
+use super::ConnectorAgent;
 use crate::agents::control::{ConnectorMove, Control};
 use crate::agents::link::Link;
 use crate::agents::message::{MotionProtocol, Packet};
 use crate::agents::side::Side;
-use sidestep_kernel::network::{ConversationId, PacketHeader};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{
+    ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketHeader,
+};
+use std::sync::Arc;
 
-impl<const D: usize> ConnectorAgent<D> {
-    /// Sends unconfirmed messages again, and treats a neighbor that never confirms as lost.
-    pub fn on_timer(&mut self, tick: u64) {
+impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
+    fn id(&self) -> EntityId {
+        self.first_id + self.me
+    }
+
+    /// Receives a packet. One that is not from a neighbor, cannot be read or is invalid is counted
+    /// and dropped.
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        self.now = self.now.max(tick);
+        let Err(why) = self.receive(from, bytes) else { return };
+        self.dropped.record(why);
+        // A packet that comes too late is of no use, and no sender's fault.
+        self.traffic.dropped += u64::from(why != DropReason::Stale);
+    }
+
+    /// Sends unconfirmed messages again, and gives up a neighbor that never confirms.
+    fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
         for side in Side::ALL {
             let link = self.links[side].as_mut().filter(|_| !self.is_silent);
@@ -23,21 +41,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.process();
     }
 
-    /// Ends the cycle at its deadline. A neighbor that has not been heard at all is lost.
-    fn end_cycle(&mut self) {
-        for side in Side::ALL {
-            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
-                self.mark_missing(side, side.neighbor(self.me, self.n));
-            }
-        }
-        self.give_up_leading();
-        self.climbing = None;
-        self.is_late = !self.is_over && self.nearest_missing().is_none();
-        self.is_closed = true;
-    }
-
-    /// Returns the tick of its next timer, if there is one.
-    pub fn next_timer(&self) -> Option<u64> {
+    fn next_timer(&self) -> Option<u64> {
         if self.is_done() {
             return None;
         }
@@ -45,13 +49,7 @@ impl<const D: usize> ConnectorAgent<D> {
         links.filter_map(Link::next_retry).chain(self.deadline()).min()
     }
 
-    /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
-    pub fn deadline(&self) -> Option<u64> {
-        self.radio.map(|radio| self.began.saturating_add(radio.ticks))
-    }
-
-    /// Returns the packets that it sends now.
-    pub fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
         let Some(cycle) = self.cycle else { return Vec::new() };
         if self.is_silent {
             return Vec::new();
@@ -77,11 +75,35 @@ impl<const D: usize> ConnectorAgent<D> {
             let payload = Packet { missing, parcel }.encode().into_packet(&header);
             self.traffic.count(payload.len());
             if let Some(link) = &mut self.links[side] {
-                link.record_size(payload.len());
+                link.record_packet(payload.len());
             }
-            out.push(OutgoingPacket { to: self.first_id + neighbor, sequence, payload });
+            out.push(OutgoingPacket {
+                to: Arc::from([self.first_id + neighbor]),
+                sequence,
+                payload,
+            });
         }
         out
+    }
+}
+
+impl<const D: usize> ConnectorAgent<D> {
+    /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
+    fn end_cycle(&mut self) {
+        for side in Side::ALL {
+            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
+                self.mark_missing(side, side.neighbor(self.me, self.n));
+            }
+        }
+        self.give_up_leading();
+        self.climbing = None;
+        self.is_late = !self.is_over && self.nearest_missing().is_none();
+        self.is_closed = true;
+    }
+
+    /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
+    pub fn deadline(&self) -> Option<u64> {
+        self.radio.map(|radio| self.began.saturating_add(radio.ticks))
     }
 
     /// Returns whether its cycle is over. It still answers questions of its neighbors.

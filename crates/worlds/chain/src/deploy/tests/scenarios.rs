@@ -5,6 +5,7 @@ use crate::scenario::ChainScenario;
 use crate::{ChainRun, chain_run};
 use serde_json::Value;
 use sidestep_kernel::control::ControlLog;
+use sidestep_kernel::network::NetworkAgent;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Digest, Simulation};
@@ -130,7 +131,7 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
                 let sent = agents[k].take_packets();
                 waiting.extend(sent.into_iter().map(|out| (agents[k].id(), out)));
                 while let Some((from, out)) = waiting.pop() {
-                    let to = (out.to - first) as usize;
+                    let to = (out.to[0] - first) as usize;
                     agents[to].on_packet(from, &out.payload, 0);
                     let sent = agents[to].take_packets();
                     waiting.extend(sent.into_iter().rev().map(|out| (agents[to].id(), out)));

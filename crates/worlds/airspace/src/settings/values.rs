@@ -50,7 +50,7 @@ bounds! {
 
 /// A number of rounds of an optimization.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rounds(pub(super) u32);
+pub(crate) struct Rounds(pub(crate) u32);
 
 impl<'de> Deserialize<'de> for Rounds {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -67,7 +67,7 @@ schema_by_hand!(Rounds, json!({ "type": "integer", "minimum": 1, "maximum": 10_0
 
 /// A number of turns to choose from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Turns(pub(super) usize);
+pub(crate) struct Turns(pub(crate) usize);
 
 impl<'de> Deserialize<'de> for Turns {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

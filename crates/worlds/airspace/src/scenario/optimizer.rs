@@ -1,10 +1,9 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
-use super::values::Held;
-use crate::baseline::ReactiveSettings;
 use crate::flight::Legs;
 use crate::objective::Objective;
+use crate::settings::{Held, ReactiveSettings};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
@@ -14,9 +13,10 @@ use sidestep_collectives::{
 use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{Closed, LeftOpen, Number, Rule as _, invalid_value, schema_by_hand};
 
-/// Largest number of samples of a block.
+/// Largest number of samples of a block. All of them are kept in memory, and with more an exact estimator is faster.
 const MAX_BLOCK_SAMPLES: usize = 10_000;
-/// Largest number of times in a list.
+/// Largest number of times in a list. Each adds as many actions as there are turn rates, and the cost of a pair grows
+/// with the square of the number of actions.
 const MAX_TIMES: usize = 20;
 
 /// A list of times.
@@ -65,11 +65,11 @@ type LookAhead = LeftOpen<0, 100_000>;
 type Margin = Closed<1, 10>;
 
 impl ReactiveSection {
-    /// Returns the settings, with other values where none are given.
-    pub(super) fn or_default(&self, usual: ReactiveSettings) -> ReactiveSettings {
+    /// Returns the settings, with those of `default` where none are given.
+    pub(super) fn or_default(&self, default: ReactiveSettings) -> ReactiveSettings {
         ReactiveSettings {
-            look_ahead_s: self.look_ahead_s.map_or(usual.look_ahead_s, f64::from),
-            margin: self.margin.map_or(usual.margin, f64::from),
+            look_ahead_s: self.look_ahead_s.map_or(default.look_ahead_s, f64::from),
+            margin: self.margin.map_or(default.margin, f64::from),
         }
     }
 }
@@ -99,16 +99,16 @@ schema_by_hand!(Switch, json!({ "enum": ["on", "off"], "default": "on" }));
 
 impl Compiler<'_> {
     /// Returns the objective. Its sums are over points, and the scenario's weights are per second:
-    /// however fine the points are, the same ways have the same order.
+    /// however fine the points are, the same paths have the same order.
     pub(super) fn objective(&self, vertical_m: f64, dtau_s: f64) -> Objective {
         let section = &self.file.airspace;
-        let paper = self.is_paper();
+        let is_paper = self.is_paper();
         let beta_per_s = section.beta.map_or(0.995, f64::from);
         Objective {
-            alpha: section.alpha.map_or(if paper { 1.0 } else { 0.001 }, f64::from) / dtau_s,
+            alpha: section.alpha.map_or(if is_paper { 1.0 } else { 0.001 }, f64::from) / dtau_s,
             // The power is left out where it changes nothing, so that it rounds nothing either.
             beta: if dtau_s == 1.0 { beta_per_s } else { math::powf(beta_per_s, dtau_s) },
-            inflation: section.inflation.map_or(if paper { 1.0 } else { 1.12 }, f64::from),
+            inflation: section.inflation.map_or(if is_paper { 1.0 } else { 1.12 }, f64::from),
             mask: true,
             vertical_m,
         }
@@ -116,18 +116,18 @@ impl Compiler<'_> {
 
     pub(super) fn settings(&self) -> Result<OptimizerConfig, InputError> {
         let section = &self.file.airspace;
-        let paper = self.is_paper();
+        let is_paper = self.is_paper();
         let estimator =
-            if paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
+            if is_paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
         let estimator = self.estimator()?.unwrap_or(estimator);
-        let choice = if paper { Choice::Draw } else { Choice::Argmax };
-        let order = if paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
+        let choice = if is_paper { Choice::Draw } else { Choice::Argmax };
+        let order = if is_paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
         Ok(OptimizerConfig {
             estimator,
             update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: self.utility(estimator)?,
-            cooling: section.cooling.map_or(if paper { 0.8 } else { 0.7 }, f64::from),
+            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.7 }, f64::from),
             stop: StopCriterion {
                 threshold: 1e-3,
                 calm_rounds: 3,
@@ -177,19 +177,20 @@ impl Compiler<'_> {
             return Ok(if self.is_paper() { Legs::default() } else { Legs::default_preset() });
         };
         let LegsSection { turns_s: Times(turns_s), until_s: Times(until_s) } = given.get_ref();
-        let wrong = |cause: String, remedy: &str| self.source.error(given.span(), cause, remedy);
         if turns_s.is_empty() != until_s.is_empty() {
             let cause = "legs with one of turns_s and until_s";
-            return Err(wrong(cause.into(), "give both, or neither for no legs"));
+            let remedy = "give both, or neither for no legs";
+            return Err(self.source.error(given.span(), cause, remedy));
         }
-        let longest_s = turns_s.iter().copied().fold(0.0, f64::max);
-        let soonest_s = until_s.iter().copied().fold(f64::INFINITY, f64::min);
-        if longest_s >= soonest_s {
-            let cause =
-                format!("a leg whose turn takes {longest_s} s, and that ends after {soonest_s} s");
+        let longest_turn_s = turns_s.iter().copied().fold(0.0, f64::max);
+        let earliest_end_s = until_s.iter().copied().fold(f64::INFINITY, f64::min);
+        if longest_turn_s >= earliest_end_s {
+            let cause = format!(
+                "a leg whose turn takes {longest_turn_s} s, and that ends after {earliest_end_s} s"
+            );
             let remedy = "give turns_s that are all shorter than each until_s; turns without a leg \
                           are holds_s";
-            return Err(wrong(cause, remedy));
+            return Err(self.source.error(given.span(), cause, remedy));
         }
         Ok(Legs { turns_s: turns_s.clone(), until_s: until_s.clone() })
     }
