@@ -35,7 +35,7 @@ pub struct AgentflyConfig {
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
     pub seeds: usize,
-    /// Most cycles of each run.
+    /// Maximum number of cycles of each run.
     pub cycles: u64,
     /// Workers.
     pub workers: usize,
@@ -97,7 +97,7 @@ pub struct AgentflyReport {
     pub claims: Vec<Claim>,
     /// Measurements over real sockets, once there are any.
     sockets: Option<SocketMeasurements>,
-    /// Ways of the airplanes of the largest team with the first seed, meters.
+    /// Tracks of the airplanes of the largest team with the first seed, meters.
     tracks_m: Vec<Vec<AirPoint>>,
 }
 
@@ -109,7 +109,7 @@ const LINK_BIT_S: f64 = 1e8;
 const LATENCY_S: f64 = 0.001;
 /// Rates for which times are shown beside, bits per second.
 const COMPARED_LINKS_BIT_S: [f64; 4] = [1e6, 1e7, LINK_BIT_S, 1e9];
-/// Number of airplanes from which on the paper finds its coordinator slow.
+/// Minimum number of airplanes for which the paper finds its coordinator slow.
 const MIN_SLOW_AIRPLANES: u64 = 5;
 const COMPARED_DEPLOYMENTS: [&str; 2] = ["team", "pim"];
 
@@ -220,7 +220,7 @@ pub fn run(
     Ok(AgentflyReport { plan: plan.clone(), cells, claims, sockets: None, tracks_m })
 }
 
-/// Returns the ways of `n` airplanes with the first seed.
+/// Returns the tracks of `n` airplanes with the first seed.
 fn tracks_m(plan: &AgentflyConfig, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
     let settings = [
         setting(AIRPLANES, n as i64),
@@ -229,7 +229,7 @@ fn tracks_m(plan: &AgentflyConfig, n: usize) -> Result<Vec<Vec<AirPoint>>, Input
     ];
     let mut run = airspace_run(&source(SCENARIO, &settings)?, 1)?;
     let mut tracks = vec![Vec::new(); n];
-    let mut note = |run: &dyn Simulation| {
+    let mut record = |run: &dyn Simulation| {
         for (track, cell) in tracks.iter_mut().zip(&downcast::<AirspaceRun>(run).state().airplanes)
         {
             let at = cell.pose().at;
@@ -238,16 +238,16 @@ fn tracks_m(plan: &AgentflyConfig, n: usize) -> Result<Vec<Vec<AirPoint>>, Input
             }
         }
     };
-    note(&run);
-    run_to_end(&mut run, note);
+    record(&run);
+    run_to_end(&mut run, record);
     Ok(tracks)
 }
 
 /// Returns team and coordinator at each number of airplanes at which either sent any message.
 fn deployment_pairs(cells: &[CaseResults]) -> impl Iterator<Item = (&CaseResults, &CaseResults)> {
-    let talks = |cell: &CaseResults| cell.number("messages") > 0.0;
+    let has_messages = |cell: &CaseResults| cell.number("messages") > 0.0;
     let both = cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
-    both.filter(move |(team, pim)| talks(team) && talks(pim))
+    both.filter(move |(team, pim)| has_messages(team) && has_messages(pim))
 }
 
 /// A quantity of the flights of one case.
@@ -514,7 +514,7 @@ mod tests {
     }
 
     /// Numbers of one deployment with some airplanes.
-    struct Made {
+    struct Numbers {
         elapsed_s: f64,
         optimization_s: f64,
         messages: f64,
@@ -522,7 +522,7 @@ mod tests {
         multicast_bytes: f64,
     }
 
-    fn made(airplanes: u64, deployment: &str, of: &Made) -> CaseResults {
+    fn results(airplanes: u64, deployment: &str, of: &Numbers) -> CaseResults {
         // As they differ by seed in a real experiment, but little.
         let spread = |value: f64, seed: usize| value * (1.0 + 0.001 * seed as f64);
         let seeds = AgentflyConfig::default().seeds;
@@ -539,46 +539,41 @@ mod tests {
             .map(|(name, value)| (name, spread(value, seed)))
             .into()
         };
-        let came = [
+        let columns = [
             ("airplanes", Value::Count(airplanes)),
             ("deployment", Value::Word(deployment.into())),
             ("optimization_s", estimate(of.optimization_s)),
             ("messages", estimate(of.messages)),
             ("by_seed", Value::BySeed((0..seeds).map(of_run).collect())),
         ];
-        CaseResults::new([], came)
+        CaseResults::new([], columns)
     }
 
     /// Team and coordinator with numbers that the paper would be right with, or wrong.
     fn paper(is_right: bool, airplanes: u64) -> [CaseResults; 2] {
         let n = airplanes as f64;
         let multicast_bytes = if is_right { n } else { n * n };
-        let team = Made {
+        let team = Numbers {
             elapsed_s: 1.0,
             optimization_s: 0.1,
             messages: n * n,
             bytes: n * n,
             multicast_bytes,
         };
-        let pim = match is_right {
-            true => Made {
+        let pim = if is_right {
+            Numbers {
                 elapsed_s: 2.0,
                 optimization_s: 6.0,
                 messages: n,
                 bytes: 9.0 * n * n * n,
                 ..team
-            },
-            false => Made {
-                elapsed_s: 0.5,
-                optimization_s: 4.0,
-                messages: 2.0 * n * n,
-                bytes: n,
-                ..team
-            },
+            }
+        } else {
+            Numbers { elapsed_s: 0.5, optimization_s: 4.0, messages: 2.0 * n * n, bytes: n, ..team }
         };
         [
-            made(airplanes, COMPARED_DEPLOYMENTS[0], &team),
-            made(airplanes, COMPARED_DEPLOYMENTS[1], &pim),
+            results(airplanes, COMPARED_DEPLOYMENTS[0], &team),
+            results(airplanes, COMPARED_DEPLOYMENTS[1], &pim),
         ]
     }
 
@@ -595,14 +590,14 @@ mod tests {
 
     #[test]
     fn what_is_not_there_decides_nothing() {
-        let nobody = Made {
+        let nobody = Numbers {
             elapsed_s: 0.0,
             optimization_s: f64::NAN,
             messages: 0.0,
             bytes: 0.0,
             multicast_bytes: 0.0,
         };
-        let silent = |n| COMPARED_DEPLOYMENTS.map(|deployment| made(n, deployment, &nobody));
+        let silent = |n| COMPARED_DEPLOYMENTS.map(|deployment| results(n, deployment, &nobody));
         assert_eq!(verdicts(&[silent(5), silent(6)]), [Verdict::Undecided; 8]);
         // Numbers of airplanes that never met are left out of all ratios; one number shows no growth.
         let some = judge(&[silent(2), paper(true, 5)].concat());

@@ -1,5 +1,5 @@
-//! Results, shared by all papers: columns, each declared once, that say how the runs of a case are
-//! summed up -> cells, which are printed as a table, kept as JSON and read by claims.
+//! Results of cases, shared by all papers: columns, each declared once, that say how the runs of a case are summed up. The
+//! results are printed as a table, kept as JSON and read by claims.
 
 use crate::study::{StudyResults, setting_number};
 use serde::ser::SerializeMap;
@@ -116,7 +116,7 @@ impl CaseRuns<'_> {
         Value::Count(self.iter_runs().filter(|run| holds(run)).count() as u64)
     }
 
-    /// Returns the least value of the runs that have it.
+    /// Returns the smallest value of the runs that have it.
     pub(crate) fn min_value(&self, metric: &str) -> Option<f64> {
         min_value(self.iter_runs().map(|run| run.number(metric)))
     }
@@ -181,16 +181,16 @@ impl Columns {
 
     /// Returns the cells as a table.
     pub(crate) fn table(&self, title: &str, note: &str, cells: &[CaseResults]) -> Table {
-        let shown: Vec<&Column> =
+        let columns: Vec<&Column> =
             self.case.iter().chain(self.results).filter(|c| !c.head.is_empty()).collect();
-        let heads: Vec<&str> = shown.iter().map(|c| c.head).collect();
+        let heads: Vec<&str> = columns.iter().map(|c| c.head).collect();
         let mut table = Table::new(title, note, &heads);
         for cell in cells {
-            let words = |c: &&Column| match c.show {
+            let text = |c: &&Column| match c.show {
                 Some(show) => show(cell),
                 None => cell.value(c.name).to_string(),
             };
-            table.push_row(shown.iter().map(words));
+            table.push_row(columns.iter().map(text));
         }
         table
     }
@@ -263,9 +263,9 @@ impl CaseResults {
     #[cfg(test)]
     pub(crate) fn new(
         case: impl IntoIterator<Item = (&'static str, Value)>,
-        came: impl IntoIterator<Item = (&'static str, Value)>,
+        results: impl IntoIterator<Item = (&'static str, Value)>,
     ) -> Self {
-        Self { case: case.into_iter().collect(), results: came.into_iter().collect(), runs: 10 }
+        Self { case: case.into_iter().collect(), results: results.into_iter().collect(), runs: 10 }
     }
 
     /// Replaces a value.
@@ -286,8 +286,8 @@ impl CaseResults {
     /// If the experiment has no such column.
     pub(crate) fn value(&self, name: &str) -> &Value {
         let mut all = self.case.iter().chain(&self.results);
-        let found = all.find(|(own, _)| *own == name).map(|(_, value)| value);
-        found.unwrap_or_else(|| panic!("there is no column `{name}`"))
+        let value = all.find(|(own, _)| *own == name).map(|(_, value)| value);
+        value.unwrap_or_else(|| panic!("there is no column `{name}`"))
     }
 
     /// Returns a number of any kind; a mean is 0 if nothing was measured.
@@ -430,12 +430,17 @@ pub(crate) fn bars<'a>(
 
 /// Returns a figure of lines.
 pub(crate) fn figure(title: &str, [x, y]: [&str; 2], series: impl Into<Vec<Series>>) -> Figure {
-    let (title, x_label, y_label) = (title.into(), x.into(), y.into());
-    Figure { title, x_label, y_label, series: series.into(), ..Figure::default() }
+    Figure {
+        title: title.into(),
+        x_label: x.into(),
+        y_label: y.into(),
+        series: series.into(),
+        ..Figure::default()
+    }
 }
 
-/// A number of runs out of several, with the 95 % interval of its share of all runs, by Clopper and
-/// Pearson.
+/// A number of runs out of several, with the 95 % interval of its share of all runs, by Clopper and Pearson: it never covers
+/// less than 95 %, also for shares near 0 and 1, which are what claims are about.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Proportion {
     /// Number of runs in which it was true,
@@ -494,7 +499,7 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     percentile(&values, 0.5).unwrap_or(0.0)
 }
 
-/// Returns the least of the values that are present.
+/// Returns the smallest of the values that are present.
 pub(crate) fn min_value(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
     values.into_iter().flatten().reduce(f64::min)
 }
@@ -504,7 +509,7 @@ pub(crate) fn max_value(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
-/// Returns a length in millimeters, with its sign, or words if nothing came near.
+/// Returns a length in millimeters, with its sign, or `far` if there is none.
 pub(crate) fn format_mm(value_m: Option<f64>) -> String {
     match value_m {
         None => "far".into(),

@@ -1,4 +1,4 @@
-//! Words of the reports, shared by all papers, and verdicts over several results.
+//! Claims and experiments as the reports print them, shared by all papers, and verdicts over several results.
 
 use crate::cells::{CaseResults, Proportion};
 use serde::Deserialize;
@@ -57,13 +57,14 @@ impl ClaimsFile {
     /// Returns the experiments, with their figures and tables in the order of the file.
     pub(crate) fn experiments(
         &'static self,
-        came: impl IntoIterator<Item = (Vec<Figure>, Vec<Table>)>,
+        results: impl IntoIterator<Item = (Vec<Figure>, Vec<Table>)>,
     ) -> Vec<Experiment> {
-        let told = |(told, (figures, tables)): (&'static ExperimentText, _)| {
-            let ExperimentText { title, about } = told;
-            Experiment { title, about, figures, tables }
-        };
-        self.experiment.iter().zip(came).map(told).collect()
+        let mut experiments = Vec::new();
+        for (text, (figures, tables)) in self.experiment.iter().zip(results) {
+            let ExperimentText { title, about } = text;
+            experiments.push(Experiment { title, about, figures, tables });
+        }
+        experiments
     }
 
     /// Returns the report of a paper: its claims, pictures, experiments, and the command that makes
@@ -88,15 +89,21 @@ impl ClaimsFile {
 
     /// Returns a claim by its number, its verdict, and our figures.
     pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
-        let told = self.claim.iter().find(|told| told.id == id);
-        let told = told.unwrap_or_else(|| panic!("there is no claim `{id}`"));
-        let (reason, papers_figure) = (told.rule.clone(), told.papers_figure.as_deref());
-        Claim { id: &told.id, paper: &told.paper, papers_figure, ours, verdict, reason }
+        let text = self.claim.iter().find(|claim| claim.id == id);
+        let text = text.unwrap_or_else(|| panic!("there is no claim `{id}`"));
+        Claim {
+            id: &text.id,
+            paper: &text.paper,
+            papers_figure: text.papers_figure.as_deref(),
+            ours,
+            verdict,
+            reason: text.rule.clone(),
+        }
     }
 }
 
-/// Fewest runs that decide anything: below it Student's interval should not be trusted, and a rule
-/// that held in every run was hardly tried.
+/// Minimum number of runs that decide anything: with fewer, Student's interval should not be trusted, and a rule that held
+/// in every run was hardly tried.
 pub(crate) const MIN_RUNS: usize = 5;
 
 /// Level of all tests; that of the 95 % intervals.
@@ -124,8 +131,8 @@ impl ThresholdTest {
 
     fn new(estimate: &Estimate, threshold: f64, agrees: impl Fn(f64) -> bool) -> Self {
         let p = estimate.p_value(threshold).filter(|_| estimate.n >= MIN_RUNS);
-        // Values that are all the threshold itself, but for rounding, are surely not on the side of
-        // the claim.
+        // Values that all equal the threshold, but for rounding, have no spread, so a test of the mean is undefined; and they
+        // are certainly not on the side of the claim.
         let is_threshold =
             |i: &Interval| i.low == i.high && (i.low - threshold).abs() <= 1e-12 * threshold.abs();
         if p.is_some() && estimate.interval.as_ref().is_some_and(is_threshold) {
@@ -169,10 +176,12 @@ pub(crate) fn judge_thresholds(family: impl IntoIterator<Item = ThresholdTest>) 
 
 /// Judges a rule for every one of `runs` runs: a single counterexample refutes it.
 pub(crate) fn judge_every_run(runs: usize, holds: bool) -> Verdict {
-    match holds {
-        false => Verdict::Refuted,
-        true if runs >= MIN_RUNS => Verdict::Held,
-        true => Verdict::Undecided,
+    if !holds {
+        Verdict::Refuted
+    } else if runs >= MIN_RUNS {
+        Verdict::Held
+    } else {
+        Verdict::Undecided
     }
 }
 
@@ -181,17 +190,23 @@ pub(crate) fn judge_all_runs<'a>(
     cells: impl IntoIterator<Item = &'a CaseResults>,
     holds: impl Fn(&CaseResults) -> bool,
 ) -> Verdict {
-    let (mut runs, mut all) = (0, true);
+    let mut runs = 0;
+    let mut holds_always = true;
     for cell in cells {
         runs += cell.runs();
-        all &= holds(cell);
+        holds_always &= holds(cell);
     }
-    judge_every_run(runs, all)
+    judge_every_run(runs, holds_always)
 }
 
 /// Judges a rule for every trial of every share.
 pub(crate) fn judge_all_trials<'a>(shares: impl IntoIterator<Item = &'a Proportion>) -> Verdict {
-    let (trials, hits) = shares.into_iter().fold((0, 0), |(n, hits), s| (n + s.n, hits + s.hits));
+    let mut trials = 0;
+    let mut hits = 0;
+    for share in shares {
+        trials += share.n;
+        hits += share.hits;
+    }
     judge_every_run(trials as usize, hits == trials)
 }
 
@@ -206,13 +221,13 @@ pub(crate) fn combined_verdict(verdicts: &[Verdict]) -> Verdict {
     }
 }
 
-/// Lists a text for each of them, one after the other.
+/// Lists a text for each item, one after the other.
 pub(crate) fn join_texts<T>(
-    them: impl IntoIterator<Item = T>,
-    told: impl Fn(T) -> String,
+    items: impl IntoIterator<Item = T>,
+    text: impl Fn(T) -> String,
 ) -> String {
-    let words: Vec<String> = them.into_iter().map(told).collect();
-    if words.is_empty() { "nothing measured".into() } else { words.join("; ") }
+    let texts: Vec<String> = items.into_iter().map(text).collect();
+    if texts.is_empty() { "nothing measured".into() } else { texts.join("; ") }
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The experiments of three papers, rerun, and the verdicts on their claims.
+//! The experiments of three papers, run again, and the verdicts on their claims.
 //!
 //! ```text
 //! agentfly.rs   the source paper of the airspace world; agentfly/ has its flights over real sockets
@@ -7,8 +7,8 @@
 //! methods.rs    methods of the airspace world on the same traffic
 //! study.rs      a sweep file and its scenario -> the table of its runs
 //! scene.rs      the content of a picture
-//! cells.rs      the table of runs -> a cell for every case: as JSON, a table, points of figures
-//! claims.rs     verdicts over cells
+//! cells.rs      the table of runs -> results of every case: as JSON, a table, points of figures
+//! claims.rs     verdicts over results
 //! ```
 //!
 //! Nothing here draws a figure or writes a file: results are data, reports are documents.

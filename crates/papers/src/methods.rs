@@ -94,25 +94,25 @@ pub fn compare_with_interrupt(
             .clone()
             .with_overrides(&[setting("airspace.method", method.name()).to_override()])?;
         let report = |share| progress(method.name(), share);
-        let flights = MethodRuns { source: &source, workers, interrupt };
-        let (change, all) = flights.run_seeds(seeds, report)?;
-        results.push(method_result(method.name(), change, &all));
+        let runs = MethodRuns { source: &source, workers, interrupt };
+        let (effect, metrics) = runs.run_seeds(seeds, report)?;
+        results.push(method_result(method.name(), effect, &metrics));
     }
     Ok(results)
 }
 
-/// A scenario to be flown with several seeds.
+/// The runs of a scenario with several seeds.
 struct MethodRuns<'a> {
     source: &'a Source,
     workers: usize,
     interrupt: &'a Interrupt,
 }
 
-/// Number of flights that show whether seeds change anything, where the world cannot tell.
+/// Number of runs that show whether seeds change anything, where the world does not know it.
 const PILOT_RUNS: usize = 2;
 
 impl MethodRuns<'_> {
-    /// Flies with as many seeds as are of use, and returns the effect of seeds.
+    /// Runs with as many seeds as are of use, and returns the effect of seeds.
     fn run_seeds(
         &self,
         SeedSpan { first, runs }: SeedSpan,
@@ -152,8 +152,8 @@ impl MethodRuns<'_> {
     }
 }
 
-fn metrics_of(flights: &[(Metrics, Digest)]) -> Vec<Metrics> {
-    flights.iter().map(|(metrics, _)| metrics.clone()).collect()
+fn metrics_of(runs: &[(Metrics, Digest)]) -> Vec<Metrics> {
+    runs.iter().map(|(metrics, _)| metrics.clone()).collect()
 }
 
 /// Runs a scenario to its end.
@@ -227,7 +227,7 @@ fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
     }
 }
 
-/// Returns the sentence without which the shield's deeds would pass for those of a method.
+/// Returns the sentence without which the actions of the shield would pass for those of a method.
 fn shield_note(results: &[MethodResult]) -> Option<String> {
     let changed = |r: &&MethodResult| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0);
     let names: Vec<_> = results.iter().filter(changed).map(|r| r.method).collect();
@@ -247,27 +247,27 @@ fn table_note(results: &[MethodResult]) -> String {
         let names = names.collect::<Vec<_>>().join(", ");
         (!names.is_empty()).then_some(names)
     };
-    let mut words = vec!["Every method flies the same traffic.".to_string()];
-    words.extend(shield_note(results));
+    let mut sentences = vec!["Every method flies the same traffic.".to_string()];
+    sentences.extend(shield_note(results));
     if of(SeedEffect::Decide).is_some() {
-        words.push("Means over runs, with their 95 % intervals.".into());
+        sentences.push("Means over runs, with their 95 % intervals.".into());
     }
     if let Some(names) = of(SeedEffect::Nothing) {
-        words.push(format!(
+        sentences.push(format!(
             "Seeds change nothing with {names}: no random number is drawn. So there is one run, and \
              no interval."
         ));
     }
     if let Some(names) = of(SeedEffect::Perhaps) {
-        words.push(format!(
+        sentences.push(format!(
             "Seeds are taken to change nothing with {names}: two runs with different seeds ended in \
              the same state, to the bit. So there is no interval."
         ));
     }
     if results.iter().all(|result| result.seeds != SeedEffect::Decide) {
-        words.extend(WORLDS.find("airspace").and_then(seed_remedy));
+        sentences.extend(WORLDS.find("airspace").and_then(seed_remedy));
     }
-    words.join(" ")
+    sentences.join(" ")
 }
 
 #[cfg(test)]
@@ -284,9 +284,9 @@ mod tests {
                     [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
                     [[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\nway_points_m = [[0, 500]]\n";
         let source = Source::new("two", text, "");
-        let found = compare(&source, &Method::ALL, seeds(5), 2, &mut |_, _| ()).expect("valid");
-        let table = table("t", &found);
-        for (result, row) in found.iter().zip(&table.rows) {
+        let results = compare(&source, &Method::ALL, seeds(5), 2, &mut |_, _| ()).expect("valid");
+        let table = table("t", &results);
+        for (result, row) in results.iter().zip(&table.rows) {
             assert_eq!((result.runs, result.losses.n), (1, 1), "{}", result.method);
             assert!(result.loss_free_interval.is_none());
             let has_mark = |cell: &String| cell.contains("[") || cell.contains("n=");
@@ -303,10 +303,10 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
         let methods = [Method::Pc, Method::None];
-        let found = compare(&source, &methods, seeds(3), 2, &mut |_, _| ()).expect("valid");
-        assert_eq!((found[0].loss_free, found[1].loss_free), (3, 0));
-        assert_eq!(found[0].arrived.mean, Some(1.0));
-        let table = table("t", &found);
+        let results = compare(&source, &methods, seeds(3), 2, &mut |_, _| ()).expect("valid");
+        assert_eq!((results[0].loss_free, results[1].loss_free), (3, 0));
+        assert_eq!(results[0].arrived.mean, Some(1.0));
+        let table = table("t", &results);
         let [pc, none] = &table.rows[..] else { panic!("two rows: {table:?}") };
         assert!(pc[0] == "pc" && pc[1].starts_with("3/3"), "{pc:?}");
         assert!(none[0] == "none" && none[1].starts_with("0/3"), "{none:?}");
@@ -318,9 +318,10 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
-        let found = compare(&source, &[Method::None], seeds(2), 2, &mut |_, _| ()).expect("valid");
-        assert_eq!(found[0].loss_free, 2);
-        let note = table("t", &found).note;
+        let results =
+            compare(&source, &[Method::None], seeds(2), 2, &mut |_, _| ()).expect("valid");
+        assert_eq!(results[0].loss_free, 2);
+        let note = table("t", &results).note;
         assert!(note.contains("The shield changed commands of none:"), "{note}");
     }
 }

@@ -2,7 +2,7 @@
 
 use sidestep::kernel::view::{Frame, Scenery, Trail};
 
-/// A moment of a run, the ways that led to it, and words.
+/// A moment of a run, the trails that led to it, and texts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Its title: the content of the picture.
@@ -13,6 +13,6 @@ pub struct Scene {
     pub scenery: Scenery,
     /// The visible bodies.
     pub frame: Frame,
-    /// The ways that led to it.
+    /// The trails that led to it.
     pub trails: Vec<Trail>,
 }

@@ -1,4 +1,4 @@
-//! Runs, shared by all papers: a sweep file and its scenario -> the table of its runs.
+//! Studies, shared by all papers: a sweep file and its scenario -> the table of its runs.
 //!
 //! The sweep files and scenarios are those of `scenarios/papers/`, which `sidestep sweep` and
 //! `sidestep run` accept unchanged. A plan keeps only some of a sweep's variants, or runs it
@@ -27,7 +27,7 @@ pub(crate) fn sub_progress(
     move |what, share| progress(what, from + (to - from) * share)
 }
 
-/// Runs between two reports of progress, per worker.
+/// Number of runs between two reports of progress, per worker: fewer would let workers wait for the slowest run too often.
 const BATCH_RUNS: usize = 8;
 
 /// Runs every item on one of up to `workers` workers; results in the order of the items.
@@ -200,26 +200,32 @@ impl Study {
 /// Makes the scenario of a cell.
 pub(crate) type ScenarioFn<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
 
-/// Returns the outcome of a run that is no run of a scenario: its values by name.
+/// Returns the outcome of an experiment that is no run of a scenario: its values by name.
 pub(crate) fn outcome_from_values(cell: &Cell, values: Value) -> Outcome {
     let metrics = match values {
         Value::Object(metrics) => metrics,
         _ => Map::new(),
     };
-    let (digest, costs) = (String::new(), Map::new());
-    Outcome { cell: cell.id, cycles: 0, digest, failure: None, metrics, costs }
-}
-
-/// Runs a simulation to its end, and calls `look` after every cycle.
-pub(crate) fn run_to_end(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulation)) {
-    let until = run.config().cycles;
-    while run.cycle() < until && !run.is_over() {
-        run.advance(1);
-        look(run);
+    Outcome {
+        cell: cell.id,
+        cycles: 0,
+        digest: String::new(),
+        failure: None,
+        metrics,
+        costs: Map::new(),
     }
 }
 
-/// Returns a run as that of a known world, for facts that only that world's state has.
+/// Runs a simulation to its end, and calls `on_cycle` after every cycle.
+pub(crate) fn run_to_end(run: &mut dyn Simulation, mut on_cycle: impl FnMut(&dyn Simulation)) {
+    let until = run.config().cycles;
+    while run.cycle() < until && !run.is_over() {
+        run.advance(1);
+        on_cycle(run);
+    }
+}
+
+/// Downcasts a run to that of a known world, for facts that only the state of that world has.
 ///
 /// # Panics
 /// When it is a run of another world.

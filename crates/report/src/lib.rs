@@ -48,20 +48,22 @@ pub fn render(document: &Document, folder: &str) -> Result<RenderedReport, DrawE
 
 /// Returns all figures and pictures, numbered in order.
 fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
-    let drawn = document.blocks.iter().filter_map(|block| match block {
-        Block::Figure(figure) => Some((&figure.title, chart_svg(figure))),
-        Block::Picture(picture) => Some((&picture.title, Ok(picture.svg.clone()))),
-        _ => None,
-    });
-    let numbered = (1..).zip(drawn);
-    let file = |(k, (title, svg)): (usize, (&String, Result<String, DrawError>))| {
-        Ok(SvgFile { stem: format!("{k:02}-{}", slug(title)), svg: svg? })
-    };
-    numbered.map(file).collect()
+    let mut files = Vec::new();
+    for block in &document.blocks {
+        let (title, svg) = match block {
+            Block::Figure(figure) => (&figure.title, chart_svg(figure)?),
+            Block::Picture(picture) => (&picture.title, picture.svg.clone()),
+            _ => continue,
+        };
+        // The number keeps the files of a folder in the order of the document, and tells equal titles apart.
+        let stem = format!("{:02}-{}", files.len() + 1, slug(title));
+        files.push(SvgFile { stem, svg });
+    }
+    Ok(files)
 }
 
 /// Returns a title as part of a file name or an address: `Trip times, by regime` becomes
-/// `trip-times-by-regime`.
+/// `trip-times-by-regime`. It has at most eight words, so that names of files stay short.
 fn slug(title: &str) -> String {
     let words = title.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
     words.map(str::to_ascii_lowercase).take(8).collect::<Vec<_>>().join("-")

@@ -54,22 +54,23 @@ fn claims_table(claims: &[Claim]) -> String {
         columns.insert(2, "the paper's figure");
     }
     let columns: Vec<String> = columns.into_iter().map(plain_cell).collect();
-    let row = |c: &Claim| {
-        let verdict = format!("**{}**", c.verdict.name());
-        let mut row = vec![
-            plain_cell(c.id),
-            markup_cell(c.paper),
-            markup_cell(&c.ours),
-            verdict,
-            markup_cell(&c.reason),
-        ];
-        if has_figure {
-            row.insert(2, plain_cell(c.papers_figure.unwrap_or("none")));
-        }
-        row
-    };
     let note = spans(&Text::from_markup(claim::READING_NOTE));
-    format!("{}\n{note}", grid(&columns, claims.iter().map(row)))
+    let rows = claims.iter().map(|claim| claim_row(claim, has_figure));
+    format!("{}\n{note}", grid(&columns, rows))
+}
+
+fn claim_row(claim: &Claim, has_figure: bool) -> Vec<String> {
+    let mut row = vec![
+        plain_cell(claim.id),
+        markup_cell(claim.paper),
+        markup_cell(&claim.ours),
+        format!("**{}**", claim.verdict.name()),
+        markup_cell(&claim.reason),
+    ];
+    if has_figure {
+        row.insert(2, plain_cell(claim.papers_figure.unwrap_or("none")));
+    }
+    row
 }
 
 fn fact_list(facts: &[(String, Text)]) -> String {
@@ -92,20 +93,24 @@ fn fenced_code(code: &Code) -> String {
 }
 
 fn spans(text: &Text) -> String {
-    let of = |span: &Span| match span {
+    text.0.iter().map(span).collect()
+}
+
+fn span(span: &Span) -> String {
+    match span {
         Span::Plain(words) => escaped(words),
         Span::Strong(words) => format!("**{}**", escaped(words)),
         Span::Code(code) => code_span(code),
-    };
-    text.0.iter().map(of).collect()
+    }
 }
 
 /// Returns inline code; if it has backticks, more of them surround it.
 fn code_span(code: &str) -> String {
     let code = code.replace('\n', " ");
-    let most = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
-    let mark = "`".repeat(most + 1);
-    if most == 0 { format!("{mark}{code}{mark}") } else { format!("{mark} {code} {mark}") }
+    let longest = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
+    let fence = "`".repeat(longest + 1);
+    // Markdown takes one space away at both ends.
+    if longest == 0 { format!("{fence}{code}{fence}") } else { format!("{fence} {code} {fence}") }
 }
 
 /// Returns our own text, with markup, for a cell.

@@ -1,10 +1,11 @@
-//! Figures for print: without titles and notes, which belong in the text around them, of a given size,
-//! and with a reader's own words.
+//! Figures for print: of a given size, without titles and notes, which belong in the text around them, and with labels of
+//! the author's choice.
 
 use crate::{SvgFile, chart, slug};
 use sidestep_document::document::Block;
 use sidestep_document::{Document, Figure, FigureKind};
 use sidestep_draw::{DrawError, Style};
+use std::collections::BTreeSet;
 
 /// Pixels of an SVG per millimeter, and per point.
 const PX_PER_MM: f64 = 96.0 / 25.4;
@@ -17,7 +18,7 @@ pub struct PrintStyle {
     pub size_mm: [f64; 2],
     /// Size of text in points.
     pub font_pt: f64,
-    /// Labels of axes and names of series that are written in other words.
+    /// Replacements of labels of axes and names of series: the label in the report, and the one to print.
     pub labels: Vec<(String, String)>,
 }
 
@@ -27,27 +28,24 @@ impl PrintStyle {
     /// # Errors
     /// When one cannot be drawn at this size.
     pub fn figures(&self, document: &Document) -> Result<Vec<SvgFile>, DrawError> {
-        let figures = document.blocks.iter().filter_map(|block| match block {
-            Block::Figure(figure) => Some(figure),
-            _ => None,
-        });
         let style = self.style();
-        let file = |(k, figure): (usize, &Figure)| {
-            let svg = chart::chart_svg_with_style(&self.without_heading(figure), &style)?;
-            Ok(SvgFile { stem: format!("{k:02}-{}", slug(&figure.title)), svg })
-        };
-        (1..).zip(figures).map(file).collect()
+        let mut files = Vec::new();
+        for figure in figures(document) {
+            let svg = chart::chart_svg_with_style(&self.for_print(figure), &style)?;
+            let stem = format!("{:02}-{}", files.len() + 1, slug(&figure.title));
+            files.push(SvgFile { stem, svg });
+        }
+        Ok(files)
     }
 
     /// Returns the labels that occur in no figure of a document.
     pub fn unused_labels<'a>(&'a self, document: &Document) -> Vec<&'a str> {
-        let is_used = |label: &str| {
-            document.blocks.iter().any(|block| match block {
-                Block::Figure(figure) => figure_labels(figure).any(|word| word == label),
-                _ => false,
-            })
-        };
-        self.labels.iter().map(|(from, _)| from.as_str()).filter(|from| !is_used(from)).collect()
+        let used: BTreeSet<&str> = figures(document).flat_map(figure_labels).collect();
+        self.labels
+            .iter()
+            .map(|(from, _)| from.as_str())
+            .filter(|from| !used.contains(from))
+            .collect()
     }
 
     fn style(&self) -> Style {
@@ -55,24 +53,35 @@ impl PrintStyle {
         Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT }
     }
 
-    fn without_heading(&self, figure: &Figure) -> Figure {
-        let mut bare = Figure { title: String::new(), note: String::new(), ..figure.clone() };
-        let said = |word: &mut String| {
-            if let Some((_, to)) = self.labels.iter().find(|(from, _)| from == word) {
-                word.clone_from(to);
-            }
-        };
-        said(&mut bare.x_label);
-        said(&mut bare.y_label);
-        bare.series.iter_mut().for_each(|series| said(&mut series.name));
-        if let FigureKind::Bars { categories } = &mut bare.kind {
-            categories.iter_mut().for_each(said);
+    /// Returns a figure without title and note, and with replaced labels.
+    fn for_print(&self, figure: &Figure) -> Figure {
+        let mut figure = Figure { title: String::new(), note: String::new(), ..figure.clone() };
+        self.replace_label(&mut figure.x_label);
+        self.replace_label(&mut figure.y_label);
+        for series in &mut figure.series {
+            self.replace_label(&mut series.name);
         }
-        bare
+        if let FigureKind::Bars { categories } = &mut figure.kind {
+            categories.iter_mut().for_each(|category| self.replace_label(category));
+        }
+        figure
+    }
+
+    fn replace_label(&self, label: &mut String) {
+        if let Some((_, to)) = self.labels.iter().find(|(from, _)| from == label) {
+            label.clone_from(to);
+        }
     }
 }
 
-/// Returns all words at the axes and in the legend of a figure.
+fn figures(document: &Document) -> impl Iterator<Item = &Figure> {
+    document.blocks.iter().filter_map(|block| match block {
+        Block::Figure(figure) => Some(figure),
+        _ => None,
+    })
+}
+
+/// Returns all labels of a figure: of its axes, its categories and its legend.
 fn figure_labels(figure: &Figure) -> impl Iterator<Item = &str> {
     let categories = match &figure.kind {
         FigureKind::Bars { categories } => &categories[..],

@@ -1,7 +1,7 @@
-//! The same flights by processes, which talk over real sockets, beside those in one process.
+//! The same flights by processes, which communicate over real sockets, beside those in one process.
 //!
-//! The caller hands over the function that flies a fleet: this crate opens no socket and starts no process. Messages
-//! and bytes are counted at the nodes, heads of packets included and those of the network below not. Time is that of
+//! The caller passes in the function that runs a fleet: this crate opens no socket and starts no process. Messages and
+//! bytes are counted at the nodes, with the headers of packets and without those of the network below. Time is that of
 //! a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on other load
 //! on it.
 
@@ -29,7 +29,7 @@ pub struct FlightMeasurement {
     pub bytes: f64,
 }
 
-/// Flies a scenario by processes, given its text.
+/// A function that runs a scenario by processes, given its text.
 pub type FleetRunner<'a, E> = dyn FnMut(&str) -> Result<FlightMeasurement, E> + 'a;
 
 /// The measurements over sockets, or the reason why there are none.
@@ -58,13 +58,13 @@ pub struct SocketCase {
     pub over_sockets: Vec<FlightMeasurement>,
 }
 
-/// Measures the flights of a plan in one process, and by `flies`.
+/// Measures the flights of a plan in one process, and by `run_fleet`.
 ///
 /// # Errors
-/// When the plan asks for an impossible scenario, and those of `flies`.
+/// When the plan asks for an impossible scenario, and those of `run_fleet`.
 pub fn measure<E: From<InputError>>(
     plan: &AgentflyConfig,
-    flies: &mut FleetRunner<'_, E>,
+    run_fleet: &mut FleetRunner<'_, E>,
     progress: &mut Progress<'_>,
 ) -> Result<SocketMeasurements, E> {
     let all = plan.sockets.airplanes.iter().flat_map(|&n| DEPLOYMENTS.map(|name| (n, name)));
@@ -72,7 +72,8 @@ pub fn measure<E: From<InputError>>(
     let mut cases = Vec::with_capacity(all.len());
     for (k, &(airplanes, deployment)) in all.iter().enumerate() {
         progress("fleets over sockets", k as f64 / all.len() as f64);
-        let (mut alone, mut over_sockets) = (Vec::new(), Vec::new());
+        let mut alone = Vec::new();
+        let mut over_sockets = Vec::new();
         for seed in 1..=plan.sockets.seeds as i64 {
             let settings = [
                 setting("seed", seed),
@@ -82,7 +83,7 @@ pub fn measure<E: From<InputError>>(
             ];
             let text = source(SCENARIO, &settings)?.text;
             alone.push(measure_in_one_process(&text)?);
-            over_sockets.push(flies(&text)?);
+            over_sockets.push(run_fleet(&text)?);
         }
         cases.push(SocketCase { airplanes, deployment, alone, over_sockets });
     }
@@ -91,9 +92,10 @@ pub fn measure<E: From<InputError>>(
 
 fn measure_in_one_process(text: &str) -> Result<FlightMeasurement, InputError> {
     let mut run = airspace_run(&source(text, &[])?, 1)?;
-    let began = Instant::now();
+    let started = Instant::now();
     run_to_end(&mut run, |_| {});
-    let (elapsed_s, metrics) = (began.elapsed().as_secs_f64(), run.metrics());
+    let elapsed_s = started.elapsed().as_secs_f64();
+    let metrics = run.metrics();
     Ok(FlightMeasurement {
         elapsed_s,
         messages: metrics.messages as f64,
@@ -132,9 +134,10 @@ impl SocketMeasurements {
     pub(super) fn claim(&self) -> Option<Claim> {
         let Self::Measured(cases) = self else { return None };
         let times = |name: &str, airplanes: usize| {
-            let is_it = |case: &&SocketCase| case.deployment == name && case.airplanes == airplanes;
-            let of = |case: &SocketCase| values_of(&case.over_sockets, |m| m.elapsed_s);
-            cases.iter().find(is_it).map_or_else(Vec::new, of)
+            cases
+                .iter()
+                .find(|case| case.deployment == name && case.airplanes == airplanes)
+                .map_or_else(Vec::new, |case| values_of(&case.over_sockets, |m| m.elapsed_s))
         };
         let teams = cases.iter().filter(|case| case.deployment == "team");
         let ratio = |case: &SocketCase| {
@@ -195,12 +198,12 @@ mod tests {
 
     /// Returns measurements in which the flights of a deployment take as long as `times` says.
     fn measured(seeds: usize, times: impl Fn(&str) -> f64) -> SocketMeasurements {
-        let mut flies = |text: &str| -> Result<FlightMeasurement, InputError> {
+        let mut run_fleet = |text: &str| -> Result<FlightMeasurement, InputError> {
             let name = DEPLOYMENTS.iter().find(|name| text.contains(&format!("\"{name}\"")));
             let alone = measure_in_one_process(text)?;
             Ok(FlightMeasurement { elapsed_s: times(name.expect("a deployment")), ..alone })
         };
-        measure(&plan(seeds), &mut flies, &mut |_, _| ()).expect("right")
+        measure(&plan(seeds), &mut run_fleet, &mut |_, _| ()).expect("right")
     }
 
     #[test]

@@ -10,14 +10,14 @@ const SMALL: &str = include_str!("../../scenarios/loria/small.toml");
 const MEDIUM: &str = include_str!("../../scenarios/loria/medium.toml");
 const LARGE: &str = include_str!("../../scenarios/loria/large.toml");
 
-/// Boxes at each end of a corridor that count as its end.
+/// Boxes at each end of a corridor that count as its end: room for two robots behind each other.
 const END_BOXES: u32 = 4;
 
-/// The way of a robot that goes to and fro past obstacles, by the names of a scenario.
+/// How a robot that goes to and fro avoids obstacles, by the names of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum AvoidancePolicy {
-    /// Keeps to its way until it touches something.
+    /// Keeps to its path until it touches something.
     Touch,
     /// Steps around things that its sonar reports, as soon as one beam does.
     Avoid,
@@ -70,15 +70,15 @@ struct GroupSection {
 
 impl Floor {
     fn new(name: &'static str, scenario: &'static str) -> Self {
-        let told: ScenarioExcerpt =
+        let excerpt: ScenarioExcerpt =
             toml::from_str(scenario).expect("the experiments' scenarios are valid");
-        let office = told.map.office.build(told.map.box_size_m);
+        let office = excerpt.map.office.build(excerpt.map.box_size_m);
         Self {
             name,
             scenario,
             office: Arc::new(office.expect("the experiments' offices stand")),
-            robots_per_corridor: told.robots[0].count,
-            people: told.people[0].count,
+            robots_per_corridor: excerpt.robots[0].count,
+            people: excerpt.people[0].count,
         }
     }
 
@@ -97,7 +97,8 @@ impl Floor {
         Self::new("large", LARGE)
     }
 
-    /// Returns the corridors along which robots go: not those across, nor passages.
+    /// Returns the corridors along which robots go: those that are long from west to east, which the cross corridors and the
+    /// passages are not.
     pub(super) fn corridors(&self) -> impl Iterator<Item = &Rect> {
         self.office.corridors.iter().filter(|c| c.width > 4 * c.height)
     }
@@ -140,8 +141,8 @@ mod tests {
     #[test]
     fn there_is_a_group_of_robots_for_every_corridor_and_its_ends_are_those_of_the_scenario() {
         for floor in [Floor::small(), Floor::medium(), Floor::large()] {
-            let told: toml::Table = toml::from_str(floor.scenario).expect("a right scenario");
-            let groups = told["robots"].as_array().expect("a list");
+            let scenario: toml::Table = toml::from_str(floor.scenario).expect("a right scenario");
+            let groups = scenario["robots"].as_array().expect("a list");
             assert_eq!(floor.corridors().count(), groups.len());
             for (corridor, group) in floor.corridors().zip(groups) {
                 let end = |key: &str| group["behaviour"][key].clone().try_into().expect("a region");

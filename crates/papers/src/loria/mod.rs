@@ -51,7 +51,7 @@ pub struct LoriaConfig {
     pub error_levels: Vec<f64>,
     /// Runs at once, when behavior is measured; no result depends on it.
     pub workers: usize,
-    /// Most workers of one run, when time is measured.
+    /// Maximum number of workers of one run, when time is measured.
     pub most_workers: usize,
     /// Repeats of each timing, at least 2.
     pub repeats: usize,
@@ -83,7 +83,7 @@ impl Default for LoriaConfig {
     }
 }
 
-/// Upper bound of a plan: a machine can do this much in a day.
+/// Upper bound of the amounts of a plan: a machine can do this much in a day.
 const MAX_AMOUNT: u64 = 1_000_000;
 
 impl LoriaConfig {
@@ -112,7 +112,7 @@ impl LoriaConfig {
                 Ok(())
             }
         };
-        let outside = |value: u64, least: u64, most: u64| !(least..=most).contains(&value);
+        let outside = |value: u64, min: u64, max: u64| !(min..=max).contains(&value);
         let levels = &self.error_levels;
         let bad_level = levels.is_empty() || levels.iter().any(|&e| !(e > 0.0 && e < 1.0));
         let count = |n: usize| n as u64;

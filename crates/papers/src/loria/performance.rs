@@ -85,13 +85,13 @@ pub(super) fn loads(plan: &LoriaConfig) -> Vec<Workload> {
     plan.robots.iter().copied().flat_map(costs).collect::<Vec<_>>().iter().map(load).collect()
 }
 
-/// Returns worker counts from 1 to `most`: all up to 4, then ever larger steps.
-pub(super) fn worker_counts(most: usize) -> Vec<usize> {
+/// Returns worker counts from 1 to `max`: all up to 4, then larger and larger steps.
+pub(super) fn worker_counts(max: usize) -> Vec<usize> {
     let mut counts: Vec<usize> = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64]
         .into_iter()
-        .filter(|&count| count < most)
+        .filter(|&count| count < max)
         .collect();
-    counts.push(most.max(1));
+    counts.push(max.max(1));
     counts
 }
 
@@ -106,7 +106,8 @@ impl PerformanceResults {
         report: &mut Progress<'_>,
     ) -> Result<Self, RecordError> {
         let loads = loads(plan);
-        let (mut timings, mut initialization) = (Vec::new(), Vec::new());
+        let mut timings = Vec::new();
+        let mut initialization = Vec::new();
         for (index, load) in loads.iter().enumerate() {
             report("parallel performance", index as f64 / loads.len() as f64);
             let times = time_load(plan, load, recorders)?;
@@ -145,8 +146,8 @@ impl PerformanceResults {
     /// processes were using it, and times mean little.
     pub(super) fn is_machine_busy(&self) -> bool {
         const SHARE: f64 = 0.85;
-        let least = SHARE * self.max_workers() as f64;
-        self.at_max_workers(false).any(|timing| timing.machine.mean_or_zero() < least)
+        let min_speed_up = SHARE * self.max_workers() as f64;
+        self.at_max_workers(false).any(|timing| timing.machine.mean_or_zero() < min_speed_up)
     }
 
     /// Returns the mean efficiency of all loads, unrecorded, with the most workers, by repeat.
@@ -284,7 +285,7 @@ enum TimedCandidate {
     Arithmetic(usize),
 }
 
-/// Returns all contestants of a load: unrecorded, recorded, and arithmetic, each with every number
+/// Returns all candidates of a load: unrecorded, recorded, and arithmetic, each with every number
 /// of workers; each has been run once.
 fn timed_candidates(
     plan: &LoriaConfig,
@@ -314,20 +315,23 @@ fn time_load(
 ) -> Result<Vec<LoadTiming>, RecordError> {
     let cycles = load.cycles(plan.timed_robot_cycles);
     let mut all = timed_candidates(plan, load, recorders)?;
-    let times_s = time_interleaved(&mut all, plan.repeats, |contestant| match contestant {
+    let times_s = time_interleaved(&mut all, plan.repeats, |candidate| match candidate {
         TimedCandidate::Run(run, ..) => run.run(cycles),
         TimedCandidate::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
     })?;
-    let machine = |wanted: usize| {
-        let is = |c: &TimedCandidate| matches!(c, TimedCandidate::Arithmetic(w) if *w == wanted);
-        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    let times_of = |is_it: &dyn Fn(&TimedCandidate) -> bool| {
+        all.iter().position(is_it).map_or(&[][..], |k| &times_s[k][..])
     };
-    let alone = |wanted: bool| {
-        let is = |c: &TimedCandidate| matches!(c, TimedCandidate::Run(_, 1, r) if *r == wanted);
-        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
+    let machine = |count: usize| {
+        times_of(&|c| matches!(c, TimedCandidate::Arithmetic(workers) if *workers == count))
     };
-    let timing = |(contestant, times_s): (&TimedCandidate, &Vec<Option<f64>>)| {
-        let &TimedCandidate::Run(_, workers, recorded) = contestant else { return None };
+    let alone = |recorded: bool| {
+        times_of(
+            &|c| matches!(c, TimedCandidate::Run(_, 1, is_recorded) if *is_recorded == recorded),
+        )
+    };
+    let timing = |(candidate, times_s): (&TimedCandidate, &Vec<Option<f64>>)| {
+        let &TimedCandidate::Run(_, workers, recorded) = candidate else { return None };
         let ratio = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
         let ratios: Vec<Option<f64>> = alone(recorded).iter().zip(times_s).map(ratio).collect();
         Some(LoadTiming {
@@ -344,8 +348,8 @@ fn time_load(
     };
     let mut timings: Vec<LoadTiming> = all.iter().zip(&times_s).filter_map(timing).collect();
     timings.sort_by_key(|timing| (timing.recorded, timing.workers));
-    for contestant in all {
-        if let TimedCandidate::Run(run, ..) = contestant {
+    for candidate in all {
+        if let TimedCandidate::Run(run, ..) = candidate {
             run.finish()?;
         }
     }

@@ -1,4 +1,4 @@
-//! Ways of robots as pictures: on the medium floor, without errors and with both kinds.
+//! Trajectories of robots as pictures: on the medium floor, without errors and with both kinds.
 
 use super::LoriaConfig;
 use super::floor::Floor;
@@ -10,9 +10,9 @@ use sidestep::kernel::{Cycle, Simulation};
 use sidestep::worlds::robots::world::Regime;
 use std::sync::Arc;
 
-/// Cycles of a run: by then all robots are on their way.
+/// Cycles of a run: by then all robots have left their starts.
 const CYCLES: Cycle = 600;
-/// Cycles at the end of the run for which ways are shown.
+/// Cycles at the end of the run for which trails are drawn.
 const TRAIL_CYCLES: Cycle = 400;
 /// The seed of all scenes.
 const SEED: u64 = 1;
@@ -30,13 +30,14 @@ pub fn all(plan: &LoriaConfig) -> [Scene; 2] {
 
 fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
     let (mut run, tracks) = run_recorded(variant, SEED, cycles);
-    let (scenery, frame) = (run.scenery(), run.frame(FrameOptions::WITHOUT_SCANS));
+    let scenery = run.scenery();
+    let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let columns = columns(&tracks, cycles.saturating_sub(TRAIL_CYCLES));
     let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, values)| values);
     let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot);
-    let whose: Vec<BodyId> = robots.map(|body| body.id()).collect();
+    let bodies: Vec<BodyId> = robots.map(|body| body.id()).collect();
     let trails = |rows: &sidestep::kernel::view::PositionColumns| {
-        rows.trails(&scenery, &frame, &whose, column).unwrap_or_default()
+        rows.trails(&scenery, &frame, &bodies, column).unwrap_or_default()
     };
     let trails: Vec<Trail> = run.position_columns().iter().flat_map(trails).collect();
     Scene {
@@ -91,7 +92,7 @@ mod tests {
                 let cycles = trail.points.chunk_by(|a, b| a.0 == b.0).count();
                 assert_eq!(cycles as Cycle, TRAIL_CYCLES + 1);
                 let leaps = trail.points.windows(2).filter(|pair| far(pair) > 2.01 * box_m).count();
-                assert_eq!(leaps, 0, "no way leaps");
+                assert_eq!(leaps, 0, "no trail leaps");
             }
         }
         assert_ne!(scenes[0].trails, scenes[1].trails);

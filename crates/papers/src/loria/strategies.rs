@@ -114,12 +114,12 @@ impl StrategyResults {
     /// Returns the speed-up of the double pool minus that of another strategy, with the most
     /// workers, one estimate per load.
     pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
-        let most = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
+        let max_workers = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
         let ratios = |load: usize, name: &str| {
-            let is = |t: &&StrategyTiming| {
-                (t.load, t.workers, t.strategy.as_str()) == (load, most, name)
+            let is_it = |t: &&StrategyTiming| {
+                (t.load, t.workers, t.strategy.as_str()) == (load, max_workers, name)
             };
-            self.trials.iter().find(is).map_or(&[][..], |t| &t.ratios[..])
+            self.trials.iter().find(is_it).map_or(&[][..], |t| &t.ratios[..])
         };
         let lead = |load| {
             Estimate::paired_difference(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()))
@@ -184,9 +184,9 @@ fn names() -> [&'static str; 3] {
 fn time_load(plan: &LoriaConfig, index: usize, load: &Workload) -> Vec<StrategyTiming> {
     let cycles = load.cycles(plan.timed_robot_cycles);
     let mut all = strategy_candidates(plan, load);
-    all.iter_mut().for_each(|contestant| contestant.run.advance(cycles));
-    let Ok(times_s) = time_interleaved(&mut all, plan.repeats, |contestant| {
-        Ok::<_, Infallible>(contestant.seconds(cycles, plan.timed_robot_cycles))
+    all.iter_mut().for_each(|candidate| candidate.run.advance(cycles));
+    let Ok(times_s) = time_interleaved(&mut all, plan.repeats, |candidate| {
+        Ok::<_, Infallible>(candidate.seconds(cycles, plan.timed_robot_cycles))
     });
     let times_of = |strategy: &str, workers: usize| {
         let is = |c: &StrategyCandidate| (c.strategy, c.workers) == (strategy, workers);

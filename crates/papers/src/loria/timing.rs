@@ -115,26 +115,26 @@ pub(super) fn time_s<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (clock.now_ns() as f64 * 1e-9, result)
 }
 
-/// Number of stretches of which the best counts as one repeat.
+/// Number of segments of which the shortest counts as one repeat.
 pub(super) const SEGMENTS: usize = 8;
 
-/// Times contestants in turn. Each gets `repeats` values, and every value is the shortest of
-/// [`SEGMENTS`] short stretches: the time of the machine when nothing else disturbs it.
-/// Contestants take turns stretch by stretch, so that disturbances affect all alike.
+/// Times candidates in turn. Each gets `repeats` values, and every value is the shortest of [`SEGMENTS`] short segments: the
+/// time of the machine when nothing else disturbs it. Candidates take turns segment by segment, so that disturbances affect
+/// all alike.
 ///
 /// # Errors
 /// The first error that `run` returns.
 pub(super) fn time_interleaved<C, E>(
-    contestants: &mut [C],
+    candidates: &mut [C],
     repeats: usize,
     mut run: impl FnMut(&mut C) -> Result<f64, E>,
 ) -> Result<Vec<Vec<Option<f64>>>, E> {
-    let mut times_s = vec![Vec::with_capacity(repeats); contestants.len()];
+    let mut times_s = vec![Vec::with_capacity(repeats); candidates.len()];
     for _ in 0..repeats {
-        let mut best_s = vec![f64::INFINITY; contestants.len()];
+        let mut best_s = vec![f64::INFINITY; candidates.len()];
         for _ in 0..SEGMENTS {
-            for (best_s, contestant) in best_s.iter_mut().zip(&mut *contestants) {
-                *best_s = best_s.min(run(contestant)?);
+            for (best_s, candidate) in best_s.iter_mut().zip(&mut *candidates) {
+                *best_s = best_s.min(run(candidate)?);
             }
         }
         times_s.iter_mut().zip(best_s).for_each(|(all, best)| all.push(Some(best)));

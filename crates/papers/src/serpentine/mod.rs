@@ -60,13 +60,13 @@ pub struct SerpentineConfig {
     pub widths_m: Vec<f64>,
     /// Numbers of followers in it.
     pub followers: Vec<usize>,
-    /// Most cycles of a run in it.
+    /// Maximum number of cycles of a run in it.
     pub corridor_cycles: u64,
     /// Steps of its leader, in the comparison of rotation rules, meters.
     pub steps_m: Vec<f64>,
     /// Numbers of discs in the open field, beside none.
     pub discs: Vec<usize>,
-    /// Most cycles of a run in it.
+    /// Maximum number of cycles of a run in it.
     pub field_cycles: u64,
     /// Speeds of moving obstacles as multiples of the speed of the chain or robot that they meet.
     pub speed_ratios: Vec<f64>,
@@ -241,7 +241,8 @@ pub fn run(
 impl SerpentineReport {
     /// Returns the experiments in the order of the report.
     fn experiments(&self) -> Vec<Experiment> {
-        let (scaling, corridor) = (&self.scaling, &self.corridor);
+        let scaling = &self.scaling;
+        let corridor = &self.corridor;
         claims::CLAIMS.experiments([
             (corridor.figures(), vec![corridor.table()]),
             (vec![self.rotations.figure()], vec![self.rotations.table()]),

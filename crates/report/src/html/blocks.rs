@@ -1,34 +1,35 @@
-//! The parts of a document.
+//! The blocks of a document.
 
 use super::{PageBlock, figures, tables, text};
 use maud::{Markup, html};
 use sidestep_document::document::{Block, Code, Text};
 
-/// Number of lines above which text is folded.
+/// Number of lines above which code is folded: more would not fit the screen beside the text around it.
 const MAX_UNFOLDED_LINES: usize = 24;
 
-pub(super) fn markup(part: &PageBlock<'_>) -> Markup {
-    match part.block {
+pub(super) fn markup(page_block: &PageBlock<'_>) -> Markup {
+    match page_block.block {
         Block::Section(_) => html! {},
-        Block::Paragraph(words) => html! { p { (text(words)) } },
-        Block::Warning(words) => html! { p .warning role="note" { (text(words)) } },
-        Block::Code(it) => code(it),
-        Block::Facts(them) => facts(them),
-        Block::Table(table) => tables::table(table, &part.id),
+        Block::Paragraph(paragraph) => html! { p { (text(paragraph)) } },
+        Block::Warning(warning) => html! { p .warning role="note" { (text(warning)) } },
+        Block::Code(block) => code(block),
+        Block::Facts(list) => facts(list),
+        Block::Table(table) => tables::table(table, &page_block.id),
         Block::Claims(claims) => tables::claims(claims),
-        Block::Figure(figure) => figures::figure(figure, &part.id, part.picture),
-        Block::Picture(picture) => figures::picture(picture, &part.id),
+        Block::Figure(figure) => figures::figure(figure, &page_block.id, page_block.picture),
+        Block::Picture(picture) => figures::picture(picture, &page_block.id),
     }
 }
 
-fn code(it: &Code) -> Markup {
+fn code(block: &Code) -> Markup {
     // A scrolling block must be reachable by keyboard.
-    let text = html! { pre tabindex="0" { code .{ "language-" (it.language) } { (it.text) } } };
+    let text =
+        html! { pre tabindex="0" { code .{ "language-" (block.language) } { (block.text) } } };
     html! {
-        @if it.text.lines().count() > MAX_UNFOLDED_LINES {
-            details { summary { (it.title) } (text) }
+        @if block.text.lines().count() > MAX_UNFOLDED_LINES {
+            details { summary { (block.title) } (text) }
         } @else {
-            figure .code { figcaption { (it.title) } (text) }
+            figure .code { figcaption { (block.title) } (text) }
         }
     }
 }

@@ -8,7 +8,8 @@ use sidestep_document::document::Picture;
 use sidestep_document::{Figure, FigureKind, Table};
 use sidestep_draw::series_colors;
 
-/// Largest number of points of a figure that has a table of its numbers.
+/// Maximum number of points of a figure with a table of its numbers: a longer table helps no reader, and the numbers are in
+/// the page as JSON anyway.
 const MAX_TABLE_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
@@ -46,8 +47,8 @@ pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
 fn alt_text(figure: &Figure) -> String {
     let names: Vec<&str> =
         figure.series.iter().map(|s| s.name.as_str()).filter(|n| !n.is_empty()).collect();
-    let of = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
-    format!("{}. {} over {}{of}.", figure.title, figure.y_label, figure.x_label)
+    let list = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
+    format!("{}. {} over {}{list}.", figure.title, figure.y_label, figure.x_label)
 }
 
 /// Returns the figure's points as a table, if they are few.
@@ -68,11 +69,11 @@ fn numbers_table(figure: &Figure) -> Option<Table> {
                 }
                 _ => point.x.to_string(),
             };
-            let end = |of: fn((f64, f64)) -> f64| {
-                point.interval.map_or(String::new(), |i| format_short(of(i)))
+            let (low, high) = match point.interval {
+                Some((low, high)) => (format_short(low), format_short(high)),
+                None => Default::default(),
             };
             let n = point.n.map_or(String::new(), |n| n.to_string());
-            let (low, high) = (end(|i| i.0), end(|i| i.1));
             table.push_row([series.name.clone(), x, format_short(point.y), low, high, n]);
         }
     }
@@ -90,12 +91,13 @@ fn safe_json(value: &serde_json::Value) -> String {
     value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028")
 }
 
-/// Returns an image of an SVG, which stands in its address.
-fn image(svg: &str, class: Option<&str>, words: &str) -> Markup {
+/// Returns an image whose address is an SVG.
+fn image(svg: &str, class: Option<&str>, alt: &str) -> Markup {
     let class = class.map_or_else(String::new, |class| format!(" class=\"{class}\""));
-    let words = html! { (words) }.into_string();
+    // Escaped by maud.
+    let alt = html! { (alt) }.into_string();
     // In single quotes, of which pictures have few: every double one would take three bytes.
-    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{words}\">", data_uri(svg)))) }
+    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{alt}\">", data_uri(svg)))) }
 }
 
 /// Returns an SVG as the address of an image, for an attribute in single quotes. Addresses take marks of

@@ -1,7 +1,7 @@
 //! Documents as a self-contained page.
 //!
 //! ```text
-//! blocks.rs    the parts of a document       figures.rs   figures and pictures
+//! blocks.rs    the blocks of a document      figures.rs   figures and pictures
 //! tables.rs    tables and claims             page.css     style
 //! page.js      sorting of tables             axes.js      ranges and ticks of figures
 //! figures.js   figures from their data       mouse.js     reactions to the mouse
@@ -30,7 +30,7 @@ const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-in
 const HINT: &str = "Figures: point at a mark for its values, drag to zoom, double-click to see \
                     all again, click a name in a legend to hide or show its series.";
 
-/// Number of sections from which the page has a table of contents.
+/// Minimum number of sections for a table of contents: fewer are found by scrolling.
 const MIN_CONTENTS_SECTIONS: usize = 3;
 
 /// Returns the page; `pictures` has one for each figure and picture, in order.
@@ -72,14 +72,14 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
     page.into_string()
 }
 
-/// A part of the page under one heading.
+/// The blocks under one heading.
 struct PageSection<'a> {
     title: Option<&'a str>,
     id: String,
     blocks: Vec<PageBlock<'a>>,
 }
 
-/// A block, its place in the page, and its picture if it has one.
+/// A block, the id of its element, and its picture if it has one.
 struct PageBlock<'a> {
     block: &'a Block,
     id: String,
@@ -94,12 +94,15 @@ impl<'a> PageSection<'a> {
         for (k, block) in document.blocks.iter().enumerate() {
             let id = |title: &str| format!("{}-{}", slug(title), k + 1);
             if let Block::Section(title) = block {
-                let (title, id) = (Some(title.as_str()), id(title));
-                sections.push(Self { title, id, blocks: Vec::new() });
+                sections.push(Self {
+                    title: Some(title.as_str()),
+                    id: id(title),
+                    blocks: Vec::new(),
+                });
                 continue;
             }
-            let is_picture = matches!(block, Block::Figure(_) | Block::Picture(_));
-            let picture = if is_picture { pictures.next() } else { None };
+            let has_picture = matches!(block, Block::Figure(_) | Block::Picture(_));
+            let picture = if has_picture { pictures.next() } else { None };
             let id = id(title_of(block).unwrap_or("part"));
             if let Some(section) = sections.last_mut() {
                 section.blocks.push(PageBlock { block, id, picture });

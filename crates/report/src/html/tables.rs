@@ -54,8 +54,8 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
     }
 }
 
-/// Returns the class that aligns the numbers of heads to the right. Cells need none, which are most of a page: those
-/// of words have one.
+/// Returns the class that aligns the heads of numbers to the right. Cells of numbers, which are most of a page, have no class:
+/// those of words have one.
 fn class(is_number: bool) -> Option<&'static str> {
     is_number.then_some("number")
 }
@@ -74,9 +74,10 @@ fn breakable_name(name: &str) -> Markup {
 
 /// Returns a cell in which the two ends of an interval stay on one line, and an exponent with its number.
 fn non_breaking(cell: &str) -> String {
-    match cell.contains('[') {
-        true => cell.replace(", ", ",\u{a0}").replace("e-", "e-\u{2060}"),
-        false => cell.into(),
+    if cell.contains('[') {
+        cell.replace(", ", ",\u{a0}").replace("e-", "e-\u{2060}")
+    } else {
+        cell.into()
     }
 }
 
