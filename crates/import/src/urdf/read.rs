@@ -90,7 +90,7 @@ struct Links {
 
 impl Links {
     /// Returns the link in an element's attribute `link`.
-    fn from_attribute(&self, element: Element) -> Result<usize, InputError> {
+    fn link_in_attribute(&self, element: Element) -> Result<usize, InputError> {
         let value = element.required("link")?;
         self.names.get(value.text()).ok_or_else(|| {
             let known: Vec<&str> = self.in_order.iter().map(String::as_str).collect();
@@ -173,8 +173,8 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
     Ok(Joint {
         name,
         kind,
-        parent: links.from_attribute(element.required_child("parent")?)?,
-        child: links.from_attribute(element.required_child("child")?)?,
+        parent: links.link_in_attribute(element.required_child("parent")?)?,
+        child: links.link_in_attribute(element.required_child("child")?)?,
         origin: origin(element)?,
         axis: axis(element, kind)?,
         limits: limits(element, kind)?,

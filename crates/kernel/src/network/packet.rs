@@ -333,7 +333,7 @@ mod tests {
         let conversation = ConversationId::new(7, Weather, &[1, 4, 9]);
         let header = PacketHeader {
             fingerprint: 0x0123_4567_89AB_CDEF,
-            conversation: conversation,
+            conversation,
             sender: 4,
             sequence: 3,
         };

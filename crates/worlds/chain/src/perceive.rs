@@ -78,7 +78,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
                 let is_itself = is_own && k == agent;
                 let gap_m = distance(leader.pose.at, solid.at) - solid.radius_m;
                 if !is_itself && gap_m <= range_m {
-                    robot_bodies.push(solid.to_robot_body());
+                    robot_bodies.push(solid.robot_body());
                 }
             }
         }
@@ -130,7 +130,7 @@ mod tests {
             let others = body.solids().filter(|(k, _)| (other, *k) != (slot, 0));
             let near =
                 others.filter(|(_, solid)| distance(at, solid.at) - solid.radius_m <= RANGE_M);
-            seen.extend(near.map(|(_, solid)| solid.to_robot_body()));
+            seen.extend(near.map(|(_, solid)| solid.robot_body()));
         }
         seen
     }

@@ -146,7 +146,7 @@ impl<const D: usize> JsonSchema for BoxSection<D> {
 
 impl<const D: usize> BoxSection<D> {
     /// Returns the floor of the box.
-    fn to_plane(&self) -> Bounds<2> {
+    fn floor(&self) -> Bounds<2> {
         Bounds { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn follow<const D: usize>(
     let Some(Robots { follower, .. }) = &context.spec.robots else { return gap_m };
     let leader = wheeled_leader(context, acting.body);
     robot_bodies.clear();
-    robot_bodies.extend(acting.body.solids().map(|(_, solid)| solid.to_robot_body()));
+    robot_bodies.extend(acting.body.solids().map(|(_, solid)| solid.robot_body()));
     let following = FollowContext { context, follower, solid, robots: robot_bodies };
     for k in 0..acting.body.robots.len() {
         if Some(k) == leader {

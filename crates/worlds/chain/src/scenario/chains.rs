@@ -508,7 +508,7 @@ impl<const D: usize> Compiler<'_, D> {
             clearance_m: ROOM_FACTOR * radius_m,
             rod_clearance_m: ROOM_FACTOR * rod.radius_m,
             ahead_m: rod.max_m,
-            within: s.within_m.as_ref().map(|within| within.get_ref().to_plane()),
+            within: s.within_m.as_ref().map(|within| within.get_ref().floor()),
         };
         let start = find_placement(site, obstacles, &wanted, Seed(self.head.seed), number)
             .map_err(|error| self.source.error_from(at, &error))?;
@@ -633,7 +633,7 @@ fn folded<const D: usize>(
         let rest = k % (leg + apart);
         let on = rest.min(leg);
         let aside_by = fold * apart + rest.saturating_sub(leg);
-        let along_by = if fold % 2 == 0 { on } else { leg - on };
+        let along_by = if fold.is_multiple_of(2) { on } else { leg - on };
         let at = add_scaled(start, u, rod_m * along_by as f64);
         add_scaled(at, aside, rod_m * aside_by as f64)
     };

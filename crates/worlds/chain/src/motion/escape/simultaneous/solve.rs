@@ -251,7 +251,7 @@ fn trial_posture<'a, const D: usize>(
     points: &'a mut [Point<D>],
     inverse_mass: &'a [f64],
 ) -> TrialPosture<'a, D> {
-    TrialPosture { points, inverse_mass: inverse_mass }
+    TrialPosture { points, inverse_mass }
 }
 
 /// Returns the direction from an obstacle to the nearest point of a part.
