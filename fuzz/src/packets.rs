@@ -1,10 +1,12 @@
 //! Agents of the worlds, which receive unchecked packets.
 
-use sidestep::kernel::network::{ConversationId, PacketBuffer, PacketHeader, parse_packet};
+use sidestep::kernel::network::{
+    ConversationId, NetworkAgent, OutgoingPacket, PacketBuffer, PacketHeader, parse_packet,
+};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::agents::traffic_state::TrafficPicture;
-use sidestep::worlds::airspace::pilot::{Fleet, Packet, Percept, Pilot, Protocol};
-use sidestep::worlds::airspace::{AirspaceWorld, airspace_run};
+use sidestep::worlds::airspace::pilot::{Percept, Pilot, Protocol};
+use sidestep::worlds::airspace::{AirspaceWorld, Fleet, airspace_run};
 use sidestep::worlds::chain::ChainState;
 use sidestep::worlds::chain::agents::{ConnectorAgent, MotionProtocol};
 use sidestep::worlds::chain::scenario::ChainScenario;
@@ -88,7 +90,7 @@ pub(crate) fn among_pilots(data: &[u8]) {
     }
     for step in steps.as_chunks::<4>().0 {
         for pilot in &mut pilots {
-            for Packet { to, payload, .. } in pilot.take_packets() {
+            for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
                 due.extend(to.iter().map(|&other| (pilot.id(), other, payload.clone())));
             }
         }

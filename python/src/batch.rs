@@ -92,7 +92,7 @@ impl Batch {
         let found = shape.or_else(|_| given.len().map(|n| n.to_string()));
         let found = found.unwrap_or_else(|_| given.to_string());
         let cause = match given.len() {
-            Ok(n) if n == self.worlds => format!("they are no {what}"),
+            Ok(n) if n == self.worlds => format!("they are not {what}"),
             _ => format!("there are {} worlds, and not {found} {what}", self.worlds),
         };
         argument_error(key, cause, format!("give an array of {} {what}", self.worlds))

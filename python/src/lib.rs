@@ -4,10 +4,10 @@
 //! scenario.rs    a file, text or dict -> a compiled scenario
 //! simulation.rs  a run that Python advances, observes and orders
 //! blocks.rs      the rows of a long run     batch.rs        many worlds that step together
-//! space.rs       spaces of numbers          decide.rs       functions in Python that decide
+//! space.rs       spaces of numbers          policy.rs       functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs       ids, values and columns of bodies
 //! read.rs        folders -> tables
-//! sweep.rs       many runs, by threads or by a crew
+//! sweep.rs       many runs, by threads or by an executor
 //! arm.rs         kinematics of arms         learn.rs        error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells

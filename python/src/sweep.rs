@@ -17,7 +17,7 @@ use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::world::Method;
+use sidestep::worlds::airspace::settings::Method;
 use sidestep_papers::methods;
 use sidestep_session::sweep::{
     self, CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task,
@@ -100,7 +100,7 @@ impl SweepOptions<'_> {
     fn request(&self, of: &Bound<'_, PyAny>) -> PyResult<SweepRequest> {
         let (sweep, made) = parse_any(of)?;
         if self.max_runs.is_some() && self.until.is_none() && sweep.until.is_none() {
-            let cause = "it bounds the runs of a sweep that goes on until it is precise";
+            let cause = "it bounds the runs of a sweep with a target precision";
             return Err(argument_error("max_runs", cause, "give until=\"ci=0.05\" as well"));
         }
         let sweep = sweep.with_overrides(self.changes()?).map_err(|e| error::input_error(&e))?;

@@ -117,8 +117,8 @@ def test_wrong_input_says_what_would_be_right(make, external):
         (lambda: sidestep.Batch(external, 1, seeds=[-1]), "whole numbers of at least 0"),
         (lambda: batch.reset([1, 2]), "an array of 5 seeds"),
         (lambda: batch.step(mask=np.ones(4, bool)), r"not \(4,\) truth values"),
-        (lambda: batch.step(mask=[True] * 5), "they are no truth values"),
-        (lambda: batch.reset(SEEDS, mask=np.ones(5)), "they are no truth values"),
+        (lambda: batch.step(mask=[True] * 5), "they are not truth values"),
+        (lambda: batch.reset(SEEDS, mask=np.ones(5)), "they are not truth values"),
         (lambda: batch.observe(out={}), r"out.sonar-8_report: it is missing"),
         (lambda: batch.observe(out={}), r"help: give .* C order of the shape \(5, 5, 8\), int64"),
     ]:

@@ -114,7 +114,7 @@ def test_a_frame_is_the_snapshot_as_a_table(external):
 @pytest.mark.parametrize(
     ("use", "words"),
     [
-        (lambda sim: sim.record(["event"]), "there is no table `event`\n  help: name some of trajectories, events"),
+        (lambda sim: sim.record(["event"]), "there is no table `event`\n  help: give some of trajectories, events"),
         (lambda sim: sim.record("events"), "is no list of tables"),
         (lambda sim: sim.record(False), "leave it out"),
         (lambda sim: sim.record(frames=0), "give 1 or more cycles"),

@@ -1,242 +1,298 @@
-//! One file of Rust: its lines, and its items apart from tests.
+//! One file of Rust: its lines, the paths that it names, and the places that figures count.
 
+use proc_macro2::Span;
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-use proc_macro2::TokenStream;
 use syn::spanned::Spanned;
-use syn::{Attribute, ImplItem, Item, Meta};
+use syn::visit::{self, Visit};
+use syn::{
+    Block, Expr, ExprMatch, ImplItemFn, Item, ItemFn, ItemMod, ItemUse, Lit, Local, Macro, Pat,
+    Signature, UseTree,
+};
 
-use crate::lines::{self, Line, Range};
+/// Parameters that a function may have, the receiver included.
+const MAX_PARAMETERS: usize = 5;
 
-/// The purpose of a file, by the folder that it lies in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
-    Code,
-    Test,
-    Bench,
-    Example,
-}
+/// Lines of code between the braces of a function.
+const MAX_LINES: usize = 40;
 
-/// Place of a file in the tree of modules.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
-    /// File that the tree grows from, `src/lib.rs` for example.
-    pub(crate) root: PathBuf,
-    /// Names of the modules from the root to this one.
-    pub(crate) names: Vec<String>,
-    pub(crate) in_library: bool,
-}
+/// Attributes of what is built for tests alone.
+const TESTS: [&str; 3] = ["#[test]", "#[cfg(test)]", "#[cfg(all(test"];
 
-/// One file of Rust.
+/// Words by which a comment is taken to give a reason.
+const REASONS: &str = "because since so otherwise else prevents avoids would hence therefore must \
+                       cannot never lest why";
+
+/// Words by which alike things are told apart, as `from_m` and `to_m`; units and letters do so too.
+const PAIRS: &str = "after back before begin bottom col cos east end first from front height high \
+                     inner last lat least left lon low lower max min most north outer right row \
+                     second sin start third top upper width";
+
+/// A file, as a target of cargo reaches it.
+#[derive(Default)]
 pub(crate) struct Source {
-    /// Path, relative to the folder of the crate.
+    /// Path, relative to the root of the workspace.
     pub(crate) path: PathBuf,
-    pub(crate) role: Role,
-    /// Lines, in order.
-    pub(crate) lines: Vec<Line>,
-    /// Everything declared, without items that are built for tests only.
-    pub(crate) items: Vec<Item>,
-    /// Modules in files of their own that are built for tests only, as [`Source::items`] lacks them.
-    pub(crate) test_modules: Vec<Item>,
-    /// The file's place in the tree of modules; none where no module names it, or only tests do.
-    pub(crate) module: Option<Place>,
+    /// File that the target's tree of modules grows from, and the names of the modules from there to this file.
+    pub(crate) module: Vec<String>,
+    pub(crate) code_lines: u64,
+    pub(crate) test_lines: u64,
+    /// Key of a figure and number of a line, outside of tests.
+    pub(crate) findings: Vec<(&'static str, usize)>,
+    /// Paths of two names or more, outside of tests.
+    pub(crate) paths: Vec<NamedPath>,
 }
 
-impl Source {
-    /// Parses a file.
-    pub(crate) fn new(path: PathBuf, role: Role, text: &str) -> Result<Source, String> {
-        let parsed = parse(text).map_err(|e| {
-            let at = e.span().start();
-            format!("{}:{}:{}: {e}", path.display(), at.line, at.column + 1)
-        })?;
-        let (tokens, mut items) = parsed;
-        let mut lines = lines::of(text, tokens);
-        let mut tests = Vec::new();
-        take_tests(&mut items, &mut tests);
-        for item in &tests {
-            mark_test(&mut lines, range(item));
-        }
-        take_test_methods(&mut items, &mut lines);
-        Ok(Source { path, role, lines, items, test_modules: tests, module: None })
-    }
-
-    /// Declares the whole file to be for tests.
-    pub(crate) fn make_test(&mut self) {
-        self.role = Role::Test;
-    }
-
-    /// Lines of a kind that are no test, in this range.
-    pub(crate) fn count(&self, kind: lines::Kind, range: Range) -> u64 {
-        let lines = &self.lines[range.start() - 1..*range.end()];
-        lines.iter().filter(|line| line.kind == kind && !line.is_test).count() as u64
-    }
+/// Path as it is written: `["crate", "a", "B"]`; the last name of a glob is `*`.
+pub(crate) struct NamedPath {
+    pub(crate) names: Vec<String>,
+    /// Module that names it, with inline modules.
+    pub(crate) module: Vec<String>,
+    /// Name that an import gives it.
+    pub(crate) import: Option<String>,
 }
 
-fn parse(text: &str) -> syn::Result<(TokenStream, Vec<Item>)> {
-    // Lines are numbered alike with and without this first line, because it stays in place.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let tokens: TokenStream = text.parse().map_err(syn::Error::from)?;
-    let file: syn::File = syn::parse2(tokens.clone())?;
-    Ok((tokens, file.items))
-}
-
-/// Range of lines that something takes, its attributes and documentation with it.
-pub(crate) fn range(node: &impl Spanned) -> Range {
-    let span = node.span();
-    span.start().line..=span.end().line
-}
-
-fn mark_test(lines: &mut [Line], range: Range) {
-    for line in &mut lines[range.start() - 1..*range.end()] {
-        line.is_test = true;
-    }
-}
-
-/// Moves items that are built for tests only out of `items`, from inline modules too.
-fn take_tests(items: &mut Vec<Item>, tests: &mut Vec<Item>) {
-    tests.extend(items.extract_if(.., |item| is_test(attributes(item))));
-    for item in items {
-        if let Item::Mod(module) = item
-            && let Some((_, inner)) = &mut module.content
-        {
-            take_tests(inner, tests);
-        }
-    }
-}
-
-/// Removes methods that are built for tests only from `impl` blocks.
-fn take_test_methods(items: &mut [Item], lines: &mut [Line]) {
-    for item in items {
-        match item {
-            Item::Mod(module) => {
-                if let Some((_, inner)) = &mut module.content {
-                    take_test_methods(inner, lines);
-                }
-            }
-            Item::Impl(block) => block.items.retain(|item| {
-                let ImplItem::Fn(method) = item else { return true };
-                let test = is_test(&method.attrs);
-                if test {
-                    mark_test(lines, range(method));
-                }
-                !test
-            }),
-            _ => {}
-        }
-    }
-}
-
-/// Returns whether attributes say that something is built for tests only.
-pub(crate) fn is_test(attributes: &[Attribute]) -> bool {
-    attributes.iter().any(|attribute| match &attribute.meta {
-        Meta::Path(path) => path.is_ident("test"),
-        Meta::List(list) if list.path.is_ident("cfg") => {
-            let condition = list.tokens.to_string().replace(' ', "");
-            condition == "test" || condition.starts_with("all(test")
-        }
-        _ => false,
-    })
-}
-
-/// Attributes of an item.
-pub(crate) fn attributes(item: &Item) -> &[Attribute] {
-    match item {
-        Item::Const(item) => &item.attrs,
-        Item::Enum(item) => &item.attrs,
-        Item::Fn(item) => &item.attrs,
-        Item::Impl(item) => &item.attrs,
-        Item::Macro(item) => &item.attrs,
-        Item::Mod(item) => &item.attrs,
-        Item::Static(item) => &item.attrs,
-        Item::Struct(item) => &item.attrs,
-        Item::Trait(item) => &item.attrs,
-        Item::Type(item) => &item.attrs,
-        Item::Use(item) => &item.attrs,
-        _ => &[],
-    }
-}
-
-/// Reads all files of a crate, sorted by path; `folder` is relative to the root of the workspace.
-pub(crate) fn read_all(root: &Path, folder: &Path) -> Result<Vec<Source>, String> {
-    let base = root.join(folder);
-    let mut paths = Vec::new();
-    collect(&base, &["rs"], &mut paths).map_err(|e| format!("{}: {e}", base.display()))?;
-    paths.sort();
+/// Reads the files of a target from its root on, but those that are known already.
+pub(crate) fn read_target(
+    workspace: &Path,
+    target: &Path,
+    is_test: bool,
+    known: &mut HashSet<PathBuf>,
+) -> Result<Vec<Source>, String> {
     let mut sources = Vec::new();
-    for full in paths {
-        let text = fs::read_to_string(&full).map_err(|e| format!("{}: {e}", full.display()))?;
-        let path = full.strip_prefix(&base).unwrap_or(&full).to_path_buf();
-        let role = role(&folder.join(&path));
-        let source = Source::new(path, role, &text)
-            .map_err(|message| format!("{}/{message}", folder.display()))?;
-        sources.push(source);
+    let mut open = vec![(vec![target.display().to_string()], is_test)];
+    while let Some((module, is_test)) = open.pop() {
+        // An attribute or a macro may put a module elsewhere: it is not read.
+        let Some(path) = file(target, &module).filter(|path| known.insert(path.clone())) else {
+            continue;
+        };
+        let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let file = syn::parse_file(&text)
+            .map_err(|e| format!("{}:{}: {e}", path.display(), e.span().start().line))?;
+        let source = Source {
+            path: path.strip_prefix(workspace).unwrap_or(&path).to_path_buf(),
+            module: module.clone(),
+            ..Source::default()
+        };
+        let lines = text.lines().map(|text| Line { text: text.trim(), is_test }).collect();
+        let mut reader = Reader { source, lines, module, is_test, declared: Vec::new() };
+        reader.visit_file(&file);
+        reader.count_lines();
+        open.extend(reader.declared);
+        sources.push(reader.source);
     }
+    sources.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(sources)
 }
 
-/// Collects the files below a folder with one of these endings, but not those of other packages or of builds.
-pub(crate) fn collect(
-    folder: &Path,
-    endings: &[&str],
-    paths: &mut Vec<PathBuf>,
-) -> std::io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        let is_foreign = path.join("Cargo.toml").exists() || path.ends_with("target");
-        if path.is_dir() && !is_foreign {
-            collect(&path, endings, paths)?;
-        } else if path
-            .extension()
-            .is_some_and(|found| endings.iter().any(|ending| found == *ending))
-        {
-            paths.push(path);
-        }
+fn file(target: &Path, module: &[String]) -> Option<PathBuf> {
+    if module.len() == 1 {
+        return Some(target.to_path_buf());
     }
-    Ok(())
+    let folder = target.parent()?.join(module[1..].join("/"));
+    [folder.with_extension("rs"), folder.join("mod.rs")].into_iter().find(|path| path.is_file())
 }
 
-/// Role of a file by the first folder that says so, from the root of the workspace down to `src`.
-fn role(path: &Path) -> Role {
-    for part in path {
-        match part.to_str() {
-            Some("src") => return Role::Code,
-            Some("tests" | "fuzz") => return Role::Test,
-            Some("benches") => return Role::Bench,
-            Some("examples") => return Role::Example,
-            _ => {}
-        }
-    }
-    Role::Code
+/// A line without the spaces around it. Lines within strings are taken for what they look like.
+struct Line<'a> {
+    text: &'a str,
+    is_test: bool,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lines::Kind;
-
-    #[test]
-    fn what_is_for_tests_is_marked_and_taken_out() {
-        let text = "fn a() {}\nimpl A {\n    #[cfg(test)]\n    fn b() {}\n    fn c() {}\n}\n\
-                    /// Doc.\n#[cfg(test)]\nmod tests {\n    fn d() {}\n}\nmod e {\n    #[test]\n    fn f() {}\n}\n\
-                    #[cfg(not(test))]\nfn g() {}\n";
-        let source = Source::new("a.rs".into(), Role::Code, text).unwrap();
-        assert_eq!(source.items.len(), 4);
-        assert_eq!(source.count(Kind::Code, 1..=source.lines.len()), 8);
+impl Line<'_> {
+    fn is_code(&self) -> bool {
+        !self.text.is_empty() && !self.text.starts_with("//")
     }
 
-    #[test]
-    fn folders_say_what_a_file_is_for() {
-        let role = |path| role(Path::new(path));
-        assert_eq!(role("crates/a/src/tests/b.rs"), Role::Code);
-        assert_eq!(role("crates/a/tests/it/b.rs"), Role::Test);
-        assert_eq!(role("crates/a/examples/b.rs"), Role::Example);
-        assert_eq!(role("benches/robots/src/main.rs"), Role::Bench);
+    fn is_comment(&self) -> bool {
+        self.text.starts_with("//")
+            && !self.text.starts_with("///")
+            && !self.text.starts_with("//!")
+    }
+}
+
+/// Walks through a file and fills a [`Source`].
+struct Reader<'a> {
+    source: Source,
+    lines: Vec<Line<'a>>,
+    /// Module that is walked through, with inline modules.
+    module: Vec<String>,
+    is_test: bool,
+    /// Modules in files of their own, and whether they are for tests.
+    declared: Vec<(Vec<String>, bool)>,
+}
+
+impl Reader<'_> {
+    /// Marks an item whose attributes keep it for tests. Returns whether all around it is for tests.
+    fn enter(&mut self, item: Span) -> bool {
+        let is_outer_test = self.is_test;
+        let lines = &mut self.lines[item.start().line - 1..item.end().line];
+        let mut head = lines.iter().take_while(|line| line.text.starts_with(['#', '/']));
+        if head.any(|line| TESTS.iter().any(|attribute| line.text.starts_with(attribute))) {
+            self.is_test = true;
+            lines.iter_mut().for_each(|line| line.is_test = true);
+        }
+        is_outer_test
     }
 
-    #[test]
-    fn a_file_that_is_no_rust_is_named() {
-        let error = Source::new("a.rs".into(), Role::Code, "fn a() {\n  let = 3;\n}").err();
-        assert!(error.unwrap().starts_with("a.rs:2:"));
+    fn record(&mut self, figure: &'static str, span: Span) {
+        if !self.is_test {
+            self.source.findings.push((figure, span.start().line));
+        }
     }
+
+    fn record_path(&mut self, names: Vec<String>, import: Option<String>) {
+        if !self.is_test && names.len() > 1 {
+            self.source.paths.push(NamedPath { names, module: self.module.clone(), import });
+        }
+    }
+
+    /// Records every path of an import that begins with these names. `a::{self}` is `a`.
+    fn record_import(&mut self, tree: &UseTree, mut names: Vec<String>) {
+        let (last, import) = match tree {
+            UseTree::Path(step) => {
+                names.push(step.ident.to_string());
+                return self.record_import(&step.tree, names);
+            }
+            UseTree::Group(group) => {
+                return group.items.iter().for_each(|tree| self.record_import(tree, names.clone()));
+            }
+            UseTree::Name(name) => (name.ident.to_string(), None),
+            UseTree::Rename(rename) => (rename.ident.to_string(), Some(rename.rename.to_string())),
+            UseTree::Glob(_) => ("*".to_string(), None),
+        };
+        if last != "self" {
+            names.push(last);
+        }
+        let import = import.or_else(|| names.last().cloned());
+        self.record_path(names, import);
+    }
+
+    fn measure_function(&mut self, signature: &Signature, body: &Block) {
+        let first = body.brace_token.span.open().start().line;
+        let last = body.brace_token.span.close().start().line;
+        let inside = self.lines.iter().take(last.saturating_sub(1)).skip(first);
+        if inside.filter(|line| line.is_code()).count() > MAX_LINES {
+            self.record("long_functions", signature.ident.span());
+        }
+    }
+
+    fn count_lines(&mut self) {
+        let mut number = 1;
+        for lines in self.lines.chunk_by(|a, b| a.is_comment() && b.is_comment()) {
+            let first = &lines[0];
+            if first.is_code() && first.is_test {
+                self.source.test_lines += 1;
+            } else if first.is_code() {
+                self.source.code_lines += 1;
+            }
+            if first.is_comment() && !first.is_test && gives_reason(lines) {
+                self.source.findings.push(("reasons", number));
+            }
+            number += lines.len();
+        }
+    }
+}
+
+fn gives_reason(comment: &[Line]) -> bool {
+    let mut words = comment.iter().flat_map(|line| line.text.split(|c: char| !c.is_alphabetic()));
+    words.any(|word| REASONS.split(' ').any(|reason| word.eq_ignore_ascii_case(reason)))
+}
+
+impl<'ast> Visit<'ast> for Reader<'_> {
+    fn visit_item(&mut self, item: &'ast Item) {
+        let is_outer_test = self.enter(item.span());
+        visit::visit_item(self, item);
+        self.is_test = is_outer_test;
+    }
+
+    fn visit_item_mod(&mut self, module: &'ast ItemMod) {
+        self.module.push(module.ident.to_string());
+        if module.content.is_none() {
+            self.declared.push((self.module.clone(), self.is_test));
+        }
+        visit::visit_item_mod(self, module);
+        self.module.pop();
+    }
+
+    fn visit_item_use(&mut self, import: &'ast ItemUse) {
+        self.record_import(&import.tree, Vec::new());
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        let names = path.segments.iter().map(|segment| segment.ident.to_string());
+        self.record_path(names.collect(), None);
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, call: &'ast Macro) {
+        // What a macro gets are tokens and no paths yet.
+        let tokens = call.tokens.to_string().replace(" :: ", "::");
+        for path in tokens.split(|c: char| !c.is_alphanumeric() && c != '_' && c != ':') {
+            let names = path.split("::").filter(|name| !name.is_empty());
+            self.record_path(names.map(String::from).collect(), None);
+        }
+    }
+
+    fn visit_item_fn(&mut self, function: &'ast ItemFn) {
+        self.measure_function(&function.sig, &function.block);
+        visit::visit_item_fn(self, function);
+    }
+
+    fn visit_impl_item_fn(&mut self, method: &'ast ImplItemFn) {
+        let is_outer_test = self.enter(method.span());
+        self.measure_function(&method.sig, &method.block);
+        visit::visit_impl_item_fn(self, method);
+        self.is_test = is_outer_test;
+    }
+
+    fn visit_signature(&mut self, signature: &'ast Signature) {
+        if signature.inputs.len() > MAX_PARAMETERS {
+            self.record("many_parameters", signature.ident.span());
+        }
+        visit::visit_signature(self, signature);
+    }
+
+    fn visit_local(&mut self, local: &'ast Local) {
+        if let Some(init) = &local.init {
+            if is_tuple_of_unlike_things(&local.pat, &init.expr) {
+                self.record("tuple_lets", local.span());
+            }
+            if matches!(*init.expr, Expr::Closure(_)) {
+                self.record("named_closures", local.span());
+            }
+        }
+        visit::visit_local(self, local);
+    }
+
+    fn visit_expr_match(&mut self, expression: &'ast ExprMatch) {
+        let mut patterns = expression.arms.iter().map(|arm| &arm.pat);
+        if patterns.any(|p| matches!(p, Pat::Lit(value) if matches!(value.lit, Lit::Bool(_)))) {
+            self.record("bool_matches", expression.span());
+        }
+        visit::visit_expr_match(self, expression);
+    }
+}
+
+/// Returns whether `let (a, b) = (x, y)` names things that are not alike.
+fn is_tuple_of_unlike_things(pattern: &Pat, value: &Expr) -> bool {
+    let (Pat::Tuple(pattern), Expr::Tuple(_)) = (pattern, value) else {
+        return false;
+    };
+    let mut kinds: Vec<Vec<String>> = pattern.elems.iter().filter_map(kind).collect();
+    kinds.sort();
+    kinds.dedup();
+    kinds.len() > 1
+}
+
+/// Returns the words of a name without those that tell alike things apart; none of a pattern that is no name.
+fn kind(pattern: &Pat) -> Option<Vec<String>> {
+    let Pat::Ident(name) = pattern else {
+        return None;
+    };
+    let name = name.ident.to_string();
+    let words =
+        name.split('_').filter(|word| word.len() > 2 && !PAIRS.split(' ').any(|p| p == *word));
+    Some(words.map(String::from).collect())
 }

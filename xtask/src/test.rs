@@ -1,12 +1,11 @@
 //! `cargo xtask test`: every test of the workspace, in two builds that share all third-party crates.
 //!
-//! Tests beside the code run with overflow checks and debug assertions on, in a build that is quick to make.
-//! Tests from outside (`tests/`: promises, the program itself) run against the shipped build, so that the
-//! program and its tests share all that cargo compiles.
+//! Tests beside the code of the hot crates (kernel, worlds and their libraries) run with overflow checks and debug
+//! assertions on, in a build that is quick to make. All others run against the shipped build, so that the program and
+//! its tests share all that cargo compiles.
 
-use crate::arguments::house;
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use crate::root;
+use std::fs;
 use std::process::{Command, ExitCode, Stdio};
 
 /// Settings of the build with checks, as environment of cargo. They are no profile of their own: that would
@@ -17,132 +16,126 @@ const CHECKS: [(&str, &str); 3] = [
     ("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1"),
 ];
 
-/// A part of the tests, compiled in one way.
-struct Part {
-    /// Targets of cargo.
-    targets: &'static [&'static str],
-    environment: &'static [(&'static str, &'static str)],
-}
+/// Crates that are hot: they are shipped without checks, so their tests beside the code are built once more with checks.
+/// All other crates of ours have overflow checks in the shipped build, too (`Cargo.toml`), and are tested in it.
+const HOT: [&str; 9] = [
+    "sidestep-airspace",
+    "sidestep-arms",
+    "sidestep-chain",
+    "sidestep-collectives",
+    "sidestep-error-models",
+    "sidestep-kernel",
+    "sidestep-map",
+    "sidestep-robots",
+    "sidestep-rods",
+];
 
-/// Tests beside the code. Of the programs, only those with tests: each other one would be compiled for nothing,
-/// together with its library. `.ci/soak` runs all others with checks as well.
-const BESIDE: Part =
-    Part { targets: &["--lib", "--bin", "sidestep-fuzz", "--bin", "xtask"], environment: &CHECKS };
+/// Programs with tests beside their code: each other program would be compiled for nothing, with its library.
+/// `.ci/soak` runs all of them with checks.
+const TESTED_PROGRAMS: [&str; 4] = ["--bin", "sidestep-fuzz", "--bin", "xtask"];
 
 /// Tests from outside, some of which run examples: the promises of the library, too, so that its golden digests
 /// are those of the shipped build.
-const OUTSIDE: Part = Part { targets: &["--test", "*"], environment: &[] };
+const OUTSIDE: [&str; 3] = ["--workspace", "--test", "*"];
 
-/// Examples as programs: among the targets of tests, cargo would compile each as a program of tests.
-const PROGRAMS: Part = Part { targets: &["--examples"], environment: &[] };
-
-/// Examples in the documentation.
-const EXAMPLES: Part = Part { targets: &["--doc"], environment: &[] };
-
-/// All of one package, as it is shipped: not every package has each sort of target.
-const ONE_PACKAGE: Part = Part { targets: &[], environment: &[] };
+/// File in which tests say why they were skipped, because the output of a passing test is not shown.
+const SKIPPED_TESTS: &str = "target/skipped-tests";
 
 /// Runs the tests by nextest where it is installed, else by `cargo test`. `chosen` is handed to it: a
 /// filter, for example. Nextest does not know the examples in the documentation; they follow it
 /// when nothing was chosen. With `--no-run`, everything is compiled only.
 pub(crate) fn run(chosen: &[String]) -> ExitCode {
-    let skipped = Skipped::new();
-    let runner: &[&str] = if has_nextest() {
-        // A filter that meets tests of one part alone is no mistake. Nextest refuses that option where nothing runs.
-        let is_run = !chosen.iter().any(|word| word == "--no-run");
-        if is_run { &["nextest", "run", "--no-tests", "pass"] } else { &["nextest", "run"] }
+    // Of an earlier run; there need not be one.
+    let _ = fs::remove_file(root().join(SKIPPED_TESTS));
+    let is_one = chosen.iter().any(|word| word.starts_with("-p") || word.starts_with("--package"));
+    let passed = if is_one {
+        // All of one package as it is shipped: not every package has each sort of target.
+        tests(&[], &[], chosen)
     } else {
-        eprintln!("nextest is not installed: `cargo test` runs one test program after the other");
-        &["test", "--no-fail-fast"]
+        // Examples as programs: among the targets of tests, cargo would compile each as a program of tests.
+        let has_examples = cargo(&["build", "--release", "--workspace", "--examples"], &[]);
+        // All parts are run, even if the first fails: a developer wants to see every failure.
+        let has_passed_with_checks = tests(&with_checks(), &CHECKS, chosen);
+        let has_passed_beside = tests(&beside(), &[], chosen);
+        let has_passed_outside = tests(&OUTSIDE, &[], chosen);
+        has_examples
+            && has_passed_with_checks
+            && has_passed_beside
+            && has_passed_outside
+            && (!chosen.is_empty() || cargo(&["test", "--release", "--workspace", "--doc"], &[]))
     };
-    let all = !names_a_package(chosen);
-    if all && !cargo(&["build"], &PROGRAMS, &[]) {
-        return ExitCode::FAILURE;
-    }
-    let parts = if all { &[BESIDE, OUTSIDE][..] } else { &[ONE_PACKAGE] };
-    // All are run, even if the first fail: a developer wants to see every failure.
-    let failed = parts.iter().filter(|part| !cargo(runner, part, chosen)).count();
-    let passed = failed == 0 && (!chosen.is_empty() || cargo(&["test"], &EXAMPLES, &[]));
-    skipped.tell();
+    print_skipped();
     if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Reasons why tests were skipped: they say so in a file, because the output of a passing test is not shown.
-struct Skipped(PathBuf);
-
-impl Skipped {
-    fn new() -> Self {
-        let file = house().join("target/skipped-tests");
-        // Of an earlier run; there need not be one.
-        let _ = std::fs::remove_file(&file);
-        Self(file)
+/// Returns the choice of tests beside the code of hot crates.
+fn with_checks() -> Vec<&'static str> {
+    // This program depends on the crate that unifies features (`.config/hakari.toml`): without one that does, packages
+    // of others would be compiled again with fewer features.
+    let mut words = vec!["-p", "xtask", "--lib"];
+    for name in HOT {
+        words.extend(["-p", name]);
     }
-
-    /// Tells how many tests were skipped, for each reason.
-    fn tell(&self) {
-        let reasons = std::fs::read_to_string(&self.0).unwrap_or_default();
-        for (why, times) in counted(&reasons) {
-            eprintln!("skipped {times} times: {why}");
-        }
-    }
+    words
 }
 
-/// Returns how often each line is there.
-fn counted(lines: &str) -> BTreeMap<&str, usize> {
-    lines.lines().fold(BTreeMap::new(), |mut counts, line| {
-        *counts.entry(line).or_default() += 1;
-        counts
-    })
+/// Returns the choice of tests beside the code of all other crates.
+fn beside() -> Vec<&'static str> {
+    let mut words = vec!["--workspace", "--lib"];
+    words.extend(TESTED_PROGRAMS);
+    // The Python package is tested from Python, and the crate of features has nothing to test.
+    for name in HOT.into_iter().chain(["sidestep-python", "sidestep-workspace-hack"]) {
+        words.extend(["--exclude", name]);
+    }
+    words
+}
+
+/// Runs tests by nextest where it is installed, else by `cargo test`.
+fn tests(targets: &[&str], settings: &[(&str, &str)], chosen: &[String]) -> bool {
+    let mut words = if has_nextest() {
+        vec!["nextest", "run", "--release"]
+    } else {
+        eprintln!("nextest is not installed: `cargo test` runs one test program after the other");
+        vec!["test", "--release", "--no-fail-fast"]
+    };
+    // A filter that meets tests of one part alone is no mistake. Nextest refuses the option where nothing runs.
+    if words[0] == "nextest" && !chosen.iter().any(|word| word == "--no-run") {
+        words.extend(["--no-tests", "pass"]);
+    }
+    words.extend(targets);
+    words.extend(chosen.iter().map(String::as_str));
+    cargo(&words, settings)
 }
 
 fn has_nextest() -> bool {
-    let mut asked = command(&["nextest", "--version"]);
-    let asked = asked.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    asked.is_ok_and(|status| status.success())
+    let answer =
+        command(&["nextest", "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    answer.is_ok_and(|status| status.success())
 }
 
-fn names_a_package(words: &[String]) -> bool {
-    words.iter().any(|word| word.starts_with("-p") || word.starts_with("--package"))
-}
-
-/// Returns whether the command succeeded, in the whole workspace unless `more` names a package.
-fn cargo(words: &[&str], part: &Part, more: &[String]) -> bool {
+/// Returns whether the command succeeded.
+fn cargo(words: &[&str], settings: &[(&str, &str)]) -> bool {
     let mut cargo = command(words);
-    cargo.env("SIDESTEP_SKIPPED", house().join("target/skipped-tests"));
-    cargo.envs(part.environment.iter().copied()).arg("--release").args(part.targets);
-    cargo.args((!names_a_package(more)).then_some("--workspace")).args(more);
+    cargo.envs(settings.iter().copied());
+    cargo.env("SIDESTEP_SKIPPED", root().join(SKIPPED_TESTS));
     cargo.status().is_ok_and(|status| status.success())
 }
 
-/// A command of cargo, in the root of the repository.
+/// Returns a command of cargo, in the root of the repository.
 fn command(words: &[&str]) -> Command {
     // Cargo tells the programs that it runs which cargo it is.
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(program);
-    command.args(words).current_dir(house());
+    command.args(words).current_dir(root());
     command
 }
 
-#[test]
-fn reasons_for_skips_are_counted() {
-    let counts = counted("no data\nno browser\nno data\n");
-    assert_eq!(Vec::from_iter(counts), [("no browser", 1), ("no data", 2)]);
-}
-
-/// Returns programs with tests that are not run, and programs that are compiled for tests without having any.
-#[cfg(test)]
-pub(crate) fn misnamed_programs(members: &[crate::members::Member]) -> Vec<String> {
-    let main = std::path::Path::new("src/main.rs");
-    let mut wrong = Vec::new();
-    for member in members {
-        let own = member.sources.iter().filter(|source| {
-            source.path == main || source.module.as_ref().is_some_and(|place| place.root == main)
-        });
-        let is_tested = own.flat_map(|source| &source.lines).any(|line| line.text == "#[test]");
-        if is_tested != BESIDE.targets.contains(&member.name.as_str()) {
-            let name = &member.name;
-            wrong.push(format!("{name}: BESIDE names its program if it has tests, and only then"));
-        }
+/// Prints each reason for which tests were skipped, and how many.
+fn print_skipped() {
+    let text = fs::read_to_string(root().join(SKIPPED_TESTS)).unwrap_or_default();
+    let mut reasons: Vec<&str> = text.lines().collect();
+    reasons.sort_unstable();
+    for equal in reasons.chunk_by(|a, b| a == b) {
+        eprintln!("skipped {} times: {}", equal.len(), equal[0]);
     }
-    wrong
 }

@@ -1,18 +1,20 @@
-//! The `sidestep` command: arguments -> plan -> session -> words.
+//! The `sidestep` command: arguments -> plan -> session -> output.
 //!
 //! ```text
-//! args.rs      the command line                  commands/*.rs   one file per command
-//! plan.rs      options -> a scenario             sweep/          options -> a sweep; its results
-//! watch.rs     progress and Ctrl-C for sessions  progress.rs     progress bars
-//! report.rs    a run's summary as text           pages.rs        documents as files
-//! exit.rs      exit codes and failures           console.rs      standard output and error
-//! link.rs      the program of fleets             fleet_table.rs  its nodes as a table
+//! args.rs             the command line                  commands/*.rs    one file per command
+//! scenario_args.rs    options -> a scenario             sweep/           options -> a sweep; its results
+//! console_watcher.rs  progress and Ctrl-C for sessions  progress.rs      progress bars
+//! interrupt.rs        Ctrl-C                            foxglove.rs      messages about live viewers
+//! report.rs           a run's summary as text           report_files.rs  documents as files
+//! exit.rs             exit codes and failures           console.rs       standard output and error
+//! link.rs             the program of fleets             fleet_table.rs   its nodes as a table
+//! fleet_watch.rs      fleets that the studio watches
 //! ```
 //!
 //! The crate `sidestep-session` drives the runs.
 //!
 //! A program with worlds or parts of its own has the whole command line by [`main_with`]: it checks, runs,
-//! sweeps, films and replays scenarios that name them.
+//! sweeps, animates and replays scenarios that name them.
 
 mod args;
 mod commands;

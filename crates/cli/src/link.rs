@@ -110,10 +110,10 @@ pub(crate) fn find_program() -> Result<PathBuf, InputError> {
         None => beside.into_iter().chain(on_path).find(|path| path.is_file()),
     };
     found.ok_or_else(|| {
-        let cause = "it is not there; it alone carries the network, so it is a program of its own";
+        let cause = "not found; fleet networking is a separate program";
         let remedy = format!(
             "get it with `cargo install --path crates/link`, or build it beside sidestep with \
-             `cargo build --release -p {LINK_PROGRAM}`; {PATH_VARIABLE} may name its path"
+             `cargo build --release -p {LINK_PROGRAM}`; {PATH_VARIABLE} may hold its path"
         );
         InputError::new(LINK_PROGRAM, cause, remedy)
     })
@@ -167,8 +167,7 @@ fn cannot_start_error(error: &std::io::Error) -> Failure {
 /// When a path in it is no text: the program could not find it.
 fn job_line(job: &Job) -> Result<String, InputError> {
     let text = serde_json::to_string(job).map_err(|e| {
-        let remedy =
-            "name scenario, folder and certificates in UTF-8: the job is handed over as text";
+        let remedy = "give scenario, folder and certificates in UTF-8: the job is sent as text";
         InputError::new("the job of a fleet", e.to_string(), remedy)
     })?;
     Ok(text + "\n")

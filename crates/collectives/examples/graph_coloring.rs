@@ -1,9 +1,9 @@
-//! Colors a map with probability collectives: no airplane in sight.
+//! Colors a map with probability collectives.
 //!
 //! `cargo run -p sidestep-collectives --example graph_coloring`
 //!
 //! Every country is a player, its strategies are the colors, and two neighbors of one color
-//! cost 1. Countries only ever learn from the cost of their own color.
+//! cost 1. Countries learn only from the cost of their own color.
 
 use sidestep_collectives::{
     Choice, Estimator, Game, OptimizerConfig, PairwiseGame, StopCriterion, Update, UpdateOrder,
@@ -21,10 +21,15 @@ const COLORS: [&str; 3] = ["red", "green", "blue"];
 fn main() {
     let mut game = PairwiseGame::new(vec![vec![0.0; COLORS.len()]; COUNTRIES.len()]);
     for (a, b) in BORDERS {
-        let same = |k: usize| f64::from(u8::from(k / COLORS.len() == k % COLORS.len()));
-        game.add_pair(a, b, (0..COLORS.len() * COLORS.len()).map(same).collect());
+        let mut costs = Vec::new();
+        for color_a in 0..COLORS.len() {
+            for color_b in 0..COLORS.len() {
+                costs.push(if color_a == color_b { 1.0 } else { 0.0 });
+            }
+        }
+        game.add_pair(a, b, costs);
     }
-    let settings = OptimizerConfig {
+    let config = OptimizerConfig {
         estimator: Estimator::Sampled { block: 30, ageing: 0.5 },
         update: Update::NearestNewton { step: 0.3 },
         order: UpdateOrder::Sequence,
@@ -34,14 +39,14 @@ fn main() {
         choice: Choice::Argmax,
     };
     let streams = Streams::new(Seed(1));
-    let outcome = optimize(&game, &settings, |country, k| {
+    let result = optimize(&game, &config, |country, k| {
         let words = streams.block(country as u32, k, Purpose(1), 0);
         f64::from(words[0]) / 4_294_967_296.0
     });
-    for (country, &color) in COUNTRIES.iter().zip(&outcome.joint) {
+    for (country, &color) in COUNTRIES.iter().zip(&result.joint) {
         println!("{country:<12} {}", COLORS[color]);
     }
-    let clashes = game.cost(&outcome.joint);
-    let end = if outcome.converged { "settled" } else { "stopped" };
-    println!("{clashes} borders between equal colors; {end} after {} rounds", outcome.rounds);
+    let clashes = game.cost(&result.joint);
+    let end = if result.converged { "converged" } else { "stopped" };
+    println!("{clashes} borders between equal colors; {end} after {} rounds", result.rounds);
 }

@@ -30,10 +30,11 @@ pub struct PairwiseGame {
     own: Vec<Vec<f64>>,
     pairs: Vec<PairCosts>,
     /// Indices of each player's pairs.
-    of_player: Vec<Vec<usize>>,
+    player_pairs: Vec<Vec<usize>>,
 }
 
-/// The costs of the joint strategies of two players.
+/// The costs of the joint strategies of two players. They are stored with a row per strategy of either player, because
+/// expectations read whole rows.
 #[derive(Debug, Clone)]
 struct PairCosts {
     a: usize,
@@ -51,15 +52,16 @@ struct PairCosts {
 struct CostTable {
     width: usize,
     costs: Vec<f64>,
-    /// Rows with any cost that is not 0, in increasing order.
-    rows: Vec<usize>,
+    /// Rows with any cost that is not 0, in increasing order: most strategies of two airplanes do not conflict.
+    nonzero_rows: Vec<usize>,
 }
 
 impl CostTable {
     fn new(width: usize, costs: Vec<f64>) -> Self {
-        let costly = costs.chunks_exact(width).map(|row| row.iter().any(|cost| *cost != 0.0));
-        let rows = costly.enumerate().filter_map(|(row, costly)| costly.then_some(row)).collect();
-        Self { width, costs, rows }
+        let rows = costs.chunks_exact(width).enumerate();
+        let nonzero = rows.filter(|(_, costs)| costs.iter().any(|cost| *cost != 0.0));
+        let nonzero_rows = nonzero.map(|(row, _)| row).collect();
+        Self { width, costs, nonzero_rows }
     }
 
     fn row(&self, row: usize) -> &[f64] {
@@ -68,7 +70,7 @@ impl CostTable {
 
     /// Adds the expected costs if rows have the probabilities `q`.
     fn add_expected_costs(&self, q: &[f64], expected: &mut [f64]) {
-        for &row in &self.rows {
+        for &row in &self.nonzero_rows {
             let p = q[row];
             expected.iter_mut().zip(self.row(row)).for_each(|(sum, cost)| *sum += cost * p);
         }
@@ -87,7 +89,7 @@ impl PairwiseGame {
     pub fn new(own: Vec<Vec<f64>>) -> Self {
         assert!(own.iter().all(|costs| !costs.is_empty()), "every player needs a strategy");
         let strategies: Vec<usize> = own.iter().map(Vec::len).collect();
-        Self { of_player: vec![Vec::new(); own.len()], strategies, own, pairs: Vec::new() }
+        Self { player_pairs: vec![Vec::new(); own.len()], strategies, own, pairs: Vec::new() }
     }
 
     /// Adds the joint cost of the strategies of players `a` and `b`: `costs[x_a][x_b]`, row by row
@@ -113,35 +115,42 @@ impl PairwiseGame {
             self.strategies[a] * self.strategies[b],
             "one cost per two strategies"
         );
-        if parts.iter().any(|part| *part != [0.0; 2]) {
-            let index = self.pairs.len();
-            let [rows, width] = [self.strategies[a], self.strategies[b]];
-            let cost = |[of_a, of_b]: &[f64; 2]| of_a + of_b;
-            let column = |x: usize| parts[x..].iter().step_by(width).map(cost);
-            let given_a = CostTable::new(width, parts.iter().map(cost).collect());
-            let given_b = CostTable::new(rows, (0..width).flat_map(column).collect());
-            self.pairs.push(PairCosts { a, b, given_a, given_b, parts });
-            self.index_pair(a, b, index);
-            self.index_pair(b, a, index);
+        if parts.iter().all(|part| *part == [0.0; 2]) {
+            return;
         }
+        let strategies_a = self.strategies[a];
+        let strategies_b = self.strategies[b];
+        let costs: Vec<f64> = parts.iter().map(|[of_a, of_b]| of_a + of_b).collect();
+        let mut transposed = Vec::with_capacity(costs.len());
+        for x_b in 0..strategies_b {
+            transposed.extend(costs[x_b..].iter().step_by(strategies_b));
+        }
+        let given_a = CostTable::new(strategies_b, costs);
+        let given_b = CostTable::new(strategies_a, transposed);
+        let index = self.pairs.len();
+        self.pairs.push(PairCosts { a, b, given_a, given_b, parts });
+        self.index_pair(a, b, index);
+        self.index_pair(b, a, index);
     }
 
     /// Adds a pair to a player's list, which is sorted by the number of the other player.
     fn index_pair(&mut self, player: usize, other: usize, index: usize) {
         let pairs = &self.pairs;
-        let of_player = &mut self.of_player[player];
-        let place = of_player.partition_point(|&k| pairs[k].a + pairs[k].b - player < other);
-        of_player.insert(place, index);
+        let player_pairs = &mut self.player_pairs[player];
+        // The sum of a pair's players less this player is the other one.
+        let slot = player_pairs.partition_point(|&k| pairs[k].a + pairs[k].b - player < other);
+        player_pairs.insert(slot, index);
     }
 
     /// Returns the part of a joint move's cost that a player bears.
     pub fn player_cost(&self, joint: &[usize], player: usize) -> f64 {
-        let own = self.own[player][joint[player]];
-        self.of_player[player].iter().fold(own, |sum, &index| {
+        let mut sum = self.own[player][joint[player]];
+        for &index in &self.player_pairs[player] {
             let PairCosts { a, b, parts, .. } = &self.pairs[index];
             let parts = parts[joint[*a] * self.strategies[*b] + joint[*b]];
-            sum + parts[usize::from(*b == player)]
-        })
+            sum += parts[usize::from(*b == player)];
+        }
+        sum
     }
 
     /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
@@ -149,7 +158,7 @@ impl PairwiseGame {
     pub fn expected_costs(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
-        for &index in &self.of_player[player] {
+        for &index in &self.player_pairs[player] {
             let PairCosts { a, b, given_a, given_b, .. } = &self.pairs[index];
             if *a == player {
                 given_b.add_expected_costs(&q[*b], expected);
@@ -175,7 +184,7 @@ impl Game for PairwiseGame {
     }
 
     fn private_cost(&self, joint: &[usize], player: usize) -> f64 {
-        let pairs = self.of_player[player].iter().map(|&index| self.pair_cost(index, joint));
+        let pairs = self.player_pairs[player].iter().map(|&index| self.pair_cost(index, joint));
         self.own[player][joint[player]] + pairs.sum::<f64>()
     }
 

@@ -1,4 +1,4 @@
-//! The rounds: estimate, update, cool, until no distribution moves anymore.
+//! The rounds: estimate, update, cool, until the distributions have converged.
 
 use super::game::Game;
 use super::player::{Choice, Player, Update, Utility};
@@ -63,10 +63,10 @@ pub struct StopCriterion {
 }
 
 impl StopCriterion {
-    /// Counts calm rounds: returns the number in a row after a round in which probabilities moved
+    /// Counts calm rounds: returns the number in a row after a round in which probabilities changed
     /// by at most `change`.
-    pub fn count_calm_rounds(&self, so_far: u32, change: f64) -> u32 {
-        if change <= self.threshold { so_far + 1 } else { 0 }
+    pub fn count_calm_rounds(&self, previous: u32, change: f64) -> u32 {
+        if change <= self.threshold { previous + 1 } else { 0 }
     }
 }
 
@@ -87,49 +87,52 @@ pub struct OptimizeResult {
 }
 
 /// Optimizes a game. `uniform(player, k)` is the `k`-th uniform number in [0, 1) of a player's own
-/// stream: samples take them in order, and the one after the last makes the final draw.
+/// stream: samples use them in order, and the one after the last is for the final draw.
 ///
 /// # Panics
 /// When the estimator is exact and the game is not a sum over pairs.
 pub fn optimize(
     game: &impl Game,
-    settings: &OptimizerConfig,
+    config: &OptimizerConfig,
     uniform: impl Fn(usize, u64) -> f64,
 ) -> OptimizeResult {
-    let mut table = OptimizerState::new(game, settings, uniform);
-    let (mut rounds, mut calm) = (0, 0);
-    while calm < settings.stop.calm_rounds && rounds < settings.stop.max_rounds {
-        let change = match settings.estimator {
-            Estimator::Sampled { block, ageing } => table.run_sampled_round(block, ageing),
-            Estimator::Exact => table.run_exact_round(),
+    let mut optimizer = OptimizerState::new(game, config, uniform);
+    let mut rounds = 0;
+    let mut calm = 0;
+    while calm < config.stop.calm_rounds && rounds < config.stop.max_rounds {
+        let change = match config.estimator {
+            Estimator::Sampled { block, ageing } => optimizer.run_sampled_round(block, ageing),
+            Estimator::Exact => optimizer.run_exact_round(),
         };
-        calm = settings.stop.count_calm_rounds(calm, change);
+        calm = config.stop.count_calm_rounds(calm, change);
         rounds += 1;
     }
-    let joint = table.final_joint();
-    let converged = calm >= settings.stop.calm_rounds;
-    let expected = table.players.iter().map(|p| p.expected().to_vec()).collect();
-    let q = table.players.into_iter().map(|p| p.q).collect();
-    OptimizeResult { joint, q, expected, rounds, converged }
+    OptimizeResult {
+        joint: optimizer.final_joint(),
+        expected: optimizer.players.iter().map(|p| p.expected().to_vec()).collect(),
+        q: optimizer.players.into_iter().map(|p| p.q).collect(),
+        rounds,
+        converged: calm >= config.stop.calm_rounds,
+    }
 }
 
 /// All players and their samples during an optimization.
 struct OptimizerState<'g, G, U> {
     game: &'g G,
-    settings: &'g OptimizerConfig,
+    config: &'g OptimizerConfig,
     uniform: U,
     players: Vec<Player>,
-    /// The distributions that the players see.
+    /// The distributions on which updates of the present round are based.
     q: Vec<Vec<f64>>,
     /// Number of samples drawn by each player.
     drawn: u64,
 }
 
 impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
-    fn new(game: &'g G, settings: &'g OptimizerConfig, uniform: U) -> Self {
+    fn new(game: &'g G, config: &'g OptimizerConfig, uniform: U) -> Self {
         let players: Vec<Player> = game.strategies().iter().map(|&n| Player::new(n)).collect();
         let q = players.iter().map(|p| p.q.clone()).collect();
-        Self { game, settings, uniform, players, q, drawn: 0 }
+        Self { game, config, uniform, players, q, drawn: 0 }
     }
 
     /// Runs a round with exact expectations; returns the largest change of a probability.
@@ -140,9 +143,9 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
             interrupt::check();
             let player = &mut self.players[i];
             player.set_expected(|expected| game.expected_costs(i, &self.q, expected));
-            change = change.max(player.update(self.settings.update, self.settings.cooling));
-            // In sequence, the players after this one see its new distribution.
-            if self.settings.order == UpdateOrder::Sequence {
+            change = change.max(player.update(self.config.update, self.config.cooling));
+            // In sequence, the next players use the new distribution of this one.
+            if self.config.order == UpdateOrder::Sequence {
                 self.q[i].clone_from(&player.q);
             }
         }
@@ -160,8 +163,8 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
             let costs: Vec<f64> = (0..block).map(|k| self.sample_cost(&samples, k, i)).collect();
             let player = &mut self.players[i];
             player.learn(&samples[i], &costs, ageing);
-            change = change.max(player.update(self.settings.update, self.settings.cooling));
-            if self.settings.order == UpdateOrder::Sequence {
+            change = change.max(player.update(self.config.update, self.config.cooling));
+            if self.config.order == UpdateOrder::Sequence {
                 samples = self.sample_block(block);
             }
         }
@@ -170,29 +173,32 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
 
     /// Draws the next `block` samples of each player.
     fn sample_block(&mut self, block: usize) -> Vec<Vec<usize>> {
-        let from = self.drawn;
+        let first = self.drawn;
         self.drawn += block as u64;
-        let uniform = &self.uniform;
-        let of = |(i, player): (usize, &Player)| {
-            (from..from + block as u64).map(|k| player.sample(uniform(i, k))).collect()
-        };
-        self.players.iter().enumerate().map(of).collect()
+        let mut samples = Vec::with_capacity(self.players.len());
+        for (i, player) in self.players.iter().enumerate() {
+            let draws = first..self.drawn;
+            samples.push(draws.map(|k| player.sample((self.uniform)(i, k))).collect());
+        }
+        samples
     }
 
+    /// Returns the cost of joint move `k` that a player learns from.
     fn sample_cost(&self, samples: &[Vec<usize>], k: usize, player: usize) -> f64 {
         interrupt::check();
-        let joint: Vec<usize> = samples.iter().map(|of_player| of_player[k]).collect();
-        match self.settings.utility {
+        let joint: Vec<usize> = samples.iter().map(|strategies| strategies[k]).collect();
+        match self.config.utility {
             Utility::Joint => self.game.cost(&joint),
             Utility::Private => self.game.private_cost(&joint, player),
         }
     }
 
     fn final_joint(&self) -> Vec<usize> {
-        let choose = |(i, player): (usize, &Player)| {
-            player.choose(self.settings.choice, (self.uniform)(i, self.drawn))
-        };
-        self.players.iter().enumerate().map(choose).collect()
+        let mut joint = Vec::with_capacity(self.players.len());
+        for (i, player) in self.players.iter().enumerate() {
+            joint.push(player.choose(self.config.choice, (self.uniform)(i, self.drawn)));
+        }
+        joint
     }
 }
 

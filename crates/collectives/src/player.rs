@@ -4,9 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// The least probability, above 0 so that every strategy may return.
+/// The minimum of a probability, above 0 so that its logarithm is finite and every strategy may return.
 const MIN_PROBABILITY: f64 = 1e-9;
-/// The lowest temperature, as a share of the costs' scale.
+/// The lowest temperature, as a fraction of the magnitude of the costs: below it, costs divided by the temperature would
+/// have no digits left of their differences.
 const MIN_TEMPERATURE_FRACTION: f64 = 1e-12;
 
 /// The step of a distribution toward the minimum of eq. 7.
@@ -73,32 +74,33 @@ impl Player {
         }
     }
 
-    /// Returns whether it can be a player with this number of strategies: one that comes from
-    /// elsewhere, such as over a network, may be anything.
+    /// Returns whether it is a valid player with this number of strategies: one that was received
+    /// from a network may have any content.
     pub fn has_strategies(&self, strategies: usize) -> bool {
         let Self { q, temperature, sums, counts, expected } = self;
+        let has_shape = [q.len(), sums.len(), counts.len()] == [strategies; 3]
+            && (expected.is_empty() || expected.len() == strategies);
         let is_distribution =
             q.iter().all(|p| (0.0..=1.0).contains(p)) && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
-        let is_known = expected.is_empty() || expected.len() == strategies;
-        let are_finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-        [q.len(), sums.len(), counts.len()] == [strategies; 3]
-            && is_known
+        let are_counts = counts.iter().all(|count| (0.0..f64::INFINITY).contains(count));
+        has_shape
             && is_distribution
+            && are_counts
             && (0.0..f64::INFINITY).contains(temperature)
-            && counts.iter().all(|count| (0.0..f64::INFINITY).contains(count))
-            && are_finite(sums)
-            && are_finite(expected)
+            && sums.iter().chain(expected).all(|number| number.is_finite())
     }
 
     /// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
     pub fn sample(&self, u: f64) -> usize {
-        let mut cumulated = 0.0;
-        let below = |p: &f64| {
-            cumulated += p;
-            u < cumulated
-        };
+        let mut cumulative = 0.0;
+        for (x, p) in self.q.iter().enumerate() {
+            cumulative += p;
+            if u < cumulative {
+                return x;
+            }
+        }
         // Rounding may leave the sum of all probabilities just below `u`.
-        self.q.iter().position(below).unwrap_or(self.q.len() - 1)
+        self.q.len() - 1
     }
 
     /// Returns the final strategy; `u` as in [`Player::sample`].
@@ -106,16 +108,20 @@ impl Player {
         match choice {
             Choice::Draw => self.sample(u),
             Choice::Argmax => {
-                let better =
-                    |best: usize, x: usize| if self.q[x] > self.q[best] { x } else { best };
-                (0..self.q.len()).fold(0, better)
+                let mut best = 0;
+                for x in 1..self.q.len() {
+                    if self.q[x] > self.q[best] {
+                        best = x;
+                    }
+                }
+                best
             }
         }
     }
 
     /// Updates the estimates from a block of samples: strategies and the cost of each. Estimates of
-    /// earlier blocks weigh `ageing` times as much as before; a strategy without any sample yet is
-    /// given the mean of all.
+    /// earlier blocks weigh `ageing` times as much as before; a strategy without any sample so far
+    /// gets the mean of all.
     pub fn learn(&mut self, samples: &[usize], costs: &[f64], ageing: f64) {
         self.sums.iter_mut().chain(&mut self.counts).for_each(|v| *v *= ageing);
         for (&x, &cost) in samples.iter().zip(costs) {
@@ -125,8 +131,9 @@ impl Player {
         let mean =
             self.sums.iter().sum::<f64>() / self.counts.iter().sum::<f64>().max(MIN_PROBABILITY);
         self.expected.clear();
-        let each = self.sums.iter().zip(&self.counts);
-        self.expected.extend(each.map(|(sum, n)| if *n > 0.0 { sum / n } else { mean }));
+        for (sum, n) in self.sums.iter().zip(&self.counts) {
+            self.expected.push(if *n > 0.0 { sum / n } else { mean });
+        }
     }
 
     /// Sets `E[G | x]` to known values, which `write` fills in.
@@ -142,10 +149,8 @@ impl Player {
     /// Moves `q` by the present estimate and then cools by the factor `cooling`. The first
     /// temperature is the spread of the estimates. Returns the largest change of a probability.
     pub fn update(&mut self, update: Update, cooling: f64) -> f64 {
-        let (low, high) = self
-            .expected
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &e| (l.min(e), h.max(e)));
+        let low = self.expected.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let spread = high - low;
         if self.temperature == 0.0 {
             self.temperature = spread;
@@ -163,23 +168,28 @@ impl Player {
         change
     }
 
+    /// Makes a step of [`Update::NearestNewton`] at temperature `t`; returns the largest change.
     fn newton(&mut self, step: f64, t: f64) -> f64 {
         let mean: f64 = self.q.iter().zip(&self.expected).map(|(q, e)| q * e).sum();
+        // The logarithms first, which the new probabilities then replace in place.
         let mut new: Vec<f64> = self.q.iter().map(|q| math::ln(*q)).collect();
         let entropy = -self.q.iter().zip(&new).map(|(q, ln)| q * ln).sum::<f64>();
         for ((new, q), expected) in new.iter_mut().zip(&self.q).zip(&self.expected) {
-            let force = (expected - mean) / t + entropy + *new;
-            *new = (q - step * q * force).max(MIN_PROBABILITY);
+            let gradient = (expected - mean) / t + entropy + *new;
+            *new = (q - step * q * gradient).max(MIN_PROBABILITY);
         }
         self.replace_distribution(&new)
     }
 
+    /// Makes a step of [`Update::Brouwer`] at temperature `t`; returns the largest change.
     fn brouwer(&mut self, step: f64, t: f64, low: f64) -> f64 {
+        // Relative to the lowest cost, so that the largest weight is 1 and none overflows.
         let weights: Vec<f64> = self.expected.iter().map(|e| math::exp((low - e) / t)).collect();
         let sum: f64 = weights.iter().sum();
-        let toward =
-            |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(MIN_PROBABILITY);
-        let new: Vec<f64> = self.q.iter().zip(&weights).map(toward).collect();
+        let mut new = Vec::with_capacity(weights.len());
+        for (q, weight) in self.q.iter().zip(&weights) {
+            new.push(((1.0 - step) * q + step * weight / sum).max(MIN_PROBABILITY));
+        }
         self.replace_distribution(&new)
     }
 

@@ -10,12 +10,12 @@ pub enum Verdict {
     Held,
     /// Our figures disagree, or agree under some conditions only.
     Refuted,
-    /// Our figures do not tell: an interval contains the threshold, there were too few runs, or the
+    /// Our figures decide nothing: an interval contains the threshold, there were too few runs, or the
     /// machine was not quiet or large enough.
     Undecided,
     /// It can no longer be judged: the quantities that the paper measured or compared are lost.
     Lost,
-    /// It only states the runs, so there is nothing to judge.
+    /// It only describes the runs, so there is nothing to judge.
     Setting,
 }
 
@@ -61,20 +61,22 @@ pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }
 
-/// Summarizes the verdicts on all claims in a sentence, by the words that stand at the claims.
+/// Summarizes the verdicts on all claims in a sentence, with the words of [`Verdict::name`].
 pub fn verdict_summary(claims: &[Claim]) -> String {
-    let told = |verdict: &Verdict| format!("{} {}", count(claims, *verdict), verdict.name());
-    let judged: Vec<String> =
-        Verdict::ALL.iter().filter(|v| **v != Verdict::Setting).map(told).collect();
+    let judged: Vec<String> = Verdict::ALL
+        .iter()
+        .filter(|verdict| **verdict != Verdict::Setting)
+        .map(|verdict| format!("{} {}", count(claims, *verdict), verdict.name()))
+        .collect();
     let settings = count(claims, Verdict::Setting);
-    let rest = match settings {
-        0 => String::new(),
-        _ => format!(" Not counted: {}.", told(&Verdict::Setting)),
-    };
-    format!("Of {} claims: {}.{rest}", claims.len() - settings, judged.join(", "))
+    let mut summary = format!("Of {} claims: {}.", claims.len() - settings, judged.join(", "));
+    if settings > 0 {
+        summary += &format!(" Not counted: {settings} {}.", Verdict::Setting.name());
+    }
+    summary
 }
 
-/// Words on how to read a list of claims.
+/// An explanation of a list of claims.
 pub const READING_NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
                         95 %, and fewer than 5 runs decide nothing but a counterexample. `held`: each \
                         comparison of the claim is on its side of the threshold. `refuted`: one is \

@@ -1,5 +1,5 @@
-//! A report as plain data: its content, in order. It knows no file and no markup; other crates make
-//! a page or a text of it.
+//! A report as plain data: its content, in order. It has no file and no markup; other crates render
+//! it as a page or as text.
 
 use super::claim::Claim;
 use super::{Figure, Table};
@@ -20,11 +20,11 @@ pub struct Document {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Block {
-    /// The head of all that follows, up to the next one.
+    /// The heading of all that follows, up to the next one.
     Section(String),
     /// A few sentences.
     Paragraph(Text),
-    /// A warning: the report is a rehearsal, or a run has not ended.
+    /// A warning: the report is a trial with few runs, or a run is not finished.
     Warning(Text),
     /// Verbatim text: commands, a scenario.
     Code(Code),
@@ -45,7 +45,7 @@ pub enum Block {
 pub struct Experiment {
     /// Its name.
     pub title: &'static str,
-    /// Its setup, and the effect to look for. Marked as [`Text::from_markup`] reads it.
+    /// Its setup, and the effect to look for, with the markup of [`Text::from_markup`].
     pub about: &'static str,
     /// Its figures.
     pub figures: Vec<Figure>,
@@ -80,7 +80,7 @@ pub struct Picture {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Text(pub Vec<Span>);
 
-/// A stretch of words with one look.
+/// A part of a text in one style.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Span {
@@ -93,12 +93,12 @@ pub enum Span {
 }
 
 impl Text {
-    /// Reads marks: `` `code` `` and `**strong**`. A mark that is not closed is plain text. Use
-    /// this only for words of our own; foreign text stays plain through `Text::from`.
+    /// Parses markup: `` `code` `` and `**strong**`. A mark that is not closed is plain text. Use
+    /// this only for text of the program; text of users stays plain through `Text::from`.
     pub fn from_markup(text: &str) -> Self {
         let mut spans = Vec::new();
         let mut rest = text;
-        while let Some((before, inside, mark, after)) = next_mark(rest) {
+        while let Some(MarkedText { before, inside, mark, after }) = next_marked(rest) {
             push_plain(&mut spans, before);
             spans.push(match mark {
                 CODE => Span::Code(inside.into()),
@@ -124,10 +124,12 @@ impl Text {
 
     /// Returns the words without their marks.
     pub fn plain_text(&self) -> String {
-        let words = |span: &Span| match span {
-            Span::Plain(text) | Span::Code(text) | Span::Strong(text) => text.clone(),
-        };
-        self.0.iter().map(words).collect()
+        self.0
+            .iter()
+            .map(|span| match span {
+                Span::Plain(text) | Span::Code(text) | Span::Strong(text) => text.as_str(),
+            })
+            .collect()
     }
 }
 
@@ -148,16 +150,24 @@ impl From<String> for Text {
 const CODE: &str = "`";
 const STRONG: &str = "**";
 
-/// Returns the text before the first pair of marks, the text in it, the mark, and the text after.
-fn next_mark(text: &str) -> Option<(&str, &str, &'static str, &str)> {
-    let pair = |mark: &'static str| {
-        let start = text.find(mark)?;
-        let inside = start + mark.len();
-        let length = text[inside..].find(mark).filter(|length| *length > 0)?;
-        let after = inside + length + mark.len();
-        Some((&text[..start], &text[inside..inside + length], mark, &text[after..]))
-    };
-    [CODE, STRONG].into_iter().filter_map(pair).min_by_key(|(before, ..)| before.len())
+/// A text split at a pair of marks.
+struct MarkedText<'a> {
+    before: &'a str,
+    inside: &'a str,
+    mark: &'static str,
+    after: &'a str,
+}
+
+/// Returns a text split at its first pair of marks.
+fn next_marked(text: &str) -> Option<MarkedText<'_>> {
+    let pairs = [CODE, STRONG].into_iter().filter_map(|mark| split_at_mark(text, mark));
+    pairs.min_by_key(|pair| pair.before.len())
+}
+
+fn split_at_mark<'a>(text: &'a str, mark: &'static str) -> Option<MarkedText<'a>> {
+    let (before, rest) = text.split_once(mark)?;
+    let (inside, after) = rest.split_once(mark)?;
+    (!inside.is_empty()).then_some(MarkedText { before, inside, mark, after })
 }
 
 fn push_plain(spans: &mut Vec<Span>, text: &str) {
@@ -199,9 +209,10 @@ impl Document {
     }
 
     /// Appends a section about an experiment.
-    pub fn experiment(&mut self, of: Experiment) -> &mut Self {
-        self.section(of.title).paragraph(Text::from_markup(of.about));
-        self.figures(of.figures.into_iter().map(Figure::with_interval_note)).tables(of.tables)
+    pub fn experiment(&mut self, experiment: Experiment) -> &mut Self {
+        let Experiment { title, about, figures, tables } = experiment;
+        self.section(title).paragraph(Text::from_markup(about));
+        self.figures(figures.into_iter().map(Figure::with_interval_note)).tables(tables)
     }
 
     /// Appends tables.
@@ -223,7 +234,7 @@ impl Document {
     }
 }
 
-/// The words above a report of little weight.
+/// The warning at the top of a report with few runs.
 const QUICK_RUN_WARNING: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
                              too few runs to measure anything; without `--quick` it is measured.";
 

@@ -16,10 +16,10 @@ pub struct Estimate {
     pub interval: Option<Interval>,
     /// Number of values.
     pub n: usize,
-    /// The interval before bounds of the quantity cut it, from which p-values follow.
+    /// The interval before it was clamped to the bounds of the quantity; p-values follow from it.
     #[serde(skip)]
-    uncut: Option<Interval>,
-    /// Whether it is a geometric mean, and Student's interval that of the logarithms.
+    unclamped: Option<Interval>,
+    /// Whether it is a geometric mean, with Student's interval of the logarithms.
     #[serde(skip)]
     is_factor: bool,
 }
@@ -28,27 +28,42 @@ impl Estimate {
     /// Returns the mean of those runs that have a value.
     pub fn from_values(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.into_iter().flatten().filter(|v| v.is_finite()).collect();
-        let (mean, interval) = (mean(&values), mean_interval(&values));
-        Self { mean, interval, n: values.len(), uncut: interval, is_factor: false }
+        let interval = mean_interval(&values);
+        Self {
+            mean: mean(&values),
+            interval,
+            n: values.len(),
+            unclamped: interval,
+            is_factor: false,
+        }
     }
 
-    /// Returns the geometric mean of those factors that are there and above 0, with the interval
+    /// Returns the geometric mean of those factors that exist and are above 0, with the interval
     /// of the mean of their logarithms: so no end of it is below 0, and the inverse of all factors
     /// has the inverse interval.
-    pub fn from_factors(values: impl IntoIterator<Item = Option<f64>>) -> Self {
-        let logarithm = |factor: f64| (factor > 0.0).then(|| factor.ln());
-        let of = Self::from_values(values.into_iter().map(|factor| factor.and_then(logarithm)));
-        let factors = |i: Interval| Interval { low: i.low.exp(), high: i.high.exp() };
-        let (mean, interval) = (of.mean.map(f64::exp), of.interval.map(factors));
-        Self { mean, interval, uncut: interval, is_factor: true, ..of }
+    pub fn from_factors(factors: impl IntoIterator<Item = Option<f64>>) -> Self {
+        let positive = factors.into_iter().map(|factor| factor.filter(|factor| *factor > 0.0));
+        let logarithms = Self::from_values(positive.map(|factor| factor.map(f64::ln)));
+        let interval = logarithms
+            .interval
+            .map(|interval| Interval { low: interval.low.exp(), high: interval.high.exp() });
+        Self {
+            mean: logarithms.mean.map(f64::exp),
+            interval,
+            n: logarithms.n,
+            unclamped: interval,
+            is_factor: true,
+        }
     }
 
     /// Returns the same estimate of a quantity that is never below `low` nor above `high`, and so neither is an end of
     /// its interval.
     #[must_use]
     pub fn clamped(self, low: f64, high: f64) -> Self {
-        let cut = |i: Interval| Interval { low: i.low.max(low), high: i.high.min(high) };
-        Self { interval: self.interval.map(cut), ..self }
+        let interval = self
+            .interval
+            .map(|interval| Interval { low: interval.low.max(low), high: interval.high.min(high) });
+        Self { interval, ..self }
     }
 
     /// Returns the mean of `a[i] - b[i]` over the pairs in which both have a value: two treatments
@@ -59,28 +74,30 @@ impl Estimate {
 
     /// Returns the geometric mean of `a[i] / b[i]` over the pairs in which both are above 0.
     pub fn geometric_ratio(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
-        let quotient = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
-        Self::from_factors(a.iter().zip(b).map(quotient))
+        Self::from_factors(a.iter().zip(b).map(|(a, b)| Some((*a)? / (*b)?)))
     }
 
     /// Returns the two-sided p-value of Student's test that the mean is `value`; `None` with fewer
     /// than two values.
     pub fn p_value(&self, value: f64) -> Option<f64> {
-        let Interval { low, high } = self.uncut?;
+        let interval = self.unclamped?;
         if !self.is_factor {
-            return Some(mean_p_value(Interval { low, high }, self.n, value));
+            return Some(mean_p_value(interval, self.n, value));
         }
-        // No factor is 0 or below.
-        let logarithms = Interval { low: low.ln(), high: high.ln() };
-        Some(if value > 0.0 { mean_p_value(logarithms, self.n, value.ln()) } else { 0.0 })
+        // A geometric mean is never 0 or below.
+        if value <= 0.0 {
+            return Some(0.0);
+        }
+        let logarithms = Interval { low: interval.low.ln(), high: interval.high.ln() };
+        Some(mean_p_value(logarithms, self.n, value.ln()))
     }
 
-    /// Returns whether the whole interval lies above `value`.
+    /// Returns whether the whole interval is above `value`.
     pub fn is_above(&self, value: f64) -> bool {
         self.interval.is_some_and(|i| i.low > value)
     }
 
-    /// Returns whether the whole interval lies below `value`.
+    /// Returns whether the whole interval is below `value`.
     pub fn is_below(&self, value: f64) -> bool {
         self.interval.is_some_and(|i| i.high < value)
     }
@@ -101,10 +118,10 @@ impl Estimate {
 pub fn format_short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
-        a if a >= 100.0 => format!("{value:.0}"),
-        a if a >= 10.0 => format!("{value:.1}"),
-        a if a >= 1.0 => format!("{value:.2}"),
-        a if a >= 0.01 => format!("{value:.3}"),
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 10.0 => format!("{value:.1}"),
+        size if size >= 1.0 => format!("{value:.2}"),
+        size if size >= 0.01 => format!("{value:.3}"),
         _ => format!("{value:.1e}"),
     }
 }

@@ -17,7 +17,7 @@ pub struct Figure {
     pub x_scale: Scale,
     /// Scale of the vertical axis.
     pub y_scale: Scale,
-    /// The way in which the points are drawn.
+    /// The kind of chart.
     pub kind: FigureKind,
     /// The series, in the order of the legend.
     pub series: Vec<Series>,
@@ -30,11 +30,11 @@ pub enum Scale {
     /// Equal steps are equal differences.
     #[default]
     Linear,
-    /// Equal steps are equal ratios; values of 0 and below have no place on the axis.
+    /// Equal steps are equal ratios; values of 0 and below are not on the axis.
     Log,
 }
 
-/// The way in which the points of a figure are drawn.
+/// The kind of a chart.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FigureKind {
@@ -45,7 +45,7 @@ pub enum FigureKind {
     Bands,
     /// Points alone.
     Points,
-    /// Ways in the plane: points joined by lines, both axes with the same scale.
+    /// Paths in the plane: points joined by lines, both axes with the same scale.
     Ways,
     /// Bars side by side; `x` is the number of a category.
     Bars {
@@ -57,7 +57,7 @@ pub enum FigureKind {
 /// A point of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// Place along the horizontal axis.
+    /// Position along the horizontal axis.
     pub x: f64,
     /// The value.
     pub y: f64,
@@ -118,10 +118,10 @@ pub struct Series {
 pub struct Table {
     /// Its title: the content of the table.
     pub title: String,
-    /// The meaning of the numbers: units, number of runs, method. Marked as
-    /// [`Text::marked`](super::document::Text::marked) reads it.
+    /// The meaning of the numbers: units, number of runs, method, with the markup of
+    /// [`Text::from_markup`](super::document::Text::from_markup).
     pub note: String,
-    /// Heads of the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
     /// Cells, row by row.
     pub rows: Vec<Vec<String>>,

@@ -7,8 +7,8 @@
 //! document.rs   a report: text, tables, figures, pictures and claims in their order
 //! ```
 //!
-//! It knows no world, no file and no markup, and carries neither font nor rasterizer, because both
-//! the library that sums up runs and the crate that writes pages depend on it.
+//! It depends on no world, file or markup, and has neither font nor rasterizer, because both
+//! the library that summarizes runs and the crate that writes pages depend on it.
 
 pub mod claim;
 pub mod document;

@@ -69,15 +69,15 @@ fn corridor() -> Result<String, DrawError> {
     let door = |number, at: (f64, f64), width, open| {
         body(BodyKind::Door, number, at, (width, 1.0)).with_state_if(open, Condition::Open)
     };
-    let ways = [
+    let paths = [
         &[(3.0, 12.0), (3.0, 11.0), (6.0, 7.0), (21.0, 7.0), (26.0, 8.0), (26.0, 3.0)][..],
         &[(32.0, 7.0), (23.0, 7.0), (15.0, 8.0), (8.0, 7.0), (8.0, 3.0), (4.0, 3.0)],
         &[(14.0, 12.0), (21.0, 12.0), (21.0, 11.0), (15.0, 11.0)],
     ];
-    let way = |way: &[(f64, f64)]| (0..).zip(way.iter().map(|&(x, y)| [x, y, 0.0])).collect();
+    let points = |path: &[(f64, f64)]| (0..).zip(path.iter().map(|&(x, y)| [x, y, 0.0])).collect();
     let trail = |(k, places): (u32, &&[(f64, f64)])| Trail {
         of: BodyId::new(BodyKind::Robot, k, None),
-        points: way(places),
+        points: points(places),
     };
     let robot = |(k, places): (u32, &&[(f64, f64)])| {
         body(BodyKind::Robot, k, places[places.len() - 1], (2.0, 2.0))
@@ -89,7 +89,7 @@ fn corridor() -> Result<String, DrawError> {
         body(BodyKind::Person, 6, (9.5, 2.5), (1.0, 1.0)),
         body(BodyKind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
     ];
-    let bodies = (0..).zip(&ways).map(robot).chain(others).collect();
+    let bodies = (0..).zip(&paths).map(robot).chain(others).collect();
     let scenery = Scenery {
         name: "To and fro on the corridor".into(),
         dimensions: 2,
@@ -99,7 +99,7 @@ fn corridor() -> Result<String, DrawError> {
         names: Vec::new(),
     };
     let frame = Frame { bodies, ..Frame::default() };
-    let trails: Vec<Trail> = (0..).zip(&ways).map(trail).collect();
+    let trails: Vec<Trail> = (0..).zip(&paths).map(trail).collect();
     draw(&scenery, &frame, &trails, &PictureOptions::page(&scenery, "Made-up places."))
 }
 

@@ -33,13 +33,17 @@ impl AnimationRenderer {
     /// When the width is 0 or above 4096, or places are not finite.
     pub fn new(scenery: Scenery, frames: &[Frame], width_px: u32) -> Result<Self, DrawError> {
         if width_px > MAX_FRAME_PX {
-            let (found, limit) = (u64::from(width_px), u64::from(MAX_FRAME_PX));
-            return Err(DrawError::TooLarge { what: "film width in px", found, limit });
+            return Err(DrawError::TooLarge {
+                what: "animation width in px",
+                found: u64::from(width_px),
+                limit: u64::from(MAX_FRAME_PX),
+            });
         }
-        DrawError::positive("film width in px", f64::from(width_px))?;
+        DrawError::positive("animation width in px", f64::from(width_px))?;
         check_content(&scenery, &Frame::default(), &[])?;
         let (canvas, window) = view(&scenery, animation_bounds(&scenery, frames)?, width_px);
-        let (width, height) = (window.width as u32, window.height as u32 + CAPTION_HEIGHT_PX);
+        let width = window.width as u32;
+        let height = window.height as u32 + CAPTION_HEIGHT_PX;
         let mut still = Pixmap::new(width, height).ok_or_else(no_area)?;
         still.fill(Color::WHITE);
         let mut film = Self { scenery, canvas, window, background: still };
@@ -58,7 +62,7 @@ impl AnimationRenderer {
         (self.background.width(), self.background.height())
     }
 
-    /// Draws a moment with the ways that led to it, and a line of text under it.
+    /// Draws a moment with the trails that led to it, and a line of text under it.
     ///
     /// # Errors
     /// When places are not finite.

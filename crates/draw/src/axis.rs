@@ -168,7 +168,8 @@ pub(crate) struct FittedAxis {
 impl FittedAxis {
     /// Lays the range's low end at pixel `from` and its high end at pixel `to`.
     pub(crate) fn scale_between(&self, from: f64, to: f64) -> Scale {
-        let (low, high) = (self.transform(self.low), self.transform(self.high));
+        let low = self.transform(self.low);
+        let high = self.transform(self.high);
         Scale {
             log: self.log,
             low,

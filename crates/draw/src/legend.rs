@@ -70,7 +70,7 @@ pub(crate) type SvgColor = Cow<'static, str>;
 /// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum LegendSymbol {
-    /// A stretch of line, perhaps with its marker, and its dashes as an attribute.
+    /// A piece of a line, perhaps with its marker, and its dashes as an attribute.
     Line { color: SvgColor, marker: Option<Marker>, dash: &'static str },
     /// A marker alone.
     Marker { color: SvgColor, marker: Marker },
@@ -108,7 +108,8 @@ pub(crate) struct Legend {
 impl Legend {
     /// Flows `entries` into rows at most `room_px` wide. Entries without a label are left out.
     pub(crate) fn new(entries: Vec<LegendEntry>, font_px: f64, room_px: f64) -> Self {
-        let (mut x, mut row) = (0.0, 0);
+        let mut x = 0.0;
+        let mut row = 0;
         let mut placed = Vec::new();
         for mut entry in entries.into_iter().filter(|entry| !entry.label.trim().is_empty()) {
             let symbol_px = 2.8 * font_px;
@@ -116,7 +117,8 @@ impl Legend {
                 text::shorten(&entry.label, font_px, Weight::Regular, room_px - symbol_px);
             let width = symbol_px + text::width(&entry.label, font_px, Weight::Regular);
             if x > 0.0 && x + width > room_px {
-                (x, row) = (0.0, row + 1);
+                x = 0.0;
+                row += 1;
             }
             placed.push((x, row, entry));
             x += width + 1.5 * font_px;
@@ -135,23 +137,24 @@ impl Legend {
 
     /// Draws the legend with its upper left corner at `(left, top)`.
     pub(crate) fn draw(&self, svg: &mut Svg, left: f64, top: f64) {
-        let look = TextStyle::new(self.font_px, Anchor::Start);
+        let text_style = TextStyle::new(self.font_px, Anchor::Start);
         for (x, row, entry) in &self.placed {
             let middle = top + (*row as f64 + 0.5) * self.row_px();
             self.draw_symbol(svg, &entry.symbol, left + x, middle);
             let text_x = left + x + 2.4 * self.font_px;
-            svg.text(text_x, middle + look.middle_px(), &entry.label, &look);
+            svg.text(text_x, middle + text_style.middle_px(), &entry.label, &text_style);
         }
     }
 
     /// Draws `symbol` two letters wide, its left end at `x`.
     fn draw_symbol(&self, svg: &mut Svg, symbol: &LegendSymbol, x: f64, y: f64) {
         let size = self.font_px;
-        let (end, center) = ((x + 2.0 * size, y), (x + size, y));
+        let center = (x + size, y);
+        let end = (x + 2.0 * size, y);
         match symbol {
             LegendSymbol::Line { color, marker, dash } => {
-                let look = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
-                svg.line((x, y), end, look);
+                let attributes = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
+                svg.line((x, y), end, attributes);
                 if let Some(marker) = marker {
                     marker.draw(svg, center, 0.32 * size, color);
                 }
@@ -179,7 +182,7 @@ impl Legend {
     }
 }
 
-/// Returns the look of a reference line.
+/// Returns the attributes of a reference line.
 pub(crate) fn reference_line_attributes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
@@ -199,7 +202,7 @@ pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color:
     svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));
 }
 
-/// Draws the head of an arrow, `head_px` long, that comes from one point and ends at another.
+/// Draws the head, `head_px` long, of an arrow from one point to another.
 pub(crate) fn arrowhead(
     svg: &mut Svg,
     from: (f64, f64),
@@ -207,8 +210,9 @@ pub(crate) fn arrowhead(
     head_px: f64,
     color: &str,
 ) {
-    let far = hypot(x - from.0, y - from.1);
-    let (ux, uy) = (head_px * (x - from.0) / far, head_px * (y - from.1) / far);
+    let length = hypot(x - from.0, y - from.1);
+    let ux = head_px * (x - from.0) / length;
+    let uy = head_px * (y - from.1) / length;
     let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
     let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (SvgNumber(x), SvgNumber(y)));
     let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", SvgNumber(x), SvgNumber(y));
@@ -226,21 +230,21 @@ pub(crate) fn paragraph(
     svg: &mut Svg,
     lines: &[String],
     (x, top): (f64, f64),
-    look: &TextStyle<'_>,
+    text_style: &TextStyle<'_>,
 ) -> f64 {
-    let line_px = look.size_px * 1.35;
+    let line_px = text_style.size_px * 1.35;
     for (row, line) in lines.iter().enumerate() {
-        svg.text(x, top + row as f64 * line_px + look.size_px, line, look);
+        svg.text(x, top + row as f64 * line_px + text_style.size_px, line, text_style);
     }
     top + lines.len() as f64 * line_px
 }
 
-/// Returns the look of a picture's title.
+/// Returns the text style of a picture's title.
 pub(crate) fn title_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { weight: Weight::Bold, fill: INK, ..TextStyle::new(size_px, Anchor::Start) }
 }
 
-/// Returns the look of small print.
+/// Returns the text style of small print.
 pub(crate) fn small_print_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { fill: FAINT_INK, ..TextStyle::new(size_px, Anchor::Start) }
 }

@@ -21,8 +21,11 @@ const MAX_PNG_PX: u32 = 8192;
 pub fn to_png(svg: &str, max_px: u32) -> Result<Vec<u8>, DrawError> {
     DrawError::positive("PNG size in px", f64::from(max_px))?;
     if max_px > MAX_PNG_PX {
-        let (found, limit) = (u64::from(max_px), u64::from(MAX_PNG_PX));
-        return Err(DrawError::TooLarge { what: "PNG size in px", found, limit });
+        return Err(DrawError::TooLarge {
+            what: "PNG size in px",
+            found: u64::from(max_px),
+            limit: u64::from(MAX_PNG_PX),
+        });
     }
     let tree = parse(svg)?;
     let size = tree.size();

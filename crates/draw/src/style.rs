@@ -39,7 +39,7 @@ pub(crate) fn series_dash(index: usize) -> &'static str {
     DASHES[index / SERIES_COLOR_COUNT % DASHES.len()]
 }
 
-/// Returns the dashes of the ways of bodies with these numbers, which differ where colors repeat.
+/// Returns the dashes of the trails of bodies with these numbers, which differ where colors repeat.
 pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str> {
     let color = |number: u32| number as usize % BODY_COLORS.len();
     let mut times = [0; BODY_COLORS.len()];
@@ -66,10 +66,10 @@ pub(crate) fn hex([r, g, b]: Color) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// The room that a picture may take, and the size of its text.
+/// The size of a picture, and of its text.
 ///
 /// A chart takes the whole `width_px` x `height_px`, and grows in height if a title, a legend or
-/// labels need it. A map is scaled to fit that room, and its title, axes and legend are added to
+/// labels need it. A map is scaled to fit that size, and its title, axes and legend are added to
 /// it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {

@@ -56,7 +56,7 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// The look of a text.
+/// The style of a text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextStyle<'a> {
     pub(crate) size_px: f64,
@@ -93,48 +93,54 @@ impl Svg {
         let _ = writeln!(self.body, "{element}");
     }
 
-    /// Writes a rectangle with the attributes `look`.
-    pub(crate) fn rect(&mut self, r: Rect, look: impl Display) {
+    /// Writes a rectangle with the attributes `attributes`.
+    pub(crate) fn rect(&mut self, r: Rect, attributes: impl Display) {
         let Rect { x, y, width, height } = r;
         let (x, y, width, height) =
             (SvgNumber(x), SvgNumber(y), SvgNumber(width), SvgNumber(height));
         self.push_raw(format_args!(
-            r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" {look}/>"#
+            r#"<rect x="{x}" y="{y}" width="{width}" height="{height}" {attributes}/>"#
         ));
     }
 
-    /// Writes a straight line with the attributes `look`.
-    pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), look: impl Display) {
+    /// Writes a straight line with the attributes `attributes`.
+    pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), attributes: impl Display) {
         let (x1, y1, x2, y2) =
             (SvgNumber(from.0), SvgNumber(from.1), SvgNumber(to.0), SvgNumber(to.1));
-        self.push_raw(format_args!(r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {look}/>"#));
+        self.push_raw(format_args!(
+            r#"<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" {attributes}/>"#
+        ));
     }
 
     /// Writes a path with the path data `data`.
-    pub(crate) fn path(&mut self, data: &str, look: impl Display) {
-        self.push_raw(format_args!(r#"<path d="{data}" {look}/>"#));
+    pub(crate) fn path(&mut self, data: &str, attributes: impl Display) {
+        self.push_raw(format_args!(r#"<path d="{data}" {attributes}/>"#));
     }
 
     /// Writes a circle around `center`.
-    pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, look: impl Display) {
-        let (x, y, r) = (SvgNumber(center.0), SvgNumber(center.1), SvgNumber(radius));
-        self.push_raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {look}/>"#));
+    pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, attributes: impl Display) {
+        let x = SvgNumber(center.0);
+        let y = SvgNumber(center.1);
+        let r = SvgNumber(radius);
+        self.push_raw(format_args!(r#"<circle cx="{x}" cy="{y}" r="{r}" {attributes}/>"#));
     }
 
     /// Writes `text` with its baseline at `y`.
-    pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextStyle<'_>) {
-        let (x, y, size) = (SvgNumber(x), SvgNumber(y), SvgNumber(look.size_px));
+    pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, style: &TextStyle<'_>) {
+        let x = SvgNumber(x);
+        let y = SvgNumber(y);
+        let size = SvgNumber(style.size_px);
         // Ink is the default fill of the document.
         let fill =
-            if look.fill == INK { String::new() } else { format!(r#" fill="{}""#, look.fill) };
-        let anchor = match look.anchor {
+            if style.fill == INK { String::new() } else { format!(r#" fill="{}""#, style.fill) };
+        let anchor = match style.anchor {
             Anchor::Start => "",
             Anchor::Middle => r#" text-anchor="middle""#,
             Anchor::End => r#" text-anchor="end""#,
         };
-        let weight = if look.weight == Weight::Bold { r#" font-weight="bold""# } else { "" };
-        let halo = if look.halo { HALO } else { "" };
-        let turn = if look.upward {
+        let weight = if style.weight == Weight::Bold { r#" font-weight="bold""# } else { "" };
+        let halo = if style.halo { HALO } else { "" };
+        let turn = if style.upward {
             format!(r#" transform="rotate(-90 {x} {y})""#)
         } else {
             String::new()

@@ -19,7 +19,8 @@ impl Ticks {
         Self { major: places.iter().map(|&v| (v, label(v, digits))).collect(), minor: vec![] }
     }
 
-    /// Returns marks at the multiples of a 1-2-5 step from `low` to `high`, `most` at most.
+    /// Returns marks at the multiples of a 1-2-5 step from `low` to `high`, `most` at most. The slack of
+    /// 1e-9 keeps a mark at an end that rounding has moved out of the range.
     pub(crate) fn linear(low: f64, high: f64, most: usize) -> Self {
         let step = nice_step(high - low, most);
         let digits = decimals(step);
@@ -120,15 +121,16 @@ pub(crate) fn decimals(step: f64) -> usize {
 }
 
 fn log_labels(marks: &[f64]) -> Vec<(f64, String)> {
-    let plain = marks.iter().all(|v| (0.000_999..=10_001.0).contains(v));
-    let say = |v: f64| {
-        if plain {
-            label(v, decimals(power(floor(log10(v) + 1e-9) as i32)))
-        } else {
-            scientific(v, 0)
-        }
-    };
-    marks.iter().map(|&v| (v, say(v))).collect()
+    // One form for all labels of an axis: decimals while the longest has at most five digits.
+    let is_plain = marks.iter().all(|v| (0.000_999..=10_001.0).contains(v));
+    let label_of = |v: f64| if is_plain { decimal_label(v) } else { scientific(v, 0) };
+    marks.iter().map(|&v| (v, label_of(v))).collect()
+}
+
+/// Returns a value as a decimal number, down to its first digit.
+fn decimal_label(value: f64) -> String {
+    let exponent = floor(log10(value) + 1e-9) as i32;
+    label(value, decimals(power(exponent)))
 }
 
 /// Returns `value` with `digits` decimals, or in powers of ten if that would be long.
@@ -141,7 +143,7 @@ pub(crate) fn label(value: f64, digits: usize) -> String {
     }
     let number = format!("{:.digits$}", value.abs());
     let (whole, rest) = number.split_at(number.find('.').unwrap_or(number.len()));
-    // Four digits are read at a glance.
+    // Up to four digits are readable without separators.
     let whole = if whole.len() > 4 { group_thousands(whole) } else { whole.into() };
     minus(&format!("{}{whole}{rest}", if value < 0.0 { "-" } else { "" }))
 }
@@ -162,9 +164,10 @@ pub(crate) fn group_thousands(digits: &str) -> String {
 fn scientific(value: f64, digits: usize) -> String {
     let exponent = floor(log10(value.abs()) + 1e-9) as i32;
     let mantissa = format!("{:.digits$}", value / power(exponent));
-    let mantissa = match mantissa.contains('.') {
-        true => mantissa.trim_end_matches('0').trim_end_matches('.'),
-        false => &mantissa,
+    let mantissa = if mantissa.contains('.') {
+        mantissa.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &mantissa
     };
     let power = superscript(exponent);
     match mantissa {

@@ -14,7 +14,7 @@ use super::table::{MAX_TEXT_BYTES, Token, data_lines, tokens};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// Number of beams per scan above which a count is taken for damage.
+/// Number of beams per scan above which a count must be damaged: no scanner has as many.
 const MAX_BEAMS: u32 = 100_000;
 /// Maximum number of words of a message that are read: those of the longest scan, and more.
 const MAX_TOKENS: usize = MAX_BEAMS as usize + 32;
@@ -52,7 +52,7 @@ pub fn read(path: &Path) -> Result<CorrectedLog, InputError> {
     parse(&path.display().to_string(), &read_text(path, MAX_TEXT_BYTES)?)
 }
 
-/// Parses the text of a log; `place` is named in errors.
+/// Parses the text of a log; `place` is its name in errors.
 ///
 /// # Errors
 /// When a message is damaged or there are fewer than two scans.
@@ -63,10 +63,10 @@ pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
         match message[0].text {
             "ODOM" => {
                 let pose = parse_odometry(place, &message)?;
-                log.scans
-                    .last_mut()
-                    .map_or(&mut log.odometry_before, |s| &mut s.odometry)
-                    .push(pose);
+                match log.scans.last_mut() {
+                    Some(scan) => scan.odometry.push(pose),
+                    None => log.odometry_before.push(pose),
+                }
             }
             "FLASER" => log.scans.push(parse_scan(place, &message)?),
             _ => {}
@@ -76,7 +76,7 @@ pub fn parse(place: &str, text: &str) -> Result<CorrectedLog, InputError> {
         return Err(InputError::new(
             place,
             format!("the log has {} FLASER messages; learning compares pairs", log.scans.len()),
-            "name a corrected CARMEN log with ODOM and FLASER messages",
+            "give a corrected CARMEN log with ODOM and FLASER messages",
         ));
     }
     Ok(log)
@@ -108,8 +108,8 @@ fn parse_scan(place: &str, message: &[Token]) -> Result<Scan, InputError> {
     })
 }
 
-fn parse_pose(place: &str, found: &[Token]) -> Result<PoseXyTheta, InputError> {
-    Ok([found[0].number(&place)?, found[1].number(&place)?, found[2].number(&place)?])
+fn parse_pose(place: &str, words: &[Token]) -> Result<PoseXyTheta, InputError> {
+    Ok([words[0].number(&place)?, words[1].number(&place)?, words[2].number(&place)?])
 }
 
 /// Messages may be longer than documented (later programs append fields), never shorter.

@@ -1,10 +1,10 @@
-//! The common parts of the two formats of maps that are drawn with characters.
+//! The common parts of the two formats of maps that are drawn in text.
 
 use sidestep_kernel::InputError;
 
 use sidestep_map::{Cell, GridMap, MAX_BOXES, check_box_count, check_box_size};
 
-/// The maximum size of a map of characters in bytes: all boxes, and as much again for line ends.
+/// The maximum size of a map in text in bytes: all boxes, and as much again for line breaks.
 pub(super) const MAX_TEXT_BYTES: u64 = 2 * MAX_BOXES;
 
 /// The text of a file or of a part of it, for error messages.
@@ -51,7 +51,7 @@ pub(super) struct Line<'a> {
 pub(super) struct Legend {
     /// The cell that a character stands for, if any.
     pub(super) cell: fn(char) -> Option<Cell>,
-    /// The remedy for other characters: a list of those that stand for a cell.
+    /// The remedy for other characters: a list of those with a meaning.
     pub(super) remedy: &'static str,
 }
 
@@ -64,27 +64,25 @@ impl Legend {
         width: usize,
         cells: &mut Vec<Cell>,
     ) -> Result<(), InputError> {
-        let before = cells.len();
-        for (at, character) in line.text.char_indices() {
+        let row_start = cells.len();
+        for (offset, character) in line.text.char_indices() {
             let cell = (self.cell)(character).ok_or_else(|| {
                 let cause = format!("`{}` means nothing in a map", character.escape_debug());
-                source.error(line.offset + at, cause, self.remedy)
+                source.error(line.offset + offset, cause, self.remedy)
             })?;
             cells.push(cell);
         }
-        match cells.len() - before {
-            length if length == width => Ok(()),
-            length => Err(uneven_row(source, line, length, width)),
-        }
+        let length = cells.len() - row_start;
+        if length == width { Ok(()) } else { Err(uneven_row(source, line, length, width)) }
     }
 }
 
-/// Returns the error of a row of `length` instead of `width` characters, at the place where it
+/// Returns the error of a row of `length` instead of `width` characters, at the position where it
 /// should end.
 fn uneven_row(source: SourceText<'_>, line: Line<'_>, length: usize, width: usize) -> InputError {
-    let at = line.text.char_indices().nth(width).map_or(line.text.len(), |(at, _)| at);
+    let end = line.text.char_indices().nth(width).map_or(line.text.len(), |(offset, _)| offset);
     let cause = format!("this row has {length} characters, not {width}");
-    source.error(line.offset + at, cause, "give all rows the same number of characters")
+    source.error(line.offset + end, cause, "give all rows the same number of characters")
 }
 
 /// Creates a map of `cells` that are given row by row from the top, `width` in a row.

@@ -11,9 +11,9 @@ pub(crate) fn extension(path: &Path) -> String {
     name.rsplit_once('.').map_or("", |(_, extension)| extension).to_owned()
 }
 
-/// Refuses a file with a name that does not say that it is of a kind. Files that name further files need it: one text
-/// can be a scenario and a map at once, so a user who may only write scenarios could have files read that a scenario
-/// may not name.
+/// Refuses a file that does not have one of the extensions of its kind. It is needed for files that refer to further
+/// files: one text can be a scenario and a map at once, so a user who may only write scenarios could otherwise have
+/// files read that a scenario may not refer to.
 ///
 /// # Errors
 /// With the extensions of that kind.
@@ -21,7 +21,7 @@ pub(crate) fn check(path: &Path, kind: &str, extensions: &[&str]) -> Result<(), 
     if extensions.contains(&extension(path).as_str()) {
         return Ok(());
     }
-    let cause = format!("the file name does not say that this is {kind}");
+    let cause = format!("the file name is not that of {kind}");
     let remedy = format!("give a file that ends in .{}, also with .gz", extensions.join(" or ."));
     Err(InputError::new(path.display(), cause, remedy))
 }

@@ -11,7 +11,7 @@ use sidestep_kernel::InputError;
 
 use sidestep_scenario::file::read_bytes;
 
-/// The maximum number of pixels; larger images are refused before memory is allocated for them.
+/// The maximum number of pixels, as a square of 16,384; larger images are refused before memory is allocated for them.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// The size of the largest image file in bytes: the ASCII form of an image of [`MAX_PIXELS`].
@@ -39,10 +39,11 @@ impl Bitmap {
     /// # Errors
     /// As [`Bitmap::load`], except those of reading the file.
     pub fn decode(place: &str, bytes: Vec<u8>) -> Result<Self, InputError> {
-        let undecodable = |error| undecodable(place, &error);
-        let decoder = decoder(bytes).map_err(undecodable)?;
+        let decoder = decoder(bytes).map_err(|error| decoding_error(place, &error))?;
         check_pixel_count(place, decoder.dimensions())?;
-        DynamicImage::from_decoder(decoder).map(Self).map_err(undecodable)
+        let image =
+            DynamicImage::from_decoder(decoder).map_err(|error| decoding_error(place, &error))?;
+        Ok(Self(image))
     }
 
     /// Number of pixels from left to right.
@@ -85,11 +86,12 @@ where
     // One division of whole numbers below 2^53, so that gray 205 is exactly 205.0 in every format.
     let steps_per_unit = P::Subpixel::DEFAULT_MAX_VALUE.into() / 255.0;
     let divisor = colors as f64 * steps_per_unit;
-    let brightness = |pixel: &P| {
+    let mut values = Vec::with_capacity(image.width() as usize * image.height() as usize);
+    for pixel in image.pixels() {
         let sum: f64 = pixel.channels()[..colors].iter().map(|&channel| channel.into()).sum();
-        sum / divisor
-    };
-    image.pixels().map(|pixel| read(brightness(pixel))).collect()
+        values.push(read(sum / divisor));
+    }
+    values
 }
 
 fn decoder(bytes: Vec<u8>) -> ImageResult<impl ImageDecoder> {
@@ -101,23 +103,21 @@ fn decoder(bytes: Vec<u8>) -> ImageResult<impl ImageDecoder> {
 }
 
 fn check_pixel_count(place: &str, (width, height): (u32, u32)) -> Result<(), InputError> {
-    match u64::from(width) * u64::from(height) {
-        1..=MAX_PIXELS => Ok(()),
-        _ => {
-            let cause = format!(
-                "an image of {width} x {height} pixels; from 1 to {MAX_PIXELS} pixels are allowed"
-            );
-            Err(InputError::new(place, cause, "scale the image, or cut out the part you need"))
-        }
+    let pixels = u64::from(width) * u64::from(height);
+    if (1..=MAX_PIXELS).contains(&pixels) {
+        return Ok(());
     }
+    let cause =
+        format!("an image of {width} x {height} pixels; from 1 to {MAX_PIXELS} pixels are allowed");
+    Err(InputError::new(place, cause, "scale the image, or cut out the part you need"))
 }
 
-fn undecodable(place: &str, error: &ImageError) -> InputError {
+fn decoding_error(place: &str, error: &ImageError) -> InputError {
     match error {
         ImageError::IoError(io) if io.kind() == ErrorKind::UnexpectedEof => InputError::new(
             place,
-            "the image is cut short: it has fewer pixels than it says",
-            "fetch or write the image again",
+            "the image is cut short: it has fewer pixels than its header says",
+            "download or write the image again",
         ),
         ImageError::Unsupported(_) => InputError::new(
             place,

@@ -1,7 +1,7 @@
 #![deny(clippy::disallowed_methods)]
 //! Readers of file formats of other programs, such as maps, robot models, traffic and data sets.
 //!
-//! Every reader accepts its file plain or packed with gzip, refuses absurd sizes before it
+//! Every reader accepts its file plain or compressed with gzip, refuses absurd sizes before it
 //! allocates memory for them, and reports errors as an [`InputError`](sidestep_kernel::InputError)
 //! with file, line and column.
 

@@ -8,7 +8,7 @@ pub const EARTH_RADIUS_M: f64 = 6_371_000.0;
 /// The smallest cosine of a center's latitude, so that a plane at a pole stays invertible.
 const MIN_COSINE: f64 = 1e-9;
 
-/// A place on the earth.
+/// A position on the earth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatLon {
     /// Latitude in degrees, + to the north.
@@ -43,22 +43,22 @@ impl LocalPlane {
         center(positions).map(Self::centered_at)
     }
 
-    /// Returns the place at the origin.
+    /// Returns the position of the origin.
     pub fn center(&self) -> LatLon {
         self.center
     }
 
-    /// Returns the meters east and north of the center, the short way around the earth.
-    pub fn to_plane_m(&self, at: LatLon) -> [f64; 2] {
-        let east_deg = wrap_deg(at.lon_deg - self.center.lon_deg);
-        let north_deg = at.lat_deg - self.center.lat_deg;
+    /// Returns the meters east and north of the center, across the date line where that is shorter.
+    pub fn to_plane_m(&self, position: LatLon) -> [f64; 2] {
+        let east_deg = wrap_deg(position.lon_deg - self.center.lon_deg);
+        let north_deg = position.lat_deg - self.center.lat_deg;
         [
             EARTH_RADIUS_M * self.east_scale * east_deg.to_radians(),
             EARTH_RADIUS_M * north_deg.to_radians(),
         ]
     }
 
-    /// Returns the place at `[east, north]` meters from the center; its longitude is in [-180,
+    /// Returns the position at `[east, north]` meters from the center; its longitude is in [-180,
     /// 180).
     pub fn to_lat_lon(&self, [east_m, north_m]: [f64; 2]) -> LatLon {
         let east_deg = (east_m / (EARTH_RADIUS_M * self.east_scale)).to_degrees();
@@ -74,9 +74,10 @@ impl LocalPlane {
 pub fn center(positions: impl IntoIterator<Item = LatLon>) -> Option<LatLon> {
     let mut sum = [0.0; 3];
     let mut is_empty = true;
-    for at in positions {
+    for position in positions {
         is_empty = false;
-        let (lat, lon) = (at.lat_deg.to_radians(), at.lon_deg.to_radians());
+        let lat = position.lat_deg.to_radians();
+        let lon = position.lon_deg.to_radians();
         sum[0] += math::cos(lat) * math::cos(lon);
         sum[1] += math::cos(lat) * math::sin(lon);
         sum[2] += math::sin(lat);
@@ -90,9 +91,9 @@ pub fn center(positions: impl IntoIterator<Item = LatLon>) -> Option<LatLon> {
 
 /// Returns a longitude or a difference of two, in [-180, 180).
 pub(super) fn wrap_deg(deg: f64) -> f64 {
-    let turned = (deg + 180.0).rem_euclid(360.0);
+    let shifted = (deg + 180.0).rem_euclid(360.0);
     // rem_euclid may round up to the modulus itself, which is outside the range.
-    if turned >= 360.0 { -180.0 } else { turned - 180.0 }
+    if shifted >= 360.0 { -180.0 } else { shifted - 180.0 }
 }
 
 #[cfg(test)]

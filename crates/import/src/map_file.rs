@@ -8,14 +8,14 @@ use super::extension::extension;
 use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
-/// The way in which a file becomes boxes.
+/// The conversion of a file into boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridOptions {
     /// Side of a box in meters.
     pub box_size_m: f64,
     /// Side of a pixel in meters. A plain image needs it; that of a ROS map has to be the same.
     pub resolution_m: Option<f64>,
-    /// The decision on unknown boxes.
+    /// The treatment of unknown boxes.
     pub unknown: UnknownPolicy,
 }
 
@@ -46,12 +46,12 @@ pub fn load_pixel_map(
 ) -> Result<Option<PixelMap>, InputError> {
     match (extension(path).as_str(), resolution_m) {
         ("yaml" | "yml", None) => rosmap::load(path).map(Some),
-        ("yaml" | "yml", Some(said_m)) => {
-            check_resolution(path, rosmap::load(path)?, said_m).map(Some)
+        ("yaml" | "yml", Some(given_m)) => {
+            check_resolution(path, rosmap::load(path)?, given_m).map(Some)
         }
         ("png" | "pgm", Some(resolution_m)) => rosmap::load_image(path, resolution_m).map(Some),
         ("png" | "pgm", None) => {
-            let cause = "an image does not say how large its pixels are";
+            let cause = "an image does not have the size of its pixels";
             let remedy = "give the side of a pixel in meters: `--resolution 0.05`, in a scenario \
                           `map.resolution_m = 0.05`";
             Err(InputError::new(path.display(), cause, remedy))
@@ -60,13 +60,14 @@ pub fn load_pixel_map(
     }
 }
 
-fn check_resolution(path: &Path, pixels: PixelMap, said_m: f64) -> Result<PixelMap, InputError> {
+fn check_resolution(path: &Path, pixels: PixelMap, given_m: f64) -> Result<PixelMap, InputError> {
     let own_m = pixels.resolution_m();
-    if (own_m - said_m).abs() <= 1e-9 * own_m {
+    // The same number may have been printed and read with other digits.
+    if (own_m - given_m).abs() <= 1e-9 * own_m {
         return Ok(pixels);
     }
-    let cause = format!("its pixels are {own_m} m, not {said_m} m");
-    Err(InputError::new(path.display(), cause, "leave the resolution out: the file says it"))
+    let cause = format!("its pixels are {own_m} m, not {given_m} m");
+    Err(InputError::new(path.display(), cause, "leave the resolution out: the file has it"))
 }
 
 fn load_char_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
@@ -87,7 +88,7 @@ fn load_char_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError>
 fn unknown_map_format(path: &Path) -> InputError {
     InputError::new(
         path.display(),
-        "the file name does not say which kind of map this is",
+        "the extension is not that of a map",
         "give a .yaml or .yml (ROS map_server), a .png or .pgm (image), a .map (MovingAI) or a .txt \
          (characters) file, each also with .gz",
     )

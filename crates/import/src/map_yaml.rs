@@ -14,7 +14,7 @@ pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
 /// bounds their depth, and with it the stack that the parser's recursive tree takes.
 const MAX_LINE_BYTES: usize = 1000;
 
-/// The largest turn of an image in radians: a whole turn, with room for rounding.
+/// The largest rotation of an image in radians: a whole turn, with room for rounding.
 const MAX_YAW_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
 /// The content of the YAML file.
@@ -24,7 +24,7 @@ pub(super) struct MapMetadata {
     pub(super) image: PathBuf,
     /// Side of a pixel in meters, positive.
     pub(super) resolution_m: f64,
-    /// The lower-left corner of the image in the world, and the turn of the image about it.
+    /// The lower-left corner of the image in the world, and the rotation of the image about it.
     pub(super) plane: Isometry2,
     /// The conversion of pixels into cells.
     pub(super) reading: OccupancyRule,
@@ -63,13 +63,12 @@ impl<'a> Document<'a> {
 
     fn resolution_m(&self) -> Result<f64, InputError> {
         let value = self.value("resolution")?;
-        match self.number(value, "resolution")? {
-            resolution_m if resolution_m > 0.0 => Ok(resolution_m),
-            other => {
-                let cause = format!("a resolution of {other} m per pixel");
-                Err(self.error(value, cause, "give the side of a pixel in meters, such as 0.05"))
-            }
+        let resolution_m = self.number(value, "resolution")?;
+        if resolution_m > 0.0 {
+            return Ok(resolution_m);
         }
+        let cause = format!("a resolution of {resolution_m} m per pixel");
+        Err(self.error(value, cause, "give the side of a pixel in meters, such as 0.05"))
     }
 
     fn plane(&self) -> Result<Isometry2, InputError> {
@@ -88,7 +87,7 @@ impl<'a> Document<'a> {
                 "write radians from -6.2832 to 6.2832, not degrees",
             ));
         }
-        // A zero with a minus sign is a zero.
+        // Adding 0 turns a negative zero into a positive one, whose digits would differ in files.
         Ok(Isometry2 { origin_m, yaw_rad: yaw_rad + 0.0 })
     }
 
@@ -100,19 +99,22 @@ impl<'a> Document<'a> {
             let remedy = "give a free_thresh that is not above occupied_thresh";
             return Err(self.error(free_value, cause, remedy));
         }
-        let (mode, negate) = (self.mode()?, self.negate()?);
-        Ok(OccupancyRule { mode, negate, occupied_thresh, free_thresh })
+        Ok(OccupancyRule {
+            mode: self.mode()?,
+            negate: self.negate()?,
+            occupied_thresh,
+            free_thresh,
+        })
     }
 
     fn threshold(&self, key: &str) -> Result<(f64, &MarkedYaml<'a>), InputError> {
         let value = self.value(key)?;
-        match self.number(value, key)? {
-            threshold if (0.0..=1.0).contains(&threshold) => Ok((threshold, value)),
-            other => {
-                let cause = format!("`{key}` is {other}");
-                Err(self.error(value, cause, "give a probability from 0 to 1, such as 0.65"))
-            }
+        let threshold = self.number(value, key)?;
+        if (0.0..=1.0).contains(&threshold) {
+            return Ok((threshold, value));
         }
+        let cause = format!("`{key}` is {threshold}");
+        Err(self.error(value, cause, "give a probability from 0 to 1, such as 0.65"))
     }
 
     fn mode(&self) -> Result<MapMode, InputError> {
@@ -144,8 +146,8 @@ impl<'a> Document<'a> {
             self.error(value, "`image` is not a file name", "write the image's name, in quotes")
         })?;
         let plain = folder.join(name);
-        let packed = folder.join(format!("{name}.gz"));
-        [plain, packed].into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let compressed = folder.join(format!("{name}.gz"));
+        [plain, compressed].into_iter().find(|path| path.is_file()).ok_or_else(|| {
             let cause = format!("there is no image file `{name}`");
             self.error(value, cause, "give the image's path, relative to this file's folder")
         })
@@ -238,10 +240,8 @@ impl OccupancyRule {
 
     /// `map_server` stores a raw value as a whole number; 101 to 255 mean unknown.
     fn raw_cell(&self, value: f64) -> Cell {
-        match value.floor() {
-            percent if percent > 100.0 => Cell::Unknown,
-            percent => self.occupancy_cell(percent / 100.0),
-        }
+        let percent = value.floor();
+        if percent > 100.0 { Cell::Unknown } else { self.occupancy_cell(percent / 100.0) }
     }
 
     fn occupancy_cell(&self, occupancy: f64) -> Cell {

@@ -55,9 +55,13 @@ impl ScenRow {
         let error =
             |cause, remedy| Err(InputError::new(place, cause, remedy).with_position(self.line, 1));
         if (self.width, self.height) != (map.width(), map.height()) {
-            let (w, h) = (map.width(), map.height());
-            let made_for = format!("{} x {}", self.width, self.height);
-            let cause = format!("a row for a map of {made_for} boxes, and the map has {w} x {h}");
+            let cause = format!(
+                "a row for a map of {} x {} boxes, and the map has {} x {}",
+                self.width,
+                self.height,
+                map.width(),
+                map.height()
+            );
             return error(cause, "give the map that the scenario was made for");
         }
         for (name, (col, row)) in [("start", self.start), ("goal", self.goal)] {
@@ -87,8 +91,8 @@ pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
 pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, InputError> {
     let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
-    let (width, height) = header(source, &mut lines)?;
-    let (width, height) = (width as usize, height as usize);
+    let size = read_header(source, &mut lines)?;
+    let [width, height] = size.map(|boxes| boxes as usize);
     let mut cells = Vec::new();
     for line in lines.by_ref().take(height) {
         LEGEND.read_row(source, line, width, &mut cells)?;
@@ -98,7 +102,7 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, In
         return Err(source.error(text.len(), cause, ROWS_REMEDY));
     }
     if let Some(line) = lines.find(|line| !line.text.trim().is_empty()) {
-        let cause = format!("text behind the {height} rows of the map");
+        let cause = format!("text after the {height} rows of the map");
         return Err(source.error(line.offset, cause, ROWS_REMEDY));
     }
     map_from_top(place, &cells, width, box_size_m)
@@ -107,18 +111,28 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, In
 const ROWS_REMEDY: &str = "give as many rows as `height` says";
 
 /// Reads the header up to and including `map`; returns the map's width and height.
-fn header<'a>(
+fn read_header<'a>(
     source: SourceText<'_>,
     lines: &mut impl Iterator<Item = Line<'a>>,
-) -> Result<(u32, u32), InputError> {
-    let (mut is_octile, mut width, mut height) = (false, None, None);
+) -> Result<[u32; 2], InputError> {
+    let mut is_octile = false;
+    let mut width = None;
+    let mut height = None;
+    // In any order, each once.
     for line in lines {
         let mut words = line.text.split_whitespace();
         match (words.next(), words.next(), words.next()) {
             (Some("type"), Some("octile"), None) if !is_octile => is_octile = true,
             (Some("width"), Some(n), None) if width.is_none() => width = Some(size(source, n)?),
             (Some("height"), Some(n), None) if height.is_none() => height = Some(size(source, n)?),
-            (Some("map"), None, None) => return finish_header(source, line, width.zip(height)),
+            (Some("map"), None, None) => {
+                let (Some(width), Some(height)) = (width, height) else {
+                    let cause = "the header lacks the map's size";
+                    return Err(source.error(line.offset, cause, HEADER_REMEDY));
+                };
+                let (columns, rows) = check_box_count(source.place, width, height)?;
+                return Ok([columns, rows]);
+            }
             _ => {
                 return Err(source.error(
                     line.offset,
@@ -141,17 +155,6 @@ fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
     })
 }
 
-fn finish_header(
-    source: SourceText<'_>,
-    line: Line<'_>,
-    size: Option<(u64, u64)>,
-) -> Result<(u32, u32), InputError> {
-    let (width, height) = size.ok_or_else(|| {
-        source.error(line.offset, "the header lacks the map's size", HEADER_REMEDY)
-    })?;
-    check_box_count(source.place, width, height)
-}
-
 /// Reads a `.scen` file (also with gzip).
 ///
 /// # Errors
@@ -168,11 +171,7 @@ pub fn load_scen(path: &Path) -> Result<Vec<ScenRow>, InputError> {
 pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
     let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
-    let is_version_1 = |line: Line<'_>| {
-        let mut words = line.text.split_whitespace();
-        words.next() == Some("version") && matches!(words.next(), Some("1" | "1.0"))
-    };
-    if !lines.next().is_some_and(is_version_1) {
+    if !lines.next().is_some_and(|line| is_version_1(line.text)) {
         let remedy = "begin the file with the line `version 1`";
         return Err(source.error(0, "not a MovingAI scenario of version 1", remedy));
     }
@@ -183,13 +182,19 @@ pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
         .collect()
 }
 
+fn is_version_1(line: &str) -> bool {
+    let mut words = line.split_whitespace();
+    words.next() == Some("version") && matches!(words.next(), Some("1" | "1.0"))
+}
+
 fn scen_row(source: SourceText<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, InputError> {
     let mut fields = Fields { source, line: text, offset: text.offset, next: Some(text.text) };
     let bucket = fields.number("the bucket")?;
     let map = fields.text("the map's name")?.0.to_owned();
-    let (width, height) = (fields.number("the map's width")?, fields.number("its height")?);
-    let start = fields.place("the start", width, height)?;
-    let goal = fields.place("the goal", width, height)?;
+    let width = fields.number("the map's width")?;
+    let height = fields.number("its height")?;
+    let start = fields.box_position("the start", width, height)?;
+    let goal = fields.box_position("the goal", width, height)?;
     let optimal_length = fields.length("the optimal length")?;
     fields.finish()?;
     Ok(ScenRow { line, bucket, map, width, height, start, goal, optimal_length })
@@ -209,7 +214,7 @@ const FIELDS_REMEDY: &str = "write bucket, map, width, height, start x, start y,
                       optimal length, with a tab between each two";
 
 impl<'a> Fields<'a> {
-    /// Takes the next field; returns it with its byte offset.
+    /// Reads the next field; returns it with its byte offset.
     fn text(&mut self, name: &str) -> Result<(&'a str, usize), InputError> {
         let offset = self.offset;
         let rest = self.next.ok_or_else(|| {
@@ -233,10 +238,16 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Takes the column and, counted from the bottom, the row of a box.
-    fn place(&mut self, name: &str, width: u32, height: u32) -> Result<(u32, u32), InputError> {
+    /// Reads the column and, counted from the bottom, the row of a box.
+    fn box_position(
+        &mut self,
+        name: &str,
+        width: u32,
+        height: u32,
+    ) -> Result<(u32, u32), InputError> {
         let offset = self.offset;
-        let (x, y): (u32, u32) = (self.number(name)?, self.number(name)?);
+        let x: u32 = self.number(name)?;
+        let y: u32 = self.number(name)?;
         if x < width && y < height {
             return Ok((x, height - 1 - y));
         }

@@ -1,7 +1,7 @@
 //! UTIAS multi-robot cooperative localization and mapping (MRCLAM) data sets.
 //!
 //! A folder holds `Barcodes.dat`, `Landmark_Groundtruth.dat` and, for each robot `N`,
-//! `RobotN_Groundtruth.dat`, `RobotN_Odometry.dat` and `RobotN_Measurement.dat`; each may be packed
+//! `RobotN_Groundtruth.dat`, `RobotN_Odometry.dat` and `RobotN_Measurement.dat`; each may be compressed
 //! as `.gz`. `#` starts a comment line; columns are separated by blanks. Every subject of
 //! `Barcodes.dat` without a surveyed position is a robot.
 //!
@@ -104,12 +104,11 @@ fn read_file(folder: &Path, name: &str) -> Result<(String, String), InputError> 
 }
 
 fn read_robot(folder: &Path, subject: u32) -> Result<RobotLog, InputError> {
-    let file = |stream: &str| read_file(folder, &format!("Robot{subject}_{stream}.dat"));
-    let (place, text) = file("Groundtruth")?;
+    let (place, text) = read_file(folder, &format!("Robot{subject}_Groundtruth.dat"))?;
     let truth = parse_truth(&place, &text)?;
-    let (place, text) = file("Odometry")?;
+    let (place, text) = read_file(folder, &format!("Robot{subject}_Odometry.dat"))?;
     let commands = parse_commands(&place, &text)?;
-    let (place, text) = file("Measurement")?;
+    let (place, text) = read_file(folder, &format!("Robot{subject}_Measurement.dat"))?;
     let measurements = parse_measurements(&place, &text)?;
     Ok(RobotLog { truth, commands, measurements })
 }
@@ -135,8 +134,12 @@ fn parse_landmarks(place: &str, text: &str) -> Result<BTreeMap<u32, [f64; 2]>, I
     Ok(landmarks)
 }
 
-fn check_unique(place: &dyn fmt::Display, twice: bool, word: &Token) -> Result<(), InputError> {
-    if !twice {
+fn check_unique(
+    place: &dyn fmt::Display,
+    is_repeated: bool,
+    word: &Token,
+) -> Result<(), InputError> {
+    if !is_repeated {
         return Ok(());
     }
     Err(word.error(place, format!("{} is listed twice", word.text), "list it once"))
@@ -144,42 +147,44 @@ fn check_unique(place: &dyn fmt::Display, twice: bool, word: &Token) -> Result<(
 
 /// Parses motion capture; sorted here, because poses are looked up by time.
 fn parse_truth(place: &str, text: &str) -> Result<Vec<StampedPose2>, InputError> {
-    let parse = |row: Result<[Token; 4], InputError>| {
+    let mut truth = Vec::new();
+    for row in rows(&place, text) {
         let [t, x, y, heading] = row?;
-        Ok(StampedPose2 {
+        truth.push(StampedPose2 {
             t_secs: t.number(&place)?,
             position_m: [x.number(&place)?, y.number(&place)?],
             heading_rad: heading.number(&place)?,
-        })
-    };
-    let mut truth: Vec<StampedPose2> = rows(&place, text).map(parse).collect::<Result<_, _>>()?;
-    truth.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
+        });
+    }
+    truth.sort_by(|a: &StampedPose2, b: &StampedPose2| a.t_secs.total_cmp(&b.t_secs));
     Ok(truth)
 }
 
 fn parse_commands(place: &str, text: &str) -> Result<Vec<VelocityCommand>, InputError> {
-    let parse = |row: Result<[Token; 3], InputError>| {
+    let mut commands = Vec::new();
+    for row in rows(&place, text) {
         let [t, forward, turn] = row?;
-        Ok(VelocityCommand {
+        commands.push(VelocityCommand {
             t_secs: t.number(&place)?,
             forward_mps: forward.number(&place)?,
             turn_radps: turn.number(&place)?,
-        })
-    };
-    rows(&place, text).map(parse).collect()
+        });
+    }
+    Ok(commands)
 }
 
 fn parse_measurements(place: &str, text: &str) -> Result<Vec<Measurement>, InputError> {
-    let parse = |row: Result<[Token; 4], InputError>| {
+    let mut measurements = Vec::new();
+    for row in rows(&place, text) {
         let [t, barcode, range, bearing] = row?;
-        Ok(Measurement {
+        measurements.push(Measurement {
             t_secs: t.number(&place)?,
             barcode: barcode.integer(&place)?,
             range_m: range.number(&place)?,
             bearing_rad: bearing.number(&place)?,
-        })
-    };
-    rows(&place, text).map(parse).collect()
+        });
+    }
+    Ok(measurements)
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl PixelMap {
         self.resolution_m
     }
 
-    /// The place of the lower-left corner in the world, and the turn of the image about it.
+    /// The position of the lower-left corner in the world, and the rotation of the image about it.
     pub fn plane(&self) -> Isometry2 {
         self.plane
     }
@@ -76,7 +76,7 @@ impl PixelMap {
     ///
     /// A pixel belongs to the box that holds its center. A box is a wall when any of its pixels is
     /// occupied, else unknown when any is unknown, else free; `unknown` then decides on the unknown
-    /// boxes. Where boxes are smaller than pixels, a box that holds no center of a pixel takes the
+    /// boxes. Where boxes are smaller than pixels, a box that holds no center of a pixel gets the
     /// value of the pixel around its own center. The last column and row may extend past the edge
     /// of the map; there is one for every pixel's center and for every box with its center on the
     /// map.
@@ -85,8 +85,9 @@ impl PixelMap {
     /// When `box_size_m` is not a positive number or makes more boxes than
     /// [`MAX_BOXES`](sidestep_map::MAX_BOXES).
     pub fn to_boxes(&self, box_size_m: f64, unknown: UnknownPolicy) -> Result<GridMap, InputError> {
-        let axis = |pixels| AxisAlignment { pixels, resolution_m: self.resolution_m, box_size_m };
-        let (x, y) = (axis(self.width), axis(self.height));
+        let resolution_m = self.resolution_m;
+        let x = AxisAlignment { pixels: self.width, resolution_m, box_size_m };
+        let y = AxisAlignment { pixels: self.height, resolution_m, box_size_m };
         check_box_size(box_size_m)?;
         let (width, height) = check_box_count("box_size_m", x.boxes(), y.boxes())?;
         let columns: Vec<_> = (0..width).map(|col| x.pixels_of(col)).collect();
@@ -100,18 +101,18 @@ impl PixelMap {
 
     /// Returns the cell of a box of these pixels.
     fn merged_cell(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
-        let mut whole = Cell::Free;
+        let mut merged = Cell::Free;
         for row in rows.clone() {
             let start = row * self.width as usize;
             for pixel in &self.pixels[start + cols.start..start + cols.end] {
                 match pixel {
                     Cell::Wall => return Cell::Wall,
-                    Cell::Unknown => whole = Cell::Unknown,
+                    Cell::Unknown => merged = Cell::Unknown,
                     Cell::Free => {}
                 }
             }
         }
-        whole
+        merged
     }
 }
 
@@ -157,9 +158,10 @@ impl AxisAlignment {
 
     /// Returns the first pixel with its center in the box `index` or after it.
     fn first_at_or_after(self, index: u64) -> u32 {
-        // `box_of` never decreases, so bisection finds the edge with the very formula that defines
-        // it.
-        let (mut low, mut high) = (0, self.pixels);
+        // `box_at` never decreases, so bisection finds the edge with the very formula that defines
+        // it; its inverse could round to another pixel.
+        let mut low = 0;
+        let mut high = self.pixels;
         while low < high {
             let middle = low + (high - low) / 2;
             if self.box_at(middle) < index {

@@ -1,11 +1,11 @@
-//! Sight lines on a map of pixels: the thing that a beam should meet.
+//! Ray casting on a map of pixels: the obstacle that a beam should hit.
 
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::Cell;
 
 use super::PixelMap;
 
-/// The first thing that a beam meets on a map.
+/// The first obstacle that a beam hits on a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RayHit {
     /// A wall, at a range in meters.
@@ -17,24 +17,28 @@ pub enum RayHit {
 }
 
 impl PixelMap {
-    /// Returns the thing met by a beam of `range_m` meters that starts at a place in the world, in a
+    /// Returns the first obstacle on a beam of `range_m` meters that starts at a position in the world, in a
     /// direction in radians, counterclockwise from x.
+    ///
+    /// The beam goes from pixel to pixel (Amanatides and Woo, "A fast voxel traversal algorithm for ray tracing", 1987),
+    /// so it misses no pixel, however thin a wall is.
     pub fn cast_ray(&self, from_m: [f64; 2], direction_rad: f64, range_m: f64) -> RayHit {
         let side_m = self.resolution_m();
         let [x, y] = self.plane().inverse_transform_point(from_m).map(|along_m| along_m / side_m);
         let angle_rad = direction_rad - self.plane().yaw_rad;
-        let [mut column, mut row] =
-            [RayAxis::new(x, cos(angle_rad)), RayAxis::new(y, sin(angle_rad))];
-        let mut at = 0.0;
+        let mut column = RayAxis::new(x, cos(angle_rad));
+        let mut row = RayAxis::new(y, sin(angle_rad));
+        let mut length = 0.0;
         loop {
             match self.pixel(column.index, row.index) {
-                Some(Cell::Wall) => return RayHit::Wall(at * side_m),
+                Some(Cell::Wall) => return RayHit::Wall(length * side_m),
                 Some(Cell::Free) => {}
                 Some(Cell::Unknown) | None => return RayHit::Unknown,
             }
-            let nearer = if column.border <= row.border { &mut column } else { &mut row };
-            at = nearer.border;
-            if at * side_m > range_m {
+            let nearer =
+                if column.border_length <= row.border_length { &mut column } else { &mut row };
+            length = nearer.border_length;
+            if length * side_m > range_m {
                 return RayHit::Nothing;
             }
             nearer.cross();
@@ -42,36 +46,44 @@ impl PixelMap {
     }
 
     fn pixel(&self, column: f64, row: f64) -> Option<Cell> {
-        let inside = |index: f64, n: u32| (0.0..f64::from(n)).contains(&index);
-        (inside(column, self.width()) && inside(row, self.height()))
-            .then(|| self.pixels()[row as usize * self.width() as usize + column as usize])
+        let is_on_map = (0.0..f64::from(self.width())).contains(&column)
+            && (0.0..f64::from(self.height())).contains(&row);
+        if !is_on_map {
+            return None;
+        }
+        Some(self.pixels()[row as usize * self.width() as usize + column as usize])
     }
 }
 
 /// A beam along one axis; lengths are in pixels along the beam.
 struct RayAxis {
-    /// The column or row of the present pixel; whole, and on the map where a pixel is.
+    /// The column or row of the present pixel; a whole number, which may be outside of the map.
     index: f64,
     /// The length at which the beam leaves the pixel along this axis.
-    border: f64,
+    border_length: f64,
     /// The length between two borders; infinite where the beam never crosses one.
-    between: f64,
-    /// 1 or -1: the side to which the index goes.
-    way: f64,
+    length_per_pixel: f64,
+    /// 1 or -1: the change of the index at a border.
+    step: f64,
 }
 
 impl RayAxis {
-    fn new(start: f64, share: f64) -> Self {
-        let (index, way) = (start.floor(), share.signum());
-        let first = if way > 0.0 { index + 1.0 - start } else { start - index };
-        let between = 1.0 / share.abs();
-        let border = if share == 0.0 { f64::INFINITY } else { first * between };
-        Self { index, border, between, way }
+    /// `component` is the beam's unit vector along the axis.
+    fn new(start: f64, component: f64) -> Self {
+        let index = start.floor();
+        let step = component.signum();
+        let to_border = if step > 0.0 { index + 1.0 - start } else { start - index };
+        let length_per_pixel = 1.0 / component.abs();
+        // 0 times infinity would be NaN.
+        let border_length =
+            if component == 0.0 { f64::INFINITY } else { to_border * length_per_pixel };
+        Self { index, border_length, length_per_pixel, step }
     }
 
+    /// Goes to the next pixel along this axis.
     fn cross(&mut self) {
-        self.index += self.way;
-        self.border += self.between;
+        self.index += self.step;
+        self.border_length += self.length_per_pixel;
     }
 }
 

@@ -1,4 +1,4 @@
-//! Maps of ROS `map_server`: a YAML file and the image that it names.
+//! Maps of ROS `map_server`: a YAML file and the image that it refers to.
 //!
 //! With `v` the mean of a pixel's color channels (0 to 255), `p = (255 - v) / 255`, or
 //! `v / 255` where `negate` is set. The pixel is occupied where `p > occupied_thresh`, free
@@ -10,11 +10,11 @@
 //! - `raw`: `v` (`255 - v` where `negate` is set) is itself the occupancy in percent, compared
 //!   with both thresholds; above 100 it is unknown.
 //!
-//! The third number of `origin` turns the image about its lower-left corner, counterclockwise. Pixels and
-//! boxes stay along the image; only places in the world are turned.
+//! The third number of `origin` rotates the image about its lower-left corner, counterclockwise. Pixels and
+//! boxes stay along the axes of the image; only positions in the world are rotated.
 //!
-//! Transparency is ignored, unlike in `map_server`, where the trinary mode takes it for one more
-//! color. Unknown keys are ignored, as in `map_server`.
+//! Transparency is ignored, unlike in `map_server`, where the trinary mode averages it with the
+//! colors. Unknown keys are ignored, as in `map_server`.
 
 use std::path::Path;
 
@@ -27,12 +27,12 @@ use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, MapMetadata, OccupancyRule};
 use sidestep_scenario::file::read_text;
 
-/// Reads the map with its YAML file at `path`. YAML file and image may be packed with gzip; an
+/// Reads the map with its YAML file at `path`. YAML file and image may be compressed with gzip; an
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
 /// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is
-/// missing or has a wrong value.
+/// missing or has an invalid value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     extension::check(path, "a map of ROS", &["yaml", "yml"])?;
     let place = path.display().to_string();

@@ -1,6 +1,6 @@
 //! Bounding boxes of STL meshes, binary and ASCII.
 //!
-//! Only the box is wanted, which takes fewer lines than any mesh library's interface: 80 bytes of
+//! Only the box is needed, for which the format is too simple for a library: 80 bytes of
 //! header, the number of triangles, and 50 bytes for each; or words, of which three numbers follow
 //! each `vertex`.
 
@@ -8,11 +8,14 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_bytes;
 use std::path::Path;
 
-/// The maximum size of a mesh in bytes after unpacking: some 10 times the largest known.
+/// The maximum size of a mesh in bytes after decompression: some 10 times the largest known.
 const MAX_MESH_BYTES: u64 = 1 << 28;
-/// Bytes before the first triangle, and of each.
+/// Bytes before the first triangle: 80 of any text, and the number of triangles.
 const HEADER_BYTES: usize = 84;
+/// Bytes of a triangle: its normal and three vertices, of three 32-bit floats each, and 2 bytes of attributes.
 const TRIANGLE_BYTES: usize = 50;
+/// The maximum of a coordinate: a larger one is damage, and would make all others of the box meaningless.
+const MAX_COORDINATE: f64 = 1e9;
 
 /// Returns the lowest and the highest coordinates of a mesh, in its own unit.
 ///
@@ -32,43 +35,54 @@ pub fn parse(place: &str, bytes: &[u8]) -> Result<[[f64; 3]; 2], InputError> {
         Some(vertices) => vertices,
         None => ascii(bytes).ok_or_else(|| invalid_mesh(place, "is no STL mesh, or cut short"))?,
     };
-    let mut found: Option<[[f64; 3]; 2]> = None;
+    let Some(&first) = vertices.first() else {
+        return Err(invalid_mesh(place, "has no triangles"));
+    };
+    let mut low = first;
+    let mut high = first;
     for vertex in vertices {
-        if !vertex.iter().all(|x| x.abs() <= 1e9) {
-            return Err(invalid_mesh(place, "has a vertex that is no place"));
+        if !vertex.iter().all(|x| x.abs() <= MAX_COORDINATE) {
+            return Err(invalid_mesh(place, "has a vertex with an impossible coordinate"));
         }
-        let [low, high] = found.unwrap_or([vertex; 2]);
-        let each = |of: fn(f64, f64) -> f64, a: [f64; 3]| [0, 1, 2].map(|i| of(a[i], vertex[i]));
-        found = Some([each(f64::min, low), each(f64::max, high)]);
+        low = std::array::from_fn(|i| low[i].min(vertex[i]));
+        high = std::array::from_fn(|i| high[i].max(vertex[i]));
     }
-    found.ok_or_else(|| invalid_mesh(place, "has no triangles"))
+    Ok([low, high])
 }
 
 fn invalid_mesh(place: &str, cause: &str) -> InputError {
     InputError::new(place, cause, "save the mesh again as binary or ASCII STL")
 }
 
-/// Reads a binary mesh; none if its size is not that of its triangles. Some begin with the word
-/// `solid` like ASCII ones, so that only the size tells.
+/// Reads a binary mesh; `None` if its size is not that of its triangles. Some start with the word
+/// `solid` like ASCII ones, so only the size distinguishes the two.
 fn binary(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
     let count = u32::from_le_bytes(bytes.get(80..HEADER_BYTES)?.try_into().ok()?) as usize;
     if bytes.len() != count.checked_mul(TRIANGLE_BYTES)?.checked_add(HEADER_BYTES)? {
         return None;
     }
-    let number = |at: &[u8]| f64::from(f32::from_le_bytes([at[0], at[1], at[2], at[3]]));
-    let vertex = |at: &[u8]| [number(at), number(&at[4..]), number(&at[8..])];
-    let triangles = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES);
-    Some(triangles.flat_map(|t| [vertex(&t[12..]), vertex(&t[24..]), vertex(&t[36..])]).collect())
+    let mut vertices = Vec::with_capacity(3 * count);
+    for triangle in bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES) {
+        // The normal, which many programs do not fill in, is the first of the four.
+        vertices.extend([12, 24, 36].map(|offset| read_vertex(&triangle[offset..])));
+    }
+    Some(vertices)
 }
 
-/// Reads an ASCII mesh; none if it is not one.
+fn read_vertex(bytes: &[u8]) -> [f64; 3] {
+    [0, 4, 8].map(|k| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[k + i]))))
+}
+
+/// Reads an ASCII mesh; `None` if it is not one.
 fn ascii(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
     let text = std::str::from_utf8(bytes).ok()?;
     let mut words = text.split_ascii_whitespace();
     if words.next()? != "solid" {
         return None;
     }
-    let (mut vertices, mut has_end) = (Vec::new(), false);
+    let mut vertices = Vec::new();
+    // Without the last word the mesh is cut short.
+    let mut has_end = false;
     while let Some(word) = words.next() {
         has_end |= word == "endsolid";
         if word == "vertex" {

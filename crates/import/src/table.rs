@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// The maximum size of a text in bytes after unpacking: some 20 times the largest known log.
+/// The maximum size of a text in bytes after decompression: some 20 times the largest known log.
 pub const MAX_TEXT_BYTES: u64 = 1 << 29;
 
 /// Returns the path of the file `name` in `folder`, or of `name.gz` where only that exists.
@@ -24,7 +24,7 @@ pub fn find_file(folder: &Path, name: &str) -> Result<PathBuf, InputError> {
     })
 }
 
-/// The maximum size of a CSV table in bytes after unpacking.
+/// The maximum size of a CSV table in bytes after decompression.
 pub const MAX_CSV_BYTES: u64 = 1 << 28;
 
 /// One word of a text, with its position.
@@ -74,7 +74,7 @@ impl Token<'_> {
     }
 }
 
-/// Returns a word as it is quoted in an error: its first 40 characters.
+/// Returns a word as an error quotes it: its first 40 characters.
 fn shorten(text: &str) -> &str {
     text.char_indices().nth(40).map_or(text, |(end, _)| &text[..end])
 }
@@ -105,19 +105,19 @@ pub fn rows<'a, const N: usize>(
     text: &'a str,
 ) -> impl Iterator<Item = Result<[Token<'a>; N], InputError>> {
     data_lines(text).map(move |(line, content)| {
-        // One word more than wanted is enough to detect that there are too many.
-        let found: Vec<Token> = tokens(line, content).take(N + 1).collect();
-        let wrong = found.get(N).or(found.last()).map_or(1, |word| word.column);
-        let count = if found.len() > N { "more" } else { "fewer" };
-        found.try_into().map_err(|_| {
-            let cause = format!("the line has {count} columns than {N}");
+        // One word more than expected is enough to detect that there are too many.
+        let words: Vec<Token> = tokens(line, content).take(N + 1).collect();
+        let column = words.get(N).or(words.last()).map_or(1, |word| word.column);
+        let comparison = if words.len() > N { "more" } else { "fewer" };
+        words.try_into().map_err(|_| {
+            let cause = format!("the line has {comparison} columns than {N}");
             InputError::new(place, cause, "restore the file; comments start with #")
-                .with_position(line, wrong)
+                .with_position(line, column)
         })
     })
 }
 
-/// A CSV file with a header row: fields are found by the name of their column.
+/// A CSV file with a header row, whose columns are found by name.
 ///
 /// Separator `,`, quotes `"`, blanks around fields ignored, lines that start with `#` skipped.
 #[derive(Debug)]
@@ -135,7 +135,7 @@ pub struct CsvTable {
 }
 
 impl CsvTable {
-    /// Reads a CSV file, plain or packed with gzip.
+    /// Reads a CSV file, plain or compressed with gzip.
     ///
     /// # Errors
     /// When it cannot be read or a row has another number of fields than the header.
@@ -143,7 +143,7 @@ impl CsvTable {
         Self::parse(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
     }
 
-    /// Parses the text of a CSV file; `place` is named in errors.
+    /// Parses the text of a CSV file; `place` is its name in errors.
     ///
     /// # Errors
     /// When a row has another number of fields than the header, there is no header, or the text
@@ -181,7 +181,7 @@ impl CsvTable {
         self.lines.push(record.position().map_or(0, |p| line_of(text, p) as u32));
         for field in record {
             self.fields.push_str(field);
-            // MAX_CSV_BYTES fits.
+            // The text has at most MAX_CSV_BYTES, which fit into 32 bits.
             self.ends.push(self.fields.len() as u32);
         }
     }
@@ -206,9 +206,8 @@ impl CsvTable {
         if missing.is_empty() {
             return Ok(names.map(|name| self.find(name).expect("none of them is missing")));
         }
-        let is_wanted = |name: &&str| names.contains(name);
-        let found: Vec<&str> = self.header.iter().map(String::as_str).collect();
-        let (known, other): (Vec<&str>, Vec<&str>) = found.into_iter().partition(is_wanted);
+        let (known, other): (Vec<&str>, Vec<&str>) =
+            self.header.iter().map(String::as_str).partition(|name| names.contains(name));
         let cause = format!(
             "the header lacks {}; it has {}",
             quote_names(&missing),
@@ -246,7 +245,7 @@ impl<'a> CsvRow<'a> {
 
     fn text(&self, index: usize) -> &'a str {
         let slot = self.index * self.table.header.len() + index;
-        let start = slot.checked_sub(1).map_or(0, |before| self.table.ends[before]);
+        let start = slot.checked_sub(1).map_or(0, |previous| self.table.ends[previous]);
         &self.table.fields[start as usize..self.table.ends[slot] as usize]
     }
 }
@@ -254,11 +253,11 @@ impl<'a> CsvRow<'a> {
 /// Largest number of columns that an error lists; a table without a header may have very many.
 const MAX_LISTED: usize = 16;
 
-/// Returns the columns of a header as an error lists them: those that are right, then the others.
+/// Returns the columns of a header as an error lists them: the expected ones, then the others.
 fn describe_columns(known: &[&str], other: &[&str]) -> String {
     match (known, other) {
         (known, []) => quote_names(known),
-        ([], other) => format!("none of those wanted, but {}", quote_names(other)),
+        ([], other) => format!("none of the expected ones, but {}", quote_names(other)),
         (known, other) => format!("{}, and others: {}", quote_names(known), quote_names(other)),
     }
 }
@@ -274,11 +273,11 @@ fn quote_names(names: &[&str]) -> String {
     }
 }
 
-/// Returns the line of the record at `position`, which is where its reader began to look for it: behind
-/// it may be comments and empty lines.
+/// Returns the line of the record at `position`, which is where its reader started to search for it: comments and
+/// empty lines may follow.
 fn line_of(text: &str, position: &csv::Position) -> usize {
-    let ahead = text.get(position.byte() as usize..).unwrap_or("").lines();
-    let skipped = ahead.take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    let rest = text.get(position.byte() as usize..).unwrap_or("").lines();
+    let skipped = rest.take_while(|line| line.is_empty() || line.starts_with('#')).count();
     position.line() as usize + skipped
 }
 
@@ -353,7 +352,7 @@ mod tests {
         let cause = "the header lacks `lat_deg`, `lon_deg`; it has `x`, and others: `lat`, `lon`";
         assert_eq!(error.cause(), cause);
         let other = table.columns(["a"]).unwrap_err();
-        assert!(other.cause().ends_with("it has none of those wanted, but `x`, `lat`, `lon`"));
+        assert!(other.cause().ends_with("it has none of the expected ones, but `x`, `lat`, `lon`"));
         let wide = (0..40).map(|k| format!("c{k}")).collect::<Vec<_>>().join(",");
         let error = CsvTable::parse(&"f.csv", &wide).unwrap().columns(["a"]).unwrap_err();
         assert!(error.cause().ends_with("`c15` and 24 more"), "{}", error.cause());

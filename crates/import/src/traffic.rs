@@ -53,7 +53,7 @@ pub struct Sample {
     pub vertical_speed_fpm: Option<f64>,
 }
 
-/// Reads a file, plain or packed with gzip.
+/// Reads a file, plain or compressed with gzip.
 ///
 /// # Errors
 /// When it cannot be read or is not as described in the [module](self).
@@ -61,7 +61,7 @@ pub fn read(path: &Path) -> Result<RecordedTraffic, InputError> {
     tracks(&CsvTable::read(path)?)
 }
 
-/// Parses text; `place` is named in errors.
+/// Parses text; `place` is its name in errors.
 ///
 /// # Errors
 /// When it is not as described in the [module](self).
@@ -72,14 +72,14 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
 /// The range of times in s since the start of 1970. Milliseconds of the present day are beyond it.
 const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
 
-/// The longest time in s between the first row and the last one, in time: no recording takes 30 years.
+/// The longest time in s between the earliest row and the latest: no recording takes 30 years.
 const MAX_DURATION_S: f64 = 1e9;
 
 /// The range of altitudes, in ft.
 const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
 
-/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong. Airplanes of the simulator
-/// are bounded by it as well, so that one that is too fast is reported at its own row.
+/// The greatest speed between two rows, in m/s: beyond it one of the two positions is wrong. The simulator bounds
+/// airplanes by it as well; here an error points at the row.
 pub const MAX_SPEED_M_S: f64 = 1e6;
 
 /// The indices of the columns.
@@ -152,14 +152,14 @@ impl<'a> ColumnIndices<'a> {
     fn icao24<'t>(&self, row: CsvRow<'t>) -> Result<&'t str, InputError> {
         let word = row.field(self.icao24);
         if word.text.is_empty() {
-            let cause = "the row names no aircraft".to_string();
+            let cause = "the row has no aircraft".to_string();
             return Err(word.error(&self.place, cause, "write its icao24 address"));
         }
         Ok(word.text)
     }
 }
 
-/// A track that is being read, with the words of the times of its samples.
+/// A track that is being read, with the words of the times of its samples, at which errors point.
 struct TrackBuilder<'t> {
     track: Track,
     times: Vec<Token<'t>>,
@@ -180,11 +180,11 @@ fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
         track.samples.push(columns.sample(row)?);
         times.push(row.field(columns.time));
     }
-    let mut drafts: Vec<TrackBuilder<'_>> = by_aircraft.into_values().collect();
-    let repeated_rows = drafts.iter_mut().map(sort_by_time).sum();
-    check_times(columns.place, &drafts)?;
-    check_speeds(columns.place, &drafts)?;
-    let tracks = drafts.into_iter().map(|draft| draft.track).collect();
+    let mut builders: Vec<TrackBuilder<'_>> = by_aircraft.into_values().collect();
+    let repeated_rows = builders.iter_mut().map(sort_by_time).sum();
+    check_times(columns.place, &builders)?;
+    check_speeds(columns.place, &builders)?;
+    let tracks = builders.into_iter().map(|builder| builder.track).collect();
     Ok(RecordedTraffic { tracks, rows, repeated_rows })
 }
 
@@ -193,48 +193,56 @@ fn new_builder<'t>(icao24: &str) -> TrackBuilder<'t> {
     TrackBuilder { track, times: Vec::new() }
 }
 
-/// Sorts the samples; of several at one instant the first is kept. Returns how many were removed.
-fn sort_by_time(draft: &mut TrackBuilder<'_>) -> usize {
-    let (samples, times) = (&mut draft.track.samples, &mut draft.times);
-    let before = samples.len();
+/// Sorts the samples; of several at one instant the first is kept. Returns the number of those removed.
+fn sort_by_time(builder: &mut TrackBuilder<'_>) -> usize {
+    let TrackBuilder { track: Track { samples, .. }, times } = builder;
+    let all = samples.len();
     let mut both: Vec<(Sample, Token<'_>)> = samples.drain(..).zip(times.drain(..)).collect();
+    // A stable sort, so that the first row of an instant in the file stays the first.
     both.sort_by(|(a, _), (b, _)| a.time_s.total_cmp(&b.time_s));
     both.dedup_by_key(|(sample, _)| sample.time_s);
     (*samples, *times) = both.into_iter().unzip();
-    before - samples.len()
+    all - samples.len()
 }
 
-/// Refuses rows that are a lifetime later than the first.
-fn check_times(place: &str, drafts: &[TrackBuilder<'_>]) -> Result<(), InputError> {
-    let all = || drafts.iter().flat_map(|draft| draft.track.samples.iter().zip(&draft.times));
-    let first_s = all().map(|(sample, _)| sample.time_s).fold(f64::INFINITY, f64::min);
-    let Some((late, word)) = all().find(|(sample, _)| sample.time_s - first_s > MAX_DURATION_S)
-    else {
-        return Ok(());
-    };
-    let cause = format!("{:?} s after the first row of the table", late.time_s - first_s);
-    let remedy =
-        format!("restore the time of one of the two: up to {MAX_DURATION_S:e} s are between them");
-    Err(word.error(&place, cause, &remedy))
+/// Refuses rows that are decades later than the first.
+fn check_times(place: &str, builders: &[TrackBuilder<'_>]) -> Result<(), InputError> {
+    let samples = builders.iter().flat_map(|builder| &builder.track.samples);
+    let first_s = samples.map(|sample| sample.time_s).fold(f64::INFINITY, f64::min);
+    for TrackBuilder { track, times } in builders {
+        for (sample, word) in track.samples.iter().zip(times) {
+            let after_s = sample.time_s - first_s;
+            if after_s > MAX_DURATION_S {
+                let cause = format!("{after_s:?} s after the first row of the table");
+                let remedy = format!(
+                    "restore the time of one of the two: up to {MAX_DURATION_S:e} s are between them"
+                );
+                return Err(word.error(&place, cause, &remedy));
+            }
+        }
+    }
+    Ok(())
 }
 
-/// Refuses rows with a place that nothing reaches from the one before, on the plane that is flown.
-fn check_speeds(place: &str, drafts: &[TrackBuilder<'_>]) -> Result<(), InputError> {
-    let samples = drafts.iter().flat_map(|draft| &draft.track.samples);
+/// Refuses rows with a position that no aircraft reaches from the previous one, on the plane of the simulation.
+fn check_speeds(place: &str, builders: &[TrackBuilder<'_>]) -> Result<(), InputError> {
+    let samples = builders.iter().flat_map(|builder| &builder.track.samples);
     let Some(plane) = LocalPlane::from_positions(samples.map(|sample| sample.position)) else {
         return Ok(());
     };
-    for TrackBuilder { track, times } in drafts {
+    for TrackBuilder { track, times } in builders {
         for (pair, word) in track.samples.windows(2).zip(&times[1..]) {
             let [from, to] = [pair[0], pair[1]].map(|sample| plane.to_plane_m(sample.position));
-            let (m, s) =
-                (math::hypot(to[0] - from[0], to[1] - from[1]), pair[1].time_s - pair[0].time_s);
-            if m / s >= MAX_SPEED_M_S {
-                let icao24 = &track.icao24;
-                let cause =
-                    format!("{icao24} flies {:.0} km in {s} s, from its row before", m / 1e3);
+            let distance_m = math::hypot(to[0] - from[0], to[1] - from[1]);
+            let duration_s = pair[1].time_s - pair[0].time_s;
+            if distance_m / duration_s >= MAX_SPEED_M_S {
+                let cause = format!(
+                    "{} flies {:.0} km in {duration_s} s, from its previous row",
+                    track.icao24,
+                    distance_m / 1e3
+                );
                 let remedy = format!(
-                    "restore its place or its time, or delete the row: nothing flies {MAX_SPEED_M_S:e} m/s"
+                    "restore its position or its time, or delete the row: nothing flies {MAX_SPEED_M_S:e} m/s"
                 );
                 return Err(word.error(&place, cause, &remedy));
             }

@@ -18,13 +18,17 @@ pub fn map_files(
         "# The map as the simulation saw it.\nimage: {IMAGE}\nresolution: {resolution_m:?}\n\
          origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     );
-    let gray = |cell: &Cell| match cell {
+    let image = pgm(width, height, cells.iter().map(|cell| gray(*cell)));
+    [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
+}
+
+/// Returns the gray value with which `map_saver` of ROS writes a cell.
+fn gray(cell: Cell) -> u8 {
+    match cell {
         Cell::Free => 254,
         Cell::Unknown => 205,
         Cell::Wall => 0,
-    };
-    let image = pgm(width, height, cells.iter().map(gray));
-    [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
+    }
 }
 
 /// Returns a binary PGM of gray values with rows that start at the bottom: the first row of the

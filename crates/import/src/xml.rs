@@ -1,4 +1,4 @@
-//! The common parts of XML readers. Every error names the position in the file.
+//! The common parts of XML readers. Every error has its position in the file.
 
 use std::str::FromStr;
 
@@ -16,7 +16,7 @@ pub(super) struct XmlFile<'a> {
 }
 
 impl<'a> XmlFile<'a> {
-    /// Parses `text`, which errors call `place`.
+    /// Parses `text`; `place` is its name in errors.
     pub(super) fn parse(place: &'a str, text: &'a str) -> Result<Self, InputError> {
         let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(text, options)
@@ -31,7 +31,7 @@ impl<'a> XmlFile<'a> {
             return Ok(root);
         }
         let cause = format!("the outermost element is <{}>, not <{name}>", root.name());
-        Err(root.error(cause, "check that this is the right sort of file"))
+        Err(root.error(cause, "check that this is the right kind of file"))
     }
 
     /// Returns all elements in the order of the file.
@@ -48,12 +48,12 @@ fn malformed(place: &str, text: &str, error: &roxmltree::Error) -> InputError {
             format!("the prefix `{prefix}:` is declared nowhere"),
             format!("write xmlns:{prefix}=\"...\" into the outermost element"),
         ),
-        Error::UnexpectedCloseTag(expected, found, _) => (
-            format!("</{found}> closes <{expected}>"),
-            format!("write </{expected}> here, or open <{found}> before"),
+        Error::UnexpectedCloseTag(expected, actual, _) => (
+            format!("</{actual}> closes <{expected}>"),
+            format!("write </{expected}> here, or open <{actual}> before"),
         ),
         Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
-            ("the XML ends in the middle".into(), "fetch the whole file again".into())
+            ("the XML ends in the middle".into(), "download the whole file again".into())
         }
         Error::NodesLimitReached => {
             (format!("has more than {MAX_NODES} elements"), "check that this is the file".into())
@@ -108,15 +108,15 @@ impl<'a> Element<'a> {
     /// Returns its first direct child that has no prefix.
     pub(super) fn first_child(self) -> Option<Element<'a>> {
         let mut nodes = self.node.children();
-        let found = nodes.find(|n| n.is_element() && n.tag_name().namespace().is_none());
-        found.map(|node| Element { node, ..self })
+        let node = nodes.find(|n| n.is_element() && n.tag_name().namespace().is_none())?;
+        Some(Element { node, ..self })
     }
 
     /// Returns its direct child called `name`, if there is one.
     pub(super) fn child(self, name: &'a str) -> Result<Option<Element<'a>>, InputError> {
-        let mut found = self.children(name);
-        let first = found.next();
-        match found.next() {
+        let mut children = self.children(name);
+        let first = children.next();
+        match children.next() {
             None => Ok(first),
             Some(second) => {
                 Err(second.error(format!("a second <{name}>"), format!("keep one <{name}>")))
@@ -191,8 +191,8 @@ impl<'a> XmlAttribute<'a> {
     pub(super) fn triple(&self) -> Result<[f64; 3], InputError> {
         let numbers: Result<Vec<_>, _> =
             self.text().split_whitespace().map(|word| self.parse_number(word)).collect();
-        numbers?.try_into().map_err(|found: Vec<f64>| {
-            let cause = format!("`{}` has {} numbers, not 3", self.attribute.name(), found.len());
+        numbers?.try_into().map_err(|numbers: Vec<f64>| {
+            let cause = format!("`{}` has {} numbers, not 3", self.attribute.name(), numbers.len());
             self.error(cause, "write three numbers between blanks, e.g. \"0 0 1\"")
         })
     }

@@ -1,14 +1,14 @@
 //! Many simulations of one scenario, stepped together: each on one worker, results by index.
 //!
 //! ```text
-//! order(team, values)      noted for all worlds, checked at once
+//! order(team, values)      queued for all worlds, checked at once
 //! advance(cycles)          every world: its orders, then its cycles     ┐
-//! observe(team, room)      [worlds, agents, ...], a row for each world  ├ on W workers that wait between calls
+//! observe(team, buffers)   [worlds, agents, ...], a row for each world  ├ on W workers that wait between calls
 //! restart(seeds)           fresh starts of some                         ┘
 //! ```
 //!
-//! A world knows nothing of the others, so the number of workers changes no bit. One that breaks off is
-//! named in the error; the others are whole.
+//! Worlds share no data, so the number of workers changes no bit. When a world panics, the error gives its
+//! index; all other worlds finish the call normally.
 
 mod error;
 mod world;
@@ -31,17 +31,17 @@ pub type SimulationFactory = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputErr
 pub struct Batch {
     shared: Arc<SharedWorlds>,
     pool: ThreadPool,
-    /// The teams of each world, which are equal.
+    /// The teams of each world, which are equal: [`Batch::new`] refuses worlds that differ.
     teams: Arc<[Team]>,
-    /// Orders that wait for the next cycle.
+    /// Orders that are given before the next cycle.
     orders: Vec<QueuedOrder>,
 }
 
 struct SharedWorlds {
-    start: Arc<SimulationFactory>,
+    factory: Arc<SimulationFactory>,
     worlds: Vec<Mutex<BatchWorld>>,
-    /// Whether a world may have an error, so that usually none has to be asked.
-    is_wrong: AtomicBool,
+    /// Whether a world may have an error: a call without errors then locks no world to search for one.
+    has_error: AtomicBool,
 }
 
 /// An order to all agents of a team in all worlds.
@@ -58,32 +58,33 @@ impl Batch {
     /// # Errors
     /// When there are no seeds, or a world cannot start.
     pub fn new(
-        start: Arc<SimulationFactory>,
+        factory: Arc<SimulationFactory>,
         seeds: &[u64],
         workers: usize,
     ) -> Result<Self, BatchError> {
         if seeds.is_empty() {
             return Err(BatchError::Empty);
         }
-        let world = |&seed: &u64| Mutex::new(BatchWorld::new(seed));
-        let worlds = seeds.iter().map(world).collect();
-        let shared = Arc::new(SharedWorlds { start, worlds, is_wrong: AtomicBool::new(false) });
-        // More workers than worlds would have nothing to do.
-        let (crew, orders) = (ThreadPool::new(workers.min(seeds.len())), Vec::new());
-        let mut batch = Self { shared, pool: crew, teams: Arc::default(), orders };
+        let worlds = seeds.iter().map(|&seed| Mutex::new(BatchWorld::new(seed))).collect();
+        let shared = SharedWorlds { factory, worlds, has_error: AtomicBool::new(false) };
+        let mut batch = Self {
+            shared: Arc::new(shared),
+            // A world is the unit of work, so further workers would stay idle.
+            pool: ThreadPool::new(workers.min(seeds.len())),
+            teams: Arc::default(),
+            orders: Vec::new(),
+        };
         batch.for_each_world(|world, index, shared| {
-            world.restart(index, world.seed, &*shared.start, None)
+            world.restart(index, world.seed, &*shared.factory, None)
         });
         batch.check_errors()?;
-        let first = batch.world(0);
-        let teams: Arc<[Team]> = first.run.as_ref().map_or(&[][..], |run| run.teams()).into();
-        drop(first);
-        let differs =
-            |world: &BatchWorld| world.run.as_ref().is_some_and(|run| *run.teams() != *teams);
-        if let Some(world) = (1..batch.len()).find(|&k| differs(&batch.world(k))) {
-            return Err(BatchError::Shape { world });
-        }
+        let teams: Arc<[Team]> = batch.world(0).teams().into();
         batch.teams = teams;
+        for index in 1..batch.len() {
+            if *batch.world(index).teams() != *batch.teams {
+                return Err(BatchError::Shape { world: index });
+            }
+        }
         Ok(batch)
     }
 
@@ -107,25 +108,28 @@ impl Batch {
     /// other, and within each world those of one agent after the other.
     ///
     /// # Errors
-    /// When an order cannot be obeyed; nothing of it is noted then.
+    /// When an order cannot be obeyed; no world gets it then.
     pub fn order(&mut self, team: usize, order: &str, values: Vec<f64>) -> Result<(), BatchError> {
-        let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
-        let width = values.len() / self.len();
-        let first = self.world(0);
-        // All worlds have these teams, and the valid orders depend on no state: one world may answer for all; a
-        // broken one accepts them.
-        let check = |(world, values)| {
-            let orders = Orders { order, agents: &its.agents, values };
-            let checked = first.run.as_ref().map_or(Ok(()), |run| run.check(&orders));
-            checked.map_err(|error| BatchError::Order { world, error })
+        let Some(Team { agents, .. }) = self.teams.get(team) else {
+            return Err(self.no_team(team).into());
         };
-        if width * self.len() != values.len() {
-            let (worlds, what, found) = (self.len(), "rows of values", values.len());
-            return Err(BatchError::Count { worlds, what, found });
+        let values_per_world = values.len() / self.len();
+        if values_per_world * self.len() != values.len() {
+            return Err(BatchError::Count {
+                worlds: self.len(),
+                what: "rows of values",
+                found: values.len(),
+            });
         }
-        match width {
-            0 => check((0, &[][..]))?,
-            width => values.chunks(width).enumerate().try_for_each(check)?,
+        // All worlds have these teams, and valid orders do not depend on the state, so one world checks the
+        // orders of all. A broken one has no run that could check: `advance` returns its error.
+        let first = self.world(0);
+        for world in 0..self.len() {
+            let values = &values[world * values_per_world..(world + 1) * values_per_world];
+            let orders = Orders { order, agents, values };
+            if let Some(run) = &first.run {
+                run.check(&orders).map_err(|error| BatchError::Order { world, error })?;
+            }
         }
         drop(first);
         self.orders.push(QueuedOrder { team, order: order.into(), values });
@@ -136,19 +140,20 @@ impl Batch {
     /// one); orders to others are dropped. A world in which nothing can happen anymore stays the same.
     ///
     /// # Errors
-    /// When a world had broken off before: nothing is done then. When it does so now, or cannot obey: all others have
-    /// done their cycles then.
+    /// When a world was broken before this call: nothing is done then. When a world breaks during it, or cannot obey
+    /// an order: all others have done their cycles then.
     pub fn advance(&mut self, cycles: u64, mask: Option<&[bool]>) -> Result<(), BatchError> {
         self.check_count(mask.map(<[bool]>::len), "truth values")?;
         self.check_errors()?;
         let orders = std::mem::take(&mut self.orders);
-        let (n, teams) = (self.len(), Arc::clone(&self.teams));
+        let worlds = self.len();
+        let teams = Arc::clone(&self.teams);
         let mask = mask.map(<[bool]>::to_vec);
         self.for_each_world(move |world, index, _| {
             if mask.as_ref().is_none_or(|mask| mask[index]) {
                 world.with_run(index, |run| {
                     for QueuedOrder { team, order, values } in &orders {
-                        let width = values.len() / n;
+                        let width = values.len() / worlds;
                         let values = &values[index * width..(index + 1) * width];
                         let agents = &teams[*team].agents;
                         run.order(&Orders { order, agents, values })?;
@@ -163,61 +168,66 @@ impl Batch {
         self.check_errors()
     }
 
-    /// Writes what the agents of a team observe in all worlds: one room for each of its spaces, with the values
+    /// Writes what the agents of a team observe in all worlds: one buffer for each of its spaces, with the values
     /// of one world after the other.
     ///
     /// # Errors
-    /// When there is no such team, or the room has another shape; or a world has broken off.
-    pub fn observe(&mut self, team: usize, room: &mut [BufferMut<'_>]) -> Result<(), BatchError> {
+    /// When there is no such team, or the buffers have another shape; or a world has broken off.
+    pub fn observe(
+        &mut self,
+        team: usize,
+        buffers: &mut [BufferMut<'_>],
+    ) -> Result<(), BatchError> {
         self.check_errors()?;
-        let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
-        let lengths: Vec<usize> =
-            its.observation_spaces.iter().map(|space| its.agents.len() * space.width()).collect();
-        self.check_buffers(team, &lengths, room)?;
-        let n = self.len();
+        let Some(Team { agents, observation_spaces, .. }) = self.teams.get(team) else {
+            return Err(self.no_team(team).into());
+        };
+        let layouts: Vec<BufferLayout> = observation_spaces
+            .iter()
+            .map(|space| BufferLayout {
+                is_integer: space.is_integer(),
+                length: agents.len() * space.width(),
+            })
+            .collect();
+        self.check_buffers(observation_spaces, &layouts, buffers)?;
+        let worlds = self.len();
         let shared = Arc::clone(&self.shared);
-        // The calling thread writes into the caller's room; the others write beside it, because as far as the
-        // compiler knows they may outlive the borrowed room.
-        let own = |index: usize| {
+        // The calling thread writes straight into the caller's buffers. The other threads cannot borrow them,
+        // because they live on after this call: they fill buffers of their own, which are copied below.
+        let observe_here = |index: usize| {
             let mut world = shared.world(index);
-            let parts = &mut world_slice(room, &lengths, index);
-            world.with_run(index, |run| run.observe(team, parts));
+            let slices = &mut world_slices(buffers, &layouts, index);
+            world.with_run(index, |run| run.observe(team, slices));
             shared.record_error(&world);
         };
-        let theirs = Arc::clone(&self.shared);
-        let extent = |(space, &length): (&Space, &usize)| {
-            let is_whole = space.is_integer();
-            BufferLayout { is_integer: is_whole, length }
-        };
-        let spaces: Vec<BufferLayout> =
-            its.observation_spaces.iter().zip(&lengths).map(extent).collect();
-        self.pool.run(
-            n,
-            own,
-            Arc::new(move |index| theirs.world(index).observe(index, team, &spaces)),
-        );
-        for index in 0..n {
-            self.world(index).copy_observations(&mut world_slice(room, &lengths, index));
+        let shared_with_threads = Arc::clone(&self.shared);
+        let thread_layouts = layouts.clone();
+        let observe_on_thread = Arc::new(move |index: usize| {
+            shared_with_threads.world(index).observe(index, team, &thread_layouts);
+        });
+        self.pool.run(worlds, observe_here, observe_on_thread);
+        for index in 0..worlds {
+            self.world(index).copy_observations(&mut world_slices(buffers, &layouts, index));
         }
         self.check_errors()
     }
 
-    /// Starts anew the worlds that have a seed here; waiting orders are dropped.
+    /// Starts anew the worlds that have a seed here; queued orders are dropped.
     ///
     /// # Errors
     /// When a world cannot start with its seed: it then stays as it was, and all others have started.
     pub fn restart(&mut self, seeds: &[Option<u64>]) -> Result<(), BatchError> {
         self.check_count(Some(seeds.len()), "seeds")?;
         self.orders.clear();
-        let (wanted, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
+        let new_seeds = seeds.to_vec();
+        let teams = Arc::clone(&self.teams);
         self.for_each_world(move |world, index, shared| {
-            if let Some(seed) = wanted[index] {
-                world.restart(index, seed, &*shared.start, Some(&teams));
+            if let Some(seed) = new_seeds[index] {
+                world.restart(index, seed, &*shared.factory, Some(&teams));
             }
         });
         // Worlds that were broken before, and have no seed here, do not concern this call.
-        let refused = self.first_error(|index, _| seeds[index].is_some());
-        refused.map_or(Ok(()), Err)
+        self.first_error(|index| seeds[index].is_some()).map_or(Ok(()), Err)
     }
 
     /// Returns the seed of each world.
@@ -241,7 +251,7 @@ impl Batch {
         self.query(|run| run.is_over())
     }
 
-    /// Returns the digest of each world; waiting orders are not in it.
+    /// Returns the digest of each world; queued orders are not in it.
     ///
     /// # Errors
     /// When a world has broken off.
@@ -253,12 +263,14 @@ impl Batch {
     ///
     /// # Errors
     /// When a world has broken off.
-    pub fn query<T>(&self, of: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
-        let answer = |k| {
-            let world = self.world(k);
-            world.run.as_deref().map(&of).ok_or_else(|| world.no_run_error(k))
-        };
-        (0..self.len()).map(answer).collect()
+    pub fn query<T>(&self, get: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
+        let mut values = Vec::with_capacity(self.len());
+        for index in 0..self.len() {
+            let world = self.world(index);
+            let run = world.run.as_deref().ok_or_else(|| world.no_run_error(index))?;
+            values.push(get(run));
+        }
+        Ok(values)
     }
 
     fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
@@ -270,37 +282,43 @@ impl Batch {
         &mut self,
         work: impl Fn(&mut BatchWorld, usize, &SharedWorlds) + Send + Sync + 'static,
     ) {
-        let (n, shared) = (self.len(), Arc::clone(&self.shared));
-        let work = Arc::new(move |k: usize| {
-            let mut world = shared.world(k);
-            work(&mut world, k, &shared);
+        let shared = Arc::clone(&self.shared);
+        let work = Arc::new(move |index: usize| {
+            let mut world = shared.world(index);
+            work(&mut world, index, &shared);
             shared.record_error(&world);
         });
-        let theirs = Arc::clone(&work);
-        self.pool.run(n, |k| work(k), theirs);
+        let work_on_thread = Arc::clone(&work);
+        self.pool.run(self.len(), |index| work(index), work_on_thread);
     }
 
-    /// Returns the error of the first world that has one. Those of broken worlds stay.
+    /// Returns the error of the first world that has one.
     fn check_errors(&self) -> Result<(), BatchError> {
-        match self.shared.is_wrong.load(Ordering::Relaxed) {
-            true => self.first_error(|_, _| true).map_or(Ok(()), Err),
-            false => Ok(()),
+        if self.shared.has_error.load(Ordering::Relaxed) {
+            self.first_error(|_| true).map_or(Ok(()), Err)
+        } else {
+            Ok(())
         }
     }
 
-    fn first_error(&self, counts: impl Fn(usize, &BatchError) -> bool) -> Option<BatchError> {
-        let (mut first, mut is_wrong) = (None, false);
+    /// Returns the error of the first of the selected worlds that has one, and clears the errors of all of them. The
+    /// error of a broken world stays, because every later call has to fail with it until the world is restarted.
+    fn first_error(&self, is_selected: impl Fn(usize) -> bool) -> Option<BatchError> {
+        let mut first = None;
+        let mut has_error = false;
         for index in 0..self.len() {
             let mut world = self.world(index);
-            if let Some(error) = world.error.clone().filter(|error| counts(index, error)) {
+            if is_selected(index)
+                && let Some(error) = world.error.clone()
+            {
                 if world.run.is_some() {
                     world.error = None;
                 }
                 first = first.or(Some(error));
             }
-            is_wrong |= world.error.is_some();
+            has_error |= world.error.is_some();
         }
-        self.shared.is_wrong.store(is_wrong, Ordering::Relaxed);
+        self.shared.has_error.store(has_error, Ordering::Relaxed);
         first
     }
 
@@ -310,29 +328,31 @@ impl Batch {
 
     fn check_count(&self, found: Option<usize>, what: &'static str) -> Result<(), BatchError> {
         let worlds = self.len();
-        let wrong = found.filter(|&found| found != worlds);
-        wrong.map_or(Ok(()), |found| Err(BatchError::Count { worlds, what, found }))
+        match found {
+            Some(found) if found != worlds => Err(BatchError::Count { worlds, what, found }),
+            _ => Ok(()),
+        }
     }
 
-    /// Checks that there is exactly the room that a team's observations in all worlds need.
+    /// Checks that the buffers have exactly the size that a team's observations in all worlds need.
     fn check_buffers(
         &self,
-        team: usize,
-        lengths: &[usize],
-        room: &[BufferMut<'_>],
+        spaces: &[Space],
+        layouts: &[BufferLayout],
+        buffers: &[BufferMut<'_>],
     ) -> Result<(), OrderError> {
-        let (observed, n) = (&self.teams[team].observation_spaces, self.len());
-        let fits = room.len() == lengths.len()
-            && room.iter().zip(observed).zip(lengths).all(|((room, space), &length)| {
-                room.len() == n * length
-                    && space.is_integer() == matches!(room, BufferMut::Integer(_))
+        let worlds = self.len();
+        let fits = buffers.len() == layouts.len()
+            && buffers.iter().zip(layouts).all(|(buffer, layout)| {
+                buffer.len() == worlds * layout.length
+                    && layout.is_integer == matches!(buffer, BufferMut::Integer(_))
             });
         if fits {
             return Ok(());
         }
-        let expected = observed.iter().zip(lengths).map(|(space, length)| {
-            let sort = if space.is_integer() { "whole" } else { "real" };
-            format!("{} of {n} x {length} {sort} values", space.name)
+        let expected = spaces.iter().zip(layouts).map(|(space, layout)| {
+            let number_type = if layout.is_integer { "whole" } else { "real" };
+            format!("{} of {worlds} x {} {number_type} values", space.name, layout.length)
         });
         Err(OrderError::BufferShape { expected: expected.collect::<Vec<_>>().join(", ") })
     }
@@ -345,29 +365,33 @@ impl std::fmt::Debug for Batch {
 }
 
 impl SharedWorlds {
-    /// A world that panicked no longer has a run, so nothing that it left behind is read.
+    /// Locks a world. A poisoned lock is fine: a world that panicked has lost its run, so nothing half-done is read.
     fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
         self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes whether a world has an error; the end of a call is a barrier.
+    /// Raises the flag if a world has an error. Relaxed order is enough, because the caller reads the flag after
+    /// [`ThreadPool::run`] has waited for all workers.
     fn record_error(&self, world: &BatchWorld) {
         if world.error.is_some() {
-            self.is_wrong.store(true, Ordering::Relaxed);
+            self.has_error.store(true, Ordering::Relaxed);
         }
     }
 }
 
-/// Returns one world's part of the room for all worlds.
-fn world_slice<'a>(
-    room: &'a mut [BufferMut<'_>],
-    lengths: &[usize],
+/// Returns one world's part of the buffers for all worlds.
+fn world_slices<'a>(
+    buffers: &'a mut [BufferMut<'_>],
+    layouts: &[BufferLayout],
     index: usize,
 ) -> Vec<BufferMut<'a>> {
-    let range = |length: usize| index * length..(index + 1) * length;
-    let one = |(room, &length): (&'a mut BufferMut<'_>, &usize)| match room {
-        BufferMut::Integer(room) => BufferMut::Integer(&mut room[range(length)]),
-        BufferMut::Real(room) => BufferMut::Real(&mut room[range(length)]),
-    };
-    room.iter_mut().zip(lengths).map(one).collect()
+    let mut slices = Vec::with_capacity(layouts.len());
+    for (buffer, layout) in buffers.iter_mut().zip(layouts) {
+        let range = index * layout.length..(index + 1) * layout.length;
+        slices.push(match buffer {
+            BufferMut::Integer(values) => BufferMut::Integer(&mut values[range]),
+            BufferMut::Real(values) => BufferMut::Real(&mut values[range]),
+        });
+    }
+    slices
 }

@@ -9,6 +9,8 @@ use crate::units::Cycle;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 const MAGIC: &[u8; 8] = b"SIDESTEP";
+/// Bytes of a checksum: a [`Digest`].
+const CHECKSUM_BYTES: usize = 16;
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
 pub const FORMAT_VERSION: u32 = 2;
@@ -29,7 +31,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// Checks that it is of the same program version, world and scenario as `expected`; formats and cycles are not compared.
+    /// Checks that it is of the same program version, world and scenario as `expected`. Formats and cycles are not
+    /// compared: decoding has refused other formats, and any cycle can be continued.
     ///
     /// # Errors
     /// When it is not; the error names the first difference.
@@ -98,20 +101,22 @@ pub fn decode<S: DeserializeOwned>(
     bytes: &[u8],
     expected: &Header,
 ) -> Result<(Cycle, S), CheckpointError> {
-    let (header, rest) = split(bytes)?;
+    let (header, state) = split(bytes)?;
     header.check_origin(expected)?;
-    let state = postcard::from_bytes(rest).map_err(|_| CheckpointError::Damaged)?;
+    let state = postcard::from_bytes(state).map_err(|_| CheckpointError::Damaged)?;
     Ok((header.cycle, state))
 }
 
+/// Checks the frame of a checkpoint, and returns its header and the bytes of its state.
 fn split(bytes: &[u8]) -> Result<(Header, &[u8]), CheckpointError> {
     let body = bytes.strip_prefix(MAGIC).ok_or(CheckpointError::NotACheckpoint)?;
-    let (_, checksum) = bytes.split_last_chunk::<16>().ok_or(CheckpointError::Damaged)?;
-    let whole = &bytes[..bytes.len() - 16];
-    if body.len() < 16 || Digest::hash_bytes(whole).as_bytes() != checksum {
+    let (_, checksum) =
+        bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(CheckpointError::Damaged)?;
+    let hashed = &bytes[..bytes.len() - CHECKSUM_BYTES];
+    if body.len() < CHECKSUM_BYTES || Digest::hash_bytes(hashed).as_bytes() != checksum {
         return Err(CheckpointError::Damaged);
     }
-    let body = &body[..body.len() - 16];
+    let body = &body[..body.len() - CHECKSUM_BYTES];
     // The format is read on its own, because the rest of another layout cannot be decoded.
     let (found, _): (u32, _) =
         postcard::take_from_bytes(body).map_err(|_| CheckpointError::Damaged)?;
@@ -125,8 +130,7 @@ fn check_match(what: &'static str, found: &str, expected: &str) -> Result<(), Ch
     if found == expected {
         return Ok(());
     }
-    let (found, expected) = (found.to_string(), expected.to_string());
-    Err(CheckpointError::Foreign { what, found, expected })
+    Err(CheckpointError::Foreign { what, found: found.into(), expected: expected.into() })
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -59,16 +59,22 @@ impl ConflictGroups {
 
     /// Puts two slots into one group. Any worker may call it, at any time between two barriers.
     pub fn join(&self, a: Slot, b: Slot) {
-        let (mut a, mut b) = (a, b);
+        let mut a = a;
+        let mut b = b;
         loop {
-            (a, b) = (self.leader(a), self.leader(b));
+            a = self.leader(a);
+            b = self.leader(b);
             if a == b {
                 return;
             }
-            let (upper, lower) = (a.min(b), a.max(b));
-            if cell(&self.parent, lower).compare_exchange(lower, upper, Relaxed, Relaxed).is_ok() {
-                let before = cell(&self.first_child, upper).swap(lower, Relaxed);
-                self.next_sibling.set(lower as usize, before);
+            // The smaller leader becomes the parent: parents then only decrease, so no cycle of parents can
+            // arise, and the last leader is the smallest slot whatever the order of the joins.
+            let parent = a.min(b);
+            let child = a.max(b);
+            // Fails if another worker has given the child a parent since `leader` read it.
+            if cell(&self.parent, child).compare_exchange(child, parent, Relaxed, Relaxed).is_ok() {
+                let sibling = cell(&self.first_child, parent).swap(child, Relaxed);
+                self.next_sibling.set(child as usize, sibling);
                 return;
             }
         }
@@ -90,14 +96,15 @@ impl ConflictGroups {
     pub fn members(&self, leader: Slot, members: &mut Vec<Slot>) {
         members.clear();
         members.push(leader);
-        let mut read = 0;
-        while read < members.len() {
-            let mut child = self.first_child.get(members[read] as usize);
+        // Breadth first, with the list itself as the queue.
+        let mut expanded = 0;
+        while expanded < members.len() {
+            let mut child = self.first_child.get(members[expanded] as usize);
             while child != NONE {
                 members.push(child);
                 child = self.next_sibling.get(child as usize);
             }
-            read += 1;
+            expanded += 1;
         }
     }
 
@@ -159,6 +166,7 @@ mod tests {
         #[test]
         fn joining_from_two_threads_gives_the_same_groups(edges in prop::collection::vec((0usize..300, 0usize..300), 0..400)) {
             let groups = ConflictGroups::new(300);
+            #[expect(clippy::disallowed_methods, reason = "tested from several threads")]
             std::thread::scope(|scope| {
                 for part in 0..2 {
                     let (groups, edges) = (&groups, &edges);

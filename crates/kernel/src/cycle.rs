@@ -6,7 +6,7 @@
 //!                         barrier                barrier          barrier
 //! ```
 //!
-//! Agents that decide together ([`crate::world::Decides`]) do so in the last phase.
+//! Agents that decide together ([`crate::world::DecisionMode::Joint`]) do so in the last phase.
 //!
 //! The source paper merges tasks while they are inserted into pool two and so needs two barriers,
 //! but a lock or an atomic exchange per claimed box. Here claims are plain stores and joining is a
@@ -35,7 +35,7 @@ pub struct PhaseTimes {
 }
 
 impl PhaseTimes {
-    /// Adds the times of another stretch of cycles.
+    /// Adds the times of other cycles.
     pub fn add(&mut self, other: Self) {
         self.claim_ns += other.claim_ns;
         self.join_ns += other.join_ns;
@@ -43,33 +43,35 @@ impl PhaseTimes {
     }
 }
 
-/// One worker's share of a run: the world's scratch and the kernel's own.
+/// One worker's share of a run: the world's scratch and the kernel's stats.
 #[derive(Debug)]
 pub struct WorkerState<S> {
     /// The world's scratch.
     pub scratch: S,
-    /// The kernel's own.
+    /// The kernel's stats.
     pub stats: WorkerStats,
 }
 
 /// A worker's group sizes, processor time and buffers.
 #[derive(Debug, Default)]
 pub struct WorkerStats {
-    /// Conflict groups seen.
+    /// Conflict groups whose leaders this worker has handled.
     pub groups: GroupSizes,
     /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
     /// measured and stand for all.
     pub cpu_ns: u64,
     /// Calls of a single cycle.
-    single: u64,
+    single_cycle_calls: u64,
+    /// Buffer for the members of a group.
     members: Vec<Slot>,
     /// Bodies in conflict that have not acted yet, in worlds with an auction.
     pending: Vec<Slot>,
 }
 
-/// The number of first calls of a single cycle that are all measured, and of later calls per measured one: reading
-/// the processor time is a system call, and small worlds that get orders from cycle to cycle take not much longer.
+/// Number of the first calls of a single cycle that are all measured.
 const MEASURED_FIRST_CALLS: u64 = 64;
+/// One of this many later calls is measured, and stands for all of them: reading the processor time is a system call,
+/// and a cycle of a small world that gets orders before each cycle takes hardly longer than that call.
 const CALLS_PER_MEASUREMENT: u64 = 16;
 
 impl WorkerStats {
@@ -78,8 +80,8 @@ impl WorkerStats {
         if cycles > 1 {
             return 1;
         }
-        self.single += 1;
-        match self.single {
+        self.single_cycle_calls += 1;
+        match self.single_cycle_calls {
             ..=MEASURED_FIRST_CALLS => 1,
             k if k.is_multiple_of(CALLS_PER_MEASUREMENT) => CALLS_PER_MEASUREMENT,
             _ => 0,
@@ -94,19 +96,20 @@ impl<S> WorkerState<S> {
     }
 }
 
-/// The workers of an engine. A worker holds its lock while it works, so it never waits for one.
+/// The states of an engine's workers. A worker holds the lock of its own state while it works, and no other takes it
+/// then, so it never waits for one.
 pub(crate) type WorkerStates<S> = [Mutex<WorkerState<S>>];
 
-/// An onlooker between the cycles of a run, on the calling thread, while all workers wait.
+/// Hooks that run between the cycles of a run, on the calling thread, while all workers are parked.
 ///
-/// It sees the state and takes over the results of the workers, so that a caller that must look
-/// after every cycle (keep poses, gather events, ask whether the run is over) costs no thread and
-/// no system call per cycle. It cannot change the state.
+/// They read the state and collect the results of the workers, so that a caller that acts after
+/// every cycle (keeps poses, gathers events, asks whether the run is over) costs no thread and
+/// no system call per cycle. They cannot change the state.
 pub trait Observer<W: Phases> {
-    /// Sees the state at the start of cycle `now`.
+    /// Called with the state at the start of cycle `now`.
     fn before_cycle(&mut self, _now: Cycle, _state: &W::State) {}
 
-    /// Sees the state after cycle `now`, and the results of the workers. `Break` ends the run
+    /// Called with the state after cycle `now`, and the results of the workers. `Break` ends the run
     /// there.
     fn after_cycle(
         &mut self,
@@ -116,31 +119,32 @@ pub trait Observer<W: Phases> {
     ) -> ControlFlow<()>;
 }
 
-/// The scratches of all workers, while these wait.
+/// The scratches of all workers, while these are parked.
 #[derive(Debug)]
 pub struct Scratches<'a, S>(&'a WorkerStates<S>);
 
 impl<S> Scratches<'_, S> {
-    /// Calls `take` for the scratch of each worker. The share of each worker differs from run to
+    /// Calls `collect` for the scratch of each worker. The share of each worker differs from run to
     /// run: no result may depend on the order.
-    pub fn for_each(&mut self, mut take: impl FnMut(&mut S)) {
-        self.0.iter().for_each(|mate| take(&mut lock(mate).scratch));
+    pub fn for_each(&mut self, mut collect: impl FnMut(&mut S)) {
+        self.0.iter().for_each(|worker_state| collect(&mut lock(worker_state).scratch));
     }
 }
 
-/// A worker that panicked ends the run, so nothing it left behind is ever read.
+/// Locks a worker's state. A poisoned lock is fine: a worker that panicked ends the run, so nothing it left behind is
+/// ever read.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Cycles in a row that are run without a change of workers.
+/// Cycles in a row that are run without a change of the number of workers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment {
     /// The first cycle.
     pub(crate) from: Cycle,
     /// The maximum number of cycles.
     pub(crate) cycles: u64,
-    /// The longest time in nanoseconds: no cycle starts later than this after the first.
+    /// The maximum time in nanoseconds: no cycle starts later than this after the first.
     pub(crate) limit_ns: u64,
 }
 
@@ -153,144 +157,154 @@ pub(crate) struct SegmentTiming {
     pub(crate) took_ns: u64,
     /// Nanoseconds until the first of them was done.
     pub(crate) first_ns: u64,
-    /// Whether the observer ended the run.
-    pub(crate) is_ended: bool,
+    /// Whether the observer stopped the run.
+    pub(crate) is_stopped: bool,
     /// Time per phase.
     pub(crate) times: PhaseTimes,
 }
 
-/// The parts of an engine that run a stretch.
+/// The parts of an engine that run a segment.
 pub(crate) struct EngineParts<'a, S, C> {
     pub(crate) groups: &'a ConflictGroups,
-    /// One worker per element.
-    pub(crate) crew: &'a WorkerStates<S>,
-    /// The threads of the crew, where it has several workers.
+    /// One element per worker.
+    pub(crate) workers: &'a WorkerStates<S>,
+    /// The threads of the workers, where there are several.
     pub(crate) team: Option<&'a mut WorkerTeam>,
     pub(crate) clock: &'a C,
     pub(crate) interrupt: &'a Interrupt,
 }
 
-/// Runs a stretch of at least one cycle.
+/// Runs a segment of at least one cycle.
 ///
-/// The result is the same bits for every length of the crew.
+/// The result is the same bits for every number of workers.
 pub(crate) fn advance<W: Phases, C: Clock>(
     world: &W,
     state: &W::State,
     parts: EngineParts<'_, W::Scratch, C>,
-    stretch: Segment,
+    segment: Segment,
     mut observer: Option<&mut dyn Observer<W>>,
 ) -> SegmentTiming {
-    let EngineParts { groups, crew, team, clock, interrupt } = parts;
+    let EngineParts { groups, workers, team, clock, interrupt } = parts;
     let started_ns = clock.now_ns();
     if let Some(observer) = &mut observer {
-        observer.before_cycle(stretch.from, state);
+        observer.before_cycle(segment.from, state);
     }
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
-    let shared =
-        SegmentContext { world, state, groups, crew, clock, interrupt, stretch, is_observed, stop };
+    let shared = SegmentContext {
+        world,
+        state,
+        groups,
+        workers,
+        clock,
+        interrupt,
+        segment,
+        is_observed,
+        stop,
+    };
     // The observer's own time belongs to no phase.
     let mark_ns = if is_observed { clock.now_ns() } else { started_ns };
-    let mut lead =
-        LeaderState { clock, observer, started_ns, mark_ns, ran: SegmentTiming::default() };
+    let mut leader =
+        LeaderState { clock, observer, started_ns, mark_ns, timing: SegmentTiming::default() };
     match team {
-        None => shared.run(&Worker::ALONE, Some(&mut lead)),
+        None => shared.run(&Worker::ALONE, Some(&mut leader)),
         Some(team) => team.run(
-            &mut vec![(); crew.len()],
-            |worker, ()| shared.run(worker, Some(&mut lead)),
+            &mut vec![(); workers.len()],
+            |worker, ()| shared.run(worker, Some(&mut leader)),
             |worker, ()| shared.run::<C>(worker, None),
         ),
     }
-    SegmentTiming { took_ns: clock.now_ns() - started_ns, ..lead.ran }
+    SegmentTiming { took_ns: clock.now_ns() - started_ns, ..leader.timing }
 }
 
-/// The data of a stretch that all workers share.
+/// The data of a segment that all workers share.
 struct SegmentContext<'a, W: Phases> {
     world: &'a W,
     state: &'a W::State,
     groups: &'a ConflictGroups,
-    crew: &'a WorkerStates<W::Scratch>,
+    workers: &'a WorkerStates<W::Scratch>,
     clock: &'a dyn Clock,
     interrupt: &'a Interrupt,
-    stretch: Segment,
+    segment: Segment,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
-    /// read it after that barrier.
+    /// read it after that barrier, so relaxed order is enough.
     stop: AtomicBool,
 }
 
-/// The part of worker 0 alone: it reads the clock, calls the observer, and ends the stretch.
+/// The data of worker 0 alone: it reads the clock, calls the observer, and ends the segment.
 struct LeaderState<'a, 'b, W: Phases, C> {
     clock: &'a C,
     observer: Option<&'a mut (dyn Observer<W> + 'b)>,
     started_ns: u64,
     /// Clock reading at the start of the present phase, in nanoseconds.
     mark_ns: u64,
-    ran: SegmentTiming,
+    timing: SegmentTiming,
 }
 
 impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
     /// Adds the time since the last call to one phase.
     fn end_phase(&mut self, phase: impl FnOnce(&mut PhaseTimes) -> &mut u64) {
         let now_ns = self.clock.now_ns();
-        *phase(&mut self.ran.times) += now_ns - self.mark_ns;
+        *phase(&mut self.timing.times) += now_ns - self.mark_ns;
         self.mark_ns = now_ns;
     }
 
-    /// Counts a cycle, and returns whether the stretch ends with it.
-    fn count_cycle(&mut self, stretch: Segment) -> bool {
+    /// Counts a cycle, and returns whether the segment ends with it.
+    fn count_cycle(&mut self, segment: Segment) -> bool {
         let since_ns = self.mark_ns - self.started_ns;
-        self.ran.cycles += 1;
-        if self.ran.cycles == 1 {
-            self.ran.first_ns = since_ns;
+        self.timing.cycles += 1;
+        if self.timing.cycles == 1 {
+            self.timing.first_ns = since_ns;
         }
-        self.ran.cycles == stretch.cycles || since_ns >= stretch.limit_ns
+        self.timing.cycles == segment.cycles || since_ns >= segment.limit_ns
     }
 }
 
 impl<W: Phases> SegmentContext<'_, W> {
-    /// One worker's part of the stretch.
-    fn run<C: Clock>(&self, worker: &Worker<'_>, lead: Option<&mut LeaderState<'_, '_, W, C>>) {
-        let weight = lock(&self.crew[worker.index()]).stats.measurement_weight(self.stretch.cycles);
-        let began_ns = if weight > 0 { self.clock.thread_cpu_ns() } else { 0 };
-        let _heeded = self.interrupt.attach();
-        self.run_cycles(worker, lead);
+    /// One worker's part of the segment.
+    fn run<C: Clock>(&self, worker: &Worker<'_>, leader: Option<&mut LeaderState<'_, '_, W, C>>) {
+        let weight =
+            lock(&self.workers[worker.index()]).stats.measurement_weight(self.segment.cycles);
+        let start_ns = if weight > 0 { self.clock.thread_cpu_ns() } else { 0 };
+        let _attached = self.interrupt.attach();
+        self.run_cycles(worker, leader);
         if weight > 0 {
-            let took_ns = self.clock.thread_cpu_ns() - began_ns;
-            lock(&self.crew[worker.index()]).stats.cpu_ns += weight * took_ns;
+            let took_ns = self.clock.thread_cpu_ns() - start_ns;
+            lock(&self.workers[worker.index()]).stats.cpu_ns += weight * took_ns;
         }
     }
 
     fn run_cycles<C: Clock>(
         &self,
         worker: &Worker<'_>,
-        mut lead: Option<&mut LeaderState<'_, '_, W, C>>,
+        mut leader: Option<&mut LeaderState<'_, '_, W, C>>,
     ) {
-        let mut held = None;
-        for now in self.stretch.from.. {
-            let mate = held.get_or_insert_with(|| lock(&self.crew[worker.index()]));
-            self.run_cycle(worker, mate, now, lead.as_deref_mut());
+        let mut guard = None;
+        for now in self.segment.from.. {
+            let worker_state = guard.get_or_insert_with(|| lock(&self.workers[worker.index()]));
+            self.run_cycle(worker, worker_state, now, leader.as_deref_mut());
             if self.is_observed {
                 // The observer locks the scratches of all workers, so each releases its own first.
-                held = None;
+                guard = None;
                 worker.barrier();
-                if let Some(lead) = &mut lead {
-                    self.observe(now, lead);
+                if let Some(leader) = &mut leader {
+                    self.observe(now, leader);
                 }
             }
-            if let Some(lead) = &mut lead
+            if let Some(leader) = &mut leader
                 // `observe` has counted the cycle already.
                 && !self.is_observed
-                && lead.count_cycle(self.stretch)
+                && leader.count_cycle(self.segment)
             {
                 self.stop.store(true, Ordering::Relaxed);
             }
             worker.barrier();
-            if let Some(lead) = &mut lead
+            if let Some(leader) = &mut leader
                 && worker.team_size() > 1
             {
                 // The wait for the others counts as part of the phase.
-                lead.end_phase(|times| &mut times.act_ns);
+                leader.end_phase(|times| &mut times.act_ns);
             }
             if self.stop.load(Ordering::Relaxed) {
                 return;
@@ -298,19 +312,20 @@ impl<W: Phases> SegmentContext<'_, W> {
         }
     }
 
-    /// Lets the observer look at the cycle that is done and, if there is one, at the next.
-    fn observe<C: Clock>(&self, now: Cycle, lead: &mut LeaderState<'_, '_, W, C>) {
-        lead.end_phase(|times| &mut times.act_ns);
-        let is_last = lead.count_cycle(self.stretch);
-        let Some(observer) = &mut lead.observer else { return };
-        lead.ran.is_ended = observer.after_cycle(now, self.state, Scratches(self.crew)).is_break();
-        if is_last || lead.ran.is_ended {
+    /// Calls the observer after the cycle that is done and, if there is one, before the next.
+    fn observe<C: Clock>(&self, now: Cycle, leader: &mut LeaderState<'_, '_, W, C>) {
+        leader.end_phase(|times| &mut times.act_ns);
+        let is_last = leader.count_cycle(self.segment);
+        let Some(observer) = &mut leader.observer else { return };
+        leader.timing.is_stopped =
+            observer.after_cycle(now, self.state, Scratches(self.workers)).is_break();
+        if is_last || leader.timing.is_stopped {
             self.stop.store(true, Ordering::Relaxed);
         } else {
             observer.before_cycle(now + 1, self.state);
         }
         // The observer's own time belongs to no phase.
-        lead.mark_ns = lead.clock.now_ns();
+        leader.mark_ns = leader.clock.now_ns();
     }
 
     /// Runs all phases of one cycle; the effects of the last one are visible after the next
@@ -319,44 +334,45 @@ impl<W: Phases> SegmentContext<'_, W> {
     fn run_cycle<C: Clock>(
         &self,
         worker: &Worker<'_>,
-        mate: &mut WorkerState<W::Scratch>,
+        worker_state: &mut WorkerState<W::Scratch>,
         now: Cycle,
-        mut lead: Option<&mut LeaderState<'_, '_, W, C>>,
+        mut leader: Option<&mut LeaderState<'_, '_, W, C>>,
     ) {
-        let &Self { world, state, groups, clock, stretch, .. } = self;
-        let WorkerState { scratch, stats: tally } = mate;
-        let pool = 3 * (now - stretch.from);
-        let turn = &mut PhaseContext { world, state, now, clock, scratch };
+        let &Self { world, state, groups, clock, segment, .. } = self;
+        let WorkerState { scratch, stats } = worker_state;
+        // Three pools of tasks per cycle, one per phase, counted from the start of the segment.
+        let pool = 3 * (now - segment.from);
+        let context = &mut PhaseContext { world, state, now, clock, scratch };
         let n = world.bodies(state);
         worker.for_each_chunk(pool, n, |bodies| {
             interrupt::check();
             bodies.clone().for_each(|body| groups.reset(body as Slot));
-            W::claim(turn, bodies);
+            W::claim(context, bodies);
         });
         worker.barrier();
-        if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.claim_ns);
+        if let Some(leader) = &mut leader {
+            leader.end_phase(|times| &mut times.claim_ns);
         }
         worker.for_each_chunk(pool + 1, n, |bodies| {
             interrupt::check();
-            W::join(turn, bodies, groups);
+            W::join(context, bodies, groups);
         });
         worker.barrier();
-        if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.join_ns);
+        if let Some(leader) = &mut leader {
+            leader.end_phase(|times| &mut times.join_ns);
         }
         let auction = world.auction();
         worker.for_each_chunk(pool + 2, n, |bodies| {
             interrupt::check();
             bodies.for_each(|body| {
-                act_if_leader(turn, groups, tally, auction.is_some(), body as Slot);
+                act_if_leader(context, groups, stats, auction.is_some(), body as Slot);
             });
         });
         if let Some(auction) = auction {
-            run_auction(auction, turn, &mut tally.pending, worker);
+            run_auction(auction, context, &mut stats.pending, worker);
         }
-        if let Some(lead) = &mut lead {
-            lead.end_phase(|times| &mut times.act_ns);
+        if let Some(leader) = &mut leader {
+            leader.end_phase(|times| &mut times.act_ns);
         }
     }
 }
@@ -364,9 +380,9 @@ impl<W: Phases> SegmentContext<'_, W> {
 /// Lets the group of `body` act if `body` leads one.
 #[inline]
 fn act_if_leader<W: Phases>(
-    turn: &mut PhaseContext<'_, W>,
+    context: &mut PhaseContext<'_, W>,
     groups: &ConflictGroups,
-    own: &mut WorkerStats,
+    stats: &mut WorkerStats,
     by_auction: bool,
     body: Slot,
 ) {
@@ -375,37 +391,37 @@ fn act_if_leader<W: Phases>(
     }
     // A body without a conflict needs neither a list of members nor an auction.
     if groups.is_singleton(body) {
-        own.groups.counts[0] += 1;
-        return W::act(turn, &mut [body]);
+        stats.groups.counts[0] += 1;
+        return W::act(context, &mut [body]);
     }
-    let mut members = std::mem::take(&mut own.members);
+    let mut members = std::mem::take(&mut stats.members);
     groups.members(body, &mut members);
-    own.groups.add(members.len());
+    stats.groups.add(members.len());
     if by_auction {
-        own.pending.extend_from_slice(&members);
+        stats.pending.extend_from_slice(&members);
     } else {
-        W::act(turn, &mut members);
+        W::act(context, &mut members);
     }
-    own.members = members;
+    stats.members = members;
 }
 
 /// Holds rounds of bidding until every body in conflict has acted. A group's bodies are all in
 /// one worker's list, so the groups spread over the workers.
 fn run_auction<W: Phases>(
     auction: &dyn Auction<W>,
-    turn: &mut PhaseContext<'_, W>,
+    context: &mut PhaseContext<'_, W>,
     pending: &mut Vec<Slot>,
     worker: &Worker<'_>,
 ) {
     while worker.any(!pending.is_empty()) {
         interrupt::check();
         for &body in &*pending {
-            auction.bid(turn, body);
+            auction.bid(context, body);
         }
         worker.barrier();
-        auction.act_on_bids(turn, pending);
+        auction.act_on_bids(context, pending);
         worker.barrier();
-        auction.retract_bids(turn);
+        auction.retract_bids(context);
     }
 }
 
@@ -415,10 +431,10 @@ mod tests {
 
     #[test]
     fn measured_calls_stand_for_all() {
-        let mut tally = WorkerStats::default();
-        let weights: Vec<u64> = (0..64 + 1600).map(|_| tally.measurement_weight(1)).collect();
+        let mut stats = WorkerStats::default();
+        let weights: Vec<u64> = (0..64 + 1600).map(|_| stats.measurement_weight(1)).collect();
         assert_eq!(weights.iter().sum::<u64>(), 64 + 1600);
         assert_eq!(weights.iter().filter(|&&weight| weight > 0).count(), 64 + 100);
-        assert!([2, 100].map(|cycles| tally.measurement_weight(cycles)) == [1, 1]);
+        assert!([2, 100].map(|cycles| stats.measurement_weight(cycles)) == [1, 1]);
     }
 }

@@ -40,15 +40,19 @@ impl fmt::Debug for Digest {
 #[derive(Default)]
 pub struct Hasher {
     inner: blake3::Hasher,
-    /// Values are gathered, because the hash is fastest on long inputs.
+    /// Values wait here for the hash, because BLAKE3 hashes 16 chunks of 1 KiB side by side and so is fastest on long
+    /// inputs.
     buffer: Vec<u8>,
 }
+
+/// Bytes at which the buffer is hashed: several times as many as one call hashes side by side, and still in the cache.
+const BUFFER_BYTES: usize = 1 << 16;
 
 impl Hasher {
     /// Adds bytes without their length; add the length first where it may vary.
     pub fn write_bytes(&mut self, bytes: &[u8]) {
         self.buffer.extend_from_slice(bytes);
-        if self.buffer.len() >= 1 << 16 {
+        if self.buffer.len() >= BUFFER_BYTES {
             self.inner.update(&self.buffer);
             self.buffer.clear();
         }
@@ -77,9 +81,10 @@ impl Hasher {
     /// Returns the digest of everything that was added.
     pub fn finish(mut self) -> Digest {
         self.inner.update(&self.buffer);
-        let mut short = [0; 16];
-        short.copy_from_slice(&self.inner.finalize().as_bytes()[..16]);
-        Digest(short)
+        // BLAKE3 gives 32 bytes, any prefix of which is a hash: 16 are enough, because nobody forges a state.
+        let mut prefix = [0; 16];
+        prefix.copy_from_slice(&self.inner.finalize().as_bytes()[..16]);
+        Digest(prefix)
     }
 }
 

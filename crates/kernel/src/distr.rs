@@ -4,7 +4,8 @@
 use crate::math;
 use crate::stream::Draws;
 
-/// The largest deviation of a row's sum from 1.
+/// The largest deviation of a row's sum from 1: probabilities that people write have a few decimals, such as three
+/// times 0.333333.
 pub const ROW_TOLERANCE: f64 = 1e-6;
 
 /// A reason why a row is not a probability distribution.
@@ -22,16 +23,15 @@ pub enum RowError {
         value: f64,
     },
     /// The row does not sum to 1 (promise L2).
-    #[error("the row sums to {}, {} 1 by {}", short(*.sum), if *.sum < 1.0 { "short of" } else { "above" }, short((.sum - 1.0).abs()))]
+    #[error("the row sums to {}, {} 1 by {}", round_to_micro(*.sum), if *.sum < 1.0 { "short of" } else { "above" }, round_to_micro((.sum - 1.0).abs()))]
     Sum {
         /// Its sum.
         sum: f64,
     },
 }
 
-/// Returns a number with at most six digits after the decimal point: the digits left over from adding are
-/// meaningless.
-fn short(value: f64) -> f64 {
+/// Rounds to six digits after the decimal point: further digits of a sum are rounding errors.
+fn round_to_micro(value: f64) -> f64 {
     (1e6 * value).round() / 1e6
 }
 
@@ -74,7 +74,7 @@ impl Bernoulli {
 
 /// A finite distribution over `0..n`, drawn with one word.
 /// Outcome `i` has probability `row[i]` within 2^-32; outcomes of probability 0 are never drawn.
-/// Outcomes are compared in their order, so put the likely one first.
+/// Outcomes are compared in their order, so a likely outcome should come first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Categorical {
     /// Outcome of each threshold; the last one is taken when no threshold is above the word.
@@ -91,22 +91,26 @@ impl Categorical {
     pub fn new(row: &[f64]) -> Result<Self, RowError> {
         check_row(row)?;
         let sum: f64 = row.iter().sum();
-        let (mut outcomes, mut thresholds) = (Vec::new(), Vec::new());
-        let mut cumulated = 0.0;
+        let mut outcomes = Vec::new();
+        let mut thresholds = Vec::new();
+        let mut cumulative = 0.0;
         for (i, &p) in row.iter().enumerate() {
-            cumulated += p / sum;
-            let threshold = (cumulated * (1u64 << 32) as f64).round() as u64;
-            let before = thresholds.last().map_or(0, |&t| u64::from(t));
-            // An outcome with a threshold not above the one before could never be drawn.
-            if p == 0.0 || threshold <= before {
+            cumulative += p / sum;
+            let threshold = (cumulative * (1u64 << 32) as f64).round() as u64;
+            let previous = thresholds.last().map_or(0, |&t| u64::from(t));
+            // An outcome with a threshold not above the previous one could never be drawn.
+            if p == 0.0 || threshold <= previous {
                 continue;
             }
             outcomes.push(i as u16);
             match u32::try_from(threshold) {
                 Ok(t) => thresholds.push(t),
+                // The threshold is 2^32, above every word: later outcomes could never be drawn.
                 Err(_) => break,
             }
         }
+        // The last outcome needs no threshold. It has one where rounding left the sum short of 1: the words above it
+        // then belong to the last outcome too.
         thresholds.truncate(outcomes.len().saturating_sub(1));
         Ok(Self { outcomes, thresholds })
     }
@@ -124,6 +128,7 @@ impl Categorical {
 
 /// Draws a standard normal value (Box-Muller) from two 64-bit draws.
 pub fn normal(draws: &mut Draws) -> f64 {
+    // 1 - u is in (0, 1], where the logarithm is finite; u itself may be 0.
     let radius = (-2.0 * math::ln(1.0 - draws.uniform())).sqrt();
     radius * math::cos(std::f64::consts::TAU * draws.uniform())
 }

@@ -1,6 +1,7 @@
-//! Runs a world for many cycles: the crew, the groups, and the choice of the number of workers.
+//! Runs a world for many cycles: the states of the workers, the conflict groups, and the choice of the number of
+//! workers.
 //!
-//! A cycle that is too small to share out runs on one worker alone. The engine measures instead of
+//! A cycle that is too small to be worth sharing runs on one worker alone. The engine measures instead of
 //! guessing, see `Autotuner`. Results do not depend on its choice.
 
 use crate::conflict::ConflictGroups;
@@ -33,7 +34,7 @@ pub struct Engine<W: Phases> {
     groups: ConflictGroups,
     /// Cycles since the bodies were arranged.
     since_arranged: u64,
-    crew: Vec<Mutex<WorkerState<W::Scratch>>>,
+    worker_states: Vec<Mutex<WorkerState<W::Scratch>>>,
     /// Barrier and cursors of all workers, created when they first work together.
     team: Option<WorkerTeam>,
     autotuner: Autotuner,
@@ -44,11 +45,13 @@ pub struct Engine<W: Phases> {
 impl<W: Phases> Engine<W> {
     /// Creates an engine of `workers` workers (at least 1) for `bodies` bodies.
     pub fn new(world: &W, bodies: usize, workers: usize) -> Self {
-        let mate = || Mutex::new(WorkerState::new(world.scratch()));
         Self {
             groups: ConflictGroups::new(bodies),
+            // The bodies are arranged before the first cycle.
             since_arranged: ARRANGE_INTERVAL_CYCLES,
-            crew: (0..workers.max(1)).map(|_| mate()).collect(),
+            worker_states: (0..workers.max(1))
+                .map(|_| Mutex::new(WorkerState::new(world.scratch())))
+                .collect(),
             team: None,
             autotuner: Autotuner::default(),
             times: PhaseTimes::default(),
@@ -56,7 +59,7 @@ impl<W: Phases> Engine<W> {
         }
     }
 
-    /// Leaves a cycle half done when `interrupt` is raised.
+    /// Lets [`Engine::advance`] unwind from a half-done cycle when `interrupt` is raised.
     pub fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = interrupt;
     }
@@ -66,14 +69,16 @@ impl<W: Phases> Engine<W> {
         self.autotuner.force_parallel = true;
     }
 
-    /// Returns the workers, for reading their results.
+    /// Returns the states of the workers, for reading their results.
     pub fn worker_states(&self) -> impl Iterator<Item = MutexGuard<'_, WorkerState<W::Scratch>>> {
-        self.crew.iter().map(lock)
+        self.worker_states.iter().map(lock)
     }
 
-    /// Returns the workers, for taking over their results.
+    /// Returns the states of the workers, for moving their results out.
     pub fn worker_states_mut(&mut self) -> impl Iterator<Item = &mut WorkerState<W::Scratch>> {
-        self.crew.iter_mut().map(|mate| mate.get_mut().unwrap_or_else(PoisonError::into_inner))
+        self.worker_states
+            .iter_mut()
+            .map(|worker_state| worker_state.get_mut().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Time spent in each phase so far.
@@ -86,232 +91,231 @@ impl<W: Phases> Engine<W> {
         self.groups.heap_bytes()
     }
 
-    /// Runs the cycles of a span, for worlds that need no look in between: events carry
-    /// their cycle, and wait in the scratches.
+    /// Runs the cycles of a range without an observer, for worlds whose events carry their cycle and
+    /// wait in the scratches until the end.
     pub fn advance(
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: CycleRange,
+        range: CycleRange,
         clock: &impl Clock,
     ) {
-        self.run(world, state, span, clock, None);
+        self.run(world, state, range, clock, None);
     }
 
-    /// Runs the cycles of a span, and returns how many: fewer where `observer`,
-    /// which is called between all cycles, has ended the run. One call with many cycles is cheaper
-    /// than many calls, because every call starts the threads anew.
+    /// Runs the cycles of a range, and returns their number: fewer where `observer`, which is called
+    /// between all cycles, has stopped the run. One call with many cycles is cheaper than many
+    /// calls, because every call starts the threads anew.
     pub fn advance_with_observer(
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: CycleRange,
+        range: CycleRange,
         clock: &impl Clock,
         observer: &mut dyn Observer<W>,
     ) -> u64 {
-        self.run(world, state, span, clock, Some(observer))
+        self.run(world, state, range, clock, Some(observer))
     }
 
     fn run(
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: CycleRange,
+        range: CycleRange,
         clock: &impl Clock,
         mut observer: Option<&mut dyn Observer<W>>,
     ) -> u64 {
-        let CycleRange { from, cycles } = span;
+        let CycleRange { from, cycles } = range;
         let mut done = 0;
         while done < cycles {
             if self.since_arranged >= ARRANGE_INTERVAL_CYCLES {
                 world.arrange(state);
                 self.since_arranged = 0;
             }
-            let plan = self.autotuner.segment_options(self.crew.len());
-            let stretch =
-                Segment { from: from + done, cycles: cycles - done, limit_ns: plan.limit_ns };
+            let options = self.autotuner.segment_options(self.worker_states.len());
+            let segment =
+                Segment { from: from + done, cycles: cycles - done, limit_ns: options.limit_ns };
+            let workers = &self.worker_states[..options.workers];
+            let team = (options.workers > 1)
+                .then(|| self.team.get_or_insert_with(|| WorkerTeam::new(options.workers)));
+            let parts = EngineParts {
+                groups: &self.groups,
+                workers,
+                team,
+                clock,
+                interrupt: &self.interrupt,
+            };
             let observer = observer.as_mut().map(|observer| &mut **observer as _);
-            let ran = self.run_segment(world, state, plan.workers, stretch, clock, observer);
-            self.autotuner.record(plan, &ran);
-            self.times.add(ran.times);
-            self.since_arranged += ran.cycles;
-            done += ran.cycles;
-            if ran.is_ended {
+            let timing = advance(world, state, parts, segment, observer);
+            self.autotuner.record(options, &timing);
+            self.times.add(timing.times);
+            self.since_arranged += timing.cycles;
+            done += timing.cycles;
+            if timing.is_stopped {
                 break;
             }
         }
         done
     }
-
-    fn run_segment(
-        &mut self,
-        world: &W,
-        state: &W::State,
-        workers: usize,
-        stretch: Segment,
-        clock: &impl Clock,
-        observer: Option<&mut dyn Observer<W>>,
-    ) -> SegmentTiming {
-        let crew = &self.crew[..workers];
-        let team = (workers > 1).then(|| self.team.get_or_insert_with(|| WorkerTeam::new(workers)));
-        let (groups, interrupt) = (&self.groups, &self.interrupt);
-        let parts = EngineParts { groups, crew, team, clock, interrupt };
-        advance(world, state, parts, stretch, observer)
-    }
 }
 
-/// Approximate duration of a stretch with one worker.
+/// Approximate duration of a segment with one worker.
 const SERIAL_SEGMENT_NS: u64 = 5_000_000;
-/// Duration of a stretch with all workers: starting their threads is below 1 % of it.
+/// Duration of a segment with all workers: starting their threads is below 1 % of it.
 const PARALLEL_SEGMENT_NS: u64 = 20_000_000;
-/// Duration of a look at the other way, or that of `PROBE_CYCLES` cycles with one worker where that
+/// Duration of a probe of the other mode, or that of [`PROBE_CYCLES`] cycles with one worker where that
 /// is longer: the first cycle says little, because a thread is started in it and caches are cold.
 const PROBE_NS: u64 = 1_000_000;
 const PROBE_CYCLES: f64 = 2.0;
 
-/// A cycle of less work than this is never shared out, because three barriers cost about 1 us where
+/// A cycle of less work than this is never run in parallel, because three barriers cost about 1 us where
 /// every worker has a processor of its own, and 100 times that where not.
 const MIN_PARALLEL_CYCLE_NS: f64 = 10_000.0;
 /// A cycle of more work than this is tried with all workers from the start, because runs have
-/// hundreds of cycles and a look takes two or three.
+/// hundreds of cycles and a probe takes two or three.
 const EAGER_PROBE_CYCLE_NS: f64 = 1_000_000.0;
 
 /// All workers are chosen only if a cycle takes them less than this share of one worker's time.
 const MAX_PARALLEL_COST_FRACTION: f64 = 0.9;
 
-/// Time before the first look, and between looks that may be worth it.
+/// Time before the first probe, and between probes after one that changed the favorite.
 const MIN_PROBE_WAIT_NS: f64 = 64e6;
-/// Longest time between looks that were not worth it; each of these waits is twice as long as the
+/// Longest time between probes that changed nothing; each of these waits is twice as long as the
 /// one before.
 const MAX_PROBE_WAIT_NS: f64 = 5e9;
-/// A look is followed by at least this many times its own duration without one.
+/// A probe is followed by at least this many times its own duration without one.
 const PROBE_WAIT_FACTOR: f64 = 64.0;
 
-/// Weight of the newest stretch in the estimated cost of a cycle.
+/// Weight of the newest segment in the exponential moving average of the cost of a cycle.
 const EMA_WEIGHT: f64 = 0.25;
 
-/// Decides by measurement whether one worker or all run the next stretch.
+/// Decides by measurement whether one worker or all run the next segment.
 ///
-/// It keeps to the faster of the two, its favorite, and looks at the other now and then. However
+/// It uses whichever was faster, its favorite, and re-measures the other occasionally: a probe. However
 /// costly the other is (with a barrier on processors that are busy with other work, a thousand
-/// times as much), looking takes at most 1 part in [`PROBE_WAIT_FACTOR`] of the time: a look ends after
-/// [`PROBE_NS`] or [`PROBE_CYCLES`], and its own cost determines when the next is due. A look that
-/// finds nothing doubles the wait for the next, up to [`MAX_PROBE_WAIT_NS`], so that a change is
-/// still noticed. Only a look can make all workers the favorite, so an old measurement never does;
+/// times as much), probing takes at most 1 part in [`PROBE_WAIT_FACTOR`] of the time: a probe ends after
+/// [`PROBE_NS`] or [`PROBE_CYCLES`], and its own cost determines when the next is due. A probe that
+/// changes nothing doubles the wait for the next, up to [`MAX_PROBE_WAIT_NS`], so that a change of load is
+/// still noticed. Only a probe can make all workers the favorite, so an old measurement never does;
 /// one worker takes over as soon as all are slower.
 #[derive(Debug)]
 struct Autotuner {
     /// Nanoseconds per cycle with one worker and with all; `None` where not measured yet.
-    alone_ns: Option<f64>,
-    team_ns: Option<f64>,
-    favors_team: bool,
-    /// Nanoseconds since the last look, and until the next.
-    since_ns: f64,
-    wait_ns: f64,
+    serial_ns: Option<f64>,
+    parallel_ns: Option<f64>,
+    favors_parallel: bool,
+    /// Nanoseconds since the last probe.
+    since_probe_ns: f64,
+    /// Nanoseconds from the last probe to the next.
+    probe_wait_ns: f64,
     force_parallel: bool,
 }
 
-/// The way in which the next stretch runs.
+/// The number of workers of the next segment, and its maximum duration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct SegmentOptions {
     workers: usize,
     limit_ns: u64,
-    /// Whether this is a look at the other way, not the favorite.
+    /// Whether this measures the other mode, not the favorite.
     is_probe: bool,
 }
 
 impl Default for Autotuner {
     fn default() -> Self {
         Self {
-            alone_ns: None,
-            team_ns: None,
-            favors_team: false,
-            since_ns: 0.0,
-            wait_ns: MIN_PROBE_WAIT_NS,
+            serial_ns: None,
+            parallel_ns: None,
+            favors_parallel: false,
+            since_probe_ns: 0.0,
+            probe_wait_ns: MIN_PROBE_WAIT_NS,
             force_parallel: false,
         }
     }
 }
 
 impl Autotuner {
-    fn segment_options(&self, crew: usize) -> SegmentOptions {
+    fn segment_options(&self, workers: usize) -> SegmentOptions {
         if self.force_parallel {
-            return SegmentOptions {
-                workers: crew,
-                limit_ns: PARALLEL_SEGMENT_NS,
-                is_probe: false,
-            };
+            return SegmentOptions { workers, limit_ns: PARALLEL_SEGMENT_NS, is_probe: false };
         }
-        let is_look = crew > 1 && self.is_probe_due();
-        let with_all = self.favors_team != is_look;
-        let limit_ns = match (is_look, with_all) {
-            (true, _) => PROBE_NS.max((PROBE_CYCLES * self.alone_ns.unwrap_or(0.0)) as u64),
-            (false, true) => PARALLEL_SEGMENT_NS,
-            (false, false) => SERIAL_SEGMENT_NS,
+        let is_probe = workers > 1 && self.is_probe_due();
+        let is_parallel = self.favors_parallel != is_probe;
+        let limit_ns = if is_probe {
+            PROBE_NS.max((PROBE_CYCLES * self.serial_ns.unwrap_or(0.0)) as u64)
+        } else if is_parallel {
+            PARALLEL_SEGMENT_NS
+        } else {
+            SERIAL_SEGMENT_NS
         };
-        SegmentOptions { workers: if with_all { crew } else { 1 }, limit_ns, is_probe: is_look }
+        SegmentOptions { workers: if is_parallel { workers } else { 1 }, limit_ns, is_probe }
     }
 
     fn is_probe_due(&self) -> bool {
-        let Some(alone_ns) = self.alone_ns else { return false };
-        if !self.favors_team && alone_ns < MIN_PARALLEL_CYCLE_NS {
+        let Some(serial_ns) = self.serial_ns else { return false };
+        if !self.favors_parallel && serial_ns < MIN_PARALLEL_CYCLE_NS {
             return false;
         }
-        let is_first = self.team_ns.is_none();
-        self.since_ns >= self.wait_ns || (is_first && alone_ns >= EAGER_PROBE_CYCLE_NS)
+        let is_first = self.parallel_ns.is_none();
+        self.since_probe_ns >= self.probe_wait_ns || (is_first && serial_ns >= EAGER_PROBE_CYCLE_NS)
     }
 
-    fn record(&mut self, plan: SegmentOptions, ran: &SegmentTiming) {
-        let took_ns = ran.took_ns as f64;
-        let with_all = self.favors_team != plan.is_probe;
-        let measured = if with_all { &mut self.team_ns } else { &mut self.alone_ns };
-        if plan.is_probe {
-            // An old measurement says nothing about the present load, so the look replaces it.
-            *measured = Some(per_cycle_ns(ran, ran.cycles > 1));
-            self.since_ns = 0.0;
+    fn record(&mut self, options: SegmentOptions, timing: &SegmentTiming) {
+        let took_ns = timing.took_ns as f64;
+        let is_parallel = self.favors_parallel != options.is_probe;
+        let measured = if is_parallel { &mut self.parallel_ns } else { &mut self.serial_ns };
+        if options.is_probe {
+            // An old measurement says nothing about the present load, so the probe replaces it.
+            *measured = Some(per_cycle_ns(timing, timing.cycles > 1));
+            self.since_probe_ns = 0.0;
             self.choose_after_probe(took_ns);
         } else {
-            let newest = per_cycle_ns(ran, false);
+            let newest = per_cycle_ns(timing, false);
             *measured = Some(measured.map_or(newest, |old| old + EMA_WEIGHT * (newest - old)));
-            self.since_ns += took_ns;
-            self.fall_back_to_one(ran);
+            self.since_probe_ns += took_ns;
+            self.fall_back_to_one(timing);
         }
     }
 
     fn choose_after_probe(&mut self, took_ns: f64) {
-        let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
+        let (Some(serial_ns), Some(parallel_ns)) = (self.serial_ns, self.parallel_ns) else {
+            return;
+        };
         // In doubt the favorite stays: all workers must be clearly faster to replace one.
-        let bar_ns =
-            if self.favors_team { alone_ns } else { MAX_PARALLEL_COST_FRACTION * alone_ns };
-        let favored_team = std::mem::replace(&mut self.favors_team, team_ns < bar_ns);
-        self.wait_ns = if favored_team == self.favors_team {
-            (2.0 * self.wait_ns).min(MAX_PROBE_WAIT_NS)
+        let threshold_ns =
+            if self.favors_parallel { serial_ns } else { MAX_PARALLEL_COST_FRACTION * serial_ns };
+        let favored_parallel = self.favors_parallel;
+        self.favors_parallel = parallel_ns < threshold_ns;
+        self.probe_wait_ns = if favored_parallel == self.favors_parallel {
+            (2.0 * self.probe_wait_ns).min(MAX_PROBE_WAIT_NS)
         } else {
             MIN_PROBE_WAIT_NS
         };
-        self.wait_ns = self.wait_ns.max(PROBE_WAIT_FACTOR * took_ns);
+        self.probe_wait_ns = self.probe_wait_ns.max(PROBE_WAIT_FACTOR * took_ns);
     }
 
-    /// Goes back to one worker where all have become slower; the loss counts like that of a look.
-    fn fall_back_to_one(&mut self, ran: &SegmentTiming) {
-        let (Some(alone_ns), Some(team_ns)) = (self.alone_ns, self.team_ns) else { return };
-        if self.favors_team && team_ns > alone_ns {
-            let lost_ns = ran.took_ns as f64 - ran.cycles as f64 * alone_ns;
-            self.favors_team = false;
-            self.since_ns = 0.0;
-            self.wait_ns = MIN_PROBE_WAIT_NS.max(PROBE_WAIT_FACTOR * lost_ns);
+    /// Goes back to one worker where all have become slower; the time lost counts like that of a probe.
+    fn fall_back_to_one(&mut self, timing: &SegmentTiming) {
+        let (Some(serial_ns), Some(parallel_ns)) = (self.serial_ns, self.parallel_ns) else {
+            return;
+        };
+        if self.favors_parallel && parallel_ns > serial_ns {
+            let lost_ns = timing.took_ns as f64 - timing.cycles as f64 * serial_ns;
+            self.favors_parallel = false;
+            self.since_probe_ns = 0.0;
+            self.probe_wait_ns = MIN_PROBE_WAIT_NS.max(PROBE_WAIT_FACTOR * lost_ns);
         }
     }
 }
 
 /// Nanoseconds per cycle, without the first one if it is to be left out: threads were started in
 /// it, and caches were cold.
-fn per_cycle_ns(ran: &SegmentTiming, without_first: bool) -> f64 {
-    let (took_ns, cycles) = if without_first {
-        (ran.took_ns - ran.first_ns, ran.cycles - 1)
-    } else {
-        (ran.took_ns, ran.cycles)
-    };
+fn per_cycle_ns(timing: &SegmentTiming, without_first: bool) -> f64 {
+    let mut took_ns = timing.took_ns;
+    let mut cycles = timing.cycles;
+    if without_first {
+        took_ns -= timing.first_ns;
+        cycles -= 1;
+    }
     (took_ns as f64 / cycles as f64).max(1.0)
 }
 
@@ -350,13 +354,14 @@ mod tests {
                 let cycles = plan.limit_ns.saturating_sub(start_ns).div_ceil(cycle_ns).max(1);
                 let took_ns = start_ns + cycles * cycle_ns;
                 let first_ns = start_ns + cycle_ns;
-                let ran = SegmentTiming { cycles, took_ns, first_ns, ..SegmentTiming::default() };
+                let timing =
+                    SegmentTiming { cycles, took_ns, first_ns, ..SegmentTiming::default() };
                 if plan.is_probe {
                     self.looks_at_ns.push(self.now_ns);
                     self.looking_ns += took_ns;
                 }
                 self.with_all_ns += if plan.workers > 1 { took_ns } else { 0 };
-                self.pace.record(plan, &ran);
+                self.pace.record(plan, &timing);
                 self.now_ns += took_ns;
             }
             self
@@ -378,8 +383,8 @@ mod tests {
         ] {
             let mut trial = Trial::default();
             trial.run(4 * SECOND_NS, cycle_ns);
-            let with_all = trial.with_all_ns as f64 / trial.now_ns as f64;
-            assert!((least..=most).contains(&with_all), "{cycle_ns:?}: {with_all}");
+            let is_parallel = trial.with_all_ns as f64 / trial.now_ns as f64;
+            assert!((least..=most).contains(&is_parallel), "{cycle_ns:?}: {is_parallel}");
         }
     }
 
@@ -390,17 +395,17 @@ mod tests {
         {
             let mut trial = Trial { start_ns, ..Trial::default() };
             trial.run(SECOND_NS / 10, cycle_ns);
-            assert!(trial.pace.favors_team, "{cycle_ns:?}");
+            assert!(trial.pace.favors_parallel, "{cycle_ns:?}");
             assert_eq!(trial.looks_at_ns.len(), 1);
         }
     }
 
     #[test]
     fn looking_takes_two_percent_at_most_however_slow_the_other_way_is() {
-        for alone_ns in [12_000, 50_000, 900_000, 3_000_000] {
+        for serial_ns in [12_000, 50_000, 900_000, 3_000_000] {
             for times_slower in [1, 3, 30, 1000] {
                 let mut trial = Trial::default();
-                let cycle_ns = [alone_ns, alone_ns * times_slower];
+                let cycle_ns = [serial_ns, serial_ns * times_slower];
                 trial.run(100 * SECOND_NS + 1000 * cycle_ns[1], cycle_ns);
                 let share = trial.share_of_looking();
                 assert!(share <= 0.02, "{cycle_ns:?}: {share}");
@@ -431,16 +436,16 @@ mod tests {
     fn a_change_is_noticed_in_either_direction() {
         let mut trial = Trial::default();
         trial.run(60 * SECOND_NS, [100_000, 2_000_000]);
-        assert!(!trial.pace.favors_team);
+        assert!(!trial.pace.favors_parallel);
         trial.run(2 * MAX_PROBE_WAIT_NS as u64, [100_000, 55_000]);
-        assert!(trial.pace.favors_team, "the other work has ended");
+        assert!(trial.pace.favors_parallel, "the other work has ended");
         trial.run(20 * SECOND_NS, [100_000, 55_000]);
         trial.run(SECOND_NS / 10, [100_000, 100_000_000]);
-        assert!(!trial.pace.favors_team, "other work has begun");
+        assert!(!trial.pace.favors_parallel, "other work has begun");
         trial.run(60 * SECOND_NS, [100_000, 55_000]);
-        assert!(trial.pace.favors_team, "and has ended");
+        assert!(trial.pace.favors_parallel, "and has ended");
         trial.run(20 * SECOND_NS, [30_000, 55_000]);
-        assert!(!trial.pace.favors_team, "one worker has become faster");
+        assert!(!trial.pace.favors_parallel, "one worker has become faster");
     }
 
     #[test]
@@ -460,7 +465,7 @@ mod tests {
     /// Counts its cycles; a cycle takes time on the clock, more of it for a second worker.
     struct Ticking<'a> {
         clock: &'a ManualClock,
-        alone_ns: u64,
+        serial_ns: u64,
         helper_ns: u64,
     }
 
@@ -477,7 +482,7 @@ mod tests {
         fn bodies(&self, state: &Ticks) -> usize {
             // Every worker calls it once a cycle.
             let is_helper = std::thread::current().name().is_some_and(|n| n.starts_with("worker"));
-            self.clock.advance_ns(if is_helper { self.helper_ns } else { self.alone_ns });
+            self.clock.advance_ns(if is_helper { self.helper_ns } else { self.serial_ns });
             state.0.len()
         }
 
@@ -500,22 +505,22 @@ mod tests {
     #[test]
     fn an_engine_spends_two_percent_at_most_on_a_team_that_is_a_thousand_times_slower() {
         let clock = ManualClock::default();
-        let world = Ticking { clock: &clock, alone_ns: 20_000, helper_ns: 20_000_000 };
+        let world = Ticking { clock: &clock, serial_ns: 20_000, helper_ns: 20_000_000 };
         let (mut state, cycles) = (ticks(3), 200_000);
         let mut engine = Engine::new(&world, 3, 2);
         engine.advance(&world, &mut state, CycleRange { from: 0, cycles }, &clock);
         assert!(engine.team.is_some(), "it was looked at");
         let took_ns = clock.now_ns() as f64;
-        let alone_ns = (cycles * world.alone_ns) as f64;
-        assert!(took_ns <= 1.02 * alone_ns, "{took_ns} against {alone_ns}");
-        engine.worker_states_mut().for_each(|mate| mate.scratch.clear());
+        let serial_ns = (cycles * world.serial_ns) as f64;
+        assert!(took_ns <= 1.02 * serial_ns, "{took_ns} against {serial_ns}");
+        engine.worker_states_mut().for_each(|worker_state| worker_state.scratch.clear());
         assert!(state.0.iter().all(|n| n.load(Relaxed) == cycles));
     }
 
     #[test]
     fn an_engine_never_makes_a_team_for_a_tiny_world() {
         let clock = ManualClock::default();
-        let world = Ticking { clock: &clock, alone_ns: 5_000, helper_ns: 1 };
+        let world = Ticking { clock: &clock, serial_ns: 5_000, helper_ns: 1 };
         let mut engine = Engine::new(&world, 3, 2);
         engine.advance(&world, &mut ticks(3), CycleRange { from: 0, cycles: 200_000 }, &clock);
         assert!(engine.team.is_none());
@@ -553,15 +558,15 @@ mod tests {
     fn an_observer_sees_every_cycle_whole_and_ends_the_run_where_it_likes() {
         let clock = ManualClock::default();
         // Several stretches.
-        let world = Ticking { clock: &clock, alone_ns: 400_000, helper_ns: 400_000 };
+        let world = Ticking { clock: &clock, serial_ns: 400_000, helper_ns: 400_000 };
         for workers in [1, 2, 3] {
             let mut engine = Engine::new(&world, 5, workers);
             engine.force_parallel();
             let (mut state, mut notes) = (ticks(5), Notes { last: 149, ..Notes::default() });
             for (from, cycles) in [(0, 1), (1, 99), (100, 1000)] {
-                let span = CycleRange { from, cycles };
+                let range = CycleRange { from, cycles };
                 let done =
-                    engine.advance_with_observer(&world, &mut state, span, &clock, &mut notes);
+                    engine.advance_with_observer(&world, &mut state, range, &clock, &mut notes);
                 assert_eq!(done, cycles.min(150 - from));
             }
             assert_eq!(notes.began, (0..150).map(|now| (now, now)).collect::<Vec<_>>());

@@ -9,11 +9,11 @@ use std::ops::Range;
 /// Wrong input: a file, an option, a table that does not sum to 1.
 ///
 /// Displayed as `place:line:column: cause`, the offending line with a caret under it where
-/// the text is known, and `help: remedy`. The key is for programs that know the text by its keys.
+/// the text is known, and `help: remedy`. The key is for programs that edit the text by its keys.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputError {
     place: String,
-    /// The position, in a box like the key, because errors travel in results by value.
+    /// The position, boxed like the key, because results carry errors by value and are as large as these.
     position: Option<Box<TextPosition>>,
     key: Option<Box<str>>,
     cause: String,
@@ -57,12 +57,12 @@ impl InputError {
     /// Adds line and column of the byte at `offset` in `text`, and quotes that line.
     #[must_use]
     pub fn with_offset(mut self, text: &str, offset: usize) -> Self {
-        let offset = boundary(text, offset);
+        let offset = floor_char_boundary(text, offset);
         let (line, column) = line_and_column(text, offset);
-        let start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
-        let quoted = text[start..].lines().next().unwrap_or("").to_string();
-        let text = Some(quoted);
-        self.position = Some(Box::new(TextPosition { line, column, end: None, text }));
+        let line_start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
+        let quoted = text[line_start..].lines().next().unwrap_or("").to_string();
+        self.position =
+            Some(Box::new(TextPosition { line, column, end: None, text: Some(quoted) }));
         self
     }
 
@@ -70,7 +70,7 @@ impl InputError {
     /// line.
     #[must_use]
     pub fn with_span(self, text: &str, span: Range<usize>) -> Self {
-        let end = line_and_column(text, boundary(text, span.end.max(span.start)));
+        let end = line_and_column(text, floor_char_boundary(text, span.end.max(span.start)));
         let mut error = self.with_offset(text, span.start);
         if let Some(position) = &mut error.position {
             position.end = Some(end);
@@ -126,10 +126,11 @@ impl fmt::Display for InputError {
         if let Some(TextPosition { line, column, text: Some(text), .. }) = self.position.as_deref()
         {
             let number = line.to_string();
-            let shown = text.replace('\t', " ");
+            // A tab is one character for the column, but several on the screen: the caret would point elsewhere.
+            let quoted = text.replace('\t', " ");
             write!(
                 f,
-                "\n  {number} | {shown}\n  {:w$} | {:c$}^",
+                "\n  {number} | {quoted}\n  {:w$} | {:c$}^",
                 "",
                 "",
                 w = number.len(),
@@ -143,7 +144,7 @@ impl fmt::Display for InputError {
 impl std::error::Error for InputError {}
 
 /// Returns the last start of a character at or before `offset`.
-fn boundary(text: &str, offset: usize) -> usize {
+fn floor_char_boundary(text: &str, offset: usize) -> usize {
     let mut offset = offset.min(text.len());
     while !text.is_char_boundary(offset) {
         offset -= 1;

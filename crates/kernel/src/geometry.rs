@@ -32,10 +32,10 @@ pub fn add_scaled<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> 
     std::array::from_fn(|i| a[i] + u[i] * k)
 }
 
-/// The point at the fraction `part` of the way from `a` to `b`.
+/// Linear interpolation: the point at a fraction of the segment from `a` to `b`.
 #[inline]
-pub fn lerp<const D: usize>(a: Point<D>, b: Point<D>, part: f64) -> Point<D> {
-    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
+pub fn lerp<const D: usize>(a: Point<D>, b: Point<D>, fraction: f64) -> Point<D> {
+    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * fraction)
 }
 
 /// Inner product.
@@ -86,8 +86,8 @@ pub fn rejection<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
 
 /// The point reached from `from` toward `to` after at most `step_m` meters.
 pub fn move_toward<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
-    let far_m = distance(from, to);
-    if far_m <= step_m { to } else { add_scaled(from, sub(to, from), step_m / far_m) }
+    let distance_m = distance(from, to);
+    if distance_m <= step_m { to } else { add_scaled(from, sub(to, from), step_m / distance_m) }
 }
 
 /// A point in another number of dimensions: further coordinates are left out, missing ones are 0.
@@ -107,6 +107,7 @@ pub fn perpendicular<const D: usize>(u: Point<D>) -> Point<D> {
     if D == 2 {
         return std::array::from_fn(|i| if i == 0 { -u[1] } else { u[0] });
     }
+    // The axis that is farthest from parallel to `u`, so that the rejection is not near zero.
     let axis = (0..D).min_by(|&i, &j| u[i].abs().total_cmp(&u[j].abs())).unwrap_or(0);
     let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
     normalized(add_scaled(e, u, -u[axis])).unwrap_or(e)
@@ -118,11 +119,13 @@ pub fn cross_2d<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Angle between two vectors, in [0, pi]; exact near 0 and pi too.
+/// Angle between two vectors, in [0, pi]. By the arc tangent, because the arc cosine loses half of the digits near 0
+/// and pi.
 pub fn angle_rad<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
-    let along_a = dot(a, b);
-    let across = if D == 2 { cross_2d(a, b).abs() } else { norm(cross(a, b)) };
-    math::atan2(across, along_a)
+    let cosine = dot(a, b);
+    let sine = if D == 2 { cross_2d(a, b).abs() } else { norm(cross(a, b)) };
+    // Both are scaled by the product of the lengths, which cancels.
+    math::atan2(sine, cosine)
 }
 
 /// Cross product of vectors in space; `D` is 3, and generic for code that knows that only at run time.
@@ -138,14 +141,15 @@ pub fn cross<const D: usize>(a: Point<D>, b: Point<D>) -> Point<3> {
 #[inline]
 pub fn nearest_on_segment<const D: usize>(p: Point<D>, a: Point<D>, b: Point<D>) -> Point<D> {
     let d = sub(b, a);
-    let length2 = dot(d, d);
-    let part = dot(sub(p, a), d);
-    if part <= 0.0 || length2 <= 0.0 {
+    let length_squared = dot(d, d);
+    // The position of the projection on the line, times the squared length.
+    let projection = dot(sub(p, a), d);
+    if projection <= 0.0 || length_squared <= 0.0 {
         a
-    } else if part >= length2 {
+    } else if projection >= length_squared {
         b
     } else {
-        add_scaled(a, d, part / length2)
+        add_scaled(a, d, projection / length_squared)
     }
 }
 

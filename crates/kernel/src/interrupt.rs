@@ -1,8 +1,8 @@
-//! A request to leave a cycle half done.
+//! A request to abandon a cycle before it is done.
 //!
 //! A run stops in good order between two cycles. But one cycle of many airplanes may take minutes,
-//! and no user who ends a run wants to wait for them. So long computations look at an [`Interrupt`]
-//! again and again ([`check`]), and when it is raised they unwind. The half-done state is lost; a
+//! and no user who ends a run wants to wait for them. So long computations poll an [`Interrupt`]
+//! ([`check`]), and unwind once it is raised. The half-done state is lost; a
 //! recorded run continues from its last checkpoint, as after a kill.
 //!
 //! The engine attaches the interrupt of a run to the threads of its workers for the time of a call, so
@@ -15,7 +15,7 @@ use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-/// A flag that one thread raises and all workers of a run look at; clones share it.
+/// A flag that one thread raises and all workers of a run poll; clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt(Arc<InterruptState>);
 
@@ -25,7 +25,7 @@ struct InterruptState {
     checks: AtomicU64,
 }
 
-/// The payload of the unwinding after a look at a raised interrupt.
+/// The payload of the unwinding that a raised interrupt starts.
 #[derive(Debug)]
 struct InterruptPayload;
 
@@ -33,7 +33,7 @@ struct InterruptPayload;
 #[derive(Debug)]
 struct WorkerLostPayload;
 
-/// The interrupt that a thread heeds. Each thread counts its own looks, so that workers that look all the
+/// The interrupt that a thread polls. Each thread counts its own checks, so that workers that check all the
 /// time do not wait for each other's cache lines.
 #[derive(Debug)]
 struct Attachment {
@@ -42,12 +42,12 @@ struct Attachment {
 }
 
 thread_local! {
-    /// The interrupt that the present computation of this thread heeds.
+    /// The interrupt that the present computation of this thread polls.
     static ATTACHMENT: RefCell<Option<Attachment>> = const { RefCell::new(None) };
 }
 
-/// Looks at the interrupt that this thread heeds, if it heeds any. A computation calls it at least
-/// once in some milliseconds of work, however deep inside it is.
+/// Checks the interrupt attached to this thread, if any. A computation calls it at least
+/// once in some milliseconds of work, at any depth of calls.
 ///
 /// # Panics
 /// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::caused`]
@@ -55,7 +55,7 @@ thread_local! {
 #[inline]
 pub fn check() {
     let is_raised =
-        ATTACHMENT.with_borrow_mut(|heeded| heeded.as_mut().is_some_and(Attachment::check));
+        ATTACHMENT.with_borrow_mut(|attached| attached.as_mut().is_some_and(Attachment::check));
     if is_raised {
         resume_unwind(Box::new(InterruptPayload));
     }
@@ -69,49 +69,48 @@ impl Attachment {
 }
 
 impl Interrupt {
-    /// Asks for the end of the work at the next look.
+    /// Ends the work at the next check.
     pub fn raise(&self) {
         self.0.is_raised.store(true, Relaxed);
     }
 
-    /// Lets this thread heed the interrupt until the returned guard is dropped.
+    /// Attaches the interrupt to this thread until the returned guard is dropped.
     pub fn attach(&self) -> AttachGuard {
-        AttachGuard {
-            before: ATTACHMENT.replace(Some(Attachment { interrupt: self.clone(), checks: 0 })),
-        }
+        let attachment = Attachment { interrupt: self.clone(), checks: 0 };
+        AttachGuard { previous: ATTACHMENT.replace(Some(attachment)) }
     }
 
-    /// Number of looks by threads that no longer heed it, for tests of the frequency of looks.
+    /// Number of checks by threads from which it was detached, for tests of the frequency of checks.
     pub fn checks(&self) -> u64 {
         self.0.checks.load(Relaxed)
     }
 
-    /// Returns whether a caught unwinding came from a look at this interrupt, rather than from a
+    /// Returns whether a caught unwinding came from a check of this interrupt, rather than from a
     /// bug.
     pub fn caused(&self, payload: &(dyn Any + Send)) -> bool {
         let is_raised = self.0.is_raised.load(Relaxed);
+        // The calling thread may unwind at a barrier, because another worker was the first to check.
         is_raised && (payload.is::<InterruptPayload>() || payload.is::<WorkerLostPayload>())
     }
 }
 
-/// A while in which a thread heeds an interrupt.
+/// Keeps an interrupt attached to the thread until it is dropped.
 #[derive(Debug)]
 pub struct AttachGuard {
-    before: Option<Attachment>,
+    /// The attachment to restore.
+    previous: Option<Attachment>,
 }
 
 impl Drop for AttachGuard {
     fn drop(&mut self) {
-        if let Some(Attachment { interrupt, checks: looks }) =
-            ATTACHMENT.replace(self.before.take())
-        {
-            interrupt.0.checks.fetch_add(looks, Relaxed);
+        if let Some(Attachment { interrupt, checks }) = ATTACHMENT.replace(self.previous.take()) {
+            interrupt.0.checks.fetch_add(checks, Relaxed);
         }
     }
 }
 
-/// Unwinds a worker that would wait for another one forever, without a message: the other one has
-/// printed the reason, if there is anything to print.
+/// Unwinds a worker that would wait forever for one that has panicked, without a message: the other one has
+/// printed the reason, unless it was interrupted.
 pub(crate) fn unwind_worker_lost() -> ! {
     resume_unwind(Box::new(WorkerLostPayload))
 }

@@ -7,17 +7,17 @@
 //!   join  : claims -> conflict groups │ barrier │   conflict.rs
 //!   act   : groups act                │ barrier │   workers.rs knows the threads
 //!
-//! Run<World>: the one simulation; Simulation: its face toward all other crates
+//! Run<World>: the one simulation; Simulation: its object-safe interface for all other crates
 //! ```
 //!
 //! Guarantees of the modules:
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
-//! - [`control`]: the observations of agents, and orders from outside, checked and recorded.
+//! - [`control`]: the observations of agents, and external orders, checked and recorded.
 //! - [`batch`]: many simulations of one scenario at once, the same bits for every number of workers.
-//! - [`interrupt`]: a cycle that takes long can be left half done.
-//! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
+//! - [`interrupt`]: a cycle that takes long can be abandoned.
+//! - [`view`]: the scenery and the frames of any world; reading them changes no run.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`network`]: the messages between agents, and their faults.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
@@ -45,6 +45,7 @@ pub mod stream;
 pub mod text;
 pub mod units;
 pub mod view;
+#[expect(clippy::disallowed_methods, reason = "the one place that starts threads")]
 pub mod workers;
 pub mod world;
 
@@ -53,8 +54,16 @@ pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;
 pub use interrupt::Interrupt;
-pub use run::Run;
+pub use run::{Run, RunStart};
 pub use run_config::{GroupSizes, RunConfig, RunStats};
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
-pub use world::{PhaseContext, Phases, World};
+pub use world::{
+    PhaseContext, Phases, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
+    WorldView,
+};
+
+/// The example of the README, which is tested.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

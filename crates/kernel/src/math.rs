@@ -1,6 +1,6 @@
 //! The float functions whose last bits differ between platforms, from `libm`.
 //!
-//! `+ - * /` and `sqrt` are exact everywhere and stay with std; `clippy.toml` bans all others,
+//! `+ - * /` and `sqrt` are correctly rounded on every platform and stay with std; `clippy.toml` bans all others,
 //! which live here, so that a result has the same bits on every machine.
 
 macro_rules! unary {
@@ -54,9 +54,9 @@ pub fn powf(x: f64, y: f64) -> f64 {
 #[inline]
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
-    let turned = (angle_rad + PI).rem_euclid(TAU);
+    let shifted = (angle_rad + PI).rem_euclid(TAU);
     // rem_euclid may round up to the modulus itself, which is outside the range.
-    if turned >= TAU { -PI } else { turned - PI }
+    if shifted >= TAU { -PI } else { shifted - PI }
 }
 
 #[cfg(test)]

@@ -14,11 +14,23 @@ use crate::simulation::Simulation;
 use crate::text::{Description, KeyValues};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
-use crate::world::{DecisionMode, World};
+use crate::world::{
+    DecisionMode, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+};
 use serde_json::Value;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
+
+/// The start of a run: its settings, its state, and the collector beside the state.
+pub struct RunStart<W: World> {
+    /// The settings.
+    pub config: RunConfig,
+    /// The state before the first cycle.
+    pub state: W::State,
+    /// The empty collector.
+    pub collector: W::Collector,
+}
 
 /// A run of a world.
 pub struct Run<W: World> {
@@ -36,56 +48,47 @@ pub struct Run<W: World> {
     /// Whether rows are kept for a recorder.
     records: bool,
     teams: Arc<Teams>,
-    /// Orders to be given when the run reaches their cycles.
+    /// Orders to be replayed when the run reaches their cycles.
     order_log: OrderLog,
-    /// Controls to be handed over likewise.
+    /// Controls to be replayed likewise.
     control_log: ControlLog,
-    /// The last cycle for which that was done.
+    /// The last cycle for which that was done: `advance` may be called several times in one cycle.
     last_applied: Option<Cycle>,
     /// Orders that were given and wait to be recorded.
     order_rows: RowBuffer<OrderRow>,
-    /// Controls that were handed over and wait to be recorded.
+    /// Controls that were submitted and wait to be recorded.
     control_rows: RowBuffer<ControlRow>,
 }
 
-impl<W: World> Run<W> {
+impl<W: WorldControl> Run<W> {
     /// Creates a run at its start, with `workers` workers; the world is shared, not copied.
     /// `scenario` is the resolved scenario's text.
-    pub fn new(
-        world: Arc<W>,
-        plan: RunConfig,
-        state: W::State,
-        books: W::Collector,
-        scenario: &str,
-        workers: usize,
-    ) -> Self {
+    pub fn new(world: Arc<W>, start: RunStart<W>, scenario: &str, workers: usize) -> Self {
+        let RunStart { config, state, collector } = start;
         let engine = Engine::new(&*world, world.bodies(&state), workers);
-        let scenario = *Digest::hash_bytes(scenario.as_bytes()).as_bytes();
-        let clock = SystemClock::default();
-        let groups_before = GroupSizes::default();
-        let (cycle, records) = (0, false);
         let teams = world.teams();
-        let (ahead, given) = (OrderLog::default(), RowBuffer::default());
         Self {
             world,
-            config: plan,
-            scenario,
+            config,
+            scenario: *Digest::hash_bytes(scenario.as_bytes()).as_bytes(),
             state,
-            collector: books,
+            collector,
             engine,
-            groups_before,
-            cycle,
-            clock,
-            records,
+            groups_before: GroupSizes::default(),
+            cycle: 0,
+            clock: SystemClock::default(),
+            records: false,
             teams,
-            order_log: ahead,
+            order_log: OrderLog::default(),
             control_log: ControlLog::default(),
             last_applied: None,
-            order_rows: given,
+            order_rows: RowBuffer::default(),
             control_rows: RowBuffer::default(),
         }
     }
+}
 
+impl<W: World> Run<W> {
     /// Uses all workers even where one would be faster; for tests and benchmarks.
     pub fn force_parallel(&mut self) {
         self.engine.force_parallel();
@@ -106,16 +109,6 @@ impl<W: World> Run<W> {
         &self.collector
     }
 
-    /// Returns the content that a checkpoint of the present state would have.
-    pub fn snapshot(&self) -> W::Snapshot {
-        self.world.save(&self.state, &self.collector, self.cycle)
-    }
-
-    /// Returns the measurements of the run so far.
-    pub fn metrics(&self) -> W::Metrics {
-        self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
-    }
-
     /// Bytes on the heap of the engine, which grow with the bodies.
     pub fn engine_heap_bytes(&self) -> usize {
         self.engine.heap_bytes()
@@ -123,12 +116,12 @@ impl<W: World> Run<W> {
 
     /// Returns the conflict groups since the start of the run, and the processor time of all workers.
     pub fn stats(&self) -> RunStats {
-        let mut effort = RunStats { groups: self.groups_before, cpu_ns: 0 };
-        for mate in self.engine.worker_states() {
-            effort.groups.merge(&mate.stats.groups);
-            effort.cpu_ns += mate.stats.cpu_ns;
+        let mut stats = RunStats { groups: self.groups_before, cpu_ns: 0 };
+        for worker in self.engine.worker_states() {
+            stats.groups.merge(&worker.stats.groups);
+            stats.cpu_ns += worker.stats.cpu_ns;
         }
-        effort
+        stats
     }
 
     fn header(&self) -> Header {
@@ -141,39 +134,50 @@ impl<W: World> Run<W> {
         }
     }
 
-    /// Takes over the results of all workers.
+    /// Moves the results of all workers to the collector.
     fn collect(&mut self) {
-        let Self { world, collector: books, engine, .. } = self;
-        engine.worker_states_mut().for_each(|mate| world.collect(books, &mut mate.scratch));
-        world.commit(books);
+        let Self { world, collector, engine, .. } = self;
+        for worker in engine.worker_states_mut() {
+            world.collect(collector, &mut worker.scratch);
+        }
+        world.commit(collector);
     }
 
-    /// Number of cycles that may run before rows must be handed over.
+    /// Number of cycles that may run before rows must be recorded.
     fn cycles_until_flush(&self) -> u64 {
-        let room = self.world.cycles_until_flush(&self.state, &self.collector, self.cycle);
-        // Orders come from outside of cycles, so one more cycle never makes it worse.
-        if self.order_rows.is_full() || self.control_rows.is_full() { room.min(1) } else { room }
+        let cycles = self.world.cycles_until_flush(&self.state, &self.collector, self.cycle);
+        if self.order_rows.is_full() || self.control_rows.is_full() {
+            // Not 0: orders are given between cycles, so a cycle adds none, and `advance` promises to do at least one.
+            cycles.min(1)
+        } else {
+            cycles
+        }
     }
 
-    /// Runs up to `cycles` cycles in which no order is ahead.
+    /// Runs up to `cycles` cycles, before which nothing is to be replayed.
     fn run_segment(&mut self, cycles: u64) -> u64 {
         let cycles = cycles.min(self.cycles_until_flush());
-        let Self { world, state, collector: books, engine, clock, .. } = self;
-        let span = CycleRange { from: self.cycle, cycles };
-        let done = match W::OBSERVES_EACH_CYCLE {
-            false => {
-                engine.advance(world, state, span, clock);
-                cycles
-            }
-            true => {
-                let mut onlooker = WorldObserver { world: &**world, books };
-                engine.advance_with_observer(world, state, span, clock, &mut onlooker)
-            }
+        let Self { world, state, collector, engine, clock, .. } = self;
+        let range = CycleRange { from: self.cycle, cycles };
+        let done = if W::OBSERVES_EACH_CYCLE {
+            let mut observer = WorldObserver { world: &**world, collector };
+            engine.advance_with_observer(world, state, range, clock, &mut observer)
+        } else {
+            engine.advance(world, state, range, clock);
+            cycles
         };
         self.cycle += done;
         done
     }
 
+    /// Returns the first cycle after the present one before which orders or controls are replayed.
+    fn next_due(&self) -> Option<Cycle> {
+        let orders = self.order_log.next_after(self.cycle);
+        orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
+    }
+}
+
+impl<W: WorldControl> Run<W> {
     /// Gives an order, or refuses it as a whole.
     fn apply_orders(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.check_orders(orders)?;
@@ -185,13 +189,16 @@ impl<W: World> Run<W> {
         if self.order_rows.is_enabled() {
             let names = self.teams.order_names();
             let name = names.iter().position(|name| name == orders.order).unwrap_or(0) as u32;
-            let (cycle, given) = (self.cycle, &mut self.order_rows);
             self.teams.for_each_order(orders, |order| {
-                let row = |(part, &value): (u32, &f64)| {
-                    let (agent, order) = (order.agent, name);
-                    OrderRow { cycle, agent, order, part, value }
-                };
-                given.extend((0..).zip(order.values).map(row));
+                for (part, &value) in (0..).zip(order.values) {
+                    self.order_rows.push(OrderRow {
+                        cycle: self.cycle,
+                        agent: order.agent,
+                        order: name,
+                        part,
+                        value,
+                    });
+                }
                 Ok(())
             })?;
         }
@@ -201,45 +208,68 @@ impl<W: World> Run<W> {
     /// Refuses orders that cannot be obeyed.
     fn check_orders(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.teams.for_each_order(orders, |order| {
-            self.world.check_order(order).map_err(|cause| {
-                let who = format!("{} {}", self.teams.noun(), order.agent);
-                let order = orders.order.into();
-                OrderError::Invalid { order, who, cause }
+            self.world.check_order(order).map_err(|cause| OrderError::Invalid {
+                order: orders.order.into(),
+                agent: self.teams.agent_name(order.agent),
+                cause,
             })
         })
     }
 
-    /// Gives the orders that are ahead for the present cycle, and hands over the controls.
+    /// Submits the controls of the present cycle, or refuses them as a whole.
+    fn apply_controls(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+        if self.records && !self.control_rows.is_enabled() {
+            let cause = "it is recorded without its controls, so it could not be reproduced; set \
+                         record.controls = true";
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
+        }
+        self.world.submit_controls(&mut self.state, self.cycle, controls)?;
+        self.control_rows.extend(control::control_rows(self.cycle, controls));
+        Ok(())
+    }
+
+    /// Replays the orders and the controls of the present cycle.
     fn apply_due(&mut self) {
         if self.last_applied.replace(self.cycle) == Some(self.cycle) {
             return;
         }
-        let ahead = std::mem::take(&mut self.order_log);
-        for orders in ahead.due(self.cycle) {
-            self.apply_orders(&orders).expect("`follow` has checked it");
+        let order_log = std::mem::take(&mut self.order_log);
+        for orders in order_log.due(self.cycle) {
+            self.apply_orders(&orders).expect("`replay_orders` has checked it");
         }
-        self.order_log = ahead;
-        let controls = std::mem::take(&mut self.control_log);
-        if let Some(handed) = controls.get(self.cycle) {
-            // A control that can no longer be carried out is skipped. The run then differs, and its digest shows it.
-            let taken = self.submit_controls(handed);
-            if taken.is_err() {
-                let _ = self.submit_controls(&[]);
+        self.order_log = order_log;
+        let control_log = std::mem::take(&mut self.control_log);
+        if let Some(controls) = control_log.get(self.cycle) {
+            // Controls that can no longer be carried out are skipped. The run then differs, and its digest shows it.
+            if self.apply_controls(controls).is_err() {
+                let _ = self.apply_controls(&[]);
             }
         }
-        self.control_log = controls;
+        self.control_log = control_log;
     }
+}
 
-    /// Returns the first cycle after the present one before which orders are given or controls handed over.
-    fn next_due(&self) -> Option<Cycle> {
-        let orders = self.order_log.next_after(self.cycle);
-        orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
+impl<W: WorldCheckpoint> Run<W> {
+    /// Returns the content that a checkpoint of the present state would have.
+    pub fn snapshot(&self) -> W::Snapshot {
+        self.world.save(&self.state, &self.collector, self.cycle)
     }
+}
 
-    /// Sets up all workers for gathering the rows and events that are now wanted.
+impl<W: WorldMetrics> Run<W> {
+    /// Returns the measurements of the run so far.
+    pub fn metrics(&self) -> W::Metrics {
+        self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
+    }
+}
+
+impl<W: WorldRecording> Run<W> {
+    /// Sets up all workers for gathering the rows and events that are now enabled.
     fn prepare(&mut self) {
-        let Self { world, collector: books, engine, .. } = self;
-        engine.worker_states_mut().for_each(|mate| world.prepare(books, &mut mate.scratch));
+        let Self { world, collector, engine, .. } = self;
+        for worker in engine.worker_states_mut() {
+            world.prepare(collector, &mut worker.scratch);
+        }
     }
 }
 
@@ -252,12 +282,12 @@ impl<W: World> fmt::Debug for Run<W> {
 /// An observer between cycles, for worlds that ask for one.
 struct WorldObserver<'a, W: World> {
     world: &'a W,
-    books: &'a mut W::Collector,
+    collector: &'a mut W::Collector,
 }
 
 impl<W: World> Observer<W> for WorldObserver<'_, W> {
     fn before_cycle(&mut self, now: Cycle, state: &W::State) {
-        self.world.before_cycle(state, self.books, now);
+        self.world.before_cycle(state, self.collector, now);
     }
 
     fn after_cycle(
@@ -266,17 +296,21 @@ impl<W: World> Observer<W> for WorldObserver<'_, W> {
         state: &W::State,
         mut scratches: Scratches<'_, W::Scratch>,
     ) -> ControlFlow<()> {
-        scratches.for_each(|scratch| self.world.collect(self.books, scratch));
-        self.world.commit(self.books);
-        let is_full = self.world.cycles_until_flush(state, self.books, now + 1) == 0;
-        match is_full || self.world.is_over(state) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        scratches.for_each(|scratch| self.world.collect(self.collector, scratch));
+        self.world.commit(self.collector);
+        let is_full = self.world.cycles_until_flush(state, self.collector, now + 1) == 0;
+        if is_full || self.world.is_over(state) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     }
 }
 
-impl<W: World> Simulation for Run<W> {
+impl<W> Simulation for Run<W>
+where
+    W: WorldCheckpoint + WorldControl + WorldMetrics + WorldRecording + WorldView,
+{
     fn world(&self) -> &'static str {
         W::NAME
     }
@@ -309,11 +343,14 @@ impl<W: World> Simulation for Run<W> {
         let mut done = 0;
         while done < cycles {
             self.apply_due();
-            let next = self.next_due();
-            let wanted = next.map_or(cycles - done, |next| (next - self.cycle).min(cycles - done));
-            let made = self.run_segment(wanted);
-            done += made;
-            if made < wanted {
+            let mut segment = cycles - done;
+            if let Some(next) = self.next_due() {
+                segment = segment.min(next - self.cycle);
+            }
+            let segment_done = self.run_segment(segment);
+            done += segment_done;
+            // The run is over, or its rows must be recorded.
+            if segment_done < segment {
                 break;
             }
         }
@@ -333,10 +370,12 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
-        let (cycle, (groups, saved)) = checkpoint::decode(checkpoint, &self.header())?;
-        self.state = self.world.restore(saved, &mut self.collector)?;
+        let (cycle, (groups, snapshot)) = checkpoint::decode(checkpoint, &self.header())?;
+        self.state = self.world.restore(snapshot, &mut self.collector)?;
         self.groups_before = groups;
-        self.engine.worker_states_mut().for_each(|mate| mate.stats.groups = GroupSizes::default());
+        for worker in self.engine.worker_states_mut() {
+            worker.stats.groups = GroupSizes::default();
+        }
         self.cycle = cycle;
         self.last_applied = None;
         Ok(())
@@ -364,11 +403,9 @@ impl<W: World> Simulation for Run<W> {
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
         // Rows of past cycles are lost: an empty recording would hide that.
         if !self.records {
-            let cause = "no rows were kept; call `begin_recording` before the first `advance`";
-            return Err(RecordError::new(
-                format!("the recording of `{}`", self.config.name),
-                cause,
-            ));
+            let place = format!("the recording of `{}`", self.config.name);
+            let cause = "no rows were kept; call `start_recording` before the first `advance`";
+            return Err(RecordError::new(place, cause));
         }
         self.collect();
         self.world.record(&mut self.state, &mut self.collector, self.cycle, recorder)?;
@@ -392,22 +429,22 @@ impl<W: World> Simulation for Run<W> {
         self.prepare();
     }
 
-    fn frame(&mut self, look: FrameOptions) -> Frame {
+    fn frame(&mut self, options: FrameOptions) -> Frame {
         self.collect();
-        self.world.frame(&self.state, &mut self.collector, self.cycle, look)
+        self.world.frame(&self.state, &mut self.collector, self.cycle, options)
     }
 
-    fn inspect(&self, who: BodyId) -> Option<Inspection> {
-        self.world.inspect(&self.state, &self.collector, self.cycle, who)
+    fn inspect(&self, body: BodyId) -> Option<Inspection> {
+        self.world.inspect(&self.state, &self.collector, self.cycle, body)
     }
 
     fn teams(&self) -> &[Team] {
         self.teams.all()
     }
 
-    fn observe(&self, team: usize, room: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
-        self.teams.check_buffers(team, room)?;
-        self.world.observe(&self.state, self.cycle, team, room);
+    fn observe(&self, team: usize, buffers: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
+        self.teams.check_buffers(team, buffers)?;
+        self.world.observe(&self.state, self.cycle, team, buffers);
         Ok(())
     }
 
@@ -421,23 +458,18 @@ impl<W: World> Simulation for Run<W> {
 
     fn replay_orders(&mut self, orders: OrderLog) -> Result<(), OrderError> {
         orders.iter().try_for_each(|(_, orders)| self.check_orders(&orders))?;
-        (self.order_log, self.last_applied) = (orders, None);
+        self.order_log = orders;
+        self.last_applied = None;
         Ok(())
     }
 
     fn submit_controls(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
-        if self.records && !self.control_rows.is_enabled() {
-            let cause = "it is recorded, and its controls are not, so nobody could compute it again; set \
-                         record.controls = true";
-            return Err(OrderError::NoExternalAgents { cause: cause.into() });
-        }
-        self.world.submit_controls(&mut self.state, self.cycle, controls)?;
-        self.control_rows.extend(control::control_rows(self.cycle, controls));
-        Ok(())
+        self.apply_controls(controls)
     }
 
     fn replay_controls(&mut self, controls: ControlLog) {
-        (self.control_log, self.last_applied) = (controls, None);
+        self.control_log = controls;
+        self.last_applied = None;
     }
 
     fn position_columns(&self) -> Vec<PositionColumns> {

@@ -1,4 +1,4 @@
-//! The plan of a run, and the effort that it took.
+//! The settings of a run, its conflict groups, and its processor time.
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ pub struct RunStats {
 pub struct GroupSizes {
     /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
     pub counts: [u64; 32],
-    /// Number of bodies of the largest group in which bodies met; 0 if none ever did.
+    /// Number of bodies of the largest group with a conflict; 0 if there was none.
     pub largest: u64,
 }
 

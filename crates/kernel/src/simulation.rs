@@ -1,4 +1,4 @@
-//! The object-safe face of a run, through which the command, a server or a binding uses any world.
+//! The object-safe interface of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
 use crate::control::{BufferMut, ControlLog, OrderError, OrderLog, Orders, Team, Teams};
@@ -14,7 +14,7 @@ use crate::world::DecisionMode;
 use std::any::Any;
 
 /// A world and a state that advances. [`crate::Run`] is the one implementation that computes; a recording that can
-/// only be shown has the same face, without metrics, teams or inspections. Code that knows the world finds its
+/// only be shown implements it too, without metrics, teams or inspections. Code that knows the world downcasts to its
 /// [`crate::Run`] by [`Any`].
 pub trait Simulation: Any + Send {
     /// Name of the world, e.g. `robots`.
@@ -26,7 +26,7 @@ pub trait Simulation: Any + Send {
     /// The phase in which its agents decide, which determines the names of the phases in reports.
     fn decision_mode(&self) -> DecisionMode;
 
-    /// The plan that the scenario asks for.
+    /// The settings of the run, from its scenario.
     fn config(&self) -> &RunConfig;
 
     /// Cycles done.
@@ -35,8 +35,7 @@ pub trait Simulation: Any + Send {
     /// Number of entities that act (robots, connectors of chains, airplanes).
     fn agents(&self) -> usize;
 
-    /// Returns whether nothing can happen anymore, e.g. because all have arrived; the run is then
-    /// complete before its planned number of cycles.
+    /// Returns whether the run has finished early, e.g. because every agent has arrived.
     fn is_over(&self) -> bool;
 
     /// Runs up to `cycles` cycles and returns the number done: fewer when a buffer for recording
@@ -59,13 +58,13 @@ pub trait Simulation: Any + Send {
     /// When the checkpoint is damaged or belongs to another world, scenario or version.
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError>;
 
-    /// Starts to keep the rows that [`Simulation::record`] hands over.
+    /// Starts to keep the rows that [`Simulation::record`] records.
     fn start_recording(&mut self);
 
     /// The tables that [`Simulation::record`] fills.
     fn schemas(&self) -> Vec<TableSchema>;
 
-    /// Hands all rows since the last call to a recorder.
+    /// Records all rows since the last call.
     ///
     /// # Errors
     /// When the recorder cannot store it, or [`Simulation::start_recording`] was never called.
@@ -81,24 +80,24 @@ pub trait Simulation: Any + Send {
     /// no result depends on it.
     fn enable_odometry(&mut self);
 
-    /// Returns the present frame, with the events since the last call and the claims of wheels
+    /// Returns the present frame, with the events since the last call and the odometry
     /// since [`Simulation::enable_odometry`] (none without it). No result depends on it.
-    fn frame(&mut self, look: FrameOptions) -> Frame;
+    fn frame(&mut self, options: FrameOptions) -> Frame;
 
     /// Returns the percepts and decisions of a body in the next cycle, and their outcome; `None` for a body that does
     /// not exist or has nothing to show. No result depends on it.
-    fn inspect(&self, who: BodyId) -> Option<Inspection>;
+    fn inspect(&self, body: BodyId) -> Option<Inspection>;
 
     /// The teams of agents with the same observations and orders.
     fn teams(&self) -> &[Team] {
         &[]
     }
 
-    /// Writes the observations of a team's agents, in its order, in the next cycle: one room for
+    /// Writes the observations of a team's agents, in its order, in the next cycle: one buffer for
     /// each of its spaces. No result depends on it.
     ///
     /// # Errors
-    /// When there is no such team, or the room has another shape.
+    /// When there is no such team, or the buffers have another shape.
     fn observe(&self, team: usize, _: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
         Err(OrderError::NoTeam { team, teams: 0 })
     }
@@ -130,24 +129,24 @@ pub trait Simulation: Any + Send {
         orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
     }
 
-    /// Hands over the actions of agents in the next cycle, because they decide outside of the run, each as its
-    /// world's message. An agent that is missing does the safe thing. In later cycles agents decide as usual, unless
+    /// Submits the actions of agents that decide outside of the run, for the next cycle, each as a message of its
+    /// world. An agent that is missing does the safe thing. In later cycles agents decide as usual, unless
     /// this is called again.
     ///
     /// # Errors
-    /// When no agents of this world decide outside, or an action is impossible; when the run is recorded without
-    /// its controls, and could not be computed again.
+    /// When no agents of this world decide outside of the run, or an action is impossible; when the run is recorded
+    /// without its controls, and could not be reproduced.
     fn submit_controls(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
-        let cause = format!("agents of the world {} decide in the run alone", self.world());
+        let cause = format!("agents of the world {} decide only within the run", self.world());
         Err(OrderError::NoExternalAgents { cause })
     }
 
-    /// Hands over these controls again, each before its cycle, whenever the run gets there: also after
+    /// Submits these controls again, each before its cycle, whenever the run gets there: also after
     /// [`Simulation::restore`]. They replace those of an earlier call. One that can no longer be carried out counts
-    /// as missing, and the state shows that it did.
+    /// as missing, and the state shows that.
     fn replay_controls(&mut self, _: ControlLog) {}
 
-    /// The recorded tables and columns that hold the places of bodies.
+    /// The recorded tables and columns that hold the positions of bodies.
     fn position_columns(&self) -> Vec<PositionColumns>;
 
     /// Returns the metrics of the run so far, as JSON (`metrics` of the summary).
@@ -159,7 +158,7 @@ pub trait Simulation: Any + Send {
     /// Returns the metrics of pairs of agents; null in worlds without any.
     fn pair_metrics(&self) -> serde_json::Value;
 
-    /// Returns the outcome of the run so far, in lines for people.
+    /// Returns the outcome of the run so far, in lines of text.
     fn summary_lines(&self) -> KeyValues;
 
     /// Returns the pose of every body.

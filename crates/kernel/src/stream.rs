@@ -12,12 +12,15 @@
 
 use crate::units::{Cycle, EntityId, Seed};
 
+/// The multipliers of Philox4x32, from table 2 of the paper.
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
+/// The increments of the key in each round: the golden ratio and sqrt(3) - 1, as fractions of 2^32.
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
 /// The Philox4x32-10 block function.
 #[inline(always)]
 pub fn philox4x32(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+    // Ten rounds, as the paper recommends; it found no weakness from seven on.
     for _ in 0..10 {
         let a = u64::from(MULTIPLIERS[0]) * u64::from(counter[0]);
         let b = u64::from(MULTIPLIERS[1]) * u64::from(counter[2]);
@@ -44,7 +47,7 @@ pub struct Streams {
 }
 
 impl Streams {
-    /// Creates the streams that grow from `seed`.
+    /// Creates the streams of `seed`.
     pub fn new(seed: Seed) -> Self {
         Self { key: [seed.0 as u32, (seed.0 >> 32) as u32] }
     }
@@ -65,6 +68,7 @@ impl Streams {
         purpose: Purpose,
         index: u32,
     ) -> [u32; 4] {
+        // The counter has no room for a second entity, so the first block is the key of another.
         let [k0, k1, ..] = self.block(entity, cycle, purpose, 0);
         philox4x32([other, index, 0, 0], [k0, k1])
     }
@@ -116,10 +120,11 @@ impl Draws {
     #[inline]
     pub fn uniform_below(&mut self, n: u32) -> u32 {
         loop {
-            let wide = u64::from(self.next_u32()) * u64::from(n);
-            let low = wide as u32;
+            let product = u64::from(self.next_u32()) * u64::from(n);
+            let low = product as u32;
+            // The first comparison alone decides nearly always; it saves the division.
             if low >= n || low >= n.wrapping_neg() % n.max(1) {
-                return (wide >> 32) as u32;
+                return (product >> 32) as u32;
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Texts of a world for people, as data: the caller that shows them decides on the layout.
+//! Texts of a world for people, as data: the caller that prints them decides on the layout.
 
 use serde_json::Value;
 
@@ -22,11 +22,14 @@ pub fn key_value(name: &str, value: impl Into<String>) -> (String, String) {
 /// Returns a number with its thousands set apart by spaces: `1 234 567`.
 pub fn group_thousands(number: u64) -> String {
     let digits = number.to_string();
-    let first = digits.len() % 3;
-    let (head, tail) = digits.split_at(first);
-    let groups = tail.as_bytes().chunks(3).map(|c| std::str::from_utf8(c).unwrap_or_default());
-    let head = (!head.is_empty()).then_some(head);
-    head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 /// Returns a number with the given number of decimals; a value that rounds to 0 has no sign.
@@ -41,25 +44,24 @@ pub fn format_fixed(value: f64, decimals: usize) -> String {
 /// The first characters of a value that is a command to copy.
 const COMMAND_PREFIX: &str = "sidestep ";
 
-/// Columns of a line of text.
+/// Columns of a line of text: the traditional width of a terminal.
 pub const LINE_COLS: usize = 80;
 
 /// Returns lines of names and values, the values below each other and broken into lines of
 /// [`LINE_COLS`] columns where they have spaces. A command, which people copy, stays whole.
 pub fn align_pairs(rows: &[(String, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    let line = |(name, value): &(String, String)| {
-        let cols = match value.starts_with(COMMAND_PREFIX) {
-            true => usize::MAX,
-            false => LINE_COLS.saturating_sub(width + 4),
-        };
-        let words = wrap(value, cols);
-        format!(
-            "  {name:<width$}  {}\n",
-            words.join(&format!("\n{:indent$}", "", indent = width + 4))
-        )
-    };
-    rows.iter().map(line).collect()
+    // Two spaces before the name, and two before the value.
+    let indent = width + 4;
+    let line_break = format!("\n{:indent$}", "");
+    let mut text = String::new();
+    for (name, value) in rows {
+        let is_command = value.starts_with(COMMAND_PREFIX);
+        let cols = if is_command { usize::MAX } else { LINE_COLS.saturating_sub(indent) };
+        let value = wrap(value, cols).join(&line_break);
+        text.push_str(&format!("  {name:<width$}  {value}\n"));
+    }
+    text
 }
 
 /// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
@@ -89,9 +91,11 @@ fn wrap_line(text: &str, cols: usize) -> Vec<String> {
 fn split_words(text: &str) -> Vec<&str> {
     let mut words = Vec::new();
     let mut start = 0;
-    for (at, _) in text.match_indices(' ').filter(|(at, _)| !text[at + 1..].starts_with('%')) {
-        words.push(&text[start..at]);
-        start = at + 1;
+    for (space, _) in text.match_indices(' ') {
+        if !text[space + 1..].starts_with('%') {
+            words.push(&text[start..space]);
+            start = space + 1;
+        }
     }
     words.push(&text[start..]);
     words

@@ -9,7 +9,7 @@ pub struct Seed(pub u64);
 /// A cycle of the synchronous loop, counted from 0.
 pub type Cycle = u64;
 
-/// The place of an entity in a state's columns. Slots may be permuted without changing any result,
+/// The index of an entity in a state's columns. Slots may be permuted without changing any result,
 /// because draws and ties depend on the entity's [`EntityId`].
 pub type Slot = u32;
 

@@ -6,7 +6,7 @@
 //! calling thread; it takes the pool from front to back, never waits, and makes no system
 //! call.
 //!
-//! [`ThreadPool`] are workers that are kept between calls.
+//! The threads of a [`ThreadPool`] live on between calls.
 
 mod thread_pool;
 
@@ -18,15 +18,20 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Pools that may be in use between two barriers and the one after: a pool's cursors are reset by
-/// the next pool but one, when no worker reads them anymore.
+/// Pools that may be in use at the same time: a pool's cursors are reset by
+/// the next pool but one, when no worker reads them anymore. Three would do; a power of two makes the
+/// remainder a mask.
 const POOLS: usize = 4;
 
-/// Numbers in the largest chunk of a pool.
+/// Numbers in the largest chunk of a pool: bodies enough that taking a chunk costs nothing beside them.
 const MAX_CHUNK: usize = 64;
+/// Chunks of each worker's share at least, so that the others find some work to take over.
+const MIN_CHUNKS_PER_SHARE: usize = 8;
 
-/// Spins before a waiting worker offers its processor to others, and yields before it sleeps.
+/// Spins before a waiting worker yields its processor: 10 to 200 us, by the processor. That is longer than workers wait
+/// for each other at the end of a balanced phase, so that they make no system call.
 const SPINS_BEFORE_YIELD: u32 = 4_000;
+/// Yields before it sleeps.
 const YIELDS_BEFORE_SLEEP: u32 = 200;
 
 /// Returns the number of processors that this process may use, at least 1. The answer takes system
@@ -35,16 +40,16 @@ pub fn available_workers() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// Runs `work` once on each of `crew.len()` workers at the same time, each with its own
-/// element of `crew`, and returns when all are done. The calling thread is worker 0.
+/// Runs `work` once on each of `states.len()` workers at the same time, each with its own
+/// element of `states`, and returns when all are done. The calling thread is worker 0.
 ///
 /// # Panics
 /// When a worker panicked (a bug); the others are released first.
-pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
-    match crew {
+pub fn run<S: Send>(states: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
+    match states {
         [] => {}
         [only] => work(&Worker::ALONE, only),
-        _ => WorkerTeam::new(crew.len()).run(crew, &work, &work),
+        _ => WorkerTeam::new(states.len()).run(states, &work, &work),
     }
 }
 
@@ -81,11 +86,11 @@ impl Worker<'_> {
         // No worker uses the cursors of the next pool but one now, so they can be reset without a
         // barrier.
         team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
-        // At least eight chunks per share, so that the others find some work to take over.
-        let chunk = (n / (size * 8)).clamp(1, MAX_CHUNK);
+        let chunk = (n / (size * MIN_CHUNKS_PER_SHARE)).clamp(1, MAX_CHUNK);
         for k in 0..size {
             let owner = (self.index + k) % size;
-            let (start, end) = (n * owner / size, n * (owner + 1) / size);
+            let start = n * owner / size;
+            let end = n * (owner + 1) / size;
             let cursor = team.cursor(pool % POOLS as u64, owner);
             loop {
                 let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
@@ -97,7 +102,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Waits until every worker is here; all writes before it are visible to every worker after it.
+    /// Waits until every worker has arrived; all writes before it are visible to every worker after it.
     ///
     /// # Panics
     /// When another worker panicked.
@@ -125,7 +130,8 @@ impl Worker<'_> {
     }
 }
 
-/// A counter on cache lines of its own, so that workers do not slow each other down.
+/// A counter on cache lines of its own, so that workers do not slow each other down. On two of 64 bytes, because
+/// processors fetch lines in pairs.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct CachePadded(AtomicUsize);
@@ -160,22 +166,23 @@ impl WorkerTeam {
     }
 
     /// Runs `lead` on the calling thread as worker 0 and `work` on a thread for each other
-    /// worker, each with its own element of `crew`, and returns when all are done.
+    /// worker, each with its own element of `states`, and returns when all are done.
     ///
     /// # Panics
-    /// When a worker panicked (a bug), or when `crew` has not one element per worker.
+    /// When a worker panicked (a bug), or when `states` has not one element per worker.
     pub(crate) fn run<S: Send>(
         &mut self,
-        crew: &mut [S],
+        states: &mut [S],
         lead: impl FnOnce(&Worker<'_>, &mut S),
         work: impl Fn(&Worker<'_>, &mut S) + Sync,
     ) {
-        assert_eq!(crew.len(), self.size, "one element per worker");
+        assert_eq!(states.len(), self.size, "one element per worker");
         self.reset();
-        let (team, work) = (&*self, &work);
-        let Some((first, others)) = crew.split_first_mut() else { return };
+        let team = &*self;
+        let work = &work;
+        let Some((first, others)) = states.split_first_mut() else { return };
         std::thread::scope(|scope| {
-            // Also released where a thread cannot be started, so that waiting workers do not hang.
+            // Here too, so that workers that wait do not hang when a thread cannot be started.
             let _release = ReleaseOnPanic(team);
             for (i, own) in others.iter_mut().enumerate() {
                 std::thread::Builder::new()
@@ -208,9 +215,13 @@ impl WorkerTeam {
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Barrier {
+    /// Workers that have arrived in the present generation.
     arrived: AtomicU32,
+    /// Number of times that all workers have passed.
     generation: AtomicU32,
+    /// Whether a worker has panicked.
     broken: AtomicBool,
+    /// Workers that wait for `wake`.
     sleepers: AtomicU32,
     sleeping: Mutex<()>,
     wake: Condvar,
@@ -224,47 +235,52 @@ impl Barrier {
             self.arrived.store(0, Ordering::Relaxed);
             self.open(generation.wrapping_add(1));
         } else {
-            self.wait_past(generation, spins);
+            self.wait_for_end(generation, spins);
         }
         if self.broken.load(Ordering::Relaxed) {
             unwind_worker_lost();
         }
     }
 
+    /// Ends the present generation, and wakes its sleepers.
     fn open(&self, next: u32) {
         // Both sides store first and then read the other's word (SeqCst), so either the sleeper
         // sees the new generation or this worker sees the sleeper.
         self.generation.store(next, Ordering::SeqCst);
         if self.sleepers.load(Ordering::SeqCst) > 0 {
+            // A sleeper between its last check and its wait holds the lock: after it the sleeper is woken.
             drop(self.sleeping.lock().unwrap_or_else(PoisonError::into_inner));
             self.wake.notify_all();
         }
     }
 
-    fn wait_past(&self, generation: u32, spins: u32) {
-        // A worker that arrives after a panic must not wait either: its generation never ends.
-        let passed = || {
-            self.generation.load(Ordering::SeqCst) != generation
-                || self.broken.load(Ordering::SeqCst)
-        };
+    /// Waits until a generation has ended.
+    fn wait_for_end(&self, generation: u32, spins: u32) {
         for _ in 0..spins {
-            if passed() {
+            if self.has_ended(generation) {
                 return;
             }
             std::hint::spin_loop();
         }
         for _ in 0..YIELDS_BEFORE_SLEEP {
-            if passed() {
+            if self.has_ended(generation) {
                 return;
             }
             std::thread::yield_now();
         }
         let mut guard = self.sleeping.lock().unwrap_or_else(PoisonError::into_inner);
         self.sleepers.fetch_add(1, Ordering::SeqCst);
-        while !passed() {
+        while !self.has_ended(generation) {
             guard = self.wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
         }
         self.sleepers.fetch_sub(1, Ordering::SeqCst);
+    }
+
+    /// Returns whether nothing is left to wait for. A worker that arrives after a panic must not wait either: its
+    /// generation never ends.
+    #[inline]
+    fn has_ended(&self, generation: u32) -> bool {
+        self.generation.load(Ordering::SeqCst) != generation || self.broken.load(Ordering::SeqCst)
     }
 }
 

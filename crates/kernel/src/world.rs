@@ -1,9 +1,14 @@
-//! The traits that a world implements: the phases of a cycle, and everything else a run needs.
+//! The traits that a world implements, one for each role.
 //!
 //! ```text
-//! Phases   claim, join, act: called by the cycle, on any number of workers
-//! Auction  bids for claims, an extension of some worlds
-//! World    everything else a run needs: rows, frames, metrics, checkpoints, texts
+//! Phases           claim, join, act: called by the cycle, on any number of workers
+//! Auction          bids for claims, an extension of some worlds
+//! World            its name, and the results of workers between cycles
+//! WorldRecording   rows of tables, and events
+//! WorldCheckpoint  digests, and states that are saved and restored
+//! WorldView        scenery and frames
+//! WorldControl     orders, controls and observations from outside; all optional
+//! WorldMetrics     measurements, and texts for people
 //! ```
 
 use crate::checkpoint::CheckpointError;
@@ -21,7 +26,7 @@ use serde_json::Value;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A worker's turn in one phase of one cycle: its inputs and its own buffers.
+/// The context of a worker in one phase of one cycle: its inputs and its own buffers.
 pub struct PhaseContext<'a, W: Phases> {
     /// The immutable world.
     pub world: &'a W,
@@ -65,23 +70,23 @@ pub trait Phases: Sync + Sized {
     /// Number of bodies, which is the number of tasks in a pool.
     fn bodies(&self, state: &Self::State) -> usize;
 
-    /// Moves bodies to other slots now and then between cycles, so that neighbors in the world are
+    /// Moves bodies to other slots, occasionally between cycles, so that neighbors in the world are
     /// neighbors in memory and each worker stays in one part of both. No result may depend on it.
     fn arrange(&self, _: &mut Self::State) {}
 
     /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
-    /// decide alone), and publishes everything it may need. Writes only the intents and claims of
+    /// decide alone), and claims everything that its action may need. Writes only the intents and claims of
     /// these bodies.
-    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>);
+    fn claim(context: &mut PhaseContext<'_, Self>, bodies: Range<usize>);
 
     /// *Join*: joins each body of `bodies` with every other whose claims meet its own. Writes
     /// only `groups`.
-    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups);
+    fn join(context: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups);
 
     /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
     /// order that depends on state and seed alone. Writes only things that the group has claimed.
     /// The order of `group` itself is arbitrary.
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
+    fn act(context: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
     fn auction(&self) -> Option<&dyn Auction<Self>> {
@@ -93,42 +98,38 @@ pub trait Phases: Sync + Sized {
 /// the highest bid on everything they claim act, until all have acted. This runs in parallel even
 /// inside a large group, and the outcome is the same as acting in the order of the bids.
 pub trait Auction<W: Phases> {
-    /// Bids for everything that a body claims, and notes it in the scratch.
-    fn bid(&self, turn: &mut PhaseContext<'_, W>, body: Slot);
+    /// Bids for everything that a body claims, and adds the bids to the scratch.
+    fn bid(&self, context: &mut PhaseContext<'_, W>, body: Slot);
 
     /// Lets the bodies of `pending` with the highest bids act, and removes them from the list.
-    fn act_on_bids(&self, turn: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
+    fn act_on_bids(&self, context: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
 
-    /// Withdraws all bids noted in the scratch.
-    fn retract_bids(&self, turn: &mut PhaseContext<'_, W>);
+    /// Withdraws all bids of the scratch.
+    fn retract_bids(&self, context: &mut PhaseContext<'_, W>);
 }
 
-/// A world that [`crate::Run`] runs: its phases, and everything else a run needs.
+/// A world that [`crate::Run`] runs, beside its phases: its name, and the results of workers between
+/// cycles.
 ///
-/// `state` holds everything that changes and that results depend on; `books` hold the rest of a
-/// run: sums for metrics, and rows and events that wait to be handed over.
+/// The state of [`Phases`] holds everything that changes and that results depend on. The collector
+/// holds the rest of a run: sums for metrics, and rows and events that wait to be recorded or shown.
 pub trait World: Phases<State: Send> + Send + 'static {
     /// Name of the world, as scenarios write it.
     const NAME: &'static str;
     /// The noun for one of its agents, e.g. `robot`.
     const AGENT: &'static str;
     /// Whether [`World::before_cycle`] and [`World::is_over`] are called before every cycle. A
-    /// world whose cycles take microseconds leaves it at `false`, because each look takes one more
-    /// barrier.
+    /// world with cycles of microseconds leaves it at `false`, because these calls need one more
+    /// barrier in each cycle.
     const OBSERVES_EACH_CYCLE: bool = false;
 
     /// The sums, rows and events that a run keeps beside the state.
     type Collector: Send;
-    /// The content of a checkpoint: the state and those books on which results depend, by entity
-    /// id.
-    type Snapshot: Serialize + DeserializeOwned;
-    /// The measurements of a run.
-    type Metrics: Serialize;
 
     /// Number of agents.
     fn agents(&self) -> usize;
 
-    /// Number of cycles that may run before rows must be handed over.
+    /// Number of cycles that may run before rows must be recorded.
     fn cycles_until_flush(&self, _: &Self::State, _: &Self::Collector, _: Cycle) -> u64 {
         u64::MAX
     }
@@ -142,58 +143,76 @@ pub trait World: Phases<State: Send> + Send + 'static {
         false
     }
 
-    /// Takes over the results of one worker from one or more cycles. The share of each worker
-    /// differs from run to run.
-    fn collect(&self, books: &mut Self::Collector, scratch: &mut Self::Scratch);
+    /// Moves the results of one worker from one or more cycles to the collector. The share of each
+    /// worker differs from run to run.
+    fn collect(&self, collector: &mut Self::Collector, scratch: &mut Self::Scratch);
 
-    /// Books the gathered results of all workers, in an order that does not depend on each worker's
-    /// share.
-    fn commit(&self, books: &mut Self::Collector);
+    /// Adds the collected results of all workers to the sums and rows, in an order that does not
+    /// depend on each worker's share.
+    fn commit(&self, collector: &mut Self::Collector);
+}
 
-    /// Starts to keep the rows that [`World::record`] hands over.
-    fn start_recording(&self, state: &mut Self::State, books: &mut Self::Collector, now: Cycle);
+/// The rows and events that a world keeps during a run.
+pub trait WorldRecording: World {
+    /// Starts to keep the rows that [`WorldRecording::record`] records.
+    fn start_recording(&self, state: &mut Self::State, collector: &mut Self::Collector, now: Cycle);
 
     /// Starts to keep events for frames.
-    fn enable_events(&self, books: &mut Self::Collector);
+    fn enable_events(&self, collector: &mut Self::Collector);
 
-    /// Starts to keep odometry for frames, in worlds with wheels that err.
+    /// Starts to keep odometry for frames, in worlds with odometry errors.
     fn enable_odometry(&self, _: &mut Self::Collector) {}
 
-    /// Sets up a worker's scratch for gathering rows and events, after [`World::start_recording`]
-    /// and [`World::enable_events`].
+    /// Sets up a worker's scratch for gathering rows and events, after
+    /// [`WorldRecording::start_recording`] and [`WorldRecording::enable_events`].
     fn prepare(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
 
-    /// The tables that are recorded.
-    fn schemas(&self, books: &Self::Collector) -> Vec<TableSchema>;
+    /// Returns the tables that are recorded.
+    fn schemas(&self, collector: &Self::Collector) -> Vec<TableSchema>;
 
-    /// Hands over the rows of all cycles before `now` that were not handed over yet.
+    /// Records the rows of all cycles before `now` that were not recorded yet.
     ///
     /// # Errors
     /// When the recorder cannot store them.
     fn record(
         &self,
         state: &mut Self::State,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
         now: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError>;
+
+    /// Returns the recorded tables and columns that hold the positions of bodies.
+    fn position_columns(&self, _: &Self::Collector) -> Vec<PositionColumns> {
+        Vec::new()
+    }
+}
+
+/// The digests of a world's states, and the content of its checkpoints.
+pub trait WorldCheckpoint: World {
+    /// The content of a checkpoint: the state, and those parts of the collector on which results
+    /// depend, by entity id.
+    type Snapshot: Serialize + DeserializeOwned;
 
     /// Returns the digest of a state.
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
     /// Returns the content of a checkpoint.
-    fn save(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Self::Snapshot;
+    fn save(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Self::Snapshot;
 
-    /// Returns the state that was saved; the books take over their part.
+    /// Returns the state that was saved, and restores the saved parts of the collector.
     ///
     /// # Errors
     /// When it does not fit this world.
     fn restore(
         &self,
         saved: Self::Snapshot,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
     ) -> Result<Self::State, CheckpointError>;
+}
 
+/// The visible part of a world.
+pub trait WorldView: World {
     /// Returns the scenery: everything that stays the same during the run.
     fn scenery(&self, name: &str) -> Scenery;
 
@@ -201,13 +220,13 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn frame(
         &self,
         state: &Self::State,
-        books: &mut Self::Collector,
+        collector: &mut Self::Collector,
         now: Cycle,
-        look: FrameOptions,
+        options: FrameOptions,
     ) -> Frame;
 
-    /// Returns the percepts and decisions of a body in cycle `now`, and their outcome if nothing
-    /// else is asked of the run; `None` for a body that does not exist or has nothing to show. It
+    /// Returns the percepts and decisions of a body in cycle `now`, and their outcome if no other
+    /// order is given before; `None` for a body that does not exist or has nothing to show. It
     /// works on a copy of the data, so that no result depends on it.
     fn inspect(
         &self,
@@ -218,13 +237,16 @@ pub trait World: Phases<State: Send> + Send + 'static {
     ) -> Option<Inspection> {
         None
     }
+}
 
+/// The control of agents from outside the run. A world without such control implements nothing of it.
+pub trait WorldControl: World {
     /// Returns the teams of agents with the same observations and orders.
     fn teams(&self) -> Arc<Teams> {
         Arc::default()
     }
 
-    /// Checks whether an order with values that are all within their bounds makes sense.
+    /// Checks whether an order makes sense. Its values are within their bounds.
     ///
     /// # Errors
     /// When it does not: words for the reason, and for the remedy.
@@ -232,14 +254,14 @@ pub trait World: Phases<State: Send> + Send + 'static {
         Ok(())
     }
 
-    /// Notes an order for the next turn of its agent. It was checked.
+    /// Keeps an order for the next decision of its agent. It was checked.
     fn order(&self, _: &mut Self::State, _: &Order<'_>) {}
 
-    /// Notes the actions of agents in cycle `now`, for which none were noted yet: they have decided outside of the
-    /// run. An agent that is missing has sent nothing.
+    /// Keeps the actions of agents for cycle `now`, for which none were submitted yet: these agents
+    /// have decided outside of the run. An agent that is missing has sent nothing.
     ///
     /// # Errors
-    /// When an agent decides within the run, or an action is impossible; nothing is noted then.
+    /// When an agent decides within the run, or an action is impossible; nothing is kept then.
     fn submit_controls(
         &self,
         _: &mut Self::State,
@@ -250,31 +272,34 @@ pub trait World: Phases<State: Send> + Send + 'static {
         Err(OrderError::NoExternalAgents { cause })
     }
 
-    /// Returns whether a recorded run keeps the controls handed over.
+    /// Returns whether a recorded run keeps the submitted controls.
     fn records_controls(&self, _: &Self::Collector) -> bool {
         false
     }
 
-    /// Writes the observations of a team's agents in cycle `now` from the frozen state; there is one room
-    /// for each of [`crate::control::Team::observed`], and each is as large as it must be.
+    /// Writes the observations of a team's agents in cycle `now` from the frozen state into one
+    /// buffer for each of the team's [`observation_spaces`]; their sizes were checked.
+    ///
+    /// [`observation_spaces`]: crate::control::Team::observation_spaces
     fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [BufferMut<'_>]) {}
+}
 
-    /// The recorded tables and columns that hold the places of bodies.
-    fn position_columns(&self, _: &Self::Collector) -> Vec<PositionColumns> {
-        Vec::new()
-    }
+/// The measurements of a run, and texts for people.
+pub trait WorldMetrics: World {
+    /// The measurements of a run.
+    type Metrics: Serialize;
 
     /// Returns the metrics of the run so far.
     fn metrics(
         &self,
         state: &Self::State,
-        books: &Self::Collector,
+        collector: &Self::Collector,
         now: Cycle,
-        effort: &RunStats,
+        stats: &RunStats,
     ) -> Self::Metrics;
 
     /// Returns the metrics of each agent, as a JSON array.
-    fn agent_metrics(&self, state: &Self::State, books: &Self::Collector, now: Cycle) -> Value;
+    fn agent_metrics(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Value;
 
     /// Returns the metrics of pairs of agents, in worlds that have any.
     fn pair_metrics(&self, _: &Self::Collector) -> Value {

@@ -150,7 +150,7 @@ fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
         .collect();
     let untested = fits.len() - tested.len();
     if words.is_empty() && !tested.is_empty() {
-        words.push("Both parts of the log agree as far as these counts can tell.".into());
+        words.push("Both parts of the log agree as far as these counts can show.".into());
     }
     if untested > 0 {
         words.push(format!("Too few counts to test: {untested} of {} tables.", fits.len()));

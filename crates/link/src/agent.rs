@@ -2,6 +2,7 @@
 //! no world's types.
 
 use crate::protocol::CycleStart;
+pub use sidestep::kernel::network::OutgoingPacket;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// Controls of agents, serialized.
@@ -25,17 +26,6 @@ pub struct InvalidControl {
     pub agent: EntityId,
     /// The reason.
     pub reason: String,
-}
-
-/// A packet that an agent sends.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutgoingPacket {
-    /// The receivers, in ascending order.
-    pub to: Vec<EntityId>,
-    /// Its number among the sender's in the conversation.
-    pub sequence: u32,
-    /// The content.
-    pub payload: Vec<u8>,
 }
 
 /// The present activity of an agent, for logs and tables.

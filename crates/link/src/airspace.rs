@@ -7,10 +7,11 @@ use crate::distributed::DistributedWorld;
 use crate::faults::FaultyChannel;
 use crate::protocol::CycleStart;
 use crate::recent_senders::{RecentSenders, drop_counts};
+use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
-use sidestep::worlds::airspace::deploy::Deployment;
-use sidestep::worlds::airspace::pilot::{Fleet, Packet, Percept, Pilot};
-use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld};
+use sidestep::worlds::airspace::pilot::{Percept, Pilot};
+use sidestep::worlds::airspace::settings::Deployment;
+use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld, Fleet};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -148,14 +149,7 @@ impl AgentProgram for PilotProgram {
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        let packets = self.pilot.take_packets().into_iter();
-        packets
-            .map(|Packet { to, sequence, payload }| OutgoingPacket {
-                to: to.to_vec(),
-                sequence,
-                payload,
-            })
-            .collect()
+        self.pilot.take_packets()
     }
 
     fn control(&self) -> Option<Vec<u8>> {

@@ -7,10 +7,9 @@ use crate::distributed::DistributedWorld;
 use crate::faults::FaultyChannel;
 use crate::protocol::CycleStart;
 use crate::recent_senders::{RecentSenders, drop_counts};
+use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
-use sidestep::worlds::chain::agents::{
-    ChainControls, ConnectorAgent, ConnectorPercept as Percept, OutgoingPacket as Packet,
-};
+use sidestep::worlds::chain::agents::{ChainControls, ConnectorAgent, ConnectorPercept as Percept};
 use sidestep::worlds::chain::{ChainRun, ChainWorld, Deployment};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
@@ -231,14 +230,7 @@ impl<const D: usize> AgentProgram for ConnectorProgram<D> {
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        let packets = self.agent.take_packets().into_iter();
-        packets
-            .map(|Packet { to, sequence, payload }| OutgoingPacket {
-                to: vec![to],
-                sequence,
-                payload,
-            })
-            .collect()
+        self.agent.take_packets()
     }
 
     fn control(&self) -> Option<Vec<u8>> {

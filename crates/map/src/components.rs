@@ -16,7 +16,7 @@ pub struct Components {
 
 /// Label of a box that is not free.
 const BLOCKED: u32 = u32::MAX;
-/// Label of a free box that no component has claimed yet.
+/// Label of a free box that is in no component yet.
 const UNLABELED: u32 = u32::MAX - 1;
 
 impl Components {
@@ -33,8 +33,8 @@ impl Components {
 
     /// Returns the component with the most boxes, of several the first; `None` without a free box.
     pub fn largest(&self) -> Option<u32> {
-        let most = self.sizes.iter().max()?;
-        self.sizes.iter().position(|size| size == most).and_then(|i| u32::try_from(i).ok())
+        let largest = self.sizes.iter().max()?;
+        self.sizes.iter().position(|size| size == largest).and_then(|i| u32::try_from(i).ok())
     }
 
     /// Returns the number of boxes of the largest component; 0 without a free box.
@@ -42,18 +42,19 @@ impl Components {
         self.sizes.iter().copied().max().unwrap_or(0)
     }
 
-    /// Claims for a new component all boxes that are connected to the box at `seed`.
+    /// Labels all boxes that are connected to the box at `seed` as a new component.
     fn flood_fill(&mut self, seed: usize) {
         let component = self.sizes.len() as u32;
         let mut pending = vec![seed];
         let mut size = 0;
         self.label[seed] = component;
-        while let Some(at) = pending.pop() {
+        while let Some(index) = pending.pop() {
             size += 1;
-            for next in neighbors(at, self.width as usize, self.label.len()).into_iter().flatten() {
-                if self.label[next] == UNLABELED {
-                    self.label[next] = component;
-                    pending.push(next);
+            let neighbors = neighbors(index, self.width as usize, self.label.len());
+            for neighbor in neighbors.into_iter().flatten() {
+                if self.label[neighbor] == UNLABELED {
+                    self.label[neighbor] = component;
+                    pending.push(neighbor);
                 }
             }
         }
@@ -61,26 +62,29 @@ impl Components {
     }
 }
 
-/// Returns the boxes east, north, west and south of the box at index `at`, where the map has them.
-fn neighbors(at: usize, width: usize, boxes: usize) -> [Option<usize>; 4] {
-    let col = at % width;
+/// Returns the boxes east, north, west and south of the box at `index`, where the map has them.
+fn neighbors(index: usize, width: usize, boxes: usize) -> [Option<usize>; 4] {
+    let col = index % width;
     [
-        (col + 1 < width).then(|| at + 1),
-        (at + width < boxes).then(|| at + width),
-        (col > 0).then(|| at - 1),
-        at.checked_sub(width),
+        (col + 1 < width).then(|| index + 1),
+        (index + width < boxes).then(|| index + width),
+        (col > 0).then(|| index - 1),
+        index.checked_sub(width),
     ]
 }
 
 impl GridMap {
     /// Returns the 4-connected components of the free boxes; `unknown` decides on unknown boxes
-    /// ([`UnknownPolicy::Keep`] keeps them apart, hence not free).
+    /// (with [`UnknownPolicy::Keep`] they are not free).
     pub fn components(&self, unknown: UnknownPolicy) -> Components {
-        let label = |&cell| match unknown.apply(cell) {
-            Cell::Free => UNLABELED,
-            Cell::Wall | Cell::Unknown => BLOCKED,
-        };
-        let label = self.cells().iter().map(label).collect();
+        let label = self
+            .cells()
+            .iter()
+            .map(|&cell| match unknown.apply(cell) {
+                Cell::Free => UNLABELED,
+                Cell::Wall | Cell::Unknown => BLOCKED,
+            })
+            .collect();
         let mut components = Components { width: self.width(), label, sizes: Vec::new() };
         for seed in 0..components.label.len() {
             if components.label[seed] == UNLABELED {

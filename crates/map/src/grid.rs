@@ -1,4 +1,4 @@
-//! The grid itself: cells, rectangles of boxes, and the limits every map keeps.
+//! The grid itself: cells, rectangles of boxes, and the limits of every map.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{Isometry2, Occupancy, OccupancyGrid};
 
-/// The maximum number of boxes of a map. A larger number is taken for a mistake (a resolution in
+/// The maximum number of boxes of a map. A larger number is probably a mistake (a resolution in
 /// millimeters, a size in the wrong unit) and refused before memory is allocated.
 pub const MAX_BOXES: u64 = 1 << 26;
 
@@ -89,20 +89,23 @@ pub struct Rect {
 impl Rect {
     /// Returns whether the box in column `col` and row `row` is inside this rectangle.
     pub fn contains(&self, col: u32, row: u32) -> bool {
-        let inside = |at: u32, start: u32, length: u32| at >= start && at - start < length;
-        inside(col, self.col, self.width) && inside(row, self.row, self.height)
+        // Differences, because a sum of start and length may overflow.
+        col >= self.col
+            && row >= self.row
+            && col - self.col < self.width
+            && row - self.row < self.height
     }
 }
 
-/// A rectangle of boxes; box (0, 0) is the lower-left corner. `x` runs east and `y` north, except on
-/// a map with a turned plane: there they are the axes of its image.
+/// A rectangle of boxes; box (0, 0) is the lower-left corner. `x` points east and `y` north, except on
+/// a map with a rotated plane: there they are the axes of its image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridMap {
     width: u32,
     height: u32,
     /// Side of a box in meters.
     pub box_size_m: f64,
-    /// The place of the lower-left corner of box (0, 0) in the world, and the turn about it.
+    /// The position of the lower-left corner of box (0, 0) in the world, and the rotation about it.
     pub plane: Isometry2,
     /// Row by row from the bottom; length `width * height`.
     cells: Vec<Cell>,
@@ -121,21 +124,21 @@ impl GridMap {
 
     /// Returns the map as the floor of a scenery.
     pub fn occupancy_grid(&self) -> OccupancyGrid {
-        let occupancy = |cell: &Cell| match cell {
+        let occupancy = self.cells.iter().map(|cell| match cell {
             Cell::Free => Occupancy::Free,
             Cell::Wall => Occupancy::Wall,
             Cell::Unknown => Occupancy::Unknown,
-        };
+        });
         OccupancyGrid {
             width: self.width,
             height: self.height,
             box_m: self.box_size_m,
             plane: self.plane,
-            boxes: self.cells.iter().map(occupancy).collect(),
+            boxes: occupancy.collect(),
         }
     }
 
-    /// Returns the same map, laid into the world.
+    /// Returns the same map with another pose in the world.
     #[must_use]
     pub fn with_plane(mut self, plane: Isometry2) -> Self {
         self.plane = plane;
@@ -164,7 +167,7 @@ impl GridMap {
     /// Returns the box in column `col` (from the west) and row `row` (from the south).
     ///
     /// # Panics
-    /// When the box lies outside the map.
+    /// When the box is outside the map.
     pub fn cell(&self, col: u32, row: u32) -> Cell {
         assert!(col < self.width, "column {col} of a map of {} columns", self.width);
         self.cells[(row as usize) * self.width as usize + col as usize]

@@ -1,8 +1,8 @@
 #![deny(clippy::disallowed_methods)]
 //! Floors of square boxes that are free, wall or unknown, and paths on them.
 //!
-//! Axes are those of ROS `map_server`: `x` (columns) runs east, `y` (rows) north, box (0, 0)
-//! is the lower-left corner. Every importer turns its file into this one type.
+//! Axes are those of ROS `map_server`: `x` (columns) points east, `y` (rows) north, box (0, 0)
+//! is the lower-left corner. Every importer converts its file into this one type.
 
 mod components;
 mod grid;

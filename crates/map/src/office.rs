@@ -77,7 +77,7 @@ impl OfficeSpec {
     /// # Errors
     /// When a number is 0 or a length less than half a box, the doors are wider than the rooms,
     /// or the building has more than [`MAX_BOXES`]. The error's place is
-    /// `office.` and the key that is wrong.
+    /// `office.` and the invalid key.
     pub fn build(&self, box_size_m: f64) -> Result<Office, InputError> {
         BoxDimensions::new(self, check_box_size(box_size_m)?)?.build(box_size_m)
     }
@@ -97,24 +97,23 @@ struct BoxDimensions {
 
 impl BoxDimensions {
     fn new(spec: &OfficeSpec, box_size_m: f64) -> Result<Self, InputError> {
-        let boxes = |key, length_m| boxes(key, length_m, box_size_m);
-        let plan = Self {
+        let dimensions = Self {
             floors: check_positive("floors", spec.floors)?,
             corridors: check_positive("corridors", spec.corridors)?,
             rooms_per_side: check_positive("rooms_per_side", spec.rooms_per_side)?,
-            room_width: boxes("room_width_m", spec.room_width_m)?,
-            room_depth: boxes("room_depth_m", spec.room_depth_m)?,
-            corridor_width: boxes("corridor_width_m", spec.corridor_width_m)?,
-            door_width: boxes("door_width_m", spec.door_width_m)?,
+            room_width: boxes("room_width_m", spec.room_width_m, box_size_m)?,
+            room_depth: boxes("room_depth_m", spec.room_depth_m, box_size_m)?,
+            corridor_width: boxes("corridor_width_m", spec.corridor_width_m, box_size_m)?,
+            door_width: boxes("door_width_m", spec.door_width_m, box_size_m)?,
         };
-        if plan.door_width > plan.room_width {
+        if dimensions.door_width > dimensions.room_width {
             let cause = format!(
                 "doors of {} m are wider than rooms of {} m",
                 spec.door_width_m, spec.room_width_m
             );
             return Err(spec_error("door_width_m", cause, "give narrower doors or wider rooms"));
         }
-        Ok(plan)
+        Ok(dimensions)
     }
 
     fn build(&self, box_size_m: f64) -> Result<Office, InputError> {
@@ -134,12 +133,20 @@ impl BoxDimensions {
 
     /// Returns width and height of the building in boxes, all walls included.
     fn size(&self) -> Result<(u32, u32), InputError> {
-        let wide = |n: u32| u64::from(n);
-        let rooms = wide(self.rooms_per_side).saturating_mul(wide(self.room_width) + 1);
+        // In 64 bits and saturating, because numbers from a file may be anything.
+        let [floors, corridors, rooms_per_side, room_width, corridor_width] = [
+            self.floors,
+            self.corridors,
+            self.rooms_per_side,
+            self.room_width,
+            self.corridor_width,
+        ]
+        .map(u64::from);
+        let rooms = rooms_per_side.saturating_mul(room_width + 1);
         let floor = rooms.saturating_add(1 + 2 * self.cross_pitch());
-        let gaps = wide(self.floors - 1).saturating_mul(wide(self.corridor_width));
-        let width = floor.saturating_mul(wide(self.floors)).saturating_add(gaps);
-        let bands = wide(self.corridors).saturating_mul(self.band_pitch());
+        let gaps = (floors - 1).saturating_mul(corridor_width);
+        let width = floor.saturating_mul(floors).saturating_add(gaps);
+        let bands = corridors.saturating_mul(self.band_pitch());
         check_box_count("office", width, bands.saturating_add(1))
     }
 
@@ -190,19 +197,21 @@ impl BoxDimensions {
     }
 
     fn build_corridor(&self, layout: &mut Layout, west: u32, row: u32) {
-        let (width, height) = (self.floor_width() - 2, self.corridor_width);
-        layout.corridors.push(Rect { col: west + 1, row, width, height });
+        let width = self.floor_width() - 2;
+        layout.corridors.push(Rect { col: west + 1, row, width, height: self.corridor_width });
     }
 
     /// Builds rooms with their lowest row at `row` and their doors in the row `door_row`.
     fn build_rooms(&self, layout: &mut Layout, west: u32, row: u32, door_row: u32) {
         for room in 0..self.rooms_per_side {
             let col = west + room * (self.room_width + 1);
-            let (width, height) = (self.room_width, self.room_depth);
-            layout.rooms.push(Rect { col, row, width, height });
-            let col = col + (self.room_width - self.door_width) / 2;
-            let door = Rect { col, row: door_row, width: self.door_width, height: 1 };
-            layout.doors.push(door);
+            layout.rooms.push(Rect { col, row, width: self.room_width, height: self.room_depth });
+            layout.doors.push(Rect {
+                col: col + (self.room_width - self.door_width) / 2,
+                row: door_row,
+                width: self.door_width,
+                height: 1,
+            });
         }
     }
 
@@ -217,14 +226,17 @@ impl BoxDimensions {
 
     /// Builds the passage to the floor that starts at column `west` from the one before it.
     fn build_passage(&self, layout: &mut Layout, west: u32) {
-        let col = west - self.corridor_width - 1;
-        let (row, width, height) =
-            (self.corridor_row(0), self.corridor_width + 2, self.corridor_width);
-        layout.corridors.push(Rect { col, row, width, height });
+        layout.corridors.push(Rect {
+            col: west - self.corridor_width - 1,
+            row: self.corridor_row(0),
+            // Through the outer walls of both floors.
+            width: self.corridor_width + 2,
+            height: self.corridor_width,
+        });
     }
 }
 
-/// The hollow parts of the solid building.
+/// The free parts of the building; everything else is wall.
 #[derive(Debug, Default)]
 struct Layout {
     doors: Vec<Rect>,
@@ -258,10 +270,10 @@ fn boxes(key: &str, length_m: f64, box_size_m: f64) -> Result<u32, InputError> {
 }
 
 fn check_positive(key: &str, number: u32) -> Result<u32, InputError> {
-    match number {
-        0 => Err(spec_error(key, "an office has at least one of these", "give 1 or more")),
-        _ => Ok(number),
+    if number == 0 {
+        return Err(spec_error(key, "an office has at least one of these", "give 1 or more"));
     }
+    Ok(number)
 }
 
 fn spec_error(key: impl fmt::Display, cause: impl Into<String>, remedy: &str) -> InputError {

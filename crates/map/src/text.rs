@@ -7,7 +7,7 @@ impl GridMap {
     /// of characters, each ended by a line feed.
     ///
     /// A map of more than `max_cols` columns is drawn smaller: a character then stands for a square
-    /// of boxes and follows the rule that makes boxes of pixels (wall where any of them is a wall,
+    /// of boxes, by the rule that merges pixels into boxes (wall where any of them is a wall,
     /// else unknown where any is unknown), so that no wall is lost.
     pub fn to_text(&self, max_cols: u32) -> String {
         let step = self.boxes_per_char(max_cols);
@@ -33,7 +33,8 @@ impl GridMap {
     pub fn to_text_with_rulers(&self, max_cols: u32) -> String {
         let margin = self.height().to_string().len() + 1;
         let max_cols = max_cols.saturating_sub(margin as u32);
-        let (step, map) = (self.boxes_per_char(max_cols), self.to_text(max_cols));
+        let step = self.boxes_per_char(max_cols);
+        let map = self.to_text(max_cols);
         let rows = map.lines().count() as u32;
         let mut text = String::new();
         for (line, row) in map.lines().zip((0..rows).rev()) {
@@ -49,17 +50,17 @@ impl GridMap {
     /// Returns the combined cell of the square of `side` boxes with the lower-left box (`col`,
     /// `row`).
     fn merged_cell(&self, col: u32, row: u32, side: u32) -> Cell {
-        let mut whole = Cell::Free;
+        let mut merged = Cell::Free;
         for row in row..(row + side).min(self.height()) {
             for col in col..(col + side).min(self.width()) {
                 match self.cell(col, row) {
                     Cell::Wall => return Cell::Wall,
-                    Cell::Unknown => whole = Cell::Unknown,
+                    Cell::Unknown => merged = Cell::Unknown,
                     Cell::Free => {}
                 }
             }
         }
-        whole
+        merged
     }
 }
 

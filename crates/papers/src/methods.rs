@@ -12,7 +12,7 @@ use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::world::Method;
+use sidestep::worlds::airspace::settings::Method;
 use sidestep_document::estimate::format_short;
 use sidestep_document::{Estimate, Table};
 

@@ -20,7 +20,8 @@ fn main() {
 
     let folder = tempfile::tempdir().expect("a temporary folder");
     let origin = Provenance { program_version: "0".into(), scenario: String::new(), seed: 1 };
-    let mut recorder = ParquetRecorder::create(folder.path(), &[schema()], &origin).expect("room");
+    let mut recorder =
+        ParquetRecorder::create(folder.path(), &[schema()], &origin).expect("a new run");
     let start = ProcessTime::now();
     for block in &blocks {
         recorder.append(0, block).expect("recorded");
@@ -30,8 +31,11 @@ fn main() {
 
     let part = folder.path().join("trajectories/part-000000000000000.parquet");
     let bytes = part.metadata().expect("a file").len() as f64;
-    let (ns, bytes) = (ns / rows as f64, bytes / rows as f64);
-    println!("{robots} robots, blocks of {cycles} cycles: {ns:.1} ns and {bytes:.2} bytes a row");
+    let row_ns = ns / rows as f64;
+    let row_bytes = bytes / rows as f64;
+    println!(
+        "{robots} robots, blocks of {cycles} cycles: {row_ns:.1} ns and {row_bytes:.2} bytes a row"
+    );
     if let Ok(copy) = std::env::var("KEEP") {
         std::fs::copy(part, copy).expect("copied");
     }

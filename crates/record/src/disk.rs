@@ -20,14 +20,14 @@ pub(crate) fn partial_path(path: &Path) -> PathBuf {
 /// # Errors
 /// An I/O error; the old content stays.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
-    let growing = partial_path(path);
-    let written = write_through(&growing, bytes);
+    let partial = partial_path(path);
+    let written = write_through(&partial, bytes);
     written.map_err(|e| {
         // On a full disk the half-written copy must not keep its space.
-        let _ = fs::remove_file(&growing);
+        let _ = fs::remove_file(&partial);
         RecordError::new(path.display(), e)
     })?;
-    rename(&growing, path)
+    rename(&partial, path)
 }
 
 fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -64,9 +64,10 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 fn sync_tree(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        match path.is_dir() {
-            true => sync_tree(&path)?,
-            false => File::options().write(true).open(&path)?.sync_all()?,
+        if path.is_dir() {
+            sync_tree(&path)?;
+        } else {
+            File::options().write(true).open(&path)?.sync_all()?;
         }
     }
     sync_folder(folder)
@@ -102,7 +103,7 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
 /// The error of a run folder that cannot be made.
 pub(crate) fn cannot_create(path: &Path, cause: impl std::fmt::Display) -> InputError {
     let cause = format!("cannot make the run folder: {cause}");
-    InputError::new(path.display(), cause, "name a folder in a place where you may write")
+    InputError::new(path.display(), cause, "give a folder in a place where you may write")
 }
 
 #[cfg(test)]

@@ -73,11 +73,13 @@ impl RunFolder {
         check_vacant(path, existing)?;
         let staging = StagingFolder::new(path)?;
         let Provenance { program_version, scenario, seed } = &run.origin;
-        let begun = manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned);
-        let manifest = Manifest { build: Some(run.build.clone()), ..begun };
+        let manifest = Manifest {
+            build: Some(run.build.clone()),
+            ..manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned)
+        };
         fill(staging.path(), &manifest, scenario)
             .map_err(|e| disk::cannot_create(path, format!("{}: {}", e.place, e.cause)))?;
-        // No process may be writing the run that is about to be deleted.
+        // Another process may be writing the run that `commit` deletes: hold its lock until then.
         let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
         staging.commit()?;
         drop(old_lock);
@@ -138,14 +140,16 @@ impl RunFolder {
 
     /// Replaces the checkpoint by the state before `cycle`.
     /// [Seal](sidestep_kernel::ports::Recorder::seal) the recorder at `cycle` first: a kill between
-    /// the two then loses only rows of the next stretch, which the resumed run writes again.
+    /// the two then loses only rows of later cycles, which the resumed run writes again.
     ///
     /// # Errors
     /// An I/O error; the checkpoint before this one stays valid.
     pub fn save_checkpoint(&mut self, cycle: u64, state: &[u8]) -> Result<(), RecordError> {
         disk::replace(&self.path.join(CHECKPOINT), state)?;
-        self.update(|m| {
-            (m.status, m.cycles_done, m.last_checkpoint) = (Status::Running, cycle, Some(cycle));
+        self.update(|manifest| {
+            manifest.status = Status::Running;
+            manifest.cycles_done = cycle;
+            manifest.last_checkpoint = Some(cycle);
         })
     }
 
@@ -163,7 +167,10 @@ impl RunFolder {
     /// # Errors
     /// An I/O error; the folder can be resumed nevertheless.
     pub fn stop(mut self, cycles_done: u64) -> Result<(), RecordError> {
-        self.update(|m| (m.status, m.cycles_done) = (Status::Incomplete, cycles_done))
+        self.update(|manifest| {
+            manifest.status = Status::Incomplete;
+            manifest.cycles_done = cycles_done;
+        })
     }
 
     /// Declares the run complete, with the digest of its final state. This is the last step of a
@@ -172,13 +179,14 @@ impl RunFolder {
     /// # Errors
     /// An I/O error; the run can be resumed at its last checkpoint.
     pub fn complete(mut self, cycles_done: u64, digest: &str) -> Result<(), RecordError> {
-        self.update(|m| {
-            (m.status, m.cycles_done) = (Status::Complete, cycles_done);
-            m.digest = Some(digest.to_string());
+        self.update(|manifest| {
+            manifest.status = Status::Complete;
+            manifest.cycles_done = cycles_done;
+            manifest.digest = Some(digest.to_string());
         })
     }
 
-    /// Changes the manifest on disk, then here.
+    /// Changes the manifest on disk first: if that fails, this value still describes the folder.
     fn update(&mut self, change: impl FnOnce(&mut Manifest)) -> Result<(), RecordError> {
         let mut changed = self.manifest.clone();
         change(&mut changed);
@@ -243,7 +251,7 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
         Ok(_) => "this is no folder".to_string(),
         Err(e) => e.to_string(),
     };
-    Err(InputError::new(path.display(), cause, "name the folder that a run was recorded to"))
+    Err(InputError::new(path.display(), cause, "give the folder that a run was recorded to"))
 }
 
 /// Refuses a path at which a new run must not be created.
@@ -258,14 +266,15 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
         (false, _, _) | (true, true, IfExists::Replace) => Ok(()),
         (true, true, IfExists::Refuse) => refuse(
             "the folder holds a run already",
-            "resume that run, name another folder, or replace the old run (--replace)",
+            "resume that run, give another folder, or replace the old run (--replace)",
         ),
         (true, false, _) => {
-            let what = match path.join(manifest::SWEEP_MANIFEST).is_file() {
-                true => "the folder holds a sweep",
-                false => "the folder holds something else than a run",
+            let cause = if path.join(manifest::SWEEP_MANIFEST).is_file() {
+                "the folder holds a sweep"
+            } else {
+                "the folder holds something else than a run"
             };
-            refuse(what, "name a new or empty folder")
+            refuse(cause, "give a new or empty folder")
         }
     }
 }
@@ -277,7 +286,7 @@ fn lock(folder: &Path) -> Result<File, InputError> {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let cause = "another process is writing this run";
-            let remedy = "wait until it ends, stop it, or name another folder";
+            let remedy = "wait until it ends, stop it, or give another folder";
             Err(InputError::new(folder.display(), cause, remedy))
         }
         Err(TryLockError::Error(e)) => {

@@ -22,7 +22,7 @@ pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
     BagSchema, BagWriter, LiveFrameWriter, LiveServer, McapFooter, McapProvenance, McapRecorder,
-    McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, is_mcap,
+    McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, ServedRun, is_mcap,
     start_live_server,
 };
 pub use parquet::ParquetRecorder;

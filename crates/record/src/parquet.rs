@@ -184,12 +184,12 @@ impl TableWriter {
             return Ok(());
         }
         self.end_part(None)?;
-        let growing = disk::partial_path(&self.folder);
-        if parts(&growing)?.is_empty() {
+        let partial = disk::partial_path(&self.folder);
+        if parts(&partial)?.is_empty() {
             // A table without rows still needs a file for its columns.
             self.new_part()?.close(None)?;
         }
-        disk::rename(&growing, &self.folder)?;
+        disk::rename(&partial, &self.folder)?;
         self.finished = true;
         Ok(())
     }
@@ -197,16 +197,16 @@ impl TableWriter {
 
 /// Returns the table's folder to its state when the recorder was sealed at `cycle`.
 fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
-    let growing = disk::partial_path(folder);
+    let partial = disk::partial_path(folder);
     if folder.exists() {
         // The run was stopped after this table was finished, but before the last one was.
-        disk::rename(folder, &growing)?;
+        disk::rename(folder, &partial)?;
     }
-    let failed = |e| RecordError::new(growing.display(), e);
-    fs::create_dir_all(&growing).map_err(failed)?;
+    let failed = |e| RecordError::new(partial.display(), e);
+    fs::create_dir_all(&partial).map_err(failed)?;
     // This check must come before anything is deleted.
-    check_sealed(&growing, cycle)?;
-    for entry in fs::read_dir(&growing).map_err(failed)? {
+    check_sealed(&partial, cycle)?;
+    for entry in fs::read_dir(&partial).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         if is_stale(&path, cycle) {
             fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
@@ -216,8 +216,8 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
 }
 
 /// Checks that the remaining rows end before the new ones start.
-fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
-    let kept = parts(growing)?.into_iter().rfind(|path| !is_stale(path, cycle));
+fn check_sealed(partial: &Path, cycle: u64) -> Result<(), RecordError> {
+    let kept = parts(partial)?.into_iter().rfind(|path| !is_stale(path, cycle));
     let Some(last) = kept else { return Ok(()) };
     if next_cycle(&last)?.is_some_and(|next| next <= cycle) {
         return Ok(());
@@ -231,7 +231,7 @@ fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
 fn is_stale(path: &Path, cycle: u64) -> bool {
     let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return false };
     match name.strip_suffix(".partial") {
-        Some(growing) => first_cycle(growing).is_some(),
+        Some(partial) => first_cycle(partial).is_some(),
         None => first_cycle(name).is_some_and(|first| first >= cycle),
     }
 }

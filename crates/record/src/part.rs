@@ -49,9 +49,9 @@ impl PartWriter {
             .set_offset_index_disabled(true)
             .set_key_value_metadata(Some(key_values))
             .build();
-        let growing = disk::partial_path(&path);
-        let failed = |cause: String| RecordError::new(growing.display(), cause);
-        let file = File::create(&growing).map_err(|e| failed(e.to_string()))?;
+        let partial = disk::partial_path(&path);
+        let failed = |cause: String| RecordError::new(partial.display(), cause);
+        let file = File::create(&partial).map_err(|e| failed(e.to_string()))?;
         let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
             .map_err(|e| failed(error_cause(e)))?;
         Ok(Self { path, file, checksums: Vec::new() })
@@ -78,11 +78,11 @@ impl PartWriter {
         for (key, value) in [(schema::CHECKSUMS, checksums), (schema::NEXT_CYCLE, next_cycle)] {
             file.append_key_value_metadata(KeyValue::new(key.to_string(), value));
         }
-        let growing = disk::partial_path(&path);
-        let failed = |cause: String| RecordError::new(growing.display(), cause);
+        let partial = disk::partial_path(&path);
+        let failed = |cause: String| RecordError::new(partial.display(), cause);
         let file = file.into_inner().map_err(|e| failed(error_cause(e)))?;
         file.sync_all().map_err(|e| failed(e.to_string()))?;
-        disk::rename(&growing, &path)
+        disk::rename(&partial, &path)
     }
 }
 

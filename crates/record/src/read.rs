@@ -152,13 +152,13 @@ fn no_complete_part(folder: &Path, name: &str) -> InputError {
 /// Returns the complete parts of a table, and whether these are all.
 fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputError> {
     let table = folder.join(name);
-    let growing = disk::partial_path(&table);
+    let partial = disk::partial_path(&table);
     let complete = table.is_dir();
-    if !complete && !growing.is_dir() {
-        let remedy = "name a run folder and one of the tables in it";
+    if !complete && !partial.is_dir() {
+        let remedy = "give a run folder and one of the tables in it";
         return Err(InputError::new(table.display(), "there is no such table", remedy));
     }
-    let found = parts(if complete { &table } else { &growing })
+    let found = parts(if complete { &table } else { &partial })
         .map_err(|e| InputError::new(e.place, e.cause, "make the folder readable"))?;
     Ok((found, complete))
 }
@@ -314,7 +314,7 @@ pub(crate) fn required_value(
     key: &str,
 ) -> Result<String, InputError> {
     schema::key_value(metadata, key).map(str::to_string).ok_or_else(|| {
-        let remedy = "name a file that a recording wrote";
+        let remedy = "give a file that a recording wrote";
         InputError::new(path.display(), format!("the file has no key `{key}`"), remedy)
     })
 }
@@ -451,7 +451,8 @@ fn read_values<T: DataType>(
     is_nullable: bool,
     mut each: impl FnMut(Option<T::T>) -> ParquetResult<()>,
 ) -> ParquetResult<()> {
-    let (mut levels, mut batch) = (Vec::new(), Vec::new());
+    let mut levels = Vec::new();
+    let mut batch = Vec::new();
     loop {
         levels.clear();
         let wanted = is_nullable.then_some(&mut levels);

@@ -64,15 +64,15 @@ pub fn write<R: Serialize>(
     program_version: &str,
     extra: &[(&str, String)],
 ) -> Result<(), RecordError> {
-    let mut growing = TableStream::create(path, columns, program_version, extra)?;
-    growing.append(columns)?;
-    growing.finish()
+    let mut table = TableStream::create(path, columns, program_version, extra)?;
+    table.append(columns)?;
+    table.finish()
 }
 
 /// A table that is written block by block, and appears once it is whole; dropped before, it leaves nothing.
 pub struct TableStream {
     path: PathBuf,
-    growing: PathBuf,
+    partial: PathBuf,
     hash: SharedChecksum,
     checksums: Vec<u32>,
     writer: Option<SerializedFileWriter<HashingWriter>>,
@@ -89,10 +89,10 @@ impl TableStream {
         program_version: &str,
         extra: &[(&str, String)],
     ) -> Result<Self, RecordError> {
-        let growing = disk::partial_path(path);
+        let partial = disk::partial_path(path);
         let hash = SharedChecksum::default();
         let create = || {
-            let sink = HashingWriter { file: File::create(&growing)?, hash: hash.clone() };
+            let sink = HashingWriter { file: File::create(&partial)?, hash: hash.clone() };
             let pairs = key_values(columns, program_version, extra)?;
             let schema = parquet_schema(columns)?;
             let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
@@ -103,7 +103,7 @@ impl TableStream {
         hash.take();
         let mut table = Self {
             path: path.into(),
-            growing: growing.clone(),
+            partial: partial.clone(),
             hash,
             checksums: Vec::new(),
             writer: None,
@@ -146,7 +146,7 @@ impl TableStream {
             let synced = writer.into_inner().and_then(|sink| Ok(sink.file.sync_all()?));
             synced.map_err(|e| self.write_error(e))?;
         }
-        disk::rename(&self.growing, &self.path)
+        disk::rename(&self.partial, &self.path)
     }
 
     fn write_error(&self, error: ParquetError) -> RecordError {
@@ -157,7 +157,7 @@ impl TableStream {
 impl Drop for TableStream {
     fn drop(&mut self) {
         // On a full disk a half-written file must not keep its space; one that was finished has its name.
-        let _ = std::fs::remove_file(&self.growing);
+        let _ = std::fs::remove_file(&self.partial);
     }
 }
 
@@ -362,7 +362,7 @@ pub(crate) fn read_key_values<const N: usize>(
 }
 
 fn cannot_open(path: &Path, e: &io::Error) -> InputError {
-    InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
+    InputError::new(path.display(), e.to_string(), "give a table that a sweep wrote")
 }
 
 /// Returns columns without rows, of the file's types.

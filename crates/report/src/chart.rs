@@ -62,7 +62,7 @@ const HALF_RANGE_FRACTION: f64 = 0.54;
 
 /// Returns a plot with axes of the same range, around the middle of the trajectories: otherwise angles would be distorted.
 fn trajectory_plot(figure: &Figure) -> Plot {
-    let plot = plot(figure, Mark::Way);
+    let plot = plot(figure, Mark::Path);
     let points = || figure.series.iter().flat_map(|s| &s.points);
     let (Some(x), Some(y)) = (extent(points().map(|p| p.x)), extent(points().map(|p| p.y))) else {
         return plot;

@@ -63,33 +63,43 @@ fn head(k: usize) -> Point<3> {
 }
 
 fn open() {
-    for (n, motions, single_us, _) in SIZES {
-        pull_open("open", n, 0, motions, single_us, |_, k| head(k));
+    for (n, motions, before_us, _) in SIZES {
+        pull_open(&OpenCase { name: "open", n, by: 0, motions, before_us }, |_, k| head(k));
     }
 }
 
 /// The same led by a connector in the middle: both sweeps in one loop.
 fn middle() {
     for ((n, motions, ..), before_us) in SIZES.into_iter().zip([4.5, 100.0, 10_100.0]) {
-        pull_open("middle", n, n / 2, motions, before_us, |home, k| {
+        pull_open(&OpenCase { name: "middle", n, by: n / 2, motions, before_us }, |home, k| {
             let t = k as f64 * 0.05;
             add(home, [0.05 * sin(t), 0.3 * sin(0.7 * t), 0.3 * cos(t)])
         });
     }
 }
 
-fn pull_open(
-    name: &str,
+/// A chain in an open field.
+struct OpenCase {
+    name: &'static str,
+    /// Number of connectors.
     n: usize,
+    /// The connector that leads.
     by: usize,
+    /// Number of motions to measure.
     motions: usize,
+    /// Microseconds per motion of an earlier version.
     before_us: f64,
-    to: impl Fn(Point<3>, usize) -> Point<3>,
-) {
+}
+
+/// Measures motions to `to(home of the leader, number of the motion)`.
+fn pull_open(case: &OpenCase, to: impl Fn(Point<3>, usize) -> Point<3>) {
+    let &OpenCase { name, n, by, motions, before_us } = case;
     let mut chain = snake(n);
     let home = chain.points()[by];
     let mut propagator = Propagator::default();
-    let (nothing, mut k, mut touched) = (Obstacles::default(), 0, 0);
+    let nothing = Obstacles::default();
+    let mut k = 0;
+    let mut touched = 0;
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;

@@ -1,5 +1,4 @@
-//! Possible places of a slave when its master has moved: push, pull, resize, rotate (slides A1 to
-//! A8).
+//! Candidate positions of a slave whose master has moved: push, pull, resize, rotate (slides A1 to A8).
 
 use super::chain::{Mobility, Rod};
 use super::geometry::{
@@ -28,7 +27,8 @@ pub(super) struct Candidate<const D: usize> {
     turn_rad: f64,
 }
 
-/// Buffers that live from one slave to the next.
+/// Buffers and options of the search for candidates, kept from one slave to the next so that nothing is
+/// allocated.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CandidateScratch<const D: usize> {
     blocks: Vec<Block<D>>,
@@ -36,15 +36,15 @@ pub(super) struct CandidateScratch<const D: usize> {
     /// Whether a rod that turns tries all its lengths, or others only if its present one is
     /// blocked.
     pub(super) all_lengths: bool,
-    /// Whether a plane rod looks for a way on both sides, or on the farther one only if the nearer
-    /// has none.
+    /// Whether a planar rod looks for a free direction on both sides, or on the farther one only if the
+    /// nearer has none.
     pub(super) both_sides: bool,
-    /// Places found by [`MotionContext::candidates`], best first.
+    /// Positions found by [`MotionContext::candidates`], best first.
     pub(super) found: Vec<Candidate<D>>,
     /// Whether one side has not been examined yet.
     pub(super) has_other_side: bool,
-    /// Whether any rod has found a way by turning since this was last reset; if none has, trying all
-    /// lengths finds the same places.
+    /// Whether any rod has found a free direction by turning since this was last reset; if none has,
+    /// trying all lengths finds the same positions.
     pub(super) has_turned: bool,
 }
 
@@ -53,12 +53,12 @@ pub(super) struct CandidateScratch<const D: usize> {
 pub(super) fn guide<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
-    least_move_m: f64,
+    min_move_m: f64,
 ) -> Point<D> {
     let g = sub(so, mn);
     let d = norm(g);
     let t = clamped(d, rod.min_m, rod.max_m);
-    if (t - d).abs() <= least_move_m {
+    if (t - d).abs() <= min_move_m {
         so
     } else if d > 0.0 {
         add_scaled(mn, g, t / d)
@@ -75,10 +75,11 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
     if t < max_m { t } else { max_m }
 }
 
-/// Most rounds of bringing a place into a box and back to an allowed length of the rod.
+/// Most alternating projections onto a box and onto the allowed lengths of the rod. They converge slowly
+/// where the two sets only touch.
 const MAX_BOX_ROUNDS: usize = 200;
 
-/// Relative rounding of ways.
+/// Relative rounding of distances.
 const ROUNDING: f64 = 1e-9;
 
 /// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
@@ -87,46 +88,46 @@ fn guide_line<const D: usize>(step: &SlaveStep<D>) -> Point<D> {
 }
 
 impl<const D: usize> MotionContext<'_, D> {
-    /// Puts all good places for a slave, best first, into `work.found`; only the one on the guide
-    /// line if it is good.
+    /// Puts all valid positions of a slave, best first, into `scratch.found`; only the one on the guide
+    /// line if it is valid.
     pub(super) fn candidates(
         &self,
         step: &SlaveStep<D>,
-        work: &mut CandidateScratch<D>,
+        scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
-        work.found.clear();
-        work.has_other_side = false;
+        scratch.found.clear();
+        scratch.has_other_side = false;
         let connector = &self.chain.connectors()[step.slave];
         if connector.is_still() {
-            return self.place_fixed(step, work);
+            return self.place_fixed(step, scratch);
         }
         if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
-            return self.place_on_line(step, work);
+            return self.place_on_line(step, scratch);
         }
         let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
-        let refusal = match self.check_place(step, guided) {
+        let objection = match self.check_place(step, guided) {
             Ok(()) => {
-                work.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
+                scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
                 return Ok(());
             }
-            Err(refusal) => refusal,
+            Err(objection) => objection,
         };
-        if refusal.reason == VetoReason::Mobility
+        if objection.reason == VetoReason::Mobility
             && let Some(at) = self.place_in_box(step, guided)
             && self.check_slave(step, at).is_ok()
         {
-            work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
+            scratch.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
             return Ok(());
         }
         match self.rules.rotation {
-            Rotation::Never => Err(refusal),
-            Rotation::Literal => self.rotate_once(step, guided, work),
-            Rotation::Union => self.rotate(step, guided, refusal, work),
+            Rotation::Never => Err(objection),
+            Rotation::Literal => self.rotate_once(step, guided, scratch),
+            Rotation::Union => self.rotate(step, guided, objection, scratch),
         }
     }
 
-    /// Returns a place that the rod allows for a slave confined to a box, by alternating between
-    /// the box and the rod's lengths.
+    /// Returns a position that the rod allows for a slave confined to a box, by alternating projections
+    /// onto the box and onto the rod's lengths.
     fn place_in_box(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
         let mobility = &self.chain.connectors()[step.slave].mobility;
         let mut at = guided;
@@ -149,17 +150,17 @@ impl<const D: usize> MotionContext<'_, D> {
         self.check_slave(step, at)
     }
 
-    /// Handles a slave that never moves: it objects unless the rod is good as it is.
+    /// Handles a slave that never moves: it objects unless the rod is within its limits as it is.
     fn place_fixed(
         &self,
         step: &SlaveStep<D>,
-        work: &mut CandidateScratch<D>,
+        scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
         if !is_length_allowed(step.rod, distance(step.mn, step.so)) {
             return Err(PendingVeto::new(self.chain.connectors()[step.slave].still_reason()));
         }
         self.check_slave(step, step.so)?;
-        work.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
+        scratch.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
         Ok(())
     }
 
@@ -167,7 +168,7 @@ impl<const D: usize> MotionContext<'_, D> {
     fn place_on_line(
         &self,
         step: &SlaveStep<D>,
-        work: &mut CandidateScratch<D>,
+        scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
         let d = distance(step.mn, step.so);
         let t = d.max(step.rod.min_m).min(step.rod.max_m);
@@ -182,34 +183,35 @@ impl<const D: usize> MotionContext<'_, D> {
                 _ => [None; 2],
             }
         };
-        let mut refusal = PendingVeto::new(VetoReason::Mobility);
+        let mut last_objection = PendingVeto::new(VetoReason::Mobility);
         for at in places.into_iter().flatten() {
             match self.check_slave(step, at) {
-                Ok(()) => work.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
-                Err(objection) => refusal = objection,
+                Ok(()) => scratch.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
+                Err(objection) => last_objection = objection,
             }
         }
-        sort(step, &mut work.found);
-        if work.found.is_empty() { Err(refusal) } else { Ok(()) }
+        sort(step, &mut scratch.found);
+        if scratch.found.is_empty() { Err(last_objection) } else { Ok(()) }
     }
 
-    /// Applies the slides' rule literally: one turn to the tangent of the obstacle nearest to the
-    /// master.
+    /// Applies the slides' rule literally (A7): one turn to the tangent of the obstacle nearest to the
+    /// master, without a check of the result.
     fn rotate_once(
         &self,
         step: &SlaveStep<D>,
         guided: Point<D>,
-        work: &mut CandidateScratch<D>,
+        scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
-        self.collect_blocks(step, distance(step.mn, guided), work);
+        self.collect_blocks(step, distance(step.mn, guided), scratch);
         let rod = [step.mn, guided];
-        let hit = work
+        let hit = scratch
             .blocks
             .iter()
             .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m, b.name))
             .filter(|(nearest, radius_m, _)| nearest.distance_m < *radius_m)
             .min_by(|(a, _, a_name), (b, _, b_name)| {
-                let (a_m, b_m) = (distance(a.on_body, step.mn), distance(b.on_body, step.mn));
+                let a_m = distance(a.on_body, step.mn);
+                let b_m = distance(b.on_body, step.mn);
                 a_m.total_cmp(&b_m).then(a_name.cmp(b_name))
             });
         let length_m = distance(step.mn, guided);
@@ -224,7 +226,7 @@ impl<const D: usize> MotionContext<'_, D> {
         if !self.may_be_at(step.slave, at) {
             return Err(PendingVeto::new(VetoReason::Mobility));
         }
-        work.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
+        scratch.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
         Ok(())
     }
 
@@ -234,28 +236,28 @@ impl<const D: usize> MotionContext<'_, D> {
         &self,
         step: &SlaveStep<D>,
         guided: Point<D>,
-        refusal: PendingVeto,
-        work: &mut CandidateScratch<D>,
+        objection: PendingVeto,
+        scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
         let Rod { min_m, max_m, .. } = step.rod;
-        self.collect_blocks(step, max_m, work);
+        self.collect_blocks(step, max_m, scratch);
         let own_m = distance(step.mn, guided);
         let lengths_m = [own_m, min_m, max_m, 0.5 * (min_m + max_m)];
         let n = if min_m < max_m { 4 } else { 1 };
-        let mut why = None;
+        let mut informative = None;
         let mut inside = None;
         for &length_m in &lengths_m[..n] {
-            if work.found.is_empty() || work.all_lengths {
-                inside = inside.or(self.add_turns(step, length_m, work, &mut why));
+            if scratch.found.is_empty() || scratch.all_lengths {
+                inside = inside.or(self.add_turns(step, length_m, scratch, &mut informative));
             }
         }
-        sort(step, &mut work.found);
-        if !work.found.is_empty() {
-            work.has_turned = true;
+        sort(step, &mut scratch.found);
+        if !scratch.found.is_empty() {
+            scratch.has_turned = true;
             return Ok(());
         }
         let inside = inside.map(|name| PendingVeto::from_owner(VetoReason::Inside, name));
-        Err(why.or(inside).unwrap_or(refusal))
+        Err(informative.or(inside).unwrap_or(objection))
     }
 
     /// Adds the good places for one length of the rod; returns the block that contains the master.
@@ -263,21 +265,21 @@ impl<const D: usize> MotionContext<'_, D> {
         &self,
         step: &SlaveStep<D>,
         length_m: f64,
-        work: &mut CandidateScratch<D>,
-        why: &mut Option<PendingVeto>,
+        scratch: &mut CandidateScratch<D>,
+        informative: &mut Option<PendingVeto>,
     ) -> Option<BlockOwner> {
         let u0 = guide_line(step);
-        let CandidateScratch { blocks, arcs, found, has_other_side, .. } = work;
-        let look_on = work.all_lengths || work.both_sides;
-        let mut add = |u: Point<D>, why: &mut Option<PendingVeto>| {
+        let CandidateScratch { blocks, arcs, found, has_other_side, .. } = scratch;
+        let finds_all = scratch.all_lengths || scratch.both_sides;
+        let mut add = |u: Point<D>, informative: &mut Option<PendingVeto>| {
             let at = add_scaled(step.mn, u, length_m);
             match self.check_place(step, at) {
                 Ok(()) => {
                     found.push(Candidate { at, rotated: true, turn_rad: angle_rad(u0, u) });
                     true
                 }
-                Err(refusal) => {
-                    keep_informative(why, refusal);
+                Err(objection) => {
+                    keep_informative(informative, objection);
                     false
                 }
             }
@@ -285,10 +287,10 @@ impl<const D: usize> MotionContext<'_, D> {
         if D == 2 {
             let plane = PlanarRod { step, length_m, u0: to_plane(u0), blocks };
             let mut sides = plane.free_directions(arcs);
-            while let Some(u) = sides
-                .next(|u| why.is_some() && self.is_too_far(step, add_scaled(step.mn, u, length_m)))
-            {
-                if add(u, why) && !look_on {
+            while let Some(u) = sides.next(|u| {
+                informative.is_some() && self.is_too_far(step, add_scaled(step.mn, u, length_m))
+            }) {
+                if add(u, informative) && !finds_all {
                     *has_other_side = sides.has_more();
                     break;
                 }
@@ -300,40 +302,44 @@ impl<const D: usize> MotionContext<'_, D> {
         blocks.retain(|b| !contains_master(step, b));
         let search = DirectionSearch { step, length_m, blocks };
         let turned = search.turn_away(u0);
-        if !turned.is_some_and(|u| add(u, why)) {
+        if !turned.is_some_and(|u| add(u, informative)) {
             let is_good = |u| self.check_place(step, add_scaled(step.mn, u, length_m)).is_ok();
             if let Some(u) = search.rings(u0, is_good) {
-                add(u, why);
+                add(u, informative);
             }
         }
         inside
     }
 
-    /// Returns whether a place is surely farther from the slave than it may go in one step.
+    /// Returns whether a position is surely farther from the slave than it may move in one step.
     fn is_too_far(&self, step: &SlaveStep<D>, at: Point<D>) -> bool {
         distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
     }
 
     /// Collects all blocks that a rod of a length may meet on any side. The order is that of the grid
     /// or the tree, and must not matter, so ties go to the lower name.
-    fn collect_blocks(&self, step: &SlaveStep<D>, length_m: f64, work: &mut CandidateScratch<D>) {
+    fn collect_blocks(
+        &self,
+        step: &SlaveStep<D>,
+        length_m: f64,
+        scratch: &mut CandidateScratch<D>,
+    ) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
-        work.blocks.clear();
+        scratch.blocks.clear();
         let rod = step.master.min(step.slave);
         self.visit_blocks(&bounds_around(step.mn, reach_m), Some(rod), step.slave, |block| {
             if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
-                work.blocks.push(*block);
+                scratch.blocks.push(*block);
             }
         });
     }
 }
 
-/// Keeps the first refusal that is more informative than the first objection: a free direction that fails
-/// for another reason.
+/// Keeps the first informative objection: a direction free of obstacles that fails for another reason.
 #[inline]
-fn keep_informative(why: &mut Option<PendingVeto>, refusal: PendingVeto) {
-    if !matches!(refusal.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
-        why.get_or_insert(refusal);
+fn keep_informative(informative: &mut Option<PendingVeto>, objection: PendingVeto) {
+    if !matches!(objection.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
+        informative.get_or_insert(objection);
     }
 }
 
@@ -346,8 +352,8 @@ fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [Candidate<D>]) {
     // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
     // first.
     found.sort_by(|a, b| {
-        let way = |c: &Candidate<D>| distance(c.at, step.so);
-        way(a).total_cmp(&way(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
+        let travel_m = |c: &Candidate<D>| distance(c.at, step.so);
+        travel_m(a).total_cmp(&travel_m(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
     });
 }
 
@@ -387,15 +393,15 @@ impl<const D: usize> PlanarRod<'_, D> {
     /// Adds the arcs of all blocks that a rod in a direction meets; returns whether there were any.
     fn add_arcs_at(&self, u: Point<D>, known: &mut BlockedArcs) -> bool {
         let s = add_scaled(self.step.mn, u, self.length_m);
-        let mut learns = false;
+        let mut has_added = false;
         for (k, block) in self.blocks.iter().enumerate() {
             if !known.known[k] && self.meets(s, block) {
                 known.known[k] = true;
                 self.add_block(block, known);
-                learns = true;
+                has_added = true;
             }
         }
-        learns
+        has_added
     }
 
     fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
@@ -412,7 +418,8 @@ impl<const D: usize> PlanarRod<'_, D> {
         let core = core_to_plane(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
-        // If the master is within the skin of a surface, the half-plane behind it is blocked.
+        // If the master is within the skin of a surface, the half-plane behind it is blocked; with the
+        // whole skin it would count as inside.
         let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
         if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
             known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
@@ -442,9 +449,9 @@ impl<const D: usize> FreeDirections<'_, D> {
         self.is_open != [false; 2]
     }
 
-    /// Returns the next free direction; none once `is_vain` says that a direction, and so any that
-    /// is farther from the start, is of no use.
-    fn next(&mut self, is_vain: impl Fn(Point<D>) -> bool) -> Option<Point<D>> {
+    /// Returns the next free direction; none once `is_useless` rejects a direction, and so any that is
+    /// farther from the start.
+    fn next(&mut self, is_useless: impl Fn(Point<D>) -> bool) -> Option<Point<D>> {
         loop {
             let turns_rad = [TurnDirection::Left, TurnDirection::Right].map(|side| {
                 let is_open = self.is_open[side as usize];
@@ -459,7 +466,7 @@ impl<const D: usize> FreeDirections<'_, D> {
             };
             let turned = interval::turn(self.plane.u0, turn_rad, side);
             let u: Point<D> = std::array::from_fn(|i| turned[i]);
-            if is_vain(u) {
+            if is_useless(u) {
                 return None;
             }
             if !self.plane.add_arcs_at(u, self.known) {
@@ -492,15 +499,17 @@ fn segment_points_at<const D: usize>(
     t: f64,
     [a, b]: [Point<D>; 2],
 ) -> [Option<Point<D>>; 2] {
-    let (d, r) = (sub(b, a), sub(a, m));
-    let (dd, dr) = (dot(d, d), dot(d, r));
-    let inside = dr * dr - dd * (dot(r, r) - t * t);
-    if inside < 0.0 || dd <= 0.0 {
+    let d = sub(b, a);
+    let r = sub(a, m);
+    let dd = dot(d, d);
+    let dr = dot(d, r);
+    let discriminant = dr * dr - dd * (dot(r, r) - t * t);
+    if discriminant < 0.0 || dd <= 0.0 {
         return [None; 2];
     }
-    [-inside.sqrt(), inside.sqrt()].map(|root| {
-        let part = (-dr + root) / dd;
-        (0.0..=1.0).contains(&part).then(|| lerp(a, b, part))
+    [-discriminant.sqrt(), discriminant.sqrt()].map(|root| {
+        let fraction = (-dr + root) / dd;
+        (0.0..=1.0).contains(&fraction).then(|| lerp(a, b, fraction))
     })
 }
 

@@ -1,6 +1,7 @@
 //! The chain: connectors joined by rods (slides V1 to V7, K1 to K6).
 //!
-//! A rod's length is never stored: it is the distance between its ends (V7).
+//! A rod's length is never stored: it is the distance between its ends (V7), so that it cannot disagree
+//! with them.
 
 use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
 use super::veto::VetoReason;
@@ -45,7 +46,7 @@ pub enum Mobility<const D: usize> {
         /// Upper corner.
         hi: Point<D>,
     },
-    /// Only where it is, as the base of an arm (slide R7).
+    /// Nowhere else, as the base of an arm (slide R7).
     Fixed,
 }
 
@@ -131,28 +132,30 @@ pub struct Chain<const D: usize> {
     rods: Vec<Rod>,
     /// Number of connectors that are not free, have failed, or have a bend limit.
     special: usize,
-    still: FixedMeasures,
+    measures: FixedMeasures,
 }
 
-/// Part of its greatest length below which the least length of a rod means that its ends can come together.
+/// Fraction of its greatest length below which the least length of a rod means that its ends can meet.
 const CLOSABLE_FRACTION: f64 = 1e-3;
 
-/// Returns the least of radii and rods. Rods that can close give no measure for the length of a step; they count only
-/// where there is nothing else.
+/// Returns the least of radii and rod lengths. Rods that can close would make every sub-step tiny, so they
+/// count only where there is nothing else.
 fn min_size_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
-    let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
     let stays_open = |rod: &&Rod| rod.min_m >= CLOSABLE_FRACTION * rod.max_m;
     let open = rods.iter().filter(stays_open).map(|rod| rod.min_m);
-    let least_m = least(&mut open.chain(radii));
-    if least_m.is_finite() { least_m } else { least(&mut rods.iter().map(|rod| rod.min_m)) }
+    let min_m = open.chain(radii).fold(f64::INFINITY, f64::min);
+    if min_m.is_finite() {
+        return min_m;
+    }
+    rods.iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min)
 }
 
 /// Measures that only new rods or radii change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FixedMeasures {
-    longest_m: f64,
-    least_m: f64,
-    thickest_m: f64,
+    max_rod_m: f64,
+    min_size_m: f64,
+    max_radius_m: f64,
 }
 
 impl<const D: usize> Chain<D> {
@@ -207,12 +210,12 @@ impl<const D: usize> Chain<D> {
             }
         }
         let special = connectors.iter().filter(|c| !c.is_plain()).count();
-        let longest_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
+        let max_rod_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
-        let least_m = min_size_m(&rods, radii);
-        let thickest_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
-        let still = FixedMeasures { longest_m, least_m, thickest_m };
-        Ok(Self { points, connectors, rods, special, still })
+        let min_size_m = min_size_m(&rods, radii);
+        let max_radius_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
+        let measures = FixedMeasures { max_rod_m, min_size_m, max_radius_m };
+        Ok(Self { points, connectors, rods, special, measures })
     }
 
     /// Returns a chain of equal rods and connectors, straight from `start` along the unit vector
@@ -240,7 +243,7 @@ impl<const D: usize> Chain<D> {
             connectors: vec![connector],
             rods: Vec::new(),
             special: usize::from(!connector.is_plain()),
-            still: self.still,
+            measures: self.measures,
         }
     }
 
@@ -249,8 +252,8 @@ impl<const D: usize> Chain<D> {
         &self.points
     }
 
-    /// Returns the positions of all connectors, for a caller that itself sees to it that rods, bends and constraints keep
-    /// their limits: none is checked.
+    /// Returns the positions of all connectors, for a caller that itself keeps rods, bends and mobilities
+    /// within their limits: none is checked.
     pub fn points_mut(&mut self) -> &mut [Point<D>] {
         &mut self.points
     }
@@ -307,25 +310,26 @@ impl<const D: usize> Chain<D> {
         })
     }
 
-    /// Returns the length below which a move counts as none, meters.
+    /// Returns the length below which a move counts as none, meters. A slave stays if it would move by
+    /// less; with exact equality, rounding decides how far a motion propagates.
     pub fn min_move_m(&self) -> f64 {
-        1e-12 * self.still.longest_m
+        1e-12 * self.measures.max_rod_m
     }
 
-    /// Returns the distance that an initiator goes at once if anything may be in the way, meters: a
-    /// quarter of the least rod or radius; rods that can close do not count.
+    /// Returns the longest sub-step of an initiator if anything may be in the way, meters: a quarter of
+    /// the least rod or radius; rods that can close do not count.
     pub fn step_m(&self) -> f64 {
-        0.25 * self.still.least_m
+        0.25 * self.measures.min_size_m
     }
 
     /// Returns the greatest length of any rod, meters.
     pub(super) fn max_rod_m(&self) -> f64 {
-        self.still.longest_m
+        self.measures.max_rod_m
     }
 
     /// Returns the greatest radius of any part, meters; no rod is thicker than its connectors.
     pub(super) fn max_radius_m(&self) -> f64 {
-        self.still.thickest_m
+        self.measures.max_radius_m
     }
 
     /// Returns whether every connector is free and bends without limit.

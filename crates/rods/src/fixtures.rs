@@ -98,7 +98,9 @@ pub(super) fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacle
 /// Returns the least clearance of a chain from itself: of discs more than one index apart, rods
 /// more than two, and discs from rods that are not neighbors.
 pub(super) fn own_clearance_m<const D: usize>(chain: &Chain<D>) -> f64 {
-    let (points, rods, connectors) = (chain.points(), chain.rods(), chain.connectors());
+    let points = chain.points();
+    let rods = chain.rods();
+    let connectors = chain.connectors();
     let rod = |i: usize| [points[i], points[i + 1]];
     let mut least_m = f64::INFINITY;
     for i in 0..points.len() {

@@ -53,8 +53,14 @@ fn between_interiors<const D: usize>(
     [p, q]: [Point<D>; 2],
     [a, b]: [Point<D>; 2],
 ) -> Option<NearestPoints<D>> {
-    let (d1, d2, r) = (sub(q, p), sub(b, a), sub(p, a));
-    let (aa, ee, bb, c, f) = (dot(d1, d1), dot(d2, d2), dot(d1, d2), dot(d1, r), dot(d2, r));
+    let d1 = sub(q, p);
+    let d2 = sub(b, a);
+    let r = sub(p, a);
+    let aa = dot(d1, d1);
+    let ee = dot(d2, d2);
+    let bb = dot(d1, d2);
+    let c = dot(d1, r);
+    let f = dot(d2, r);
     let s = (bb * f - c * ee) / (aa * ee - bb * bb);
     if D == 2 {
         return segments_cross([p, q], [a, b]).then(|| {
@@ -67,7 +73,8 @@ fn between_interiors<const D: usize>(
     let t = (bb * s + f) / ee;
     let is_inside = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
     (is_inside && norm_squared(n) > PARALLEL2 * aa * ee).then(|| {
-        let (on_body, on_core) = (add_scaled(p, d1, s), add_scaled(a, d2, t));
+        let on_body = add_scaled(p, d1, s);
+        let on_core = add_scaled(a, d2, t);
         // The points are slightly off along the lines; their distance across the lines is not.
         let r = sub(on_body, on_core);
         let distance_m = dot([r[0], r[1], r[2]], n).abs() / norm(n);
@@ -78,7 +85,8 @@ fn between_interiors<const D: usize>(
 /// Returns whether two plane segments cross: the ends of each are strictly on both sides of the other.
 #[inline]
 pub fn segments_cross<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
-    let (d1, d2) = (sub(q, p), sub(b, a));
+    let d1 = sub(q, p);
+    let d2 = sub(b, a);
     cross_2d(d1, sub(a, p)) * cross_2d(d1, sub(b, p)) < 0.0
         && cross_2d(d2, sub(p, a)) * cross_2d(d2, sub(q, a)) < 0.0
 }
@@ -109,30 +117,33 @@ impl<const D: usize> Cuboid<D> {
     /// The squared distance along the segment is convex and made of parabolas; its slope rises, so
     /// the minimum lies where the slope changes sign between two of the at most `2 D` joints.
     pub fn nearest_to_segment(&self, [p, q]: [Point<D>; 2]) -> NearestPoints<D> {
-        let (from, to) = (self.to_local(p), self.to_local(q));
+        let from = self.to_local(p);
+        let to = self.to_local(q);
         let d = sub(to, from);
-        let part = self.min_slope_fraction(from, d);
-        let local = add_scaled(from, d, part);
+        let fraction = self.min_slope_fraction(from, d);
+        let local = add_scaled(from, d, fraction);
         let clamped: Point<D> =
             std::array::from_fn(|i| local[i].clamp(-self.half_m[i], self.half_m[i]));
         NearestPoints {
             distance_m: distance(local, clamped),
-            on_body: lerp(p, q, part),
+            on_body: lerp(p, q, fraction),
             on_core: self.to_world(clamped),
         }
     }
 
-    /// Returns half the slope of the squared distance at one part of the way.
-    fn slope(&self, from: Point<D>, d: Point<D>, part: f64) -> f64 {
+    /// Returns half the slope of the squared distance at a fraction of the segment.
+    fn slope(&self, from: Point<D>, d: Point<D>, fraction: f64) -> f64 {
         let outside = |i: usize| {
-            let x = from[i] + d[i] * part;
+            let x = from[i] + d[i] * fraction;
             x - x.clamp(-self.half_m[i], self.half_m[i])
         };
         (0..D).map(|i| outside(i) * d[i]).sum()
     }
 
+    /// Returns the fraction of the segment at which the squared distance is least.
     fn min_slope_fraction(&self, from: Point<D>, d: Point<D>) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
+        let mut low = 0.0;
+        let mut high = 1.0;
         if self.slope(from, d, low) >= 0.0 {
             return low;
         }
@@ -143,12 +154,16 @@ impl<const D: usize> Cuboid<D> {
             for side in [-self.half_m[i], self.half_m[i]] {
                 let joint = (side - from[i]) / d[i];
                 if joint > low && joint < high {
-                    let falls = self.slope(from, d, joint) < 0.0;
-                    *(if falls { &mut low } else { &mut high }) = joint;
+                    if self.slope(from, d, joint) < 0.0 {
+                        low = joint;
+                    } else {
+                        high = joint;
+                    }
                 }
             }
         }
-        let (a, b) = (self.slope(from, d, low), self.slope(from, d, high));
+        let a = self.slope(from, d, low);
+        let b = self.slope(from, d, high);
         if b > a { low + (high - low) * (-a / (b - a)) } else { low }
     }
 
@@ -275,17 +290,20 @@ impl<const D: usize> Core<D> {
 /// Returns whether a point is at least `reach_m` from a segment, without division or root.
 #[inline]
 fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
-    let (d, r) = (sub(q, p), sub(c, p));
-    let (part, whole, reach2) = (dot(r, d), dot(d, d), reach_m * reach_m);
-    if part <= 0.0 {
+    let d = sub(q, p);
+    let r = sub(c, p);
+    let along = dot(r, d);
+    let length2 = dot(d, d);
+    let reach2 = reach_m * reach_m;
+    if along <= 0.0 {
         return dot(r, r) >= reach2;
     }
-    if part >= whole {
+    if along >= length2 {
         let r = sub(c, q);
         return dot(r, r) >= reach2;
     }
     let across2 = if D == 2 { cross_2d(d, r) * cross_2d(d, r) } else { norm_squared(cross(d, r)) };
-    across2 >= reach2 * whole
+    across2 >= reach2 * length2
 }
 
 /// Returns whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.
@@ -298,7 +316,8 @@ fn is_on_one_side<const D: usize>(
     reach_m: f64,
 ) -> bool {
     let d = sub(q, p);
-    let (left_a, left_b) = (cross_2d(d, sub(a, p)), cross_2d(d, sub(b, p)));
+    let left_a = cross_2d(d, sub(a, p));
+    let left_b = cross_2d(d, sub(b, p));
     let far = reach_m * reach_m * dot(d, d);
     left_a * left_b > 0.0 && left_a * left_a > far && left_b * left_b > far
 }
@@ -316,7 +335,8 @@ impl<const D: usize> Bounds<D> {
     /// Returns the least box around points.
     #[inline]
     pub fn from_points(points: &[Point<D>]) -> Self {
-        let (mut lo, mut hi) = (points[0], points[0]);
+        let mut lo = points[0];
+        let mut hi = points[0];
         for p in &points[1..] {
             for i in 0..D {
                 lo[i] = lo[i].min(p[i]);

@@ -1,4 +1,4 @@
-//! A uniform grid that finds the boxes nearby.
+//! A uniform grid that finds the boxes nearby: the broad phase of collision detection.
 
 use super::geometry::{Bounds, Point};
 
@@ -13,8 +13,10 @@ pub struct Grid<const D: usize> {
     first: Vec<CellIndex<D>>,
 }
 
-/// Largest mean number of entries per box; beyond it the grid gets coarser.
+/// Largest mean number of entries per box; beyond it the grid gets coarser, so that a few large boxes among
+/// many small ones do not fill the memory.
 const MAX_ENTRIES_PER_BOX: usize = 64;
+/// Largest number of cells per box, so that a few boxes far apart do not either.
 const MAX_CELLS_PER_BOX: usize = 64;
 
 impl<const D: usize> Grid<D> {
@@ -56,20 +58,21 @@ impl<const D: usize> Grid<D> {
 
     /// Visits every box that meets `near`, each once.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
         if self.bounds.is_empty() {
             return;
         }
         let range = self.cells.range(near);
         self.cells.for_each(range, |cell, index| {
-            let (from, to) = (self.starts[index] as usize, self.starts[index + 1] as usize);
+            let from = self.starts[index] as usize;
+            let to = self.starts[index + 1] as usize;
             for &k in &self.entries[from..to] {
                 let k = k as usize;
                 // A box in several cells is reported only in the first cell that it shares with the
                 // query.
                 let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
                 if is_first && self.bounds[k].meets(near) {
-                    look(k);
+                    visit_one(k);
                 }
             }
         });
@@ -143,10 +146,14 @@ impl<const D: usize> CellLayout<D> {
 
     /// Visits the cells of a block, and their indices, in the order of the indices.
     #[inline]
-    fn for_each(&self, [lo, hi]: [CellIndex<D>; 2], mut look: impl FnMut(CellIndex<D>, usize)) {
+    fn for_each(
+        &self,
+        [lo, hi]: [CellIndex<D>; 2],
+        mut visit_one: impl FnMut(CellIndex<D>, usize),
+    ) {
         let mut cell = lo;
         loop {
-            look(cell, self.index(cell));
+            visit_one(cell, self.index(cell));
             let mut axis = 0;
             while cell[axis] == hi[axis] {
                 cell[axis] = lo[axis];

@@ -1,8 +1,9 @@
-//! Proof that a motion brings no two parts of a chain near each other, without a look at each.
+//! Proof that a motion brings no two parts of a chain near each other, without a test of each pair.
 //!
-//! Every rod once measured the distance of the parts that could be in its way. Since then none has come
-//! nearer to it by more than twice the longest way of any connector, which an odometer sums up. Rods
-//! that have used up their room measure again; most need not do so for many motions.
+//! The idea is that of conservative advancement and of Verlet lists. The clearance of every rod from all
+//! parts that may not touch it has been measured at some time. Since then none has come nearer by more
+//! than twice the longest travel of any connector, which an odometer sums up. Only rods whose clearance
+//! is used up are measured again; most need not be for many motions.
 
 use super::chain::Chain;
 use super::geometry::{
@@ -10,18 +11,21 @@ use super::geometry::{
 };
 use super::rod_bvh::RodBvh;
 
-/// Rods between which no distance is measured: they touch by construction, or nearly so.
+/// Index distance of rods between which no distance is measured: they touch by construction, or nearly
+/// so.
 const NEIGHBORS: usize = 2;
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;
-/// Distance up to which parts are searched, in lengths of the longest rod.
+/// Distance up to which parts are searched, in lengths of the longest rod: a longer search finds more
+/// parts, a shorter one is soon repeated.
 const SEARCH_LENGTHS: f64 = 1.5;
 /// Fewest rods for which it is worth the effort; also, between the ends of fewer than three no distance
 /// would be measured.
 const MIN_RODS: usize = 8;
 /// Reading at which the odometer starts again, meters, long before rounding matters.
 const MAX_ODOMETER_M: f64 = 1e5;
-/// Travel after which the tree is built anew, as a part of the distance searched.
+/// Travel after which the tree is built anew, as a fraction of the distance searched: queries grow by the
+/// travel since.
 const STALE_FRACTION: f64 = 0.25;
 
 /// Distances of a chain's rods from all parts that can be in their way, with the travel since.
@@ -29,7 +33,8 @@ const STALE_FRACTION: f64 = 0.25;
 pub(super) struct MotionBounds<const D: usize> {
     /// Positions to which the odometer has counted.
     points: Vec<Point<D>>,
-    /// Twice the ways of everything so far, meters.
+    /// Twice the sum of the longest travel of each motion so far, meters: two parts approach each other at
+    /// most by the travel of both.
     odometer_m: f64,
     /// The odometer's reading at which a part could touch each rod.
     until_m: Vec<f64>,
@@ -44,16 +49,16 @@ impl<const D: usize> MotionBounds<D> {
         chain.rods().len() >= MIN_RODS
     }
 
-    /// Notes the places of a chain, whichever it is and however it came there.
+    /// Records the positions of a chain, which may be another one or have been changed from outside.
     pub(super) fn record(&mut self, chain: &Chain<D>) {
         if self.points.len() != chain.points().len() || self.odometer_m > MAX_ODOMETER_M {
             self.reset(chain);
         } else if self.points != chain.points() {
-            let way2 = |(was, is): (&Point<D>, &Point<D>)| {
-                let way = sub(*is, *was);
-                dot(way, way)
+            let travel2 = |(old, new): (&Point<D>, &Point<D>)| {
+                let moved = sub(*new, *old);
+                dot(moved, moved)
             };
-            let farthest2 = self.points.iter().zip(chain.points()).map(way2).fold(0.0, f64::max);
+            let farthest2 = self.points.iter().zip(chain.points()).map(travel2).fold(0.0, f64::max);
             self.add_travel(farthest2.sqrt());
             self.points.copy_from_slice(chain.points());
         }
@@ -65,42 +70,45 @@ impl<const D: usize> MotionBounds<D> {
         self.points.extend_from_slice(chain.points());
         self.until_m.clear();
         self.until_m.resize(chain.rods().len(), f64::NEG_INFINITY);
-        (self.odometer_m, self.built_at_m) = (0.0, f64::NEG_INFINITY);
+        self.odometer_m = 0.0;
+        self.built_at_m = f64::NEG_INFINITY;
     }
 
-    /// Notes that the chain stays where an allowed motion has brought it.
+    /// Records that the chain stays where an allowed motion has brought it.
     pub(super) fn accept(&mut self, chain: &Chain<D>) {
         self.points.copy_from_slice(chain.points());
     }
 
-    /// Notes that a motion of `way_m` that was looked at is taken back.
-    pub(super) fn revert(&mut self, way_m: f64) {
-        self.add_travel(way_m);
+    /// Records that a motion of `travel_m` that was tested is taken back. Clearances measured at its end
+    /// are off by its travel, so that counts a second time.
+    pub(super) fn revert(&mut self, travel_m: f64) {
+        self.add_travel(travel_m);
     }
 
-    fn add_travel(&mut self, way_m: f64) {
-        self.odometer_m += 2.0 * way_m;
+    fn add_travel(&mut self, travel_m: f64) {
+        self.odometer_m += 2.0 * travel_m;
     }
 
-    /// Returns the positions that were noted.
+    /// Returns the recorded positions.
     pub(super) fn recorded_points(&self) -> &[Point<D>] {
         &self.points
     }
 
-    /// Returns whether a motion from the noted positions to where the chain is now, in which no connector
-    /// moved by more than `way_m`, brings no two parts near each other, neither now nor on its way.
-    pub(super) fn allows(&mut self, chain: &Chain<D>, way_m: f64) -> bool {
-        self.add_travel(way_m);
-        // On its way every part was at most so far from where it is, and rods keep a distance from
-        // the parts they pass that is at most the one needed at rest.
-        let needed_m = 2.0 * chain.max_radius_m() + 3.0 * way_m + MARGIN_M;
+    /// Returns whether a motion from the recorded positions to where the chain is now, in which no connector
+    /// moved by more than `travel_m`, brings no two parts near each other, neither at its end nor on its
+    /// path.
+    pub(super) fn allows(&mut self, chain: &Chain<D>, travel_m: f64) -> bool {
+        self.add_travel(travel_m);
+        // Two diameters at rest; on the path both parts were up to the travel from where they are, and
+        // the test of paths adds it once more.
+        let needed_m = 2.0 * chain.max_radius_m() + 3.0 * travel_m + MARGIN_M;
         for rod in 0..self.until_m.len() {
             if self.until_m[rod] - self.odometer_m >= needed_m {
                 continue;
             }
-            let room_m = self.clearance_m(chain, rod, needed_m);
-            self.until_m[rod] = self.odometer_m + room_m;
-            if room_m < needed_m {
+            let clearance_m = self.measure_clearance_m(chain, rod, needed_m);
+            self.until_m[rod] = self.odometer_m + clearance_m;
+            if clearance_m < needed_m {
                 return false;
             }
         }
@@ -109,33 +117,37 @@ impl<const D: usize> MotionBounds<D> {
 
     /// Returns the distance of a rod from all parts that can be in its way, up to the distance
     /// searched, meters.
-    fn clearance_m(&mut self, chain: &Chain<D>, rod: usize, needed_m: f64) -> f64 {
-        let look_m = needed_m + SEARCH_LENGTHS * chain.max_rod_m();
-        if self.odometer_m - self.built_at_m > STALE_FRACTION * look_m {
+    fn measure_clearance_m(&mut self, chain: &Chain<D>, rod: usize, needed_m: f64) -> f64 {
+        let search_m = needed_m + SEARCH_LENGTHS * chain.max_rod_m();
+        if self.odometer_m - self.built_at_m > STALE_FRACTION * search_m {
             let ends = chain.points().windows(2);
             self.tree.rebuild(ends.map(Bounds::from_points));
             self.built_at_m = self.odometer_m;
         }
         let points = chain.points();
         let ends = |k: usize| [points[k], points[k + 1]];
-        let mut room_m = look_m.min(end_distance_m(points, rod));
+        let mut clearance_m = search_m.min(end_distance_m(points, rod));
         let near =
-            Bounds::from_points(&ends(rod)).grown(look_m + self.odometer_m - self.built_at_m);
+            Bounds::from_points(&ends(rod)).grown(search_m + self.odometer_m - self.built_at_m);
         self.tree.visit(&near, |other| {
-            if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends(rod), ends(other), room_m) {
-                room_m = room_m.min(between_segments(ends(rod), ends(other)).distance_m);
+            if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends(rod), ends(other), clearance_m) {
+                clearance_m = clearance_m.min(between_segments(ends(rod), ends(other)).distance_m);
             }
         });
-        room_m
+        clearance_m
     }
 }
 
-/// Returns whether two rods are surely as far from each other as `room_m`, or less than half of the spare
-/// distance nearer: by their middles, which is much quicker than their distance.
+/// Returns whether two rods are surely as far from each other as `clearance_m`, less half of the margin:
+/// by the distance of their middles, which is much cheaper than that of the segments.
 #[inline]
-fn is_beyond<const D: usize>([a, b]: [Point<D>; 2], [c, d]: [Point<D>; 2], room_m: f64) -> bool {
+fn is_beyond<const D: usize>(
+    [a, b]: [Point<D>; 2],
+    [c, d]: [Point<D>; 2],
+    clearance_m: f64,
+) -> bool {
     let middles_m = 0.5 * distance(add(a, b), add(c, d));
-    middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= room_m - 0.5 * MARGIN_M
+    middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= clearance_m - 0.5 * MARGIN_M
 }
 
 /// Returns the distance of a rod from the connectors nearest to it that may not touch it: those

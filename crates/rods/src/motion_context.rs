@@ -1,6 +1,6 @@
-//! The perception and the options of one slave: the judge of every position of a chain's part.
+//! The context in which a slave reacts, and the validity check of every position of a part of a chain.
 //!
-//! A slave's reaction depends on its master's move, its own place, the rod before, and its
+//! A slave's reaction depends on its master's move, its own position, the rod before its master, and its
 //! surroundings (slide E4), never on anything farther along the chain.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
@@ -11,15 +11,17 @@ use super::rules::Rules;
 use super::sweep::Sweep;
 use super::veto::VetoReason;
 use std::f64::consts::PI;
+use std::ops::Range;
 
-/// Clearance that a turn aims at, meters. It is at least ten times the tolerance, because otherwise
-/// the next step would start "inside".
+/// Clearance that a turn aims at, meters. It is a hundred times the tolerance: with equal values a master
+/// that touches a wall counts as inside it in the next step, which is a veto.
 pub const SKIN_M: f64 = 1e-7;
 /// Penetration that counts as contact, meters.
 pub const TOLERANCE_M: f64 = 1e-9;
 /// Tolerance of bend limits, rad.
 pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
-/// Distance below which a body without any thickness is touched, meters.
+/// Distance below which a body without thickness is touched, meters. Its radius less the tolerance would
+/// be negative, and it could be passed.
 const TOUCH_M: f64 = 1e-12;
 
 /// New positions before they are accepted, for a run of connectors around the initiator.
@@ -34,14 +36,21 @@ pub(super) struct TentativePositions<const D: usize> {
 impl<const D: usize> TentativePositions<D> {
     pub(super) fn start(&mut self, n: usize, first: usize) {
         self.points.resize(n, [0.0; D]);
-        (self.from, self.to) = (first, first);
+        self.from = first;
+        self.to = first;
+    }
+
+    /// Returns the connectors that have a new position.
+    pub(super) fn run(&self) -> Range<usize> {
+        self.from..self.to
     }
 
     /// Sets the position of a connector of the run, or of one beside it.
     pub(super) fn set(&mut self, i: usize, p: Point<D>) {
         debug_assert!(self.from <= i + 1 && i <= self.to, "the run would have a gap");
         self.points[i] = p;
-        (self.from, self.to) = (self.from.min(i), self.to.max(i + 1));
+        self.from = self.from.min(i);
+        self.to = self.to.max(i + 1);
     }
 
     pub(super) fn get(&self, i: usize) -> Option<Point<D>> {
@@ -64,7 +73,8 @@ pub(super) struct Block<const D: usize> {
     pub(super) stops_tip: bool,
 }
 
-/// The owner of a block; its order breaks ties.
+/// The owner of a block. Its order breaks ties, because the order in which blocks are visited depends on
+/// the grid and must not matter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum BlockOwner {
     Obstacle(u32),
@@ -109,15 +119,18 @@ impl PendingVeto {
 pub(super) struct SlaveStep<const D: usize> {
     pub(super) master: usize,
     pub(super) slave: usize,
-    /// The master before and after, and the slave before.
+    /// The master's old position.
     pub(super) mo: Point<D>,
+    /// The master's new position.
     pub(super) mn: Point<D>,
+    /// The slave's old position.
     pub(super) so: Point<D>,
     /// The connector on the master's other side, if its place is settled.
     pub(super) prev: Option<Point<D>>,
     pub(super) rod: Rod,
-    /// Radius of the slave's body and bend limit of the master.
+    /// Radius of the slave's body, meters.
     pub(super) tip_radius_m: f64,
+    /// Bend limit of the master, rad.
     pub(super) max_bend_rad: f64,
 }
 
@@ -126,7 +139,8 @@ impl<const D: usize> SlaveStep<D> {
         Sweep { from: [self.mo, self.so], to: [self.mn, s] }
     }
 
-    pub(super) fn exceeds_bend_at(&self, s: Point<D>) -> bool {
+    /// Returns whether the master's bend is within its limit with the slave at `s`.
+    pub(super) fn is_bend_allowed_at(&self, s: Point<D>) -> bool {
         let Some(prev) = self.prev else { return true };
         self.max_bend_rad >= PI
             || angle_rad(sub(self.mn, prev), sub(s, self.mn))
@@ -140,19 +154,20 @@ pub fn contact_distance_m(radius_m: f64) -> f64 {
     (radius_m - TOLERANCE_M).max(TOUCH_M)
 }
 
-/// The inputs of a motion.
+/// The inputs of a slave's reaction: the chain as it was, the tentative positions so far, and the
+/// surroundings.
 pub(super) struct MotionContext<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
     pub(super) rules: &'a Rules,
-    pub(super) overlay: &'a TentativePositions<D>,
-    pub(super) own: &'a RodBvh<D>,
+    pub(super) tentative: &'a TentativePositions<D>,
+    pub(super) own_rods: &'a RodBvh<D>,
 }
 
 impl<'a, const D: usize> MotionContext<'a, D> {
     /// Returns the current place of a connector: its new place if it has one.
     pub(super) fn position(&self, i: usize) -> Point<D> {
-        self.overlay.get(i).unwrap_or(self.chain.points()[i])
+        self.tentative.get(i).unwrap_or(self.chain.points()[i])
     }
 
     /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
@@ -162,10 +177,10 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         near: &Bounds<D>,
         rod: Option<usize>,
         tip: usize,
-        mut look: impl FnMut(&Block<D>),
+        mut visit_one: impl FnMut(&Block<D>),
     ) {
         self.obstacles.visit(near, |o| {
-            look(&Block {
+            visit_one(&Block {
                 core: o.core,
                 radius_m: o.radius_m,
                 name: BlockOwner::Obstacle(o.id),
@@ -174,25 +189,25 @@ impl<'a, const D: usize> MotionContext<'a, D> {
             });
         });
         if self.rules.self_collision {
-            self.own.visit(near, |other| {
+            self.own_rods.visit(near, |other| {
                 for block in self.own_blocks(other, rod, tip).into_iter().flatten() {
-                    look(&block);
+                    visit_one(&block);
                 }
             });
         }
     }
 
     /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
-    /// Neighbors are exempt because they touch by construction.
+    /// Neighbors are exempt because they touch by construction, or nearly so in a tight bend.
     fn own_blocks(&self, other: usize, rod: Option<usize>, tip: usize) -> [Option<Block<D>>; 3] {
         let connectors = self.chain.connectors();
         let connector = |c: usize| {
-            let far_from_rod = rod.is_some_and(|r| c + 1 < r || c > r + 2);
+            let is_far_from_rod = rod.is_some_and(|r| c + 1 < r || c > r + 2);
             Block {
                 core: Core::Point(self.position(c)),
                 radius_m: connectors[c].radius_m,
                 name: BlockOwner::OwnConnector(c),
-                stops_rod: far_from_rod,
+                stops_rod: is_far_from_rod,
                 stops_tip: c.abs_diff(tip) > 1,
             }
         };
@@ -210,23 +225,23 @@ impl<'a, const D: usize> MotionContext<'a, D> {
 
     /// Checks whether the slave may be at `s`; returns the first objection otherwise.
     pub(super) fn check_slave(&self, step: &SlaveStep<D>, s: Point<D>) -> Result<(), PendingVeto> {
-        if !step.exceeds_bend_at(s) {
+        if !step.is_bend_allowed_at(s) {
             return Err(PendingVeto::new(VetoReason::BendLimit));
         }
-        let longest_m = self.rules.slave_step_max_m;
-        if longest_m < f64::INFINITY && distance(step.so, s) > longest_m {
+        let max_step_m = self.rules.slave_step_max_m;
+        if max_step_m < f64::INFINITY && distance(step.so, s) > max_step_m {
             return Err(PendingVeto::new(VetoReason::StepLimit));
         }
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);
         let near = swept_bounds([step.mo, step.so, step.mn, s], reach_m);
         let mut worst: Option<(f64, BlockOwner, VetoReason)> = None;
         let rod = step.master.min(step.slave);
-        let way_m = step.sweep(s).max_travel_m();
+        let travel_m = step.sweep(s).max_travel_m();
         self.visit_blocks(&near, Some(rod), step.slave, |block| {
-            if let Some((depth_m, reason)) = depth_and_reason(step, s, way_m, block) {
-                let deeper = worst
+            if let Some((depth_m, reason)) = depth_and_reason(step, s, travel_m, block) {
+                let is_deeper = worst
                     .is_none_or(|(w, name, _)| depth_m > w || (depth_m == w && block.name < name));
-                if deeper {
+                if is_deeper {
                     worst = Some((depth_m, block.name, reason));
                 }
             }
@@ -234,7 +249,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         worst.map_or(Ok(()), |(_, name, reason)| Err(PendingVeto::from_owner(reason, name)))
     }
 
-    /// Returns whether the slave stays where it is allowed to be.
+    /// Returns whether a connector's mobility allows a position.
     pub(super) fn may_be_at(&self, i: usize, p: Point<D>) -> bool {
         let connector = &self.chain.connectors()[i];
         if connector.is_still() {
@@ -244,30 +259,33 @@ impl<'a, const D: usize> MotionContext<'a, D> {
     }
 }
 
-/// Returns the depth of a rod or its end in a block, and the reason; `None` if all is well. No point of
-/// the rod moves by more than `way_m`.
+/// Returns the depth of a rod or its end in a block, and the reason of the veto; `None` if the block is
+/// not in the way. No point of the rod moves by more than `travel_m`.
 fn depth_and_reason<const D: usize>(
     step: &SlaveStep<D>,
     s: Point<D>,
-    way_m: f64,
+    travel_m: f64,
     block: &Block<D>,
 ) -> Option<(f64, VetoReason)> {
-    let (rod, core) = ([step.mn, s], &block.core);
+    let rod = [step.mn, s];
+    let core = &block.core;
     let rod_m = block.radius_m + step.rod.radius_m;
     let tip_m = block.radius_m + step.tip_radius_m;
     let tip_is_clear = !block.stops_tip || core.is_clear_of_point(s, contact_distance_m(tip_m));
-    let sure_m = contact_distance_m(rod_m).max(Sweep::<D>::safe_distance_m(way_m, rod_m));
+    // One distance clears both the end of the path and the path itself: the usual case.
+    let sure_m = contact_distance_m(rod_m).max(Sweep::<D>::safe_distance_m(travel_m, rod_m));
     if tip_is_clear && (!block.stops_rod || core.is_clear_of_segment(rod, sure_m)) {
         return None;
     }
     let rod_is_clear = !block.stops_rod || core.is_clear_of_segment(rod, contact_distance_m(rod_m));
     if rod_is_clear && tip_is_clear {
-        let passes =
-            step.sweep(s).is_clear_on_the_way(core, rod_m, way_m) || was_inside(step, block);
-        return (!passes).then_some((0.0, VetoReason::WouldTunnel));
+        // A rod that starts inside has no clear path, and must be able to get out.
+        let is_allowed =
+            step.sweep(s).is_path_clear(core, rod_m, travel_m) || was_inside(step, block);
+        return (!is_allowed).then_some((0.0, VetoReason::WouldTunnel));
     }
-    let (now_m, before_m) =
-        (depth_m(step.mn, s, step, block), depth_m(step.mo, step.so, step, block));
+    let now_m = depth_m(step.mn, s, step, block);
+    let before_m = depth_m(step.mo, step.so, step, block);
     // A part that starts inside may stay, but must not go deeper.
     if before_m > TOLERANCE_M && now_m <= before_m {
         return None;

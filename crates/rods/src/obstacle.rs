@@ -1,8 +1,8 @@
 //! Obstacles, and the search for those nearby.
 //!
 //! Static obstacles lie in a uniform grid, which copies share; moving ones are a list, with a grid
-//! of its own if they are many. A query names a box and visits every obstacle whose own box meets
-//! it exactly once, without allocating (slide P3: proximity is sensed locally).
+//! of its own if they are many. A query is a box and visits every obstacle whose own box meets it
+//! exactly once, without allocating (slide P3: proximity is sensed locally).
 
 use super::geometry::{self, Bounds, Core, Point, add, scaled};
 use super::grid::Grid;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// An obstacle: all points within a radius of a convex core.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle<const D: usize> {
-    /// Its name in vetoes. Several obstacles may share one, as the walls of a room do.
+    /// Its id in vetoes. Several obstacles may share one, as the walls of a room do.
     pub id: u32,
     /// Its inner part.
     pub core: Core<D>,
@@ -50,8 +50,7 @@ impl<const D: usize> Obstacle<D> {
         self.core.bounds().grown(self.radius_m)
     }
 
-    /// Returns whether it is in the range of coordinates: an obstacle that flies on and on leaves it in the
-    /// end.
+    /// Returns whether it is in the range of coordinates. One that moves on without end leaves it.
     pub fn is_in_range(&self) -> bool {
         self.check().is_ok()
     }
@@ -182,13 +181,13 @@ impl<const D: usize> Obstacles<D> {
     /// Visits every obstacle whose box meets `near`, each once: the static ones first, in an order
     /// that depends only on the obstacles and the box.
     #[inline]
-    pub fn visit<'a>(&'a self, near: &Bounds<D>, mut look: impl FnMut(&'a Obstacle<D>)) {
-        self.still.grid.visit(near, |k| look(&self.still.all[k]));
+    pub fn visit<'a>(&'a self, near: &Bounds<D>, mut visit_one: impl FnMut(&'a Obstacle<D>)) {
+        self.still.grid.visit(near, |k| visit_one(&self.still.all[k]));
         if self.moving.len() > MAX_LINEAR_SCAN {
-            return self.moving_grid.visit(near, |k| look(&self.moving[k]));
+            return self.moving_grid.visit(near, |k| visit_one(&self.moving[k]));
         }
         for obstacle in self.moving.iter().filter(|o| o.bounds().meets(near)) {
-            look(obstacle);
+            visit_one(obstacle);
         }
     }
 

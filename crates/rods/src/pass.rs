@@ -1,4 +1,4 @@
-//! One motion on its way outward: its direction, and its results so far.
+//! One motion as it propagates outward: its direction, and its results so far.
 
 use std::ops::Range;
 
@@ -8,12 +8,16 @@ pub(super) struct MotionTally {
     /// First and one past the last connector that reacted.
     pub(super) from: usize,
     pub(super) to: usize,
+    /// Connectors that changed, summed over sub-steps.
     pub(super) changed: usize,
+    /// Rods that turned, summed over sub-steps.
     pub(super) rotated: usize,
+    /// Longest move of a connector other than the initiator, meters.
     pub(super) max_slave_step_m: f64,
 }
 
 impl MotionTally {
+    /// Returns the tally of a motion of connector `first` that nothing has followed yet.
     #[inline]
     pub(super) fn start(first: usize) -> Self {
         Self { from: first, to: first, ..Self::default() }
@@ -22,7 +26,8 @@ impl MotionTally {
     /// Counts the connectors around the initiator that have reacted.
     #[inline]
     pub(super) fn record_run(&mut self, run: Range<usize>) {
-        (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
+        self.from = self.from.min(run.start);
+        self.to = self.to.max(run.end);
     }
 
     /// Adds the results of a separate motion.
@@ -34,10 +39,10 @@ impl MotionTally {
         self.record_slave_move(motion.max_slave_step_m);
     }
 
-    /// Counts a connector other than the initiator that moved by `way_m`.
+    /// Counts a connector other than the initiator that moved by `travel_m`.
     #[inline]
-    pub(super) fn record_slave_move(&mut self, way_m: f64) {
-        self.max_slave_step_m = self.max_slave_step_m.max(way_m);
+    pub(super) fn record_slave_move(&mut self, travel_m: f64) {
+        self.max_slave_step_m = self.max_slave_step_m.max(travel_m);
     }
 }
 
@@ -51,7 +56,7 @@ pub(super) enum Direction {
 }
 
 impl Direction {
-    /// Both.
+    /// Both directions, in the order in which sweeps are made.
     pub(super) const BOTH: [Self; 2] = [Self::Up, Self::Down];
 
     /// Returns the master of a slave.

@@ -1,8 +1,8 @@
 //! Propagation of one motion through the whole chain, or not at all (slides R1 to R7).
 //!
 //! The initiator moves; from it two sweeps go outward, each slave reacting to its master and
-//! becoming the next one's master. New positions are kept apart until both sweeps have agreed: a
-//! veto leaves every bit of the chain as it was.
+//! becoming the next one's master. Both sweeps write to tentative positions, which are committed
+//! only once both have succeeded: a veto leaves every bit of the chain as it was.
 
 use super::candidates::{Candidate, CandidateScratch};
 use super::chain::{Chain, is_in_range, out_of_range};
@@ -22,9 +22,11 @@ use separation::ProofSchedule;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
-/// Most sub-steps of a request; one that would need more is refused.
+/// Most sub-steps of a request. One that would need more is an input error: it comes from a wrong
+/// unit or from a rod of nearly no length, and would seem to hang.
 const MAX_SUB_STEPS: f64 = 1e6;
-/// Number of sub-steps from one look at whether to go on to the next.
+/// Number of sub-steps between two checks for an interrupt. On a chain of a million connectors so
+/// many take about 0.3 s.
 const INTERRUPT_CHECK_INTERVAL: usize = 16;
 
 /// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
@@ -33,25 +35,28 @@ const INTERRUPT_CHECK_INTERVAL: usize = 16;
 pub struct Propagator<const D: usize> {
     /// Rules by which chains react.
     pub rules: Rules,
-    overlay: TentativePositions<D>,
-    own: RodBvh<D>,
-    leeway: MotionBounds<D>,
+    tentative: TentativePositions<D>,
+    own_rods: RodBvh<D>,
+    motion_bounds: MotionBounds<D>,
+    /// When to try proofs of single sub-steps.
     proofs: ProofSchedule,
-    /// Proofs of all sub-steps of a request at once.
-    whole_proofs: ProofSchedule,
-    work: CandidateScratch<D>,
-    untried: Vec<Alternative<D>>,
-    /// Positions before the request, for the run of connectors that have moved.
-    before: TentativePositions<D>,
+    /// When to try proofs of all sub-steps of a request at once.
+    request_proofs: ProofSchedule,
+    scratch: CandidateScratch<D>,
+    alternatives: Vec<Alternative<D>>,
+    /// Positions before the request, of the run of connectors that have moved since: a veto in a
+    /// later sub-step takes back the earlier ones.
+    original: TentativePositions<D>,
     tally: MotionTally,
 }
 
-/// An alternative for an earlier slave.
+/// A choice point of the depth-first search: another reaction of an earlier slave.
 #[derive(Debug, Clone, Copy)]
 enum Alternative<const D: usize> {
     /// Another place.
     Place { slave: usize, candidate: Candidate<D> },
-    /// A turn of its rod to the other side, which has not been examined yet.
+    /// A turn of its rod to the other side. It is computed only on backtracking, because that is
+    /// rare and a turn is the costly part of a reaction.
     OtherSide { slave: usize, tried: Point<D> },
 }
 
@@ -75,10 +80,13 @@ impl<const D: usize> DrivenConnectors<D> {
         self.first..self.first + self.n
     }
 
-    /// Returns their positions after `k` of `n` equal parts of their way.
+    /// Returns their positions after `k` of `n` equal sub-steps; the last one is the target, bit for bit.
     fn positions_at(&self, from: [Point<D>; 2], [k, n]: [usize; 2]) -> [Point<D>; 2] {
-        let part = k as f64 / n as f64;
-        [0, 1].map(|h| if k == n { self.to[h] } else { lerp(from[h], self.to[h], part) })
+        if k == n {
+            return self.to;
+        }
+        let fraction = k as f64 / n as f64;
+        [0, 1].map(|h| lerp(from[h], self.to[h], fraction))
     }
 
     /// Returns their positions.
@@ -87,8 +95,23 @@ impl<const D: usize> DrivenConnectors<D> {
     }
 }
 
-/// An objection and the connector that raised it.
+/// The index of the connector that objects, and its objection.
 type ConnectorVeto = (usize, PendingVeto);
+
+/// The inputs of one sweep outward from the initiator; nothing changes them before the commit.
+#[derive(Clone, Copy)]
+struct SweepContext<'a, const D: usize> {
+    chain: &'a Chain<D>,
+    obstacles: &'a Obstacles<D>,
+    direction: Direction,
+}
+
+impl<const D: usize> SweepContext<'_, D> {
+    /// Returns the connector after `i`, if the chain goes on there.
+    fn next(&self, i: usize) -> Option<usize> {
+        self.direction.next(i, self.chain.points().len())
+    }
+}
 
 impl<const D: usize> Propagator<D> {
     /// Returns a propagator for rules.
@@ -107,48 +130,51 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         request: &Request<D>,
     ) -> Result<Outcome<D>, InputError> {
-        let mut heads = DrivenConnectors::from_motion(&request.motion);
-        check(chain, &heads)?;
-        let from = heads.positions(chain);
-        self.tally = MotionTally::start(heads.first);
-        self.before.start(chain.points().len(), heads.first);
-        if let Err((by, refusal)) = project(chain, &mut heads, request.mode) {
-            return Ok(Outcome::Vetoed(make_veto(chain, heads.first, by, refusal)));
+        let mut driven = DrivenConnectors::from_motion(&request.motion);
+        check(chain, &driven)?;
+        let from = driven.positions(chain);
+        self.tally = MotionTally::start(driven.first);
+        self.original.start(chain.points().len(), driven.first);
+        if let Err((by, objection)) = project(chain, &mut driven, request.mode) {
+            return Ok(Outcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
-        let n = self.sub_steps(chain, obstacles, &heads, from)?;
-        if self.pull_all_if_separated(chain, obstacles, &heads, n) {
+        let n = self.sub_steps(chain, obstacles, &driven, from)?;
+        if self.pull_all_if_separated(chain, obstacles, &driven, n) {
             return Ok(Outcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
             if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
                 interrupt::check();
             }
-            let heads = DrivenConnectors { to: heads.positions_at(from, [k, n]), ..heads };
-            if let Err((by, refusal)) = self.sub_step(chain, obstacles, heads, k < n) {
-                let veto = make_veto(chain, heads.first, by, refusal);
+            let driven = DrivenConnectors { to: driven.positions_at(from, [k, n]), ..driven };
+            if let Err((by, objection)) = self.sub_step(chain, obstacles, driven, k == n) {
+                let veto = make_veto(chain, driven.first, by, objection);
                 return Ok(self.stop(chain, request.mode, veto));
             }
         }
         Ok(Outcome::Moved(self.completed_motion(None)))
     }
 
+    /// Returns the number of sub-steps of a request.
     fn sub_steps(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &DrivenConnectors<D>,
+        driven: &DrivenConnectors<D>,
         from: [Point<D>; 2],
     ) -> Result<usize, InputError> {
-        let way_m = distance(from[0], heads.to[0]).max(distance(from[1], heads.to[heads.n - 1]));
-        count_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), way_m)
+        let travel_m =
+            distance(from[0], driven.to[0]).max(distance(from[1], driven.to[driven.n - 1]));
+        count_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), travel_m)
     }
 
+    /// Ends a request at a veto: keeps the sub-steps so far, or takes them back.
     fn stop(&mut self, chain: &mut Chain<D>, mode: VetoEffect, veto: Veto<D>) -> Outcome<D> {
         if mode == VetoEffect::AsFarAsPossible && self.tally.changed > 0 {
             return Outcome::Moved(self.completed_motion(Some(veto)));
         }
-        let run = self.before.from..self.before.to;
-        chain.points_mut()[run].copy_from_slice(self.before.positions());
+        let run = self.original.run();
+        chain.points_mut()[run].copy_from_slice(self.original.positions());
         Outcome::Vetoed(veto)
     }
 
@@ -157,143 +183,150 @@ impl<const D: usize> Propagator<D> {
         CompletedMotion { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
-    /// Makes one short motion, after which the request goes on or ends: all of it, or none.
+    /// Makes one sub-step: all of it, or nothing. `is_last` says that no later one can make the request
+    /// take it back.
     fn sub_step(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: DrivenConnectors<D>,
-        goes_on: bool,
+        driven: DrivenConnectors<D>,
+        is_last: bool,
     ) -> Result<(), ConnectorVeto> {
-        let is_there =
-            |(h, k): (usize, usize)| distance(heads.to[h], chain.points()[k]) <= chain.min_move_m();
-        if heads.indices().enumerate().all(is_there) {
+        if has_arrived(chain, &driven) {
             return Ok(());
         }
-        let is_open = is_open(chain, obstacles, &heads);
+        // From the cheapest motion to the dearest. Each gives the bits of the last one where it
+        // applies, so which of them runs is a matter of speed alone.
+        let is_open = is_open(chain, obstacles, &driven);
         if is_open && !self.rules.self_collision {
-            open::pull(chain, heads.first, heads.to[0], StayRule::Exactly, &mut self.tally);
+            open::pull(chain, driven.first, driven.to[0], StayRule::Exactly, &mut self.tally);
             return Ok(());
         }
-        if is_open && self.pull_if_separated(chain, &heads, goes_on) {
+        if is_open && self.pull_if_separated(chain, &driven, is_last) {
             return Ok(());
         }
         if self.rules.self_collision {
-            if !is_open && self.sweep_if_separated(chain, obstacles, &heads) {
+            if !is_open && self.sweep_if_separated(chain, obstacles, &driven) {
                 return Ok(());
             }
             let rods = 0..chain.rods().len();
-            self.own.refit(rods.map(|i| rod_box(chain, i, |k| chain.points()[k])));
+            self.own_rods.refit(rods.map(|i| rod_box(chain, i, |k| chain.points()[k])));
         }
         let rotated = self.tally.rotated;
-        let followed = self.sweep_from(chain, obstacles, &heads);
+        let followed = self.sweep_from(chain, obstacles, &driven);
         match followed {
-            Ok(()) => self.commit(chain, &heads),
+            Ok(()) => self.commit(chain, &driven),
             Err(_) => self.tally.rotated = rotated,
         }
         followed
     }
 
-    /// Finds new places for the heads and all connectors that follow them.
+    /// Finds new places for the driven connectors and all that follow them.
     fn sweep_from(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &DrivenConnectors<D>,
+        driven: &DrivenConnectors<D>,
     ) -> Result<(), ConnectorVeto> {
-        self.overlay.start(chain.points().len(), heads.first);
-        self.place_heads(chain, obstacles, heads)?;
-        self.sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)?;
-        self.sweep(chain, obstacles, heads.first, Direction::Down)
+        self.tentative.start(chain.points().len(), driven.first);
+        self.place_driven(chain, obstacles, driven)?;
+        // A fixed order: the second sweep sees the new places of the first one, for the bend at the
+        // initiator and for collisions of the chain with itself.
+        let up = SweepContext { chain, obstacles, direction: Direction::Up };
+        let down = SweepContext { direction: Direction::Down, ..up };
+        self.sweep(up, driven.first + driven.n - 1)?;
+        self.sweep(down, driven.first)
     }
 
-    fn place_heads(
+    fn place_driven(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &DrivenConnectors<D>,
+        driven: &DrivenConnectors<D>,
     ) -> Result<(), ConnectorVeto> {
-        for (h, k) in heads.indices().enumerate() {
-            let scene = self.scene(chain, obstacles);
-            scene.check_initiator(k, heads.to[h]).map_err(|refusal| (k, refusal))?;
+        // Both are checked before one is placed: the ends of a driven rod move at once, so neither
+        // is an obstacle to the other at a new place.
+        for (h, k) in driven.indices().enumerate() {
+            let context = self.context(chain, obstacles);
+            context.check_initiator(k, driven.to[h]).map_err(|objection| (k, objection))?;
         }
-        for (h, k) in heads.indices().enumerate() {
-            self.place(chain, k, heads.to[h]);
+        for (h, k) in driven.indices().enumerate() {
+            self.place(chain, k, driven.to[h]);
         }
-        if heads.n == 2 {
-            let [m, s] = [heads.first, heads.first + 1];
-            let step = SlaveStep {
-                mn: heads.to[0],
-                ..self.scene(chain, obstacles).step(m, s, Direction::Up, chain.points()[s])
-            };
-            if !is_length_allowed(step.rod, distance(heads.to[0], heads.to[1])) {
-                return Err((s, PendingVeto::new(VetoReason::Mobility)));
-            }
-            let alone = SlaveStep { prev: None, ..step };
-            self.scene(chain, obstacles).check_slave(&alone, heads.to[1]).map_err(|r| (s, r))?;
+        if driven.n == 2 {
+            self.check_driven_rod(chain, obstacles, driven)?;
         }
         Ok(())
     }
 
-    fn scene<'a>(
+    /// Checks the rod between two driven connectors, as if its second end were a slave of the first.
+    fn check_driven_rod(
+        &self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        driven: &DrivenConnectors<D>,
+    ) -> Result<(), ConnectorVeto> {
+        let slave = driven.first + 1;
+        let context = self.context(chain, obstacles);
+        let step = SlaveStep { mn: driven.to[0], ..context.step(slave, Direction::Up) };
+        if !is_length_allowed(step.rod, distance(driven.to[0], driven.to[1])) {
+            return Err((slave, PendingVeto::new(VetoReason::Mobility)));
+        }
+        // Its bends are checked by the sweeps, when the connectors on both sides are placed.
+        let without_bend = SlaveStep { prev: None, ..step };
+        context.check_slave(&without_bend, driven.to[1]).map_err(|objection| (slave, objection))
+    }
+
+    fn context<'a>(
         &'a self,
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
     ) -> MotionContext<'a, D> {
-        let Self { rules, overlay, own, .. } = self;
-        MotionContext { chain, obstacles, rules, overlay, own }
+        let Self { rules, tentative, own_rods, .. } = self;
+        MotionContext { chain, obstacles, rules, tentative, own_rods }
     }
 
-    /// Sweeps from a head outward. Rods keep their lengths when they turn, which is cheap and
-    /// nearly always enough; if that ends in a veto, the sweep is repeated with every length they
+    /// Sweeps from a driven connector outward. Rods keep their lengths when they turn, which is cheap
+    /// and nearly always enough; if that ends in a veto, the sweep is repeated with every length they
     /// may have. Without a rod that has turned the repetition would end in the same veto.
-    fn sweep(
-        &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        head: usize,
-        direction: Direction,
-    ) -> Result<(), ConnectorVeto> {
+    fn sweep(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
         let rotated = self.tally.rotated;
-        (self.work.all_lengths, self.work.has_turned) = (false, false);
-        let followed = self.follow(chain, obstacles, head, direction);
-        let Some(first) = direction.next(head, chain.points().len()) else { return followed };
+        self.scratch.all_lengths = false;
+        self.scratch.has_turned = false;
+        let followed = self.follow(sweep, head);
+        let Some(first) = sweep.next(head) else { return followed };
         if followed.is_ok()
             || self.rules.rotation != Rotation::Union
-            || !self.work.has_turned
-            || !has_more_places(chain, head, direction)
+            || !self.scratch.has_turned
+            || !has_more_places(sweep.chain, head, sweep.direction)
         {
             return followed;
         }
-        self.revert(chain, first, direction);
+        self.revert(sweep.chain, first, sweep.direction);
         self.tally.rotated = rotated;
-        self.work.all_lengths = true;
-        self.follow(chain, obstacles, head, direction)
+        self.scratch.all_lengths = true;
+        self.follow(sweep, head)
     }
 
-    /// Follows the chain from a head outward, until a slave need not move or the chain ends.
-    fn follow(
-        &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        head: usize,
-        direction: Direction,
-    ) -> Result<(), ConnectorVeto> {
-        self.untried.clear();
+    /// Follows the chain from a driven connector outward, until a slave need not move or the chain ends.
+    fn follow(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
+        self.alternatives.clear();
+        let chain = sweep.chain;
         let mut first_objection: Option<ConnectorVeto> = None;
-        let mut left = self.rules.backtracks;
+        let mut backtracks_left = self.rules.backtracks;
         let mut master = head;
-        while let Some(slave) = direction.next(master, chain.points().len()) {
-            let (at_slave, chosen) = match self.react(chain, obstacles, slave, direction) {
+        while let Some(slave) = sweep.next(master) {
+            let (at_slave, chosen) = match self.react(sweep, slave) {
                 Ok(chosen) => (slave, chosen),
-                Err(refusal) => {
-                    let objection = *first_objection.get_or_insert((slave, refusal));
-                    self.step_back(chain, obstacles, direction, &mut left, objection)?
+                Err(objection) => {
+                    // The first one is reported: the later ones are those of detours around it.
+                    let first = *first_objection.get_or_insert((slave, objection));
+                    self.backtrack(sweep, &mut backtracks_left, first)?
                 }
             };
             let so = chain.points()[at_slave];
             let stays = distance(chosen.at, so) <= chain.min_move_m();
-            if stays && self.may_stop(chain, obstacles, at_slave, direction) {
+            if stays && self.may_stop(sweep, at_slave) {
                 return Ok(());
             }
             self.place(chain, at_slave, if stays { so } else { chosen.at });
@@ -306,66 +339,58 @@ impl<const D: usize> Propagator<D> {
     /// Returns the best place for a slave; its alternatives are remembered.
     fn react(
         &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
+        sweep: SweepContext<'_, D>,
         slave: usize,
-        direction: Direction,
     ) -> Result<Candidate<D>, PendingVeto> {
-        self.find_candidates(chain, obstacles, slave, direction)?;
-        let Self { work, untried, .. } = self;
-        let chosen = work.found[0];
-        let rest = work.found[1..].iter().rev();
-        untried.extend(rest.map(|&candidate| Alternative::Place { slave, candidate }));
-        if work.has_other_side {
-            untried.push(Alternative::OtherSide { slave, tried: chosen.at });
+        self.find_candidates(sweep, slave)?;
+        let Self { scratch, alternatives, .. } = self;
+        let chosen = scratch.found[0];
+        // A stack: the next best goes on top, and the side not examined yet above all.
+        let rest = scratch.found[1..].iter().rev();
+        alternatives.extend(rest.map(|&candidate| Alternative::Place { slave, candidate }));
+        if scratch.has_other_side {
+            alternatives.push(Alternative::OtherSide { slave, tried: chosen.at });
         }
         Ok(chosen)
     }
 
-    /// Fills `work.found` with places for a slave.
+    /// Fills `scratch.found` with places for a slave.
     fn find_candidates(
         &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
+        SweepContext { chain, obstacles, direction }: SweepContext<'_, D>,
         slave: usize,
-        direction: Direction,
     ) -> Result<(), PendingVeto> {
-        let Self { rules, overlay, own, work, .. } = self;
-        let scene = MotionContext { chain, obstacles, rules, overlay, own };
-        let master = direction.master(slave);
-        scene.candidates(&scene.step(master, slave, direction, chain.points()[slave]), work)
+        let Self { rules, tentative, own_rods, scratch, .. } = self;
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
+        context.candidates(&context.step(slave, direction), scratch)
     }
 
-    /// Steps back after an objection: the latest of the earlier slaves with an alternative takes
-    /// it.
-    fn step_back(
+    /// Backtracks after an objection: the latest of the earlier slaves with an alternative takes it.
+    /// Returns that slave and its new place, or the objection if no alternative is left.
+    fn backtrack(
         &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        direction: Direction,
-        left: &mut usize,
+        sweep: SweepContext<'_, D>,
+        backtracks_left: &mut usize,
         objection: ConnectorVeto,
     ) -> Result<(usize, Candidate<D>), ConnectorVeto> {
-        while let Some(untried) = self.untried.pop() {
-            if *left == 0 {
-                return Err((
-                    objection.0,
-                    PendingVeto { reason: VetoReason::Limit, ..objection.1 },
-                ));
+        while let Some(alternative) = self.alternatives.pop() {
+            if *backtracks_left == 0 {
+                let (by, veto) = objection;
+                return Err((by, PendingVeto { reason: VetoReason::Limit, ..veto }));
             }
-            *left -= 1;
-            match untried {
+            *backtracks_left -= 1;
+            match alternative {
                 Alternative::Place { slave, candidate } => {
-                    self.revert(chain, slave, direction);
+                    self.revert(sweep.chain, slave, sweep.direction);
                     return Ok((slave, candidate));
                 }
                 Alternative::OtherSide { slave, tried } => {
-                    self.revert(chain, slave, direction);
-                    self.work.both_sides = true;
-                    let found = self.find_candidates(chain, obstacles, slave, direction);
-                    self.work.both_sides = false;
-                    let other = self.work.found.iter().find(|c| c.at != tried);
-                    if let (Ok(()), Some(&candidate)) = (found, other) {
+                    self.revert(sweep.chain, slave, sweep.direction);
+                    self.scratch.both_sides = true;
+                    let result = self.find_candidates(sweep, slave);
+                    self.scratch.both_sides = false;
+                    let other = self.scratch.found.iter().find(|c| c.at != tried);
+                    if let (Ok(()), Some(&candidate)) = (result, other) {
                         return Ok((slave, candidate));
                     }
                 }
@@ -375,97 +400,106 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Returns whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
-    /// and the rod beyond it are good as they are.
-    fn may_stop(
-        &self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        slave: usize,
-        direction: Direction,
-    ) -> bool {
-        let Some(next) = direction.next(slave, chain.points().len()) else { return true };
-        let scene = self.scene(chain, obstacles);
-        let step = scene.step(slave, next, direction, chain.points()[next]);
-        is_length_allowed(step.rod, distance(step.so, step.mn)) && step.exceeds_bend_at(step.so)
+    /// and the rod beyond it are allowed as they are.
+    fn may_stop(&self, sweep: SweepContext<'_, D>, slave: usize) -> bool {
+        let Some(next) = sweep.next(slave) else { return true };
+        let step = self.context(sweep.chain, sweep.obstacles).step(next, sweep.direction);
+        // The bend counts as well: its inner rod has turned, though its outer one stays. Without this
+        // test a chain with a limit of 60 degrees stopped at 86.
+        is_length_allowed(step.rod, distance(step.so, step.mn)) && step.is_bend_allowed_at(step.so)
     }
 
     fn place(&mut self, chain: &Chain<D>, i: usize, at: Point<D>) {
-        self.overlay.set(i, at);
-        self.refresh_own(chain, i);
+        self.tentative.set(i, at);
+        self.refresh_own_rods(chain, i);
     }
 
-    fn refresh_own(&mut self, chain: &Chain<D>, i: usize) {
+    /// Updates the boxes of the rods at a connector whose tentative position has changed.
+    fn refresh_own_rods(&mut self, chain: &Chain<D>, i: usize) {
         if !self.rules.self_collision {
             return;
         }
         for rod in i.saturating_sub(1)..(i + 1).min(chain.rods().len()) {
-            let at = |k: usize| self.overlay.get(k).unwrap_or(chain.points()[k]);
+            let at = |k: usize| self.tentative.get(k).unwrap_or(chain.points()[k]);
             let bounds = rod_box(chain, rod, at);
-            self.own.set(rod, bounds);
+            self.own_rods.set(rod, bounds);
         }
     }
 
     /// Forgets the new places from a slave outward.
     fn revert(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
-        let (from, to) = (self.overlay.from, self.overlay.to);
-        let forgotten = match direction {
-            Direction::Up => slave..to,
-            Direction::Down => from..slave + 1,
+        let Range { start, end } = self.tentative.run();
+        let reverted = match direction {
+            Direction::Up => {
+                self.tentative.to = slave.min(end);
+                slave..end
+            }
+            Direction::Down => {
+                self.tentative.from = (slave + 1).max(start);
+                start..slave + 1
+            }
         };
-        match direction {
-            Direction::Up => self.overlay.to = slave.min(to),
-            Direction::Down => self.overlay.from = (slave + 1).max(from),
-        }
-        for i in forgotten {
-            self.refresh_own(chain, i);
+        for i in reverted {
+            self.refresh_own_rods(chain, i);
         }
     }
 
-    fn commit(&mut self, chain: &mut Chain<D>, heads: &DrivenConnectors<D>) {
-        // Outward from the head, so that the run of old positions has no gap.
-        let (from, to) = (self.overlay.from, self.overlay.to);
-        for i in (heads.first..to).chain((from..heads.first).rev()) {
+    /// Writes the tentative positions into the chain.
+    fn commit(&mut self, chain: &mut Chain<D>, driven: &DrivenConnectors<D>) {
+        let run = self.tentative.run();
+        // Outward from the driven connectors, so that the run of original positions has no gap.
+        for i in (driven.first..run.end).chain((run.start..driven.first).rev()) {
             let old = chain.points()[i];
-            let new = self.overlay.get(i).unwrap_or(old);
-            if self.before.get(i).is_none() {
-                self.before.set(i, old);
+            let new = self.tentative.get(i).unwrap_or(old);
+            if self.original.get(i).is_none() {
+                self.original.set(i, old);
             }
             self.tally.changed += usize::from(old != new);
-            if !heads.indices().contains(&i) {
+            if !driven.indices().contains(&i) {
                 self.tally.record_slave_move(distance(old, new));
             }
             chain.points_mut()[i] = new;
         }
-        self.tally.record_run(from..to);
+        self.tally.record_run(run);
     }
+}
+
+/// Returns whether every driven connector is at its target, up to the least move.
+fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> bool {
+    driven
+        .indices()
+        .enumerate()
+        .all(|(h, k)| distance(driven.to[h], chain.points()[k]) <= chain.min_move_m())
 }
 
 /// Returns whether only the chain itself can be in the way of a motion.
 fn is_open<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
-    heads: &DrivenConnectors<D>,
+    driven: &DrivenConnectors<D>,
 ) -> bool {
-    obstacles.is_empty() && chain.is_plain() && heads.n == 1
+    obstacles.is_empty() && chain.is_plain() && driven.n == 1
 }
 
-/// Returns the number of sub-steps of a way. `is_empty` says that there is no obstacle.
+/// Returns the number of sub-steps in which an initiator moves by `travel_m`. `is_empty` says that
+/// there is no obstacle.
 fn count_sub_steps(
     rules: &Rules,
-    least_step_m: f64,
+    default_step_m: f64,
     is_empty: bool,
-    way_m: f64,
+    travel_m: f64,
 ) -> Result<usize, InputError> {
     let step_m = match rules.step_m {
         Some(step_m) if step_m > 0.0 => step_m,
+        // Where nothing can object, one long step is as safe as many short ones.
         _ if is_empty && !rules.self_collision => f64::INFINITY,
-        _ => least_step_m,
+        _ => default_step_m,
     };
-    let n = (way_m / step_m).ceil().max(1.0);
+    let n = (travel_m / step_m).ceil().max(1.0);
     if n > MAX_SUB_STEPS {
         return Err(InputError::new(
             "target",
-            format!("is {way_m} m away, which takes {n} steps of {step_m} m"),
+            format!("is {travel_m} m away, which takes {n} steps of {step_m} m"),
             "go there in several requests",
         ));
     }
@@ -484,28 +518,23 @@ fn has_more_places<const D: usize>(chain: &Chain<D>, head: usize, direction: Dir
 
 impl<const D: usize> MotionContext<'_, D> {
     /// Returns the step of a slave whose master's new place is settled.
-    fn step(
-        &self,
-        master: usize,
-        slave: usize,
-        direction: Direction,
-        so: Point<D>,
-    ) -> SlaveStep<D> {
+    fn step(&self, slave: usize, direction: Direction) -> SlaveStep<D> {
         let points = self.chain.points();
-        let before = match direction {
+        let master = direction.master(slave);
+        let behind_master = match direction {
             Direction::Up => master.checked_sub(1),
             Direction::Down => (master + 1 < points.len()).then_some(master + 1),
         };
         // In the first sweep the connector on the initiator's other side has yet to move, and the
         // second sweep will check the bend.
-        let prev =
-            before.filter(|&b| direction == Direction::Down || self.overlay.get(b).is_some());
+        let prev = behind_master
+            .filter(|&b| direction == Direction::Down || self.tentative.get(b).is_some());
         SlaveStep {
             master,
             slave,
             mo: points[master],
             mn: self.position(master),
-            so,
+            so: points[slave],
             prev: prev.map(|b| self.position(b)),
             rod: self.chain.rod_between(master, slave),
             tip_radius_m: self.chain.connectors()[slave].radius_m,
@@ -513,7 +542,7 @@ impl<const D: usize> MotionContext<'_, D> {
         }
     }
 
-    /// Checks whether the way of an initiator is free of obstacles and of the chain's own parts.
+    /// Checks whether the path of an initiator is free of obstacles and of the chain's own parts.
     fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
         if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
             return Ok(());
@@ -532,13 +561,16 @@ impl<const D: usize> MotionContext<'_, D> {
             let before_m = keep_m - block.core.nearest_to_point(from).distance_m;
             let after_m = keep_m - block.core.nearest_to_point(to).distance_m;
             let was_inside = before_m > TOLERANCE_M;
+            // An initiator that starts inside, e.g. because an obstacle has moved, must be able to get
+            // out; only deeper it must not go.
             if was_inside && after_m <= before_m {
                 return;
             }
             let reason = if was_inside { VetoReason::Inside } else { VetoReason::TargetBlocked };
-            let deeper =
+            // Of equal depths the lower name counts, because blocks come in no particular order.
+            let is_deeper =
                 worst.is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
-            if deeper {
+            if is_deeper {
                 worst = Some((after_m, block.name, reason));
             }
         });
@@ -546,30 +578,32 @@ impl<const D: usize> MotionContext<'_, D> {
     }
 }
 
-/// Projects the targets to allowed places of the heads, or returns the objection.
+/// Projects the targets of driven connectors to allowed places, or returns the objection.
 fn project<const D: usize>(
     chain: &Chain<D>,
-    heads: &mut DrivenConnectors<D>,
+    driven: &mut DrivenConnectors<D>,
     mode: VetoEffect,
 ) -> Result<(), ConnectorVeto> {
-    for (h, k) in heads.indices().enumerate() {
-        let (connector, at) = (&chain.connectors()[k], chain.points()[k]);
-        if heads.to[h] == at {
+    for (h, k) in driven.indices().enumerate() {
+        let connector = &chain.connectors()[k];
+        let at = chain.points()[k];
+        if driven.to[h] == at {
             continue;
         }
-        if connector.is_still() && distance(heads.to[h], at) > chain.min_move_m() {
+        if connector.is_still() && distance(driven.to[h], at) > chain.min_move_m() {
             return Err((k, PendingVeto::new(connector.still_reason())));
         }
-        if !connector.mobility.allows(heads.to[h], at) {
-            if mode == VetoEffect::Exact || heads.n > 1 {
+        if !connector.mobility.allows(driven.to[h], at) {
+            if mode == VetoEffect::Exact || driven.n > 1 {
                 return Err((k, PendingVeto::new(VetoReason::Mobility)));
             }
-            heads.to[h] = connector.mobility.project(heads.to[h], at);
+            driven.to[h] = connector.mobility.project(driven.to[h], at);
         }
     }
     Ok(())
 }
 
+/// Returns the box around a rod and the connectors at its ends, for connectors at `at`.
 fn rod_box<const D: usize>(
     chain: &Chain<D>,
     i: usize,
@@ -580,29 +614,31 @@ fn rod_box<const D: usize>(
     Bounds::from_points(&[at(i), at(i + 1)]).grown(radius_m)
 }
 
+/// Returns the veto of an objection, with the chain where its motion has ended.
 fn make_veto<const D: usize>(
     chain: &Chain<D>,
     from: usize,
     by: usize,
-    refusal: PendingVeto,
+    objection: PendingVeto,
 ) -> Veto<D> {
-    let PendingVeto { reason, obstacle } = refusal;
+    let PendingVeto { reason, obstacle } = objection;
     Veto { by, from, reason, obstacle, reached: chain.points()[from] }
 }
 
-fn check<const D: usize>(chain: &Chain<D>, heads: &DrivenConnectors<D>) -> Result<(), InputError> {
-    if heads.first + heads.n > chain.points().len() {
+/// Refuses a motion of connectors that the chain does not have, or to a target out of range.
+fn check<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> Result<(), InputError> {
+    if driven.first + driven.n > chain.points().len() {
         return Err(InputError::new(
             "initiator",
             format!(
                 "is number {}, and the chain has {} connectors",
-                heads.first,
+                driven.first,
                 chain.points().len()
             ),
             "count from 0",
         ));
     }
-    heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
+    driven.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
 pub mod local_solver;

@@ -1,28 +1,30 @@
-//! An arm's reach: moving one connector of a chain held by others: a fixed base, a base on a line, on a
-//! plane or in a box, two ends, or any of them in between.
+//! Reaching: moving one connector of a chain while others hold it: a fixed base, a base on a line, on a
+//! plane or in a box, two ends, or any connectors in between.
 //!
-//! A connector that is held vetoes a pull of rods of fixed length that would take it away, so its objection
-//! is answered by return passes: all held connectors move tentatively, and are then led back, each to its
-//! place if it is fixed, and to the nearest one allowed if it is not. All passes and the check of the whole
-//! way are one transaction.
+//! With rods of fixed length a held connector would veto every pull, and no target could be reached. So
+//! the held connectors are set free for the time being, and return passes lead them back, each to its
+//! place if it is fixed, and to the nearest one allowed if it is not. For one fixed base a double pass
+//! is an iteration of FABRIK (Aristidou and Lasenby, 2011). All passes and the check of the whole path
+//! are one transaction.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Mobility};
 use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
 use super::propagate::Propagator;
 use super::tunneling::find_tunneling;
-use super::veto::{Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason};
+use super::veto::{Motion, Request, RequestSource, Veto, VetoEffect, VetoReason};
 use sidestep_kernel::{InputError, interrupt};
 
-/// Most double passes before the search is given up.
+/// Most double passes before the search is given up. One held connector converges in few passes,
+/// unless the target is at full reach.
 const MAX_DOUBLE_PASSES: usize = 40;
 /// Most double passes where several connectors are held, because their return passes disturb each other.
 const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.
 const MIN_GAIN: f64 = 1e-4;
-/// Distance from their places within which several held connectors count as being back; each is put
-/// there exactly then, which takes up a tenth of the tolerance of the rods' lengths.
+/// Distance from their places within which several held connectors count as being back. Then each is
+/// put there exactly, which uses up a tenth of the tolerance of the rods' lengths.
 const RETURN_TOLERANCE_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 
 /// The target of a connector, and the base.
@@ -48,7 +50,7 @@ pub enum ReachOutcome<const D: usize> {
         /// Passes to the target and back.
         double_passes: usize,
     },
-    /// The target cannot be reached in this way; nothing has changed.
+    /// The passes did not reach the target; nothing has changed.
     Short {
         /// The place nearest to the target that the connector could have reached.
         nearest: Point<D>,
@@ -67,14 +69,25 @@ struct HeldConnector<const D: usize> {
 }
 
 impl<const D: usize> HeldConnector<D> {
-    /// Returns the place to which the connector goes back from where it is.
+    /// Returns the place to which the connector is to return.
     fn home_position(&self, chain: &Chain<D>) -> Point<D> {
+        if self.failed {
+            return self.home;
+        }
         match self.mobility {
-            _ if self.failed => self.home,
             Mobility::Free | Mobility::Fixed => self.home,
             on => on.project(chain.points()[self.k], self.home),
         }
     }
+}
+
+/// A chain whose held connectors are set free, and the goal of its passes.
+struct ReachPasses<'a, const D: usize> {
+    propagator: &'a mut Propagator<D>,
+    chain: &'a mut Chain<D>,
+    obstacles: &'a Obstacles<D>,
+    request: &'a ReachRequest<D>,
+    held: &'a [HeldConnector<D>],
 }
 
 /// Moves a connector to a target while the base keeps its place, bit for bit, and all other held
@@ -86,50 +99,43 @@ pub fn reach<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    order: &ReachRequest<D>,
+    request: &ReachRequest<D>,
 ) -> Result<ReachOutcome<D>, InputError> {
-    if order.base >= chain.points().len() || order.base == order.k {
+    if request.base >= chain.points().len() || request.base == request.k {
         return Err(InputError::new(
             "base",
-            format!("is connector {}, of {}", order.base, chain.points().len()),
-            "name another connector than the one that moves, counted from 0",
+            format!("is connector {}, of {}", request.base, chain.points().len()),
+            "give another connector than the one that moves, counted from 0",
         ));
     }
     let before = chain.points().to_vec();
-    let held = held_connectors(chain, order);
+    let held = held_connectors(chain, request);
     for h in &held {
         chain.set_mobility(h.k, Mobility::Free)?;
         chain.set_failed(h.k, false);
     }
-    let came = run_passes(propagator, chain, obstacles, order, &held);
+    let passes = ReachPasses { propagator, chain, obstacles, request, held: &held };
+    let outcome = passes.run();
     for h in &held {
         chain.set_mobility(h.k, h.mobility)?;
         chain.set_failed(h.k, h.failed);
     }
-    let came = came.map(|came| match came {
-        ReachOutcome::There { .. } => {
-            path_veto(chain, obstacles, &before, order).map_or(came, |veto| ReachOutcome::Short {
-                nearest: chain.points()[order.k],
-                veto: Some(veto),
-            })
-        }
-        short @ ReachOutcome::Short { .. } => short,
-    });
-    if !matches!(came, Ok(ReachOutcome::There { .. })) {
+    let outcome = outcome.map(|outcome| checked_path(outcome, chain, obstacles, &before, request));
+    if !matches!(outcome, Ok(ReachOutcome::There { .. })) {
         chain.points_mut().copy_from_slice(&before);
     }
-    came
+    outcome
 }
 
 /// Returns the connectors that are not free to go anywhere, and the base.
 fn held_connectors<const D: usize>(
     chain: &Chain<D>,
-    order: &ReachRequest<D>,
+    request: &ReachRequest<D>,
 ) -> Vec<HeldConnector<D>> {
     let is_held = |k: usize| {
         let connector = &chain.connectors()[k];
-        k != order.k
-            && (k == order.base || connector.failed || connector.mobility != Mobility::Free)
+        k != request.k
+            && (k == request.base || connector.failed || connector.mobility != Mobility::Free)
     };
     let held = (0..chain.points().len()).filter(|&k| is_held(k)).map(|k| {
         let connector = &chain.connectors()[k];
@@ -139,90 +145,111 @@ fn held_connectors<const D: usize>(
     held.collect()
 }
 
-fn run_passes<const D: usize>(
-    propagator: &mut Propagator<D>,
-    chain: &mut Chain<D>,
-    obstacles: &Obstacles<D>,
-    order: &ReachRequest<D>,
-    held: &[HeldConnector<D>],
-) -> Result<ReachOutcome<D>, InputError> {
-    let most = if held.len() > 1 { MAX_MUTUAL_PASSES } else { MAX_DOUBLE_PASSES };
-    let mut nearest = chain.points()[order.k];
-    let mut off_m = distance(nearest, order.target);
-    for double_passes in 0..=most {
-        interrupt::check();
-        if off_m <= order.tolerance_m && restore_held(chain, held) {
-            return Ok(ReachOutcome::There { off_m, double_passes });
+impl<const D: usize> ReachPasses<'_, D> {
+    fn run(mut self) -> Result<ReachOutcome<D>, InputError> {
+        let ReachRequest { k, target, tolerance_m, .. } = *self.request;
+        let max_passes = if self.held.len() > 1 { MAX_MUTUAL_PASSES } else { MAX_DOUBLE_PASSES };
+        let mut nearest = self.chain.points()[k];
+        let mut off_m = distance(nearest, target);
+        for double_passes in 0..=max_passes {
+            interrupt::check();
+            if off_m <= tolerance_m && self.restore_held() {
+                return Ok(ReachOutcome::There { off_m, double_passes });
+            }
+            if let Some(veto) = self.double_pass()? {
+                return Ok(ReachOutcome::Short { nearest, veto: Some(veto) });
+            }
+            // The errors of the held connectors count too: a pass that only trades one for the other
+            // is no gain.
+            let now_m = distance(self.chain.points()[k], target) + self.max_error_m();
+            if now_m > off_m * (1.0 - MIN_GAIN) && now_m > tolerance_m {
+                return Ok(ReachOutcome::Short { nearest, veto: None });
+            }
+            nearest = self.chain.points()[k];
+            off_m = now_m;
         }
-        if let Some(veto) = double_pass(propagator, chain, obstacles, order, held)? {
-            return Ok(ReachOutcome::Short { nearest, veto: Some(veto) });
-        }
-        let now_m = distance(chain.points()[order.k], order.target) + max_error_m(chain, held);
-        if now_m > off_m * (1.0 - MIN_GAIN) && now_m > order.tolerance_m {
-            return Ok(ReachOutcome::Short { nearest, veto: None });
-        }
-        (nearest, off_m) = (chain.points()[order.k], now_m);
+        Ok(ReachOutcome::Short { nearest, veto: None })
     }
-    Ok(ReachOutcome::Short { nearest, veto: None })
-}
 
-/// Leads the initiator to its target, and then all held connectors back; returns the objection, if there
-/// is one.
-fn double_pass<const D: usize>(
-    propagator: &mut Propagator<D>,
-    chain: &mut Chain<D>,
-    obstacles: &Obstacles<D>,
-    order: &ReachRequest<D>,
-    held: &[HeldConnector<D>],
-) -> Result<Option<Veto<D>>, InputError> {
-    for pass in 0..=held.len() {
-        let (k, to) = match pass.checked_sub(1) {
-            None => (order.k, order.target),
-            Some(i) => (held[i].k, held[i].home_position(chain)),
-        };
-        let motion = Motion::Connector { k, to };
-        let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
-        if let Outcome::Vetoed(veto) = propagator.propagate(chain, obstacles, &request)? {
+    /// Leads the initiator to its target, and then all held connectors back; returns the objection, if
+    /// there is one.
+    fn double_pass(&mut self) -> Result<Option<Veto<D>>, InputError> {
+        let ReachRequest { k, target, .. } = *self.request;
+        if let Some(veto) = self.lead(k, target)? {
             return Ok(Some(veto));
         }
-        // A last move shorter than the least counts as none, so a held connector is put exactly home.
-        if pass > 0 {
-            chain.points_mut()[k] = to;
+        for h in self.held {
+            let home = h.home_position(self.chain);
+            if let Some(veto) = self.lead(h.k, home)? {
+                return Ok(Some(veto));
+            }
+            // A last move shorter than the least counts as none, so a held connector is put exactly
+            // home.
+            self.chain.points_mut()[h.k] = home;
         }
+        Ok(None)
     }
-    Ok(None)
-}
 
-/// Returns the greatest distance of a held connector from its place, meters.
-fn max_error_m<const D: usize>(chain: &Chain<D>, held: &[HeldConnector<D>]) -> f64 {
-    let off_m = held.iter().map(|h| distance(chain.points()[h.k], h.home_position(chain)));
-    off_m.fold(0.0, f64::max)
-}
-
-/// Puts all held connectors exactly where they belong, if they are as good as there; returns whether they are.
-fn restore_held<const D: usize>(chain: &mut Chain<D>, held: &[HeldConnector<D>]) -> bool {
-    let is_back = max_error_m(chain, held) <= RETURN_TOLERANCE_M;
-    for h in held.iter().filter(|_| is_back) {
-        let place = h.home_position(chain);
-        chain.points_mut()[h.k] = place;
+    /// Moves one connector, or returns the veto.
+    fn lead(&mut self, k: usize, to: Point<D>) -> Result<Option<Veto<D>>, InputError> {
+        let motion = Motion::Connector { k, to };
+        let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
+        let outcome = self.propagator.propagate(self.chain, self.obstacles, &request)?;
+        Ok(outcome.veto().copied())
     }
-    is_back
+
+    /// Returns the greatest distance of a held connector from its place, meters.
+    fn max_error_m(&self) -> f64 {
+        let chain = &*self.chain;
+        let off_m = self.held.iter().map(|h| distance(chain.points()[h.k], h.home_position(chain)));
+        off_m.fold(0.0, f64::max)
+    }
+
+    /// Puts all held connectors exactly where they belong, if all are nearly there; returns whether they
+    /// are.
+    fn restore_held(&mut self) -> bool {
+        if self.max_error_m() > RETURN_TOLERANCE_M {
+            return false;
+        }
+        for h in self.held {
+            let home = h.home_position(self.chain);
+            self.chain.points_mut()[h.k] = home;
+        }
+        true
+    }
 }
 
-/// Returns the veto of an obstacle on the way from the old state to the new one, because no pass has
-/// checked that whole way.
+/// Returns the outcome of the passes; a success becomes a failure if an obstacle is on the path.
+fn checked_path<const D: usize>(
+    outcome: ReachOutcome<D>,
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    before: &[Point<D>],
+    request: &ReachRequest<D>,
+) -> ReachOutcome<D> {
+    if let ReachOutcome::Short { .. } = outcome {
+        return outcome;
+    }
+    match path_veto(chain, obstacles, before, request) {
+        None => outcome,
+        Some(veto) => ReachOutcome::Short { nearest: chain.points()[request.k], veto: Some(veto) },
+    }
+}
+
+/// Returns the veto of an obstacle between the old state and the new one: each pass was checked, but
+/// not the straight path that the chain appears to take.
 fn path_veto<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     before: &[Point<D>],
-    order: &ReachRequest<D>,
+    request: &ReachRequest<D>,
 ) -> Option<Veto<D>> {
-    find_tunneling(chain, before, obstacles, 0.0).map(|passed| Veto {
-        by: passed.rod + 1,
-        from: order.k,
+    find_tunneling(chain, before, obstacles, 0.0).map(|tunneled| Veto {
+        by: tunneled.rod + 1,
+        from: request.k,
         reason: VetoReason::WouldTunnel,
-        obstacle: Some(passed.obstacle),
-        reached: before[order.k],
+        obstacle: Some(tunneled.obstacle),
+        reached: before[request.k],
     })
 }
 
@@ -243,11 +270,12 @@ mod tests {
     #[test]
     fn an_arm_reaches_and_its_base_keeps_every_bit() {
         let mut chain = arm();
-        let order = ReachRequest { k: 6, target: [3.0, 2.5], base: 0, tolerance_m: 1e-6 };
-        let came = reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &order);
-        assert!(matches!(came.unwrap(), ReachOutcome::There { .. }));
+        let request = ReachRequest { k: 6, target: [3.0, 2.5], base: 0, tolerance_m: 1e-6 };
+        let outcome =
+            reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
+        assert!(matches!(outcome.unwrap(), ReachOutcome::There { .. }));
         assert_eq!(chain.points()[0], [0.0, 0.0]);
-        assert!(distance(chain.points()[6], order.target) <= 1e-6);
+        assert!(distance(chain.points()[6], request.target) <= 1e-6);
         assert!(chain.max_rod_violation_m() <= 1e-9);
         assert_eq!(chain.connectors()[0].mobility, Mobility::Fixed);
     }
@@ -256,29 +284,30 @@ mod tests {
     fn a_target_out_of_reach_changes_nothing() {
         let mut chain = arm();
         let before = chain.clone();
-        let order = ReachRequest { k: 6, target: [0.0, 9.0], base: 0, tolerance_m: 1e-6 };
-        let came = reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &order);
-        assert!(matches!(came.unwrap(), ReachOutcome::Short { veto: None, .. }));
+        let request = ReachRequest { k: 6, target: [0.0, 9.0], base: 0, tolerance_m: 1e-6 };
+        let outcome =
+            reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
+        assert!(matches!(outcome.unwrap(), ReachOutcome::Short { veto: None, .. }));
         assert_eq!(chain, before);
         assert!(
             reach(
                 &mut Propagator::default(),
                 &mut chain,
                 &Obstacles::default(),
-                &ReachRequest { base: 6, ..order }
+                &ReachRequest { base: 6, ..request }
             )
             .is_err()
         );
     }
 
     #[test]
-    fn a_blocked_target_is_told() {
+    fn a_blocked_target_is_reported() {
         let mut chain = arm();
         let before = chain.clone();
         let obstacles = Obstacles::new(vec![Obstacle::ball(4, [4.0, 2.0], 0.5)], 1.0).unwrap();
-        let order = ReachRequest { k: 6, target: [4.0, 2.0], base: 0, tolerance_m: 1e-6 };
-        let came = reach(&mut Propagator::default(), &mut chain, &obstacles, &order).unwrap();
-        let ReachOutcome::Short { veto: Some(veto), .. } = came else { panic!("{came:?}") };
+        let request = ReachRequest { k: 6, target: [4.0, 2.0], base: 0, tolerance_m: 1e-6 };
+        let outcome = reach(&mut Propagator::default(), &mut chain, &obstacles, &request).unwrap();
+        let ReachOutcome::Short { veto: Some(veto), .. } = outcome else { panic!("{outcome:?}") };
         assert_eq!((veto.reason, veto.obstacle), (VetoReason::TargetBlocked, Some(4)));
         assert_eq!(chain, before);
     }

@@ -1,10 +1,10 @@
 //! Re-forming a broken chain (slide F3): the parts between two whole ends are scattered, or some of
 //! them are missing.
 //!
-//! Passes from one stub to the other and back, each slave by push, pull and resize, bring every rod
-//! into its limits; the whole ends keep every bit. Parts that only just reach would take passes
-//! without end, and are laid out instead. If the gap is longer than the remaining parts, one end must
-//! come, and only an end that may.
+//! Passes from one stub (the last whole connector before the gap) to the other and back, each slave by
+//! push, pull and resize, bring every rod into its limits; the whole ends keep every bit. Where the
+//! parts only just reach, passes converge too slowly, and the parts are laid out instead. If the gap is
+//! longer than the remaining parts, one end is pulled nearer, if it is allowed to move.
 
 use super::candidates::guide;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
@@ -21,12 +21,12 @@ use std::ops::RangeInclusive;
 /// Most double passes before the parts are laid out. Where they reach with room to spare, the worst
 /// case measured took 120.
 const MAX_DOUBLE_PASSES: usize = 1_000;
-/// Ratio of the gap to the reach of the scattered parts from which on they are stretched out.
+/// Ratio of the gap to the reach of the scattered parts from which on they are laid out on a line.
 const STRETCH_RATIO: f64 = 0.999;
-/// Ratio of the gap to the reach of the scattered parts that an end leaves when it comes.
+/// Ratio of the gap to the reach of the scattered parts that an end leaves when it is pulled nearer.
 const SLACK_RATIO: f64 = 0.95;
 
-/// The whole end that may come if the gap is too long.
+/// The whole end that may move nearer if the gap is too long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MovableEnd {
     /// Neither end.
@@ -55,7 +55,7 @@ pub enum ReformResult {
         missing: usize,
     },
     /// The parts cannot be joined, because one rod is longer than the gap and all other rods, or an
-    /// end that may come did not; nothing has changed.
+    /// end could not be pulled near enough; nothing has changed.
     NotReached {
         /// Error of the worst rod, meters.
         off_m: f64,
@@ -63,7 +63,7 @@ pub enum ReformResult {
 }
 
 /// Brings the scattered connectors of a chain back between the two whole ends beside them. An end
-/// that may come is pulled as a chain of its own; the other keeps every bit. Obstacles are ignored:
+/// that may move is pulled as a chain of its own; the other keeps every bit. Obstacles are ignored:
 /// move the whole chain afterwards to avoid them.
 ///
 /// # Errors
@@ -72,16 +72,18 @@ pub enum ReformResult {
 pub fn reform<const D: usize>(
     chain: &mut Chain<D>,
     scattered: RangeInclusive<usize>,
-    may_come: MovableEnd,
+    movable: MovableEnd,
 ) -> Result<ReformResult, InputError> {
-    let (first, last) = (*scattered.start(), *scattered.end());
+    let first = *scattered.start();
+    let last = *scattered.end();
     check_ends(chain, first, last)?;
     let before = chain.points().to_vec();
-    let (low, high) = (first - 1, last + 1);
+    let low = first - 1;
+    let high = last + 1;
     let have_m: f64 = chain.rods()[low..high].iter().map(|r| r.max_m).sum();
     let need_m = distance(chain.points()[low], chain.points()[high]);
     if need_m > have_m + LENGTH_TOLERANCE_M {
-        match may_come {
+        match movable {
             MovableEnd::Nobody => {
                 let missing = missing_rods(&chain.rods()[low..high], need_m - have_m);
                 return Ok(ReformResult::GapTooLong { have_m, need_m, missing });
@@ -139,28 +141,30 @@ fn missing_rods(rods: &[Rod], gap_m: f64) -> usize {
 /// because passes would converge to that line without end.
 fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
     let [a, b] = [chain.points()[low], chain.points()[high]];
-    let part = distance(a, b) / have_m;
-    let fit = |rod: &Rod| is_length_allowed(*rod, part * rod.max_m);
-    if part < STRETCH_RATIO || !chain.rods()[low..high].iter().all(fit) {
+    let stretch = distance(a, b) / have_m;
+    let fit = |rod: &Rod| is_length_allowed(*rod, stretch * rod.max_m);
+    if stretch < STRETCH_RATIO || !chain.rods()[low..high].iter().all(fit) {
         return;
     }
-    let mut way_m = 0.0;
+    let mut along_m = 0.0;
     for i in low..high - 1 {
-        way_m += chain.rods()[i].max_m;
-        chain.points_mut()[i + 1] = lerp(a, b, way_m / have_m);
+        along_m += chain.rods()[i].max_m;
+        chain.points_mut()[i + 1] = lerp(a, b, along_m / have_m);
     }
 }
 
 /// Passes from one stub to the connector before the other.
 fn run_pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
-    let least_move_m = chain.min_move_m();
+    let min_move_m = chain.min_move_m();
     let mut master = from;
     let mut mo = chain.points()[from];
     while let Some(slave) = direction.next(master, chain.points().len()).filter(|&s| s != to) {
-        let (mn, so) = (chain.points()[master], chain.points()[slave]);
+        let mn = chain.points()[master];
+        let so = chain.points()[slave];
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = guide([mo, mn, so], rod, least_move_m);
-        (master, mo) = (slave, so);
+        chain.points_mut()[slave] = guide([mo, mn, so], rod, min_move_m);
+        master = slave;
+        mo = so;
     }
 }
 
@@ -171,18 +175,21 @@ fn pull_end<const D: usize>(
     other_stub: usize,
     have_m: f64,
 ) -> Result<(), InputError> {
-    let (low, high) = (*end.start(), *end.end());
+    let low = *end.start();
+    let high = *end.end();
     let stub = if low == 0 { high } else { low };
-    let (at, to) = (chain.points()[stub], chain.points()[other_stub]);
+    let at = chain.points()[stub];
+    let to = chain.points()[other_stub];
     // Passes converge slowly where the parts are stretched out, so they get some slack.
-    let part = 1.0 - SLACK_RATIO * have_m / distance(at, to);
-    let target: Point<D> = lerp(at, to, part);
+    let fraction = 1.0 - SLACK_RATIO * have_m / distance(at, to);
+    let target: Point<D> = lerp(at, to, fraction);
     let mut alone = Chain::new_broken(
         chain.points()[low..=high].to_vec(),
         chain.connectors()[low..=high].to_vec(),
         chain.rods()[low..high].to_vec(),
     )?;
     let request = Request::exact(stub - low, target);
+    // If the end cannot move, the check of all rods that follows says so.
     let _ = Propagator::default().propagate(&mut alone, &Obstacles::default(), &request)?;
     chain.points_mut()[low..=high].copy_from_slice(alone.points());
     Ok(())
@@ -219,8 +226,8 @@ mod tests {
             let mut chain =
                 broken::<2>(seed, scattered.clone(), [1.0, 10.0, 100.0][seed as usize / 20]);
             let before = chain.clone();
-            let came = reform(&mut chain, scattered.clone(), MovableEnd::Nobody).unwrap();
-            assert!(matches!(came, ReformResult::Whole { .. }), "{seed}: {came:?}");
+            let result = reform(&mut chain, scattered.clone(), MovableEnd::Nobody).unwrap();
+            assert!(matches!(result, ReformResult::Whole { .. }), "{seed}: {result:?}");
             assert!(chain.max_rod_violation_m() <= 1e-9);
             assert_eq!(chain.points()[..*scattered.start()], before.points()[..*scattered.start()]);
             assert_eq!(
@@ -241,34 +248,36 @@ mod tests {
             for p in &mut chain.points_mut()[3..n - 2] {
                 *p = add(*p, numbers.point(5.0));
             }
-            let came = reform(&mut chain, 3..=n - 3, MovableEnd::Nobody).unwrap();
-            assert_eq!(came, ReformResult::Whole { double_passes: 0 });
+            let result = reform(&mut chain, 3..=n - 3, MovableEnd::Nobody).unwrap();
+            assert_eq!(result, ReformResult::Whole { double_passes: 0 });
             assert!(chain.max_rod_violation_m() <= 1e-9);
         }
     }
 
     #[test]
-    fn a_gap_too_long_is_named_unless_an_end_may_come() {
+    fn a_gap_too_long_is_reported_unless_an_end_may_move() {
         let mut chain = broken::<3>(1, 18..=21, 3.0);
         // Two parts are missing: the far end is two rods further away.
         for p in &mut chain.points_mut()[22..] {
             p[0] += 2.0;
         }
         let before = chain.clone();
-        let told = reform(&mut chain, 18..=21, MovableEnd::Nobody).unwrap();
-        let ReformResult::GapTooLong { have_m, need_m, missing } = told else { panic!("{told:?}") };
+        let result = reform(&mut chain, 18..=21, MovableEnd::Nobody).unwrap();
+        let ReformResult::GapTooLong { have_m, need_m, missing } = result else {
+            panic!("{result:?}")
+        };
         assert!((have_m - 5.5).abs() < 1e-12 && (need_m - 7.0).abs() < 1e-12);
         assert_eq!(missing, 2, "1.5 m of rods of 1.1 m");
         assert_eq!(chain, before);
-        let came = reform(&mut chain, 18..=21, MovableEnd::Last).unwrap();
-        assert!(matches!(came, ReformResult::Whole { .. }), "{came:?}");
+        let result = reform(&mut chain, 18..=21, MovableEnd::Last).unwrap();
+        assert!(matches!(result, ReformResult::Whole { .. }), "{result:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
         assert_eq!(chain.points()[..18], before.points()[..18]);
         assert!(reform(&mut chain, 0..=3, MovableEnd::Nobody).is_err());
     }
 
     /// Chains with missing parts, so that those left reach across the gap with `part` of their length.
-    fn wanting<const D: usize>(seed: u64, part: f64) -> Chain<D> {
+    fn chain_with_missing_parts<const D: usize>(seed: u64, part: f64) -> Chain<D> {
         let mut numbers = TestRng::new(seed);
         let parts = 3 + seed as usize % 18;
         let gap_m = part * 1.1 * (parts + 1) as f64;
@@ -288,14 +297,14 @@ mod tests {
     fn all_that_just_reach_are_joined_and_all_that_do_not_are_refused() {
         for seed in 0..400 {
             let part = 1.01 - 0.02 * (seed as f64 / 400.0) * (seed as f64 / 400.0);
-            let mut chain = wanting::<2>(seed, part);
+            let mut chain = chain_with_missing_parts::<2>(seed, part);
             let scattered = 3..=chain.points().len() - 4;
-            let came = reform(&mut chain, scattered, MovableEnd::Nobody).unwrap();
+            let result = reform(&mut chain, scattered, MovableEnd::Nobody).unwrap();
             let reaches = part <= 1.0;
             assert_eq!(
-                matches!(came, ReformResult::Whole { .. }),
+                matches!(result, ReformResult::Whole { .. }),
                 reaches,
-                "{seed}: {part}, {came:?}"
+                "{seed}: {part}, {result:?}"
             );
             assert!(!reaches || chain.max_rod_violation_m() <= 1e-9);
         }
@@ -308,8 +317,8 @@ mod tests {
         let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
         let mut chain =
             Chain::new_broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
-        let came = reform(&mut chain, 1..=6, MovableEnd::Nobody).unwrap();
-        assert!(matches!(came, ReformResult::Whole { .. }), "{came:?}");
+        let result = reform(&mut chain, 1..=6, MovableEnd::Nobody).unwrap();
+        assert!(matches!(result, ReformResult::Whole { .. }), "{result:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
     }
 }

@@ -1,4 +1,4 @@
-//! A tree of boxes over the rods, which finds the chain's own parts nearby.
+//! A bounding volume hierarchy over the rods, which finds the chain's own parts nearby.
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
 //! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
@@ -7,7 +7,7 @@
 use super::geometry::Bounds;
 use std::ops::Range;
 
-/// Rods per leaf.
+/// Rods per leaf: a test of four boxes in a row costs less than two more levels of the tree.
 const RODS_PER_LEAF: usize = 4;
 
 /// Boxes around the rods and their connectors, and around groups of them.
@@ -17,7 +17,7 @@ pub struct RodBvh<const D: usize> {
     /// A binary heap: node 1 is the root, `leaves..2 * leaves` are the leaves.
     nodes: Vec<Bounds<D>>,
     leaves: usize,
-    /// Leaves whose boxes, or the ones above, may be larger than they must.
+    /// Leaves whose boxes, or the ones above, may be larger than necessary.
     loose: Range<usize>,
 }
 
@@ -48,9 +48,10 @@ impl<const D: usize> RodBvh<D> {
     }
 
     fn mark_loose(&mut self, leaf: usize) {
-        self.loose = match self.loose.is_empty() {
-            true => leaf..leaf + 1,
-            false => self.loose.start.min(leaf)..self.loose.end.max(leaf + 1),
+        self.loose = if self.loose.is_empty() {
+            leaf..leaf + 1
+        } else {
+            self.loose.start.min(leaf)..self.loose.end.max(leaf + 1)
         };
     }
 
@@ -63,9 +64,11 @@ impl<const D: usize> RodBvh<D> {
         for leaf in loose.clone() {
             self.nodes[self.leaves + leaf] = self.leaf_bounds(leaf);
         }
-        let (mut from, mut to) = (self.leaves + loose.start, self.leaves + loose.end - 1);
+        let mut from = self.leaves + loose.start;
+        let mut to = self.leaves + loose.end - 1;
         while from > 1 {
-            (from, to) = (from / 2, to / 2);
+            from /= 2;
+            to /= 2;
             for node in from..=to {
                 self.nodes[node] = self.nodes[2 * node].joined(&self.nodes[2 * node + 1]);
             }
@@ -92,26 +95,28 @@ impl<const D: usize> RodBvh<D> {
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
         // The depth of the tree is at most the number of bits of a usize.
-        let mut waiting = [0usize; 66];
+        let mut stack = [0usize; 66];
         let mut n = usize::from(!self.rods.is_empty());
-        waiting[0] = 1;
+        stack[0] = 1;
         while n > 0 {
             n -= 1;
-            let node = waiting[n];
+            let node = stack[n];
             if !self.nodes[node].meets(near) {
                 continue;
             }
             if node < self.leaves {
-                (waiting[n], waiting[n + 1]) = (2 * node + 1, 2 * node);
+                // The lower child goes on top, so that rods come in the order of the chain.
+                stack[n] = 2 * node + 1;
+                stack[n + 1] = 2 * node;
                 n += 2;
                 continue;
             }
             let from = (node - self.leaves) * RODS_PER_LEAF;
             for rod in from..(from + RODS_PER_LEAF).min(self.rods.len()) {
                 if self.rods[rod].meets(near) {
-                    look(rod);
+                    visit_one(rod);
                 }
             }
         }

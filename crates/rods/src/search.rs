@@ -1,5 +1,5 @@
-//! A search for a direction of a rod in space that is free of all obstacles nearby, because the blocked
-//! directions on a sphere have no order.
+//! A search for a direction of a rod in space that is free of all obstacles nearby. Unlike the blocked
+//! directions in the plane, those on a sphere are no intervals, so none is computed exactly.
 //!
 //! First the rod turns away from the worst obstacle, again and again; that is nearly always enough.
 //! If it is not, rings of directions around the wanted one are tried from the narrowest on, and the
@@ -12,9 +12,11 @@ use super::motion_context::{Block, BlockOwner, SKIN_M, SlaveStep, contact_distan
 use sidestep_kernel::math;
 use std::f64::consts::{PI, TAU};
 
-/// Most turns away from single obstacles before the rings.
+/// Most turns away from single obstacles before the rings: where two obstacles turn the rod back and forth,
+/// more turns do not end it.
 const MAX_TURNS: usize = 24;
-/// Cosine of the turn beyond which turning away counts as lost: 100 degrees.
+/// Cosine of the turn beyond which turning away is given up: 100 degrees. So large a turn throws the slave
+/// around its master.
 const LOST_COSINE: f64 = -0.173_648;
 /// Directions on a ring.
 const AZIMUTHS: usize = 24;
@@ -36,6 +38,7 @@ struct WorstBlock<const D: usize> {
     depth_m: f64,
     point: Point<D>,
     radius_m: f64,
+    /// Whether the connector at the rod's end is in it, not the rod.
     by_tip: bool,
     name: BlockOwner,
 }
@@ -59,17 +62,19 @@ impl<const D: usize> DirectionSearch<'_, D> {
     pub(super) fn rings(
         &self,
         wanted: Point<D>,
-        is_good: impl Fn(Point<D>) -> bool,
+        is_valid: impl Fn(Point<D>) -> bool,
     ) -> Option<Point<D>> {
         let e1 = perpendicular(wanted);
         let e2 = other_perpendicular(wanted, e1);
         let is_free =
-            |u: Point<D>| self.exceeds_bend(u) && self.worst_block(u).is_none() && is_good(u);
-        let (mut inner_rad, mut ring_rad) = (0.0, 0.02);
+            |u: Point<D>| self.is_bend_allowed(u) && self.worst_block(u).is_none() && is_valid(u);
+        let mut inner_rad = 0.0;
+        let mut ring_rad = 0.02;
         while ring_rad <= MAX_RING_RAD {
             for k in 0..AZIMUTHS {
                 let azimuth_rad = TAU * k as f64 / AZIMUTHS as f64;
-                let (c, s) = (math::cos(azimuth_rad), math::sin(azimuth_rad));
+                let c = math::cos(azimuth_rad);
+                let s = math::sin(azimuth_rad);
                 let side = add(scaled(e1, c), scaled(e2, s));
                 let at =
                     |rad: f64| add(scaled(wanted, math::cos(rad)), scaled(side, math::sin(rad)));
@@ -77,13 +82,15 @@ impl<const D: usize> DirectionSearch<'_, D> {
                     return Some(at(nearest_free_rad(inner_rad, ring_rad, |rad| is_free(at(rad)))));
                 }
             }
-            (inner_rad, ring_rad) = (ring_rad, ring_rad * 1.15 + 0.005);
+            inner_rad = ring_rad;
+            // Denser near the wanted direction, where a free one is worth most.
+            ring_rad = ring_rad * 1.15 + 0.005;
         }
         None
     }
 
-    fn exceeds_bend(&self, u: Point<D>) -> bool {
-        self.step.exceeds_bend_at(add_scaled(self.step.mn, u, self.length_m))
+    fn is_bend_allowed(&self, u: Point<D>) -> bool {
+        self.step.is_bend_allowed_at(add_scaled(self.step.mn, u, self.length_m))
     }
 
     /// Returns the direction itself, or the nearest on the cone of the bend limit.
@@ -94,7 +101,8 @@ impl<const D: usize> DirectionSearch<'_, D> {
             return u;
         }
         let side = side_of(into, u);
-        let (c, s) = (math::cos(self.step.max_bend_rad), math::sin(self.step.max_bend_rad));
+        let c = math::cos(self.step.max_bend_rad);
+        let s = math::sin(self.step.max_bend_rad);
         add(scaled(into, c), scaled(side, s))
     }
 
@@ -102,7 +110,7 @@ impl<const D: usize> DirectionSearch<'_, D> {
     fn worst_block(&self, u: Point<D>) -> Option<WorstBlock<D>> {
         let s = add_scaled(self.step.mn, u, self.length_m);
         let mut worst: Option<WorstBlock<D>> = None;
-        let mut note = |hit: WorstBlock<D>| {
+        let mut keep_worst = |hit: WorstBlock<D>| {
             let is_worse = |w: &WorstBlock<D>| {
                 hit.depth_m > w.depth_m || hit.depth_m == w.depth_m && hit.name < w.name
             };
@@ -117,20 +125,31 @@ impl<const D: usize> DirectionSearch<'_, D> {
             {
                 let nearest = block.core.nearest_to_segment([self.step.mn, s]);
                 let depth_m = contact_distance_m(rod_m) - nearest.distance_m;
-                let (point, name) = (nearest.on_core, block.name);
-                note(WorstBlock { depth_m, point, radius_m: rod_m, by_tip: false, name });
+                keep_worst(WorstBlock {
+                    depth_m,
+                    point: nearest.on_core,
+                    radius_m: rod_m,
+                    by_tip: false,
+                    name: block.name,
+                });
             }
             let tip_m = block.radius_m + self.step.tip_radius_m;
             if block.stops_tip && !block.core.is_clear_of_point(s, contact_distance_m(tip_m)) {
                 let nearest = block.core.nearest_to_point(s);
                 let depth_m = contact_distance_m(tip_m) - nearest.distance_m;
-                let (point, name) = (nearest.on_core, block.name);
-                note(WorstBlock { depth_m, point, radius_m: tip_m, by_tip: true, name });
+                keep_worst(WorstBlock {
+                    depth_m,
+                    point: nearest.on_core,
+                    radius_m: tip_m,
+                    by_tip: true,
+                    name: block.name,
+                });
             }
         }
         worst
     }
 
+    /// Returns the direction turned from `u` until the rod only touches the block; `None` if there is none.
     fn turn_from(&self, u: Point<D>, hit: &WorstBlock<D>) -> Option<Point<D>> {
         let to = sub(hit.point, self.step.mn);
         let apart_m = norm(to);
@@ -178,7 +197,8 @@ fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
         return scaled(e1, -1.0);
     }
     std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let j = (i + 1) % 3;
+        let k = (i + 2) % 3;
         u[j] * e1[k] - u[k] * e1[j]
     })
 }
@@ -187,7 +207,11 @@ fn other_perpendicular<const D: usize>(u: Point<D>, e1: Point<D>) -> Point<D> {
 fn nearest_free_rad(mut blocked_rad: f64, mut free_rad: f64, is_free: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..BISECTIONS {
         let middle_rad = 0.5 * (blocked_rad + free_rad);
-        *(if is_free(middle_rad) { &mut free_rad } else { &mut blocked_rad }) = middle_rad;
+        if is_free(middle_rad) {
+            free_rad = middle_rad;
+        } else {
+            blocked_rad = middle_rad;
+        }
     }
     free_rad
 }

@@ -1,4 +1,4 @@
-//! Rods one after the other between two places: places for their joints, in closed form.
+//! A polygon of rods between two points, in closed form.
 //!
 //! Rods of lengths in intervals reach from one place to another exactly if no side of the polygon
 //! that they make with the gap has to be longer than all others together. The gap is the longest
@@ -13,19 +13,19 @@ use super::geometry::{
 /// to it as they can. They lie straight if they can be so short, and as a triangle otherwise.
 pub(super) fn joints<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
-    let least_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
-    let most_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
-    if gap_m < least_m {
+    let sum_min_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
+    let sum_max_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
+    if gap_m < sum_min_m {
         return triangle(a, b, &folded_m(rods, gap_m));
     }
-    let part = (gap_m - least_m) / (most_m - least_m).max(f64::MIN_POSITIVE);
-    let lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, part)).collect();
+    let fraction = (gap_m - sum_min_m) / (sum_max_m - sum_min_m).max(f64::MIN_POSITIVE);
+    let lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, fraction)).collect();
     on_line([a, b], &lengths_m)
 }
 
-/// Returns a length of a rod: the least for part 0, the greatest for part 1.
-fn length_m(rod: &Rod, part: f64) -> f64 {
-    rod.min_m + part.clamp(0.0, 1.0) * (rod.max_m - rod.min_m)
+/// Returns a length of a rod: the least for fraction 0, the greatest for fraction 1.
+fn length_m(rod: &Rod, fraction: f64) -> f64 {
+    rod.min_m + fraction.clamp(0.0, 1.0) * (rod.max_m - rod.min_m)
 }
 
 /// Returns lengths for rods that are too long to lie straight: the least, unless one rod is longer
@@ -36,20 +36,20 @@ fn folded_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
     let longest_m = longest.map_or(0.0, |k| rods[k].min_m);
     let lack_m = longest_m - gap_m - others().map(|rod| rod.min_m).sum::<f64>();
     let room_m: f64 = others().map(|rod| rod.max_m - rod.min_m).sum();
-    let part = lack_m / room_m.max(f64::MIN_POSITIVE);
-    let of = |i: usize| length_m(&rods[i], if Some(i) == longest { 0.0 } else { part });
-    (0..rods.len()).map(of).collect()
+    let stretch = lack_m / room_m.max(f64::MIN_POSITIVE);
+    let fraction = |i: usize| if Some(i) == longest { 0.0 } else { stretch };
+    (0..rods.len()).map(|i| length_m(&rods[i], fraction(i))).collect()
 }
 
 /// Returns the joints between rods that lie one after the other from one place to the other.
 fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Point<D>> {
     let whole_m: f64 = lengths_m.iter().sum();
-    let ends_m = lengths_m.iter().scan(0.0, |way_m, length_m| {
-        *way_m += length_m;
-        Some(*way_m)
+    let ends_m = lengths_m.iter().scan(0.0, |along_m, length_m| {
+        *along_m += length_m;
+        Some(*along_m)
     });
     let joints = lengths_m.len().saturating_sub(1);
-    ends_m.take(joints).map(|way_m| lerp(a, b, way_m / whole_m)).collect()
+    ends_m.take(joints).map(|along_m| lerp(a, b, along_m / whole_m)).collect()
 }
 
 /// Returns the joints of rods that lie as a triangle. Its first side is the gap, extended beyond `a`
@@ -59,7 +59,8 @@ fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<
     let gap_m = distance(a, b);
     let half_m = 0.5 * (gap_m + lengths_m.iter().sum::<f64>());
     let ahead = normalized(sub(b, a)).unwrap_or(first_axis());
-    let (mut joints, mut back_m) = (Vec::with_capacity(lengths_m.len()), 0.0);
+    let mut joints = Vec::with_capacity(lengths_m.len());
+    let mut back_m = 0.0;
     for length_m in lengths_m {
         if gap_m + back_m + length_m > half_m {
             break;
@@ -72,7 +73,9 @@ fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<
     if rest.is_empty() {
         return joints;
     }
-    let (first_m, third_m) = (gap_m + back_m, rest.iter().sum::<f64>());
+    let first_m = gap_m + back_m;
+    let third_m = rest.iter().sum::<f64>();
+    // The foot of the apex on the first side, by the law of cosines.
     let foot_m = (second_m - third_m) * (second_m + third_m) / first_m.max(f64::MIN_POSITIVE);
     let foot_m = (0.5 * (foot_m + first_m)).clamp(-second_m, *second_m);
     let side_m = (second_m * second_m - foot_m * foot_m).max(0.0).sqrt();

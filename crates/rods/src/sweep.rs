@@ -1,4 +1,5 @@
-//! A test whether a rod passes through a solid between two good positions.
+//! Continuous collision detection of one rod: whether it passes through a solid between two positions
+//! that are both clear.
 //!
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
 //! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
@@ -17,42 +18,43 @@ pub struct Sweep<const D: usize> {
     pub to: [Point<D>; 2],
 }
 
-/// The part of the distance at rest that a rod keeps on its way in space.
+/// Fraction of the distance at rest that a rod keeps on its path in space. Any value above 0 rules out
+/// tunneling; the whole distance would forbid turns past an obstacle that the rod may touch.
 const KEPT_FRACTION: f64 = 0.5;
-/// Conservative steps before a way counts as blocked.
+/// Steps of conservative advancement before a path counts as blocked.
 const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> Sweep<D> {
     /// Returns the longest distance that any point of the rod moves, meters.
     pub(super) fn max_travel_m(&self) -> f64 {
-        let way2 = |end: usize| {
-            let way = sub(self.to[end], self.from[end]);
-            dot(way, way)
+        let travel2 = |end: usize| {
+            let moved = sub(self.to[end], self.from[end]);
+            dot(moved, moved)
         };
-        way2(0).max(way2(1)).sqrt()
+        travel2(0).max(travel2(1)).sqrt()
     }
 
-    /// Returns whether the rod passes no point of the core on its way; in space, whether it stays half as
+    /// Returns whether the rod passes no point of the core on its path; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
     pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
-        let way_m = self.max_travel_m();
-        core.is_clear_of_segment(self.to, Self::safe_distance_m(way_m, keep_m))
-            || self.is_clear_on_the_way(core, keep_m, way_m)
+        let travel_m = self.max_travel_m();
+        core.is_clear_of_segment(self.to, Self::safe_distance_m(travel_m, keep_m))
+            || self.is_path_clear(core, keep_m, travel_m)
     }
 
     /// Returns the distance at the end of a move, in meters, from which on a rod whose points move
-    /// at most `way_m` is surely clear of a core: no point was nearer than its end distance less
-    /// its way.
-    pub(super) fn safe_distance_m(way_m: f64, keep_m: f64) -> f64 {
-        way_m + Self::kept_m(keep_m) + TOUCH_M
+    /// at most `travel_m` is surely clear of a core: no point was nearer than its end distance less
+    /// its travel.
+    pub(super) fn safe_distance_m(travel_m: f64, keep_m: f64) -> f64 {
+        travel_m + Self::kept_m(keep_m) + TOUCH_M
     }
 
     fn kept_m(keep_m: f64) -> f64 {
         if D == 2 { 0.0 } else { KEPT_FRACTION * keep_m }
     }
 
-    /// Returns whether the way is clear, without checking where it ends.
-    pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
+    /// Returns whether the path is clear, without a check of its end.
+    pub(super) fn is_path_clear(&self, core: &Core<D>, keep_m: f64, travel_m: f64) -> bool {
         match core {
             Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
             Core::Segment([a, b]) if D == 2 => {
@@ -61,7 +63,7 @@ impl<const D: usize> Sweep<D> {
             Core::Cuboid(cuboid) if D == 2 => {
                 cuboid.edges_2d().iter().all(|e| !self.crosses(*e) && !self.is_crossed_by(e[0]))
             }
-            _ => self.stays_away(core, Self::kept_m(keep_m), way_m),
+            _ => self.stays_away(core, Self::kept_m(keep_m), travel_m),
         }
     }
 
@@ -71,10 +73,15 @@ impl<const D: usize> Sweep<D> {
 
     /// Returns whether a plane point lies on the rod at some time, by the roots of a parabola.
     fn is_crossed_by(&self, p: Point<D>) -> bool {
-        let (m, r) = (sub(self.from[0], p), sub(self.from[1], self.from[0]));
+        // At time t the master is at m + t dm and the rod is r + t dr; p is on its line where their
+        // cross product is zero.
+        let m = sub(self.from[0], p);
+        let r = sub(self.from[1], self.from[0]);
         let dm = sub(self.to[0], self.from[0]);
         let dr = sub(sub(self.to[1], self.to[0]), r);
-        let (a, b, c) = (cross_2d(dr, dm), cross_2d(r, dm) + cross_2d(dr, m), cross_2d(r, m));
+        let a = cross_2d(dr, dm);
+        let b = cross_2d(r, dm) + cross_2d(dr, m);
+        let c = cross_2d(r, m);
         roots(a, b, c).into_iter().flatten().any(|time| {
             (0.0..=1.0).contains(&time) && {
                 let rod = add_scaled(r, dr, time);
@@ -84,16 +91,17 @@ impl<const D: usize> Sweep<D> {
         })
     }
 
-    /// Advances as far as is safe each time, however the ends move.
-    fn stays_away(&self, core: &Core<D>, kept_m: f64, way_m: f64) -> bool {
+    /// Conservative advancement: each step is as long as the clearance allows at the highest speed of
+    /// any point, so nothing is skipped however the ends move.
+    fn stays_away(&self, core: &Core<D>, kept_m: f64, travel_m: f64) -> bool {
         let mut time = 0.0;
         for _ in 0..MAX_ADVANCES {
             let rod = [0, 1].map(|end| lerp(self.from[end], self.to[end], time));
-            let spare_m = core.nearest_to_segment(rod).distance_m - kept_m;
-            if spare_m <= 0.0 {
+            let clearance_m = core.nearest_to_segment(rod).distance_m - kept_m;
+            if clearance_m <= 0.0 {
                 return false;
             }
-            time += spare_m.max(TOUCH_M) / way_m;
+            time += clearance_m.max(TOUCH_M) / travel_m;
             if time >= 1.0 {
                 return true;
             }
@@ -111,12 +119,12 @@ fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if a == 0.0 {
         return [(b != 0.0).then(|| -c / b), None];
     }
-    let inside = b * b - 4.0 * a * c;
-    if inside < 0.0 {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant < 0.0 {
         return [None; 2];
     }
     // This sum has no cancellation; the other root follows from the product of both.
-    let q = -0.5 * (b + inside.sqrt().copysign(b));
+    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
     [Some(q / a), (q != 0.0).then(|| c / q)]
 }
 

@@ -1,4 +1,5 @@
-//! Passages through obstacles between two states of a chain and of its surroundings.
+//! Continuous collision detection between two states of a chain and of its surroundings: tunneling
+//! through obstacles.
 //!
 //! A request guarantees that in every sub-step both ends of a rod go straight from their old to
 //! their new place while obstacles stand still, and that no rod and no connector passes through the
@@ -7,8 +8,8 @@
 //!
 //! Moving obstacles move between requests, when a world advances them. One that is fast and thin
 //! may jump over a rod and touch it neither before nor after: a ball only if it moves at once by
-//! more than twice its radius and the rod's together. A caller that advances obstacles that fast asks
-//! [`find_tunneling`], which looks at the motion relative to each of them.
+//! more than twice its radius and the rod's together. A caller that advances obstacles that fast calls
+//! [`find_tunneling`], which checks the motion relative to each of them.
 
 use super::chain::Chain;
 use super::geometry::{Bounds, Point, add, norm, scaled};
@@ -26,7 +27,7 @@ pub struct TunneledRod {
 
 /// Returns the first rod that passed through an obstacle, while the chain went straight from
 /// `before` to its present place, and every moving obstacle along its velocity for `dt_s` seconds
-/// to its present place. Of several obstacles, it names the one with the lowest id.
+/// to its present place. Of several obstacles it reports the one with the lowest id.
 ///
 /// `before` has one point for every connector.
 pub fn find_tunneling<const D: usize>(
@@ -39,7 +40,8 @@ pub fn find_tunneling<const D: usize>(
     let furthest_m = dt_s * speeds_m_s.fold(0.0, f64::max);
     (0..chain.rods().len().min(before.len().saturating_sub(1))).find_map(|rod| {
         let ends = |points: &[Point<D>]| [points[rod], points[rod + 1]];
-        let (from, to) = (ends(before), ends(chain.points()));
+        let from = ends(before);
+        let to = ends(chain.points());
         let radius_m = chain.rods()[rod].radius_m;
         let near =
             Bounds::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);
@@ -57,11 +59,12 @@ pub fn find_tunneling<const D: usize>(
     })
 }
 
-/// Part of a gap that rounding may take, meters.
+/// Error of a gap by rounding, meters.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Returns the obstacle that a capsule would pass through, or come deeper into than it was, on its way from one place
-/// to another with both ends going straight; of several that with the lowest id. A ball is a capsule of no length.
+/// Returns the obstacle that a capsule would pass through, or penetrate deeper than before, when both its
+/// ends move straight from one place to another; of several the one with the lowest id. A ball is a
+/// capsule of no length.
 pub fn blocking_obstacle<const D: usize>(
     Sweep { from, to }: Sweep<D>,
     radius_m: f64,
@@ -74,11 +77,13 @@ pub fn blocking_obstacle<const D: usize>(
         let keep_m = o.radius_m + radius_m;
         let gap_m = |ends| o.core.nearest_to_segment(ends).distance_m - keep_m;
         let least_m = gap_m(from).min(0.0) - ROUNDING_M;
-        let passes = match is_ball {
-            true => gap_m([from[0], to[0]]) < least_m,
-            false => gap_m(to) < least_m || !Sweep { from, to }.is_clear(&o.core, keep_m),
+        let is_blocked = if is_ball {
+            // The path of a ball is itself a capsule, so one distance is exact.
+            gap_m([from[0], to[0]]) < least_m
+        } else {
+            gap_m(to) < least_m || !Sweep { from, to }.is_clear(&o.core, keep_m)
         };
-        if passes && hit.is_none_or(|id| o.id < id) {
+        if is_blocked && hit.is_none_or(|id| o.id < id) {
             hit = Some(o.id);
         }
     });
@@ -99,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_ball_that_jumps_over_a_resting_rod_is_told() {
+    fn a_fast_ball_that_jumps_over_a_resting_rod_is_reported() {
         let chain = rod_at([[0.0, 0.0], [1.0, 0.0]]);
         let ball =
             |x: f64| Obstacle { velocity_m_s: [0.0, 10.0], ..Obstacle::ball(7, [x, -0.5], 0.01) };
@@ -126,7 +131,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whoever_crosses_a_moving_point_is_told(
+        fn a_rod_that_crosses_a_moving_point_is_reported(
             before in [point(), point()], after in [point(), point()],
             from in point(), velocity_m_s in point(),
         ) {
@@ -134,7 +139,7 @@ mod tests {
             let ball = Obstacle { velocity_m_s, ..Obstacle::ball(1, from, 0.0) };
             let mut obstacles = Obstacles::new(vec![ball], 1.0).unwrap();
             obstacles.advance(1.0);
-            let told = find_tunneling(&rod_at(after), &before, &obstacles, 1.0).is_some();
+            let is_reported = find_tunneling(&rod_at(after), &before, &obstacles, 1.0).is_some();
             // Tests many times: a point that crosses comes nearer than any gap between them.
             let apart_m = |k: i32| {
                 let time = f64::from(k) / 2000.0;
@@ -143,8 +148,8 @@ mod tests {
                 Core::Point(at).nearest_to_segment(rod).distance_m
             };
             let least_m = (0..=2000).map(apart_m).fold(f64::INFINITY, f64::min);
-            prop_assert!(least_m < 5e-3 || !told, "{least_m}");
-            prop_assert!(least_m > 1e-9 || told, "{least_m}");
+            prop_assert!(least_m < 5e-3 || !is_reported, "{least_m}");
+            prop_assert!(least_m > 1e-9 || is_reported, "{least_m}");
         }
     }
 }

@@ -1,8 +1,12 @@
-//! Several motions of one end of a chain at once, if nothing is in the way.
+//! Several motions of one end of a chain at once, where nothing can object: a time-skewed (wavefront)
+//! sweep.
 //!
-//! One motion is a series of dependent square roots and divisions, each of which the processor
-//! waits for. Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes
-//! are independent, and each computes the same bits as the motions one after the other.
+//! One motion is a series of dependent square roots and divisions, and its speed is their latency.
+//! Motion `w` can be at connector `j - w` while motion 0 is at connector `j`: all lanes are
+//! independent, so the compiler vectorizes them, and each computes the same bits as the motions one
+//! after the other.
+//!
+//! [`DeferredMotions`] collects motions of a chain until they fill the lanes or somebody reads it.
 
 #![expect(
     clippy::needless_range_loop,
@@ -25,7 +29,8 @@ pub const LANES: usize = 12;
 /// errors below 2^-51 of that, and of three coordinates one has more than half of a move.
 const ROUNDING_LENGTH_M: f64 = MAX_COORDINATE_M * 3.6e-15;
 
-/// Number of motions below which one after the other is faster.
+/// Number of motions below which one after the other is faster: lanes without a motion cost as much as
+/// those with one.
 const MIN_MOTIONS: usize = 3;
 
 /// Moves the first connector through `heads`, one after the other, like the same number of
@@ -61,24 +66,60 @@ pub fn pull_first<const D: usize>(
     Ok(())
 }
 
-/// Measures of several motions, as if the chain had been measured after each.
+/// Measures of several motions, equal to those of a chain measured after each of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WavefrontMeasures {
     /// Connectors that have changed, the initiator included, summed over the motions.
     pub changed: u64,
-    /// Longest way of a connector other than the initiator, meters.
+    /// Longest move of a connector other than the initiator in one motion, meters.
     pub longest_m: f64,
     /// Greatest amount by which a rod that moved was outside its limits, meters.
     pub max_rod_violation_m: f64,
 }
 
-/// Moves the first connector of a plain chain through at most [`LANES`] heads, each farther from the
-/// one before than the least move.
-pub fn pull_and_measure<const D: usize>(
-    chain: &mut Chain<D>,
-    heads: &[Point<D>],
-) -> WavefrontMeasures {
-    pull_lanes::<D, true>(chain, heads)
+/// Motions of connector 0 of a plain chain that the other connectors have yet to follow.
+///
+/// Where nothing can object, a chain follows its initiator in one way only, so it does not matter when
+/// it does: to follow several motions at once gives the same bits, and is much faster. Until then only
+/// connector 0 of the chain is where it should be.
+#[derive(Debug, Clone, Default)]
+pub struct DeferredMotions<const D: usize> {
+    /// Position of connector 0 before the first deferred motion.
+    start: Option<Point<D>>,
+    /// Positions of connector 0 after each of them.
+    heads: Vec<Point<D>>,
+}
+
+impl<const D: usize> DeferredMotions<D> {
+    /// Returns whether no motion is deferred: all connectors are where they should be.
+    pub fn is_empty(&self) -> bool {
+        self.heads.is_empty()
+    }
+
+    /// Returns whether as many motions are deferred as are made at once: then the chain is to follow.
+    pub fn is_full(&self) -> bool {
+        self.heads.len() == LANES
+    }
+
+    /// Moves connector 0 of a plain chain alone, by more than the chain's least move.
+    ///
+    /// # Panics
+    /// If [`Self::is_full`].
+    pub fn move_first(&mut self, chain: &mut Chain<D>, to: Point<D>) {
+        assert!(!self.is_full(), "the chain has to follow first");
+        let head = &mut chain.points_mut()[0];
+        self.start.get_or_insert(*head);
+        self.heads.push(to);
+        *head = to;
+    }
+
+    /// Lets the other connectors follow all deferred motions; returns their measures, if there were any.
+    pub fn catch_up(&mut self, chain: &mut Chain<D>) -> Option<WavefrontMeasures> {
+        chain.points_mut()[0] = self.start.take()?;
+        let measures = pull_lanes::<D, true>(chain, &self.heads);
+        self.heads.clear();
+        Some(measures)
+    }
 }
 
 /// One coordinate of the connectors that lanes are at: lane `w` has its slave at `w` and its
@@ -112,20 +153,22 @@ impl<const D: usize> LanePositions<D> {
 struct LaneLimits {
     min_m: [f64; LANES],
     max_m: [f64; LANES],
-    /// Number of rods in a row that equal the last.
-    alike: usize,
+    /// Number of rods in a row that equal the last. Once all lanes have the same limits, they need not be
+    /// shifted: most chains have equal rods.
+    equal_rods: usize,
 }
 
 impl LaneLimits {
     /// Passes every lane's rod on to the next lane, and a new one to the first.
     #[inline]
     fn shift(&mut self, next: Rod) {
-        let is_as_last = next.min_m == self.min_m[0] && next.max_m == self.max_m[0];
-        self.alike = if is_as_last { self.alike + 1 } else { 0 };
-        if self.alike < LANES {
+        let is_equal = next.min_m == self.min_m[0] && next.max_m == self.max_m[0];
+        self.equal_rods = if is_equal { self.equal_rods + 1 } else { 0 };
+        if self.equal_rods < LANES {
             self.min_m.copy_within(..LANES - 1, 1);
             self.max_m.copy_within(..LANES - 1, 1);
-            (self.min_m[0], self.max_m[0]) = (next.min_m, next.max_m);
+            self.min_m[0] = next.min_m;
+            self.max_m[0] = next.max_m;
         }
     }
 }
@@ -137,29 +180,31 @@ struct LaneMotions<const D: usize, const MEASURES: bool> {
     /// Number of connectors.
     connectors: usize,
     limits: LaneLimits,
-    least_move_m: f64,
+    min_move_m: f64,
     /// Length of a move above which a slave surely moves; -1 in lanes without a motion, where it is never read.
-    surely_m: [f64; LANES],
-    /// Whether a lane's last slave stayed, and whether its motion has ended.
+    sure_move_m: [f64; LANES],
+    /// Whether a lane's last slave stayed.
     rests: [bool; LANES],
+    /// Whether a lane's motion has ended.
     ended: [bool; LANES],
     /// Whether some lane rests or has ended.
     is_mixed: bool,
-    /// Measures by lane: the square of the longest way, and the greatest violation.
+    /// Square of the longest move, by lane.
     longest2: [f64; LANES],
+    /// Greatest violation of a rod's limits, by lane, meters.
     violation_m: [f64; LANES],
     changed: u64,
 }
 
 impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     fn new(chain: &Chain<D>, n: usize) -> Self {
-        let surely_m = chain.min_move_m().max(ROUNDING_LENGTH_M);
+        let sure_move_m = chain.min_move_m().max(ROUNDING_LENGTH_M);
         Self {
             n,
             connectors: chain.points().len(),
-            limits: LaneLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], alike: LANES },
-            least_move_m: chain.min_move_m(),
-            surely_m: std::array::from_fn(|w| if w < n { surely_m } else { -1.0 }),
+            limits: LaneLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], equal_rods: LANES },
+            min_move_m: chain.min_move_m(),
+            sure_move_m: std::array::from_fn(|w| if w < n { sure_move_m } else { -1.0 }),
             rests: [false; LANES],
             ended: [false; LANES],
             is_mixed: false,
@@ -188,21 +233,21 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             }
         }
         let d = square.map(f64::sqrt);
-        // Whether every lane is at a slave that moves. All lanes are looked at, because a search would branch at
-        // each.
+        // Whether some lane is not at a slave that surely moves. All lanes are tested, because a search that
+        // stops early would branch at each and not be vectorized.
         let mut one_by_one = self.is_mixed || j < self.n || j >= self.connectors;
-        let mut part = [0.0; LANES];
+        let mut scale = [0.0; LANES];
         for w in 0..LANES {
             let t = clamped(d[w], self.limits.min_m[w], self.limits.max_m[w]);
-            one_by_one |= (t - d[w]).abs().min(d[w]) <= self.surely_m[w];
-            part[w] = t / d[w];
+            one_by_one |= (t - d[w]).abs().min(d[w]) <= self.sure_move_m[w];
+            scale[w] = t / d[w];
         }
         if one_by_one {
             return self.react_one_by_one(now, next, j);
         }
         for i in 0..D {
             for w in 0..LANES {
-                next.rows[i][w + 1] = now.rows[i][w + 1] + g[i][w] * part[w];
+                next.rows[i][w + 1] = now.rows[i][w + 1] + g[i][w] * scale[w];
             }
         }
         if MEASURES {
@@ -213,12 +258,14 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     /// Measures all lanes at once.
     #[inline]
     fn measure(&mut self, now: &LanePositions<D>, next: &LanePositions<D>) {
-        let (mut way2, mut length2) = ([0.0; LANES], [0.0; LANES]);
+        let mut move2 = [0.0; LANES];
+        let mut length2 = [0.0; LANES];
         for i in 0..D {
             for w in 0..LANES {
                 let new = next.rows[i][w + 1];
-                let (way, rod) = (new - now.rows[i][w], now.rows[i][w + 1] - new);
-                way2[w] += way * way;
+                let moved = new - now.rows[i][w];
+                let rod = now.rows[i][w + 1] - new;
+                move2[w] += moved * moved;
                 length2[w] += rod * rod;
             }
         }
@@ -226,7 +273,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             let length_m = length2[w].sqrt();
             let outside_m = (length_m - self.limits.max_m[w]).max(self.limits.min_m[w] - length_m);
             self.violation_m[w] = self.violation_m[w].max(outside_m);
-            self.longest2[w] = self.longest2[w].max(way2[w]);
+            self.longest2[w] = self.longest2[w].max(move2[w]);
         }
         self.changed += self.n as u64;
     }
@@ -243,13 +290,13 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             let [mo, mn, so] = [next.get(w), now.get(w + 1), now.get(w)];
             let rod =
                 Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
-            // The way a sweep ends: at a slave that stays, if the rod beyond is good as it is.
+            // A sweep ends at a slave that stays, if the rod beyond it is within its limits.
             self.ended[w] |= self.rests[w] && is_length_allowed(rod, distance(mn, so));
             if self.ended[w] {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = guide([mo, mn, so], rod, self.least_move_m);
+            let new = guide([mo, mn, so], rod, self.min_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
@@ -260,24 +307,25 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     }
 
     fn measure_one(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
-        let (way, length_m) = (sub(new, so), distance(mn, new));
+        let moved = sub(new, so);
+        let length_m = distance(mn, new);
         let outside_m = (length_m - rod.max_m).max(rod.min_m - length_m);
         self.violation_m[w] = self.violation_m[w].max(outside_m);
-        self.longest2[w] = self.longest2[w].max(dot(way, way));
+        self.longest2[w] = self.longest2[w].max(dot(moved, moved));
         self.changed += u64::from(new != so);
     }
 
-    /// Returns whether no motion goes on.
+    /// Returns whether all motions have ended.
     fn have_ended(&self) -> bool {
         self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }
 
     fn measures(&self) -> WavefrontMeasures {
-        let most = |by_lane: &[f64]| by_lane[..self.n].iter().copied().fold(0.0, f64::max);
+        let max = |by_lane: &[f64]| by_lane[..self.n].iter().copied().fold(0.0, f64::max);
         WavefrontMeasures {
             changed: self.changed,
-            longest_m: most(&self.longest2).sqrt(),
-            max_rod_violation_m: most(&self.violation_m),
+            longest_m: max(&self.longest2).sqrt(),
+            max_rod_violation_m: max(&self.violation_m),
         }
     }
 }
@@ -291,13 +339,15 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
     let n = heads.len();
     let mut motions = LaneMotions::<D, MEASURES>::new(chain, n);
     let (points, rods) = chain.parts_mut();
-    let nobody = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
-    let (mut now, mut next) = (LanePositions::far_apart(), LanePositions::far_apart());
+    let unused = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
+    let mut now = LanePositions::far_apart();
+    let mut next = LanePositions::far_apart();
     for j in 0..points.len() + n - 1 {
-        // Past the last connector, never at the place before, so that no rod has length zero.
+        // Past the last connector: a place that differs from the one before, so that no rod of an unused
+        // lane has length zero.
         let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
         now.set(0, points.get(j).copied().unwrap_or_else(beyond));
-        motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
+        motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(unused));
         motions.react(&now, &mut next, j);
         if let Some(head) = heads.get(j) {
             // Lane j is at connector 0, which goes to its head.
@@ -306,7 +356,7 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
         if j + 1 >= n {
             points[j + 1 - n] = next.get(n);
             if motions.have_ended() {
-                // The places left behind by earlier lanes no longer change.
+                // The connectors that the lanes are at no longer change.
                 let count = points.len();
                 for w in (0..n - 1).filter(|&w| j - w < count) {
                     points[j - w] = next.get(w + 1);
@@ -365,7 +415,7 @@ mod tests {
                 expected.max_rod_violation_m =
                     expected.max_rod_violation_m.max(single.max_rod_violation_m());
             }
-            let measured = pull_and_measure(&mut at_once, group);
+            let measured = pull_lanes::<D, true>(&mut at_once, group);
             assert_eq!(at_once.points(), single.points());
             assert_eq!(measured.changed, expected.changed);
             assert_eq!(measured.longest_m.to_bits(), expected.longest_m.to_bits());

@@ -1,4 +1,4 @@
-//! A scenario with the files that it names, as kept in a run folder.
+//! A scenario with the files that it refers to, as stored in a run folder.
 
 use super::Source;
 use super::file::read_bytes;
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The folder of the files, relative to the scenario.
 const FOLDER: &str = "inputs";
-/// Size in bytes of the largest file that is copied unchanged, after unpacking.
+/// Maximum size in bytes of a file that is copied, after decompression: far above any map, and small enough to hold.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// A scenario that needs no file from elsewhere, together with the files that it contains instead.
@@ -22,12 +22,12 @@ pub struct ResolvedScenario {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-/// The text of a resolved scenario before and after its seed: it gives the texts of all scenarios that differ only by
-/// their seed, without reading or editing any of them.
+/// The text of a resolved scenario before and after its seed: the texts of all scenarios that differ only by
+/// their seed, without parsing or editing any of them. A sweep has thousands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SeedTemplate {
     before: String,
-    behind: String,
+    after: String,
 }
 
 /// The only key of a resolved scenario that is read.
@@ -41,15 +41,17 @@ impl ResolvedScenario {
     pub fn seed_template(&self) -> Option<SeedTemplate> {
         let SeedKey { seed } = toml::from_str(&self.text).ok()?;
         let span = seed.span();
-        let (before, behind) = (&self.text[..span.start], &self.text[span.end..]);
-        Some(SeedTemplate { before: before.into(), behind: behind.into() })
+        Some(SeedTemplate {
+            before: self.text[..span.start].into(),
+            after: self.text[span.end..].into(),
+        })
     }
 }
 
 impl SeedTemplate {
     /// Returns the text with a seed.
     pub fn with_seed(&self, seed: u64) -> String {
-        format!("{}{seed}{}", self.before, self.behind)
+        format!("{}{seed}{}", self.before, self.after)
     }
 }
 
@@ -63,7 +65,7 @@ pub struct Bundle<'a> {
 
 impl<'a> Bundle<'a> {
     /// Starts with the scenario's text; seed and cycles are written even where they are the
-    /// default.
+    /// default, because a default may change in a later version.
     pub fn new(source: &'a Source, seed: u64, cycles: u64) -> Self {
         // TOML has no larger integers.
         let cycles = cycles.min(i64::MAX as u64);

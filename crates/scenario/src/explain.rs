@@ -1,15 +1,15 @@
-//! Errors of the TOML reader in helpful words.
+//! Cause and remedy of errors of the TOML reader.
 
 use super::number::split_invalid_value;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 
 /// Returns cause and remedy of an error of the TOML reader; `top` are the keys of the top level, some
-/// of which the reader did not see, and `otherwise` is the remedy of errors without a better one.
+/// of which the reader did not see, and `default_remedy` is for errors without a better one.
 pub(crate) fn explain(
     error: &toml::de::Error,
     top: &[&str],
-    otherwise: String,
+    default_remedy: String,
 ) -> (String, String) {
     let message = error.message().trim();
     let path = path_of(error);
@@ -32,7 +32,7 @@ pub(crate) fn explain(
     if let Some((missing, _)) = backticked_name(message, "missing field `") {
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
-    (message.replace('\n', " "), otherwise)
+    (message.replace('\n', " "), default_remedy)
 }
 
 fn top_level_remedy(key: &str) -> String {
@@ -41,26 +41,27 @@ fn top_level_remedy(key: &str) -> String {
     )
 }
 
-/// Returns the keys of a table, which its reader lists in its error for an unknown one.
+/// Returns the keys of a table. Serde gives them only in the error for an unknown key, so one is provoked.
 pub(crate) fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let Err(error) = toml::from_str::<T>("\"\" = 0") else { return Vec::new() };
-    let told =
-        backticked_name(error.message(), "unknown field `").map(|(_, known)| known.to_string());
-    told.iter().flat_map(|known| quoted(known)).map(String::from).collect()
+    match backticked_name(error.message(), "unknown field `") {
+        Some((_, known)) => quoted(known).into_iter().map(String::from).collect(),
+        None => Vec::new(),
+    }
 }
 
 /// Returns the name in backticks after a prefix, and the rest of the message.
-fn backticked_name<'a>(message: &'a str, beginning: &str) -> Option<(&'a str, &'a str)> {
-    message.strip_prefix(beginning)?.split_once('`')
+fn backticked_name<'a>(message: &'a str, prefix: &str) -> Option<(&'a str, &'a str)> {
+    message.strip_prefix(prefix)?.split_once('`')
 }
 
-/// Returns the keys on the way to the error, joined by dots. The reader gives them in its message
+/// Returns the path to the error, as keys joined by dots. The reader gives it in its message
 /// only, and only where it has no text to quote.
 fn path_of(error: &toml::de::Error) -> Option<String> {
     let mut error = error.clone();
     error.set_input(None);
-    let words = error.to_string();
-    let last = words.trim_end().lines().last()?;
+    let message = error.to_string();
+    let last = message.trim_end().lines().last()?;
     last.strip_prefix("in `")?.strip_suffix('`').map(String::from)
 }
 
@@ -68,28 +69,28 @@ fn last_key(path: &str) -> &str {
     path.rsplit('.').next().unwrap_or(path)
 }
 
+/// Returns the names in backticks in a text.
 fn quoted(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 
 /// Returns "did you mean" with the nearest of `known`, or the whole list.
 pub fn suggestion(found: &str, known: &[&str]) -> String {
-    let distance = |k: &&&str| strsim::osa_distance(found, k);
-    match known.iter().min_by_key(distance) {
+    match known.iter().min_by_key(|name| strsim::osa_distance(found, name)) {
         // The longer a name, the more typing errors it may have.
         Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
             format!("did you mean `{best}`?")
         }
-        // A list may be put together from several, which share keys.
+        // The keys of the top level are joined from several lists, which may share keys.
         Some(_) => format!("known are: {}", deduplicated(known).join(", ")),
         None => "nothing is known here".into(),
     }
 }
 
-/// Returns the words, without repetitions.
-fn deduplicated<'a>(words: &[&'a str]) -> Vec<&'a str> {
+/// Returns the names in their order, without repetitions.
+fn deduplicated<'a>(names: &[&'a str]) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
-    words.iter().copied().filter(|word| seen.insert(*word)).collect()
+    names.iter().copied().filter(|name| seen.insert(*name)).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Bounded reading of files, plain or packed with gzip.
+//! Bounded reading of files, plain or compressed with gzip.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -9,11 +9,12 @@ use sidestep_kernel::InputError;
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// Returns the content of the file at `path`, unpacked where it is packed with gzip (recognized by
+/// Returns the content of the file at `path`, decompressed if it is compressed with gzip (recognized by
 /// its first bytes, not by its name).
 ///
 /// # Errors
-/// When the file cannot be read or unpacked, or has more than `max_bytes` (unpacked).
+/// When the file cannot be read or decompressed, or has more than `max_bytes` after that: a small file may decompress
+/// to any size.
 pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
     // One byte beyond the limit is enough to detect that there are too many.
     let bytes = try_read(path, max_bytes.saturating_add(1)).map_err(|e| unreadable(path, &e))?;
@@ -39,9 +40,10 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
 
 fn try_read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut file = BufReader::new(File::open(path)?);
-    let is_packed = file.fill_buf()?.starts_with(&GZIP_MAGIC);
+    let is_compressed = file.fill_buf()?.starts_with(&GZIP_MAGIC);
     let mut bytes = Vec::new();
-    if is_packed {
+    if is_compressed {
+        // Several members in a row are one file, as `cat a.gz b.gz` writes it.
         MultiGzDecoder::new(file).take(limit).read_to_end(&mut bytes)?;
     } else {
         file.take(limit).read_to_end(&mut bytes)?;
@@ -53,7 +55,7 @@ fn unreadable(path: &Path, error: &io::Error) -> InputError {
     let remedy = match error.kind() {
         io::ErrorKind::NotFound => "check the path; relative ones start at the working directory",
         io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput => {
-            "the gzip file is damaged or cut short: pack or fetch it again"
+            "the gzip file is damaged or cut short: compress or download it again"
         }
         _ => "check that this is a file and that it may be read",
     };

@@ -1,11 +1,11 @@
-//! Places of the keys of a scenario in its text, for errors about keys that were read much earlier.
+//! Positions of the keys of a scenario in its text, for errors about keys that were read much earlier.
 //!
-//! A key is named as in overrides, `robots.1.count`: elements of arrays by their number, and
-//! a section that stands alone by 0 or without a number; names with dots stand in quotes.
+//! Keys are in the notation of overrides, `robots.1.count`: elements of arrays by their number, and
+//! a single section by 0 or without a number; names with dots are quoted.
 
 use crate::Source;
 use crate::edit::{KeyPart, parse_key};
-use crate::locate::{locate, path};
+use crate::locate::{dotted_path, locate};
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -16,39 +16,45 @@ use toml::{Spanned, Value};
 pub struct Key {
     /// The key itself.
     pub name: String,
-    /// Its place in the text.
+    /// Its position in the text.
     pub span: Range<usize>,
 }
 
 impl Source {
     /// Returns the keys of a table, in the order of the text; none where there is no such table.
     pub fn keys(&self, path: &str) -> Vec<Key> {
-        let Ok(root) = DeTable::parse(&self.text) else { return Vec::new() };
-        let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
-        let found = find(&Spanned::new(span, root), path).map(|found| keys_of(found.value));
-        let mut keys = found.unwrap_or_default();
+        let Some(root) = self.root() else { return Vec::new() };
+        let Some(table) = find(&root, path) else { return Vec::new() };
+        let mut keys = keys_of(table.value);
         keys.sort_by_key(|key| key.span.start);
         keys
     }
 
+    /// Returns the root table with the positions of everything in it.
+    fn root(&self) -> Option<Spanned<DeValue<'_>>> {
+        let root = DeTable::parse(&self.text).ok()?;
+        Some(Spanned::new(root.span(), DeValue::Table(root.into_inner())))
+    }
+
     /// Returns the value of a key, if the text has it.
     pub fn value(&self, path: &str) -> Option<Value> {
-        let mut found = Value::Table(self.text.parse().ok()?);
+        let mut value = Value::Table(self.text.parse().ok()?);
         for part in parse_key(path).ok()? {
-            if let Value::Array(many) = &mut found
+            // An array of one needs no number, as in overrides.
+            if let Value::Array(elements) = &mut value
                 && part.number().is_none()
-                && many.len() == 1
+                && elements.len() == 1
             {
-                found = many.remove(0);
+                value = elements.remove(0);
             }
-            found = match (found, part.number()) {
-                (Value::Array(many), Some(index)) => many.into_iter().nth(index)?,
-                (found @ Value::Table(_), Some(0)) => found,
+            value = match (value, part.number()) {
+                (Value::Array(elements), Some(index)) => elements.into_iter().nth(index)?,
+                (table @ Value::Table(_), Some(0)) => table,
                 (Value::Table(mut table), _) => table.remove(&part.name)?,
                 _ => return None,
             };
         }
-        Some(found)
+        Some(value)
     }
 
     /// Creates an error at a key; with the key alone where it is not in the text.
@@ -64,19 +70,17 @@ impl Source {
         }
     }
 
-    /// Returns the place of the first of `keys` that the section at a span has, for errors about keys
-    /// with values that do not know their places; the place of the section if it has none of them.
+    /// Returns the position of the first of `keys` that the section at a span has, for errors about keys
+    /// whose values have no position; the position of the section if it has none of them.
     pub fn key_span(&self, section: Range<usize>, keys: &[&str]) -> Range<usize> {
-        let way = locate(&self.text, &section).map(|way| path(&way));
-        let place = |key: &&str| self.span_of(&format!("{}.{key}", way.as_ref()?));
-        keys.iter().find_map(place).unwrap_or(section)
+        let Some(steps) = locate(&self.text, &section) else { return section };
+        let path = dotted_path(&steps);
+        keys.iter().find_map(|key| self.span_of(&format!("{path}.{key}"))).unwrap_or(section)
     }
 
-    /// Returns the place of a key, if the text has it.
+    /// Returns the position of a key, if the text has it.
     fn span_of(&self, path: &str) -> Option<Range<usize>> {
-        let root = DeTable::parse(&self.text).ok()?;
-        let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
-        find(&Spanned::new(span, root), path).map(|found| found.span)
+        find(&self.root()?, path).map(|located| located.span)
     }
 
     /// Creates the error for a key that has no effect; `because` completes the
@@ -93,7 +97,7 @@ fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
     keys.map(|key| Key { name: key.get_ref().to_string(), span: key.span() }).collect()
 }
 
-/// A value, and the place of its key; that of an element of an array is its own.
+/// A value, and the position of its key; for an element of an array, its own position.
 struct LocatedValue<'t, 'i> {
     span: Range<usize>,
     value: &'t Spanned<DeValue<'i>>,
@@ -107,21 +111,23 @@ impl<'t, 'i> LocatedValue<'t, 'i> {
 
 /// Returns the value at a path.
 fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<LocatedValue<'t, 'i>> {
-    let mut found = LocatedValue::without_key(root);
+    let mut located = LocatedValue::without_key(root);
     for part in parse_key(path).ok()? {
-        found = step(found, &part)?;
+        located = step(located, &part)?;
     }
-    Some(found)
+    Some(located)
 }
 
-fn step<'t, 'i>(found: LocatedValue<'t, 'i>, part: &KeyPart) -> Option<LocatedValue<'t, 'i>> {
-    match (found.value.get_ref(), part.number()) {
-        (DeValue::Array(many), Some(index)) => many.get(index).map(LocatedValue::without_key),
-        // An array of one may be passed without a number, as in overrides.
-        (DeValue::Array(many), None) if many.len() == 1 => {
-            step(LocatedValue::without_key(many.first()?), part)
+fn step<'t, 'i>(parent: LocatedValue<'t, 'i>, part: &KeyPart) -> Option<LocatedValue<'t, 'i>> {
+    match (parent.value.get_ref(), part.number()) {
+        (DeValue::Array(elements), Some(index)) => {
+            elements.get(index).map(LocatedValue::without_key)
         }
-        (DeValue::Table(_), Some(0)) => Some(found),
+        // An array of one needs no number, as in overrides.
+        (DeValue::Array(elements), None) if elements.len() == 1 => {
+            step(LocatedValue::without_key(elements.first()?), part)
+        }
+        (DeValue::Table(_), Some(0)) => Some(parent),
         (DeValue::Table(table), _) => {
             let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part.name)?;
             Some(LocatedValue { span: key.span(), value })

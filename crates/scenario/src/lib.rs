@@ -5,7 +5,7 @@
 //! [`Source`] reads the text and applies overrides (`overrides.rs`) and edits (`edit/`), serde turns it into sections
 //! ([`Sections`]) with numbers that check themselves ([`Number`], [`Integer`],
 //! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
-//! gathers a scenario with all the files that it names. The same sections give JSON Schemas for
+//! collects a scenario with all the files that it refers to. The same sections give JSON Schemas for
 //! editors and forms ([`schema`]).
 
 mod bundle;

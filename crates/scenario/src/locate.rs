@@ -1,4 +1,4 @@
-//! The key at a place of a text: from spans of bytes to keys in the notation of `--set`.
+//! The key at a position of a text: from spans of bytes to keys in the notation of `--set`.
 
 use std::ops::Range;
 use toml::Spanned;
@@ -15,17 +15,17 @@ pub(crate) enum PathStep {
 
 /// Returns a path in the notation of `--set`: `robots.1.at.0`. Names that are no bare keys are
 /// quoted as in TOML.
-pub(crate) fn path(way: &[PathStep]) -> String {
-    let words: Vec<String> = way
+pub(crate) fn dotted_path(path: &[PathStep]) -> String {
+    let parts: Vec<String> = path
         .iter()
-        .map(|part| match part {
+        .map(|step| match step {
             // Without quotes it would be the number of an element.
             PathStep::Name(name) if name.bytes().all(|b| b.is_ascii_digit()) => format!("{name:?}"),
             PathStep::Name(name) => toml_edit::Key::new(name).display_repr().into_owned(),
             PathStep::Index(index) => index.to_string(),
         })
         .collect();
-    words.join(".")
+    parts.join(".")
 }
 
 /// Returns the path to the innermost key (or element of an array) that contains a span of a text,
@@ -33,57 +33,57 @@ pub(crate) fn path(way: &[PathStep]) -> String {
 /// possible.
 pub(crate) fn locate(text: &str, span: &Range<usize>) -> Option<Vec<PathStep>> {
     let (root, _) = DeTable::parse_recoverable(text);
-    let mut search = KeySearch { span, way: Vec::new(), best: None };
+    let mut search = KeySearch { span, path: Vec::new(), best: None };
     search.table(root.get_ref());
-    search.best.map(|best| best.way)
+    search.best.map(|best| best.path)
 }
 
-/// The smallest place found so far.
+/// The smallest key or value found so far that contains the span.
 struct BestMatch {
     bytes: usize,
-    way: Vec<PathStep>,
+    path: Vec<PathStep>,
 }
 
 struct KeySearch<'a> {
     span: &'a Range<usize>,
-    way: Vec<PathStep>,
+    path: Vec<PathStep>,
     best: Option<BestMatch>,
 }
 
 impl KeySearch<'_> {
     fn table(&mut self, table: &DeTable<'_>) {
         for (key, value) in table.iter() {
-            self.way.push(PathStep::Name(key.get_ref().to_string()));
+            self.path.push(PathStep::Name(key.get_ref().to_string()));
             self.offer(&key.span());
             self.value(value);
-            self.way.pop();
+            self.path.pop();
         }
     }
 
-    /// Looks into a value, even one that does not contain the span: a table with a header has the
+    /// Searches a value, even one that does not contain the span: a table with a header has the
     /// span of the header alone.
     fn value(&mut self, value: &Spanned<DeValue<'_>>) {
         self.offer(&value.span());
         match value.get_ref() {
             DeValue::Table(table) => self.table(table),
-            DeValue::Array(many) => {
-                for (index, one) in many.iter().enumerate() {
-                    self.way.push(PathStep::Index(index));
-                    self.value(one);
-                    self.way.pop();
+            DeValue::Array(elements) => {
+                for (index, element) in elements.iter().enumerate() {
+                    self.path.push(PathStep::Index(index));
+                    self.value(element);
+                    self.path.pop();
                 }
             }
             _ => {}
         }
     }
 
-    /// Takes the present path if this is its place; of two places of the same size the inner one,
-    /// which comes later.
-    fn offer(&mut self, place: &Range<usize>) {
-        let contains = place.start <= self.span.start && self.span.end <= place.end;
-        let bytes = place.len();
+    /// Keeps the present path if its key or value has the smallest range so far that contains the span; of two ranges
+    /// of the same size the later, which is the inner one.
+    fn offer(&mut self, range: &Range<usize>) {
+        let contains = range.start <= self.span.start && self.span.end <= range.end;
+        let bytes = range.len();
         if contains && bytes > 0 && self.best.as_ref().is_none_or(|best| bytes <= best.bytes) {
-            self.best = Some(BestMatch { bytes, way: self.way.clone() });
+            self.best = Some(BestMatch { bytes, path: self.path.clone() });
         }
     }
 }
@@ -97,7 +97,7 @@ mod tests {
 
     fn key_of(part: &str) -> Option<String> {
         let start = TEXT.find(part).expect(part);
-        locate(TEXT, &(start..start + part.len())).map(|way| path(&way))
+        locate(TEXT, &(start..start + part.len())).map(|path| dotted_path(&path))
     }
 
     #[test]
@@ -119,7 +119,10 @@ mod tests {
             assert_eq!(key_of(part).as_deref(), Some(key), "{part}");
         }
         let last = TEXT.rfind("[[many]]").expect("the second");
-        assert_eq!(locate(TEXT, &(last..last + 8)).map(|way| path(&way)), Some("many.1".into()));
+        assert_eq!(
+            locate(TEXT, &(last..last + 8)).map(|path| dotted_path(&path)),
+            Some("many.1".into())
+        );
     }
 
     #[test]

@@ -26,29 +26,29 @@ pub struct MetricLabel {
     pub meaning: &'static str,
 }
 
-/// Returns a metric in words, by the meanings of its world; a name without one is split into its
+/// Returns a metric in words, from the list of its world; a name that is not listed is split into its
 /// own words.
-pub fn metric_label(meanings: &[MetricInfo], name: &str) -> MetricLabel {
-    let found = find_info(meanings, name).or_else(|| find_info(meanings, name.split_once('.')?.1));
-    if let Some((meaning, rest)) = found {
-        let own = split_unit(meaning.name).1;
-        let unit = if meaning.unit.is_empty() { own } else { Some(meaning.unit) };
-        let words = meaning.words.replace('*', &rest.replace(['_', '-'], " "));
-        return MetricLabel { words, unit, meaning: meaning.meaning };
+pub fn metric_label(infos: &[MetricInfo], name: &str) -> MetricLabel {
+    // A metric of a sweep may have its table before its name: `metrics.collisions`.
+    let found = find_info(infos, name).or_else(|| find_info(infos, name.split_once('.')?.1));
+    if let Some((info, rest)) = found {
+        let unit = if info.unit.is_empty() { split_unit(info.name).1 } else { Some(info.unit) };
+        let words = info.words.replace('*', &rest.replace(['_', '-'], " "));
+        return MetricLabel { words, unit, meaning: info.meaning };
     }
     let (quantity, unit) = split_unit(name);
     let words = quantity.replace('_', " ").replace('.', ": ");
     MetricLabel { words, unit, meaning: "" }
 }
 
-/// Returns the meaning of a name, and the end of the name that stands for `*`.
-fn find_info<'a>(meanings: &'a [MetricInfo], name: &'a str) -> Option<(&'a MetricInfo, &'a str)> {
-    meanings.iter().find_map(|meaning| {
-        let rest = match meaning.name.strip_suffix('*') {
-            Some(begin) => name.strip_prefix(begin)?,
-            None => (meaning.name == name).then_some("")?,
+/// Returns the entry of a name, and the end of the name that stands for `*`.
+fn find_info<'a>(infos: &'a [MetricInfo], name: &'a str) -> Option<(&'a MetricInfo, &'a str)> {
+    infos.iter().find_map(|info| {
+        let rest = match info.name.strip_suffix('*') {
+            Some(prefix) => name.strip_prefix(prefix)?,
+            None => (info.name == name).then_some("")?,
         };
-        Some((meaning, rest))
+        Some((info, rest))
     })
 }
 

@@ -1,5 +1,5 @@
 //! The section of a network that may lose and delay messages: the same keys in every world with agents that
-//! talk.
+//! communicate.
 //!
 //! A world defines the notation of its agents in the lists of faults, and the agents that exist ([`AgentNaming`]).
 
@@ -20,48 +20,48 @@ use std::ops::Range;
 
 /// The names of a world's agents in its network's section, and the defaults there.
 pub trait AgentNaming {
-    /// A silence, as written.
+    /// A radio outage, as in the file.
     type RadioOutage: DeserializeOwned + JsonSchema + Debug;
-    /// A partition, as written.
+    /// A partition, as in the file.
     type Partition: DeserializeOwned + JsonSchema + Debug;
-    /// A link that works one way, as written.
+    /// A link that works in one direction, as in the file.
     type UnidirectionalLink: DeserializeOwned + JsonSchema + Debug;
 
     /// Latency unless it is given, seconds.
     const DEFAULT_LATENCY_S: f64;
-    /// The shortest latency that a clock can resolve, seconds.
+    /// The shortest latency that the world's clock can resolve, seconds.
     const MIN_LATENCY_S: f64;
-    /// Number of talks in a cycle, one after the other.
+    /// Number of conversations in a cycle, one after the other.
     const CONVERSATIONS_PER_CYCLE: u32;
     /// Words for the longest deadline.
     const MAX_DEADLINE_TEXT: &str;
 
-    /// Returns a silence by its agent's id on the network.
+    /// Returns a radio outage by its agent's id on the network.
     ///
     /// # Errors
-    /// When there is no such agent, or the times make no sense.
-    fn radio_outage(&self, one: &Self::RadioOutage) -> Result<RadioOutage, SectionError>;
+    /// When there is no such agent, or the times are impossible.
+    fn radio_outage(&self, section: &Self::RadioOutage) -> Result<RadioOutage, SectionError>;
 
     /// Returns a partition by its agents' ids on the network.
     ///
     /// # Errors
-    /// When there are no such agents or sides, or the times make no sense.
-    fn partition(&self, one: &Self::Partition) -> Result<Partition, SectionError>;
+    /// When there are no such agents or sides, or the times are impossible.
+    fn partition(&self, section: &Self::Partition) -> Result<Partition, SectionError>;
 
     /// Returns a link by its agents' ids on the network.
     ///
     /// # Errors
-    /// When there is no such link, or the times make no sense.
+    /// When there is no such link, or the times are impossible.
     fn unidirectional_link(
         &self,
-        one: &Self::UnidirectionalLink,
+        section: &Self::UnidirectionalLink,
     ) -> Result<UnidirectionalLink, SectionError>;
 }
 
-/// A network's section that makes no sense.
+/// An error in a network's section.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionError {
-    /// The place of the error; none for the section itself.
+    /// Its position in the text; none for the section itself.
     pub span: Option<Range<usize>>,
     /// The cause.
     pub cause: String,
@@ -70,7 +70,7 @@ pub struct SectionError {
 }
 
 impl SectionError {
-    /// Returns an error without a place of its own.
+    /// Returns an error of the section itself.
     pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { span: None, cause: cause.into(), remedy: remedy.into() }
     }
@@ -179,14 +179,17 @@ impl Rule for BandwidthRule {
     }
 }
 
-/// Part of a cycle in which its talks end, unless it is given.
+/// Fraction of a cycle after which its conversations end, unless it is given: the rest is left for acting on their
+/// result.
 const CONVERSATION_FRACTION: f64 = 0.9;
+/// Waits for an answer that fit into a conversation at least: with fewer, one lost message could end it.
+const MIN_WAITS_PER_CONVERSATION: f64 = 8.0;
 
 impl<N: AgentNaming> NetworkSection<N> {
     /// Returns the network, in a world with cycles of `dt_s` seconds.
     ///
     /// # Errors
-    /// When times do not fit into a cycle, or a fault makes no sense: the first one of these.
+    /// When times do not fit into a cycle, or a fault is impossible: the first one of these.
     pub fn network(&self, dt_s: f64, names: &N) -> Result<Network, SectionError> {
         let latency_s = self.latency_s.map_or(N::DEFAULT_LATENCY_S, f64::from);
         let max_delay_s = self.max_delay_s.map_or(0.0, f64::from);
@@ -197,6 +200,7 @@ impl<N: AgentNaming> NetworkSection<N> {
             latency_s,
             bandwidth_bit_s: self.bandwidth_bit_s.map_or(f64::INFINITY, f64::from),
             max_delay_s,
+            // A request and its answer take twice the latency and the delay; 3 leaves room for the answer's work.
             patience_s: self.patience_s.map_or(3.0 * (latency_s + max_delay_s), f64::from),
             deadline_s: self.deadline_s.map_or(deadline_s, f64::from),
             range_m: self.range_m.map_or(f64::INFINITY, f64::from),
@@ -207,35 +211,41 @@ impl<N: AgentNaming> NetworkSection<N> {
         };
         check_times::<N>(&network, dt_s)?;
         Ok(Network {
-            radio_outages: read_faults(&self.silent, |one| names.radio_outage(one))?,
-            partitions: read_faults(&self.partitions, |one| names.partition(one))?,
-            unidirectional_links: read_faults(&self.one_way, |one| names.unidirectional_link(one))?,
+            radio_outages: read_faults(&self.silent, |section| names.radio_outage(section))?,
+            partitions: read_faults(&self.partitions, |section| names.partition(section))?,
+            unidirectional_links: read_faults(&self.one_way, |section| {
+                names.unidirectional_link(section)
+            })?,
             ..network
         })
     }
 }
 
-/// Reads a list of faults.
+/// Reads a list of faults, each by `read`; errors get the position of the fault.
 fn read_faults<A, B>(
-    all: &[Spanned<A>],
-    one: impl Fn(&A) -> Result<B, SectionError>,
+    sections: &[Spanned<A>],
+    read: impl Fn(&A) -> Result<B, SectionError>,
 ) -> Result<Vec<B>, SectionError> {
-    let at = |written: &Spanned<A>| {
-        one(written.get_ref()).map_err(|wrong| SectionError { span: Some(written.span()), ..wrong })
-    };
-    all.iter().map(at).collect()
+    let mut faults = Vec::with_capacity(sections.len());
+    for section in sections {
+        let fault = read(section.get_ref())
+            .map_err(|error| SectionError { span: Some(section.span()), ..error })?;
+        faults.push(fault);
+    }
+    Ok(faults)
 }
 
 /// Checks that times fit into a cycle.
-fn check_times<N: AgentNaming>(n: &Network, dt_s: f64) -> Result<(), SectionError> {
-    let waits_s = n.patience_s.max(n.latency_s + n.max_delay_s);
-    if f64::from(N::CONVERSATIONS_PER_CYCLE) * n.deadline_s <= dt_s && 8.0 * waits_s <= n.deadline_s
-    {
+fn check_times<N: AgentNaming>(network: &Network, dt_s: f64) -> Result<(), SectionError> {
+    let &Network { latency_s, max_delay_s, patience_s, deadline_s, .. } = network;
+    let wait_s = patience_s.max(latency_s + max_delay_s);
+    let fits_cycle = f64::from(N::CONVERSATIONS_PER_CYCLE) * deadline_s <= dt_s;
+    if fits_cycle && MIN_WAITS_PER_CONVERSATION * wait_s <= deadline_s {
         return Ok(());
     }
     let cause = format!(
-        "latency_s = {}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
-        n.latency_s, n.max_delay_s, n.patience_s, n.deadline_s
+        "latency_s = {latency_s}, max_delay_s = {max_delay_s}, patience_s = {patience_s}, \
+         deadline_s = {deadline_s}"
     );
     let remedy = format!(
         "give a patience of at most an eighth of the deadline, latency and delay of no more, and a \
@@ -245,7 +255,7 @@ fn check_times<N: AgentNaming>(n: &Network, dt_s: f64) -> Result<(), SectionErro
     Err(SectionError::new(cause, remedy))
 }
 
-/// Returns a while from its two times.
+/// Returns a period from its two times.
 ///
 /// # Errors
 /// When its times are invalid.
@@ -260,7 +270,7 @@ pub fn time_window(from_s: f64, until_s: f64) -> Result<TimeWindow, SectionError
 /// Checks the sides of a partition; `agent` is the word for its agents.
 ///
 /// # Errors
-/// When one is named twice, or there are fewer than two sides.
+/// When an agent is on two sides, or there are fewer than two sides.
 pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), SectionError> {
     check_unique(sides.concat(), agent)?;
     if sides.len() >= 2 {
@@ -270,22 +280,22 @@ pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), SectionEr
     Err(SectionError::new("a partition with fewer than two sides", remedy))
 }
 
-/// Checks that no agent is named twice.
+/// Checks that no agent is given twice.
 ///
 /// # Errors
-/// With the lowest id that is.
+/// For the lowest id that is.
 pub fn check_unique(mut ids: Vec<EntityId>, agent: &str) -> Result<(), SectionError> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
         Some(pair) => {
-            let cause = format!("{agent} {} is named twice", pair[0]);
+            let cause = format!("{agent} {} is listed twice", pair[0]);
             Err(SectionError::new(cause, format!("name each {agent} once")))
         }
     }
 }
 
-/// The end of an endless while, in seconds.
+/// The end of a period without an end, in seconds; a function, because serde takes defaults from functions.
 pub fn endless_s() -> f64 {
     f64::INFINITY
 }

@@ -5,18 +5,18 @@
 //! type for a later check that needs the position too is wrapped: `Spanned<Positive>`.
 //!
 //! ```
-//! use sidestep_scenario::{Positive, Share, Source, Whole};
+//! use sidestep_scenario::{Fraction, Integer, Positive, Source};
 //!
 //! #[derive(Debug, serde::Deserialize)]
 //! struct Radio {
 //!     range_m: Positive,
-//!     loss: Option<Share>,
-//!     channels: Whole<1, 16>,
+//!     loss: Option<Fraction>,
+//!     channels: Integer<1, 16>,
 //! }
 //! let read = |text: &str| Source::new("s.toml", text, "").parse::<Radio>();
 //! let radio = read("range_m = 4\nchannels = 2").expect("right");
 //! assert_eq!((radio.range_m.get(), radio.loss, radio.channels.get()), (4.0, None, 2));
-//! let error = read("range_m = 4\nloss = nan\nchannels = 2").expect_err("no share");
+//! let error = read("range_m = 4\nloss = nan\nchannels = 2").expect_err("not a fraction");
 //! assert_eq!(error.position(), Some((2, 8)));
 //! assert_eq!((error.cause(), error.remedy()), ("loss = NaN", "give 0 to 1"));
 //! ```
@@ -116,34 +116,32 @@ impl<const MIN: i64, const MAX: i64, const HAS_MIN: bool, const HAS_MAX: bool> R
     for Interval<MIN, MAX, HAS_MIN, HAS_MAX>
 {
     fn allows(number: f64) -> bool {
-        let (least, most) = (MIN as f64, MAX as f64);
-        let is_in = number >= least && number <= most;
-        is_in && (HAS_MIN || number > least) && (HAS_MAX || number < most)
+        let low = MIN as f64;
+        let high = MAX as f64;
+        (low..=high).contains(&number) && (HAS_MIN || number > low) && (HAS_MAX || number < high)
     }
 
     fn description() -> String {
-        let [least, most] = [MIN, MAX].map(format_bound);
+        let low = format_bound(MIN);
+        let high = format_bound(MAX);
         match (HAS_MIN, HAS_MAX) {
-            (true, true) => format!("{least} to {most}"),
-            (false, true) => format!("a number above {least} and at most {most}"),
-            (true, false) => format!("{least} or more and less than {most}"),
-            (false, false) => format!("more than {least} and less than {most}"),
+            (true, true) => format!("{low} to {high}"),
+            (false, true) => format!("a number above {low} and at most {high}"),
+            (true, false) => format!("{low} or more and less than {high}"),
+            (false, false) => format!("more than {low} and less than {high}"),
         }
     }
 
     fn limits() -> Value {
-        let least = if HAS_MIN { "minimum" } else { "exclusiveMinimum" };
-        let most = if HAS_MAX { "maximum" } else { "exclusiveMaximum" };
-        json!({ least: MIN, most: MAX })
+        let minimum = if HAS_MIN { "minimum" } else { "exclusiveMinimum" };
+        let maximum = if HAS_MAX { "maximum" } else { "exclusiveMaximum" };
+        json!({ minimum: MIN, maximum: MAX })
     }
 }
 
 /// A bound in short form: 1e6 rather than 1000000.
 fn format_bound(bound: i64) -> String {
-    match bound.abs() < 1_000_000 {
-        true => bound.to_string(),
-        false => format!("{bound:e}"),
-    }
+    if bound.abs() < 1_000_000 { bound.to_string() } else { format!("{bound:e}") }
 }
 
 /// A number that is valid under a rule.
@@ -164,9 +162,10 @@ impl<R: Rule> Number<R> {
     }
 
     fn checked<E: Error>(number: f64) -> Result<Self, E> {
-        match R::allows(number) {
-            true => Ok(Self(number, PhantomData)),
-            false => Err(invalid_value(number, &format!("give {}", R::description()))),
+        if R::allows(number) {
+            Ok(Self(number, PhantomData))
+        } else {
+            Err(invalid_value(number, &format!("give {}", R::description())))
         }
     }
 }
@@ -225,9 +224,10 @@ impl<const MIN: u64, const MAX: u64> Integer<MIN, MAX> {
 
     /// Returns the remedy in words, without a maximum beyond all practical numbers.
     fn remedy(is_below: bool) -> String {
-        match is_below && MAX >= u64::from(u32::MAX) {
-            true => format!("give {MIN} or more"),
-            false => format!("give {MIN} to {MAX}"),
+        if is_below && MAX >= u64::from(u32::MAX) {
+            format!("give {MIN} or more")
+        } else {
+            format!("give {MIN} to {MAX}")
         }
     }
 }
@@ -251,9 +251,10 @@ impl<'de, const MIN: u64, const MAX: u64> Deserialize<'de> for Integer<MIN, MAX>
             }
 
             fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
-                match (MIN..=MAX).contains(&number) {
-                    true => Ok(Integer(number)),
-                    false => Err(invalid_value(number, &Self::Value::remedy(number < MIN))),
+                if (MIN..=MAX).contains(&number) {
+                    Ok(Integer(number))
+                } else {
+                    Err(invalid_value(number, &Self::Value::remedy(number < MIN)))
                 }
             }
         }
@@ -300,9 +301,9 @@ pub struct NumberRange {
 impl<'de> Deserialize<'de> for NumberRange {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match deserializer.deserialize_any(RangeVisitor("a number, or [least, greatest]"))? {
-            Numbers::One(both) => Ok(Self { low: both, high: both }),
+            Numbers::One(number) => Ok(Self { low: number, high: number }),
             Numbers::Many(numbers) => match numbers[..] {
-                [least, greatest] => Ok(Self { low: least, high: greatest }),
+                [low, high] => Ok(Self { low, high }),
                 _ => {
                     let remedy = "give one number, or the least and the greatest";
                     Err(invalid_value(format_args!("{numbers:?}"), remedy))
@@ -349,8 +350,9 @@ impl<'de> Visitor<'de> for RangeVisitor {
     }
 }
 
-/// Separator between an invalid value and its remedy, in the reader's one message.
+/// The start of the message of an invalid value. Serde's errors are one text, so value and remedy travel in it.
 const INVALID_VALUE_PREFIX: &str = "wrong value `";
+/// The separator between the value and the remedy.
 const REMEDY_SEPARATOR: &str = "`, ";
 
 /// Creates the error of a type that refuses a value; `Source::parse` adds key and position.

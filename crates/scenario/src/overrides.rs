@@ -7,8 +7,8 @@ use toml_edit::Value;
 
 impl Source {
     /// Applies `key=value` overrides: `seed=3`, `robots.count=20`, `map.file="x.yaml"`. A value
-    /// that is not TOML is taken as text. A table that stands alone in an array needs no index;
-    /// others are counted from 0 (`robots.1.count`).
+    /// that is not TOML is taken as text. The only table of an array needs no index;
+    /// several are counted from 0 (`robots.1.count`).
     ///
     /// # Errors
     /// When the text is not TOML, or a key leads through something that is not a table.
@@ -17,14 +17,16 @@ impl Source {
         if overrides.is_empty() {
             return Ok(self);
         }
-        let wanted: Vec<Override<'_>> =
+        let overrides: Vec<Override<'_>> =
             overrides.iter().map(|text| parse_override(text)).collect::<Result<_, _>>()?;
-        let given: Vec<(&str, String)> =
-            wanted.iter().map(|(_, key, value)| (*key, value.to_string().trim().into())).collect();
-        let others = self.replace_values(&given);
-        for (place, key, value) in others.into_iter().map(|k| &wanted[k]) {
-            let told = |refused: EditError| InputError::new(place, refused.cause, refused.remedy);
-            self.set_to(key, value, told)?;
+        let values: Vec<(&str, String)> = overrides
+            .iter()
+            .map(|one| (one.key, one.value.to_string().trim().to_string()))
+            .collect();
+        let remaining = self.replace_values(&values);
+        for Override { place, key, value } in remaining.into_iter().map(|k| &overrides[k]) {
+            let input_error = |error: EditError| InputError::new(place, error.cause, error.remedy);
+            self.set_to(key, value, input_error)?;
         }
         // Overrides may be applied in several steps.
         if !self.place.ends_with(OVERRIDES_SUFFIX) {
@@ -34,8 +36,13 @@ impl Source {
     }
 }
 
-/// The name of an override in errors, its key, and its value.
-type Override<'a> = (String, &'a str, Value);
+/// A parsed override.
+struct Override<'a> {
+    /// Its name in errors.
+    place: String,
+    key: &'a str,
+    value: Value,
+}
 
 fn parse_override(override_text: &str) -> Result<Override<'_>, InputError> {
     let place = format!("--set {override_text}");
@@ -43,24 +50,21 @@ fn parse_override(override_text: &str) -> Result<Override<'_>, InputError> {
         let remedy = "write --set key=value, e.g. --set robots.count=20";
         return Err(InputError::new(place, "there is no `=`", remedy));
     };
-    let value = value.trim();
-    match value.parse() {
-        Ok(value) => Ok((place, key, value)),
-        // As text, it would be refused later, where it is no longer clear that a number was meant.
-        Err(_) if overflows_to_infinity(value) => {
-            let cause = format!("`{value}` is larger than any number that can be held (1.8e308)");
-            Err(InputError::new(
-                place,
-                cause,
-                "write a smaller number, or inf where that makes sense",
-            ))
-        }
-        // Text needs no quotes on a command line, so a value that is not TOML is text.
-        Err(_) => Ok((place, key, Value::from(value))),
+    let text = value.trim();
+    if let Ok(value) = text.parse() {
+        return Ok(Override { place, key, value });
     }
+    // As text, it would be refused later, where it is no longer clear that a number was meant.
+    if overflows_to_infinity(text) {
+        let cause = format!("`{text}` is larger than any number that can be held (1.8e308)");
+        let remedy = "write a smaller number, or inf where that makes sense";
+        return Err(InputError::new(place, cause, remedy));
+    }
+    // Text needs no quotes on a command line, so a value that is not TOML is text.
+    Ok(Override { place, key, value: Value::from(text) })
 }
 
-/// Returns whether a text is written like a number, in digits, and rounds to infinity.
+/// Returns whether a text is a number in digits that rounds to infinity.
 fn overflows_to_infinity(text: &str) -> bool {
     text.contains(|c: char| c.is_ascii_digit()) && text.parse().is_ok_and(f64::is_infinite)
 }

@@ -1,4 +1,4 @@
-//! Remarks on valid scenarios: surprises for their author.
+//! Remarks on valid scenarios: effects that their author may not expect.
 
 use serde::Serialize;
 
@@ -6,9 +6,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The run is hardly the one that its author wants.
+    /// The run is probably not the one that its author wants.
     Warning,
-    /// The run is all right, but may differ from its author's expectation.
+    /// The run is valid, but may differ from its author's expectation.
     Note,
 }
 
@@ -27,7 +27,7 @@ impl Severity {
 pub struct Remark {
     /// Its weight.
     pub severity: Severity,
-    /// The key concerned, in the notation of overrides: `robots.0.effector`.
+    /// The key in question, in the notation of overrides: `robots.0.effector`.
     pub key: String,
     /// One sentence, or a cause and a remedy: `it does so: do that`.
     pub words: String,

@@ -21,8 +21,8 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
         let spanned = Spanned::<OneOrMany<T, Spanned<T>>>::deserialize(deserializer)?;
         let span = spanned.span();
         Ok(Self(match spanned.into_inner() {
-            OneOrMany::One(one) => vec![Spanned::new(span, one)],
-            OneOrMany::Each(many) => many,
+            OneOrMany::One(table) => vec![Spanned::new(span, table)],
+            OneOrMany::Many(tables) => tables,
         }))
     }
 }
@@ -42,10 +42,11 @@ impl<T: JsonSchema> JsonSchema for Sections<T> {
     }
 }
 
-/// The content of a key: one table, or an array of them.
+/// The content of a key: one table, or an array of them. Read by hand, because an untagged enum of serde buffers the
+/// content and loses the positions in it.
 enum OneOrMany<One, Each> {
     One(One),
-    Each(Vec<Each>),
+    Many(Vec<Each>),
 }
 
 impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrMany<One, Each> {
@@ -73,11 +74,11 @@ impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for On
                 self,
                 mut seq: A,
             ) -> Result<Self::Value, A::Error> {
-                let mut many = Vec::new();
-                while let Some(one) = seq.next_element()? {
-                    many.push(one);
+                let mut tables = Vec::new();
+                while let Some(table) = seq.next_element()? {
+                    tables.push(table);
                 }
-                Ok(OneOrMany::Each(many))
+                Ok(OneOrMany::Many(tables))
             }
         }
         deserializer.deserialize_any(Visitor(std::marker::PhantomData))

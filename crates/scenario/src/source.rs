@@ -1,7 +1,7 @@
 //! The text of a scenario, and its parser.
 
 use super::explain::{explain, keys_of};
-use super::locate::{locate, path};
+use super::locate::{dotted_path, locate};
 use crate::Spanned;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -14,10 +14,13 @@ use toml::de::{DeTable, Deserializer};
 /// Version of the scenario format that this program reads.
 pub const FORMAT: u32 = 1;
 
+/// Maximum size in bytes of a scenario file: thousands of agents with routes take one of them.
+const MAX_BYTES: u64 = 16 << 20;
+
 /// The suffix of the place of a scenario with overrides.
 pub(crate) const OVERRIDES_SUFFIX: &str = " (with --set)";
 
-/// The text of a scenario, where it came from, and the folder that its paths are relative to.
+/// The text of a scenario, its name in errors, and the folder that its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
     /// Its name in errors.
@@ -37,7 +40,7 @@ pub struct Preamble {
     pub world: Spanned<String>,
 }
 
-/// Words in errors about constructs that may span many lines.
+/// Words in errors about constructs that may span many lines: without its end, all errors after one follow from it.
 const MULTILINE_CONSTRUCTS: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
 
 /// Keys of [`Head`].
@@ -73,7 +76,7 @@ impl Source {
     /// # Errors
     /// When the file cannot be read or an override does not fit.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, InputError> {
-        let text = crate::file::read_text(path, 16 << 20)?;
+        let text = crate::file::read_text(path, MAX_BYTES)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         Self::new(path.display().to_string(), text, folder).with_overrides(overrides)
     }
@@ -101,21 +104,24 @@ impl Source {
     /// # Errors
     /// The same as for [`Self::parse`].
     pub fn parse_world<T: DeserializeOwned>(&self) -> Result<(Head, T), InputError> {
-        let told = |error| {
+        let input_error = |error| {
             let own = keys_of::<T>();
             let top: Vec<&str> =
                 HEAD_KEYS.into_iter().chain(own.iter().map(String::as_str)).collect();
             self.toml_error(&error, &top)
         };
-        let table = DeTable::parse(&self.text).map_err(told)?;
+        let table = DeTable::parse(&self.text).map_err(input_error)?;
         let span = table.span();
-        // Two tables instead of a flattened field, which would lose the places of its entries.
-        let (head, own): (DeTable<'_>, DeTable<'_>) = table
+        // Two tables instead of a flattened field, which would lose the positions of its entries.
+        let (head, sections): (DeTable<'_>, DeTable<'_>) = table
             .into_inner()
             .into_iter()
             .partition(|(key, _)| HEAD_KEYS.contains(&&**key.get_ref()));
-        let part = |table| Deserializer::from(toml::Spanned::new(span.clone(), table));
-        Ok((Head::deserialize(part(head)).map_err(told)?, T::deserialize(part(own)).map_err(told)?))
+        let head = Deserializer::from(toml::Spanned::new(span.clone(), head));
+        let head = Head::deserialize(head).map_err(input_error)?;
+        let sections = Deserializer::from(toml::Spanned::new(span, sections));
+        let sections = T::deserialize(sections).map_err(input_error)?;
+        Ok((head, sections))
     }
 
     /// Returns the syntax errors: one for each line, and none that only follows from an array, a
@@ -124,38 +130,37 @@ impl Source {
         let (_, mut errors) = DeTable::parse_recoverable(&self.text);
         // The reader reports errors in an array before errors above it.
         errors.sort_by_key(|error| error.span().map(|span| span.start));
-        let mut told: Vec<InputError> = Vec::new();
+        let mut reported: Vec<InputError> = Vec::new();
+        let mut last_line = None;
         for error in errors {
             let error = self.toml_error(&error, &[]);
-            let line = |error: &InputError| error.position().map(|(line, _)| line);
-            if told.last().is_none_or(|last| line(last) != line(&error)) {
-                let is_open = MULTILINE_CONSTRUCTS.iter().any(|word| error.cause().contains(word));
-                told.push(error);
-                if is_open {
-                    break;
-                }
+            let line = error.position().map(|(line, _)| line);
+            if !reported.is_empty() && line == last_line {
+                continue;
+            }
+            let is_open = MULTILINE_CONSTRUCTS.iter().any(|word| error.cause().contains(word));
+            last_line = line;
+            reported.push(error);
+            if is_open {
+                break;
             }
         }
-        told
+        reported
     }
 
     fn toml_error(&self, error: &toml::de::Error, top: &[&str]) -> InputError {
         let (cause, remedy) = explain(error, top, self.example_remedy());
-        let told = InputError::new(&self.place, cause, remedy);
+        let input_error = InputError::new(&self.place, cause, remedy);
         match error.span() {
-            Some(span) => self.with_span(told, span),
-            None => told,
+            Some(span) => self.with_span(input_error, span),
+            None => input_error,
         }
     }
 
-    /// Adds a place of the text to an error: position, end and key.
+    /// Adds a span of the text to an error: position, end and key.
     fn with_span(&self, error: InputError, span: Range<usize>) -> InputError {
-        let way = locate(&self.text, &span);
-        let error = error.with_span(&self.text, span);
-        match way {
-            Some(way) => error.with_key(path(&way)),
-            None => error,
-        }
+        let error = self.with_key_at(span.clone(), error);
+        error.with_span(&self.text, span)
     }
 
     /// Returns the remedy that points to an example of the scenario's own world.
@@ -185,8 +190,9 @@ impl Source {
         Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
     }
 
-    /// Returns the text above the first section, where the keys of all worlds stand; it may end in the middle of
-    /// a value with lines that look like a section.
+    /// Returns the text above the first section, which has the keys of all worlds, so that the preamble of a large
+    /// scenario is read without parsing all of it. It may end in the middle of a value with lines that look like a
+    /// section.
     fn top(&self) -> &str {
         let section = if self.text.starts_with('[') { Some(0) } else { self.text.find("\n[") };
         &self.text[..section.unwrap_or(self.text.len())]
@@ -196,7 +202,7 @@ impl Source {
     fn sweep_error(&self) -> Option<InputError> {
         let table = self.text.parse::<toml::Table>().ok()?;
         let is_sweep = table.contains_key("scenario") && !table.contains_key("world");
-        let remedy = "run it with `sidestep sweep`, or name the scenario that it names";
+        let remedy = "run it with `sidestep sweep`, or give the scenario that it refers to";
         is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 
@@ -224,15 +230,15 @@ impl Source {
         self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
     }
 
-    /// Adds the key that names a file, at a span, to the file's error.
+    /// Adds the key at a span to an error, e.g. the key that refers to a file to the file's error.
     pub fn with_key_at(&self, span: Range<usize>, error: InputError) -> InputError {
         match locate(&self.text, &span) {
-            Some(way) => error.with_key(path(&way)),
+            Some(path) => error.with_key(dotted_path(&path)),
             None => error,
         }
     }
 
-    /// Returns the result of reading a file that a key of the section at a span names; errors get the path to that
+    /// Returns the result of reading a file that a key of the section at a span refers to; errors get the path to that
     /// key.
     ///
     /// # Errors
@@ -246,19 +252,21 @@ impl Source {
         read.map_err(|error| self.with_key_at(self.key_span(section, &[key]), error))
     }
 
-    /// Returns an error as one of this text, for readers who see only that: an error of a file that the text names
-    /// becomes one of the key that names it.
+    /// Returns an error as one of this text, for readers who see only that: an error of a file that the text refers to
+    /// becomes one of the key that refers to it.
     pub fn error_at_reference(&self, error: &InputError) -> InputError {
         let Some(key) = error.key().filter(|_| error.place() != self.place) else {
             return error.clone();
         };
-        let at =
-            error.position().map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
-        let cause = format!("{}{at}: {}", error.place(), error.cause());
+        let position = match error.position() {
+            Some((line, column)) => format!(":{line}:{column}"),
+            None => String::new(),
+        };
+        let cause = format!("{}{position}: {}", error.place(), error.cause());
         self.error_at(key, cause, error.remedy())
     }
 
-    /// Returns its place without the mark of overrides.
+    /// Returns its place without the suffix of overrides.
     pub fn file_place(&self) -> &str {
         self.place.trim_end_matches(OVERRIDES_SUFFIX)
     }

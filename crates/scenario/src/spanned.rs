@@ -1,11 +1,11 @@
-//! Values that know their place in the text.
+//! Values with their position in the text.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer};
 use std::borrow::{Borrow, Cow};
 use std::ops::Range;
 
-/// A value and its place in the text, in bytes. It stands for the value alone in comparisons, as a
+/// A value and its position in the text, in bytes. It counts as the value alone in comparisons, as a
 /// key of a map and in a JSON Schema.
 ///
 /// The reader's own type does the work; this one exists because a schema can be derived for it.
@@ -13,12 +13,12 @@ use std::ops::Range;
 pub struct Spanned<T>(toml::Spanned<T>);
 
 impl<T> Spanned<T> {
-    /// Creates a value at a place; the empty place `0..0` is that of a default.
+    /// Creates a value at a position; a default has the empty one, `0..0`.
     pub fn new(span: Range<usize>, value: T) -> Self {
         Self(toml::Spanned::new(span, value))
     }
 
-    /// Returns its place in the text.
+    /// Returns its position in the text.
     pub fn span(&self) -> Range<usize> {
         self.0.span()
     }
@@ -28,7 +28,7 @@ impl<T> Spanned<T> {
         self.0.get_ref()
     }
 
-    /// Returns the value without its place.
+    /// Returns the value without its position.
     pub fn into_inner(self) -> T {
         self.0.into_inner()
     }

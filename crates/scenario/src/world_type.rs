@@ -31,13 +31,13 @@ pub trait WorldType: Send + Sync {
         serde_json::json!({ "additionalProperties": true })
     }
 
-    /// The files beside scenarios that this world reads, each as a word for it, with the JSON Schema of its keys.
+    /// The other kinds of TOML files that this world reads, each by a word for it and the JSON Schema of its keys.
     fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
         Vec::new()
     }
 
-    /// The things that seeds decide in a scenario of this world, as a list of nouns with the keys that cause it;
-    /// empty where a world gives none.
+    /// The quantities that are drawn at random in a scenario of this world, as a list of nouns with the keys that cause
+    /// it; empty where a world gives none.
     fn random_quantities(&self) -> &'static str {
         ""
     }
@@ -59,7 +59,7 @@ pub trait WorldType: Send + Sync {
     /// Compiles a scenario of this world.
     ///
     /// # Errors
-    /// When anything in it is wrong; with place, line, column, cause and remedy.
+    /// When it is invalid; with place, line, column, cause and remedy.
     fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError>;
 }
 
@@ -68,7 +68,7 @@ pub trait CompiledScenario: Send + Sync {
     /// Name of its world.
     fn world(&self) -> &'static str;
 
-    /// The plan that the scenario asks for.
+    /// The settings of its runs.
     fn plan(&self) -> RunConfig;
 
     /// Number of simulated bodies, the measure of a run's size.
@@ -77,7 +77,7 @@ pub trait CompiledScenario: Send + Sync {
     /// Returns the contents of the scenario, for people to check.
     fn contents(&self, source: &Source) -> Description;
 
-    /// Returns the surprises for the scenario's author, the weightiest first.
+    /// Returns the effects that the scenario's author may not expect, warnings first.
     fn remarks(&self) -> Vec<Remark> {
         Vec::new()
     }
@@ -90,14 +90,14 @@ pub trait CompiledScenario: Send + Sync {
     /// Returns the scenario as stored in a run folder: complete, with all its files.
     ///
     /// # Errors
-    /// When a file that it names can no longer be read.
+    /// When a file that it refers to can no longer be read.
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError>;
 
-    /// Returns the same scenario with another seed, where that takes less than compiling it: a fresh start without
-    /// reading or tabulating again. `None` where it does not.
+    /// Returns the same scenario with another seed, if that is faster than compiling it: without
+    /// reading files or computing tables again. `None` if it is not.
     ///
     /// # Errors
-    /// When the scenario is wrong with that seed.
+    /// When the scenario is invalid with that seed.
     fn reseeded(&self, _seed: u64) -> Option<Result<Box<dyn CompiledScenario>, InputError>> {
         None
     }
@@ -115,21 +115,21 @@ pub trait CompiledScenario: Send + Sync {
 pub enum SeedEffect {
     /// Nothing: no random number is drawn.
     Nothing,
-    /// Draws only guide a search, which may find the same result with every seed: only runs can tell.
+    /// Draws only guide a search, which may find the same result with every seed.
     Perhaps,
-    /// Draws decide the run; also where a world does not know.
+    /// Draws decide the run; also the answer of a world that cannot say.
     #[default]
     Decide,
 }
 
-/// The translation of a file of another program.
+/// A file of another program, translated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedScenario {
     /// The scenario's text, or the reason why nothing in the file can be simulated.
     pub scenario: Result<String, InputError>,
-    /// Further findings in the file, as JSON.
+    /// The report of the translation, as JSON.
     pub json: serde_json::Value,
-    /// The same for people.
+    /// The same as lines of text.
     pub lines: KeyValues,
 }
 
@@ -190,7 +190,7 @@ impl Worlds {
     /// Compiles a scenario of any of these worlds.
     ///
     /// # Errors
-    /// When no such world is known, or the scenario is wrong.
+    /// When no such world is known, or the scenario is invalid.
     pub fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
         let name = source.preamble()?.world;
         let world = self.find(name.get_ref()).ok_or_else(|| {

@@ -64,7 +64,7 @@ impl AllowedFiles {
         let mut roots = Vec::with_capacity(paths.len());
         for path in paths {
             let real = path.canonicalize().map_err(|e| {
-                let remedy = "name a scenario, a recording or a folder that is there";
+                let remedy = "give a scenario, a recording or a folder that is there";
                 Problem::new(path.display().to_string(), e.to_string(), remedy)
             })?;
             roots.push(Root { path: path.clone(), real });
@@ -147,7 +147,7 @@ impl AllowedFiles {
         };
         let path = self.resolve(folder)?;
         let unreadable = |e: std::io::Error| {
-            Problem::new(folder, format!("cannot be listed: {e}"), "name a folder that may be read")
+            Problem::new(folder, format!("cannot be listed: {e}"), "give a folder that may be read")
         };
         let mut paths = Vec::new();
         for item in fs::read_dir(&path).map_err(unreadable)?.take(MAX_ENTRIES) {
@@ -169,7 +169,7 @@ impl AllowedFiles {
 
 /// Returns the problem of a path that may not be read.
 fn outside_roots(path: &str) -> Problem {
-    let cause = "is not below the folders that were named at start";
+    let cause = "is not below the folders that were given at start";
     Problem::new(path, cause, "start the studio with its folder: sidestep studio FOLDER")
 }
 

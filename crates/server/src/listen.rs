@@ -26,7 +26,7 @@ pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputEr
         bound if is_taken(&bound) => {
             let remedy = match next_free_port(ip, port) {
                 Some(free) => format!("give --port {free}, which is free, or leave it out"),
-                None => "leave it out, and a free one is taken".into(),
+                None => "leave it out to use a free one".into(),
             };
             Err(InputError::new(format!("--port {port}"), "the port is in use", remedy))
         }

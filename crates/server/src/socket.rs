@@ -291,7 +291,7 @@ impl SocketSessions {
 fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let schema = worlds.schema(Some(world)).ok_or_else(|| {
         let names = worlds.names().join(", ");
-        Problem::new(world, "no such world is known", format!("name one of {names}"))
+        Problem::new(world, "no such world", format!("give one of {names}"))
     })?;
     Ok(ReplyBody::Schema { schema })
 }
@@ -303,7 +303,7 @@ fn catch_panic(
     work: impl FnOnce() -> Option<Result<ReplyBody, Problem>>,
 ) {
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        let cause = "this is a bug in sidestep";
+        let cause = "internal error (a bug in Sidestep)";
         Some(Err(Problem::new("request", cause, "please report it with the request")))
     });
     match done {

@@ -36,14 +36,14 @@ impl AllowedFiles {
     /// When it is elsewhere, hidden, or no plain file.
     pub(crate) fn target(&self, path: &str) -> Result<WriteTarget, Problem> {
         let refuse = |cause| {
-            let remedy = "name a .toml file below the folders that were named at start";
+            let remedy = "give a .toml file below the folders that were given at start";
             Err(Problem::new(path, cause, remedy))
         };
         let given = PathBuf::from(path);
         // A missing folder and a forbidden one are reported alike.
         let real = real_path(&given).unwrap_or_default();
         let Some(below) = self.relative_to_root(&real) else {
-            return refuse("is in no folder below those that were named at start");
+            return refuse("is in no folder below those that were given at start");
         };
         let is_hidden = |part: &std::ffi::OsStr| part.as_encoded_bytes().starts_with(b".");
         if below.iter().any(is_hidden) {

@@ -2,18 +2,18 @@
 //! exports, runs sweeps, and makes the documents of reports.
 //!
 //! ```text
-//! scenario.rs   a file and overrides -> a scenario     journey.rs    one run, to its end
-//! driver.rs     advances in slices                     recording.rs  the folder of a run
-//! orders.rs     orders from outside, followed again
-//! film/         frames into files                      picture.rs    pictures into files
-//! rerun.rs      recorded runs, computed again          replay.rs     ... and compared
-//! played/       ... of other builds, from their tables or messages
-//! export/       recorded runs in other formats         report/       folders -> documents
-//! sweep/        many runs of one scenario              summary.rs    the results of a run
-//! live/         viewers that watch and steer           beat.rs       when a cycle is due
-//! watcher.rs    progress, and requests to stop         identity.rs   the build that made a run
-//! attend.rs     work that its caller looks after       rows.rs       rows that are kept in memory
-//! fleet.rs      the job of agents as processes
+//! scenario.rs      a file and overrides -> a scenario   managed_run.rs   one run, to its end
+//! driver.rs        advances in slices                   run_recorder.rs  the folder of a run
+//! orders.rs        external orders, followed again      run_tables.rs    tables of a recorded run
+//! frame_sink/      frames into files                    picture.rs       pictures into files
+//! recorded_run.rs  recorded runs, computed again        replay.rs        ... and compared (compare.rs)
+//! playback/        ... of other builds, from their tables or messages
+//! export/          recorded runs in other formats       report/          folders -> documents
+//! sweep/           many runs of one scenario            summary.rs       the results of a run
+//! live/            viewers that watch and steer         pacer.rs         when a cycle is due
+//! watcher.rs       progress, and requests to stop       identity.rs      the build that made a run
+//! polling.rs       work that its caller polls           row_store.rs     rows that are kept in memory
+//! files.rs         files written completely or not      fleet.rs         the job of agents as processes
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the

@@ -69,7 +69,7 @@ impl OutputPaths<'_> {
             && resolve_path(folder).starts_with(resolve_path(file))
         {
             let cause = "the run folder is to be there";
-            let remedy = "name a file beside the folder, or in it";
+            let remedy = "give a file beside the folder, or in it";
             return Err(InputError::new(file.display(), cause, remedy));
         }
         McapRecorder::check_vacant(file, self.if_exists())
@@ -346,7 +346,7 @@ fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), Inpu
     if !has_orders(folder)? {
         return Ok(());
     }
-    let cause = format!("its agents were decided from outside up to cycle {}", run.cycle());
+    let cause = format!("its agents were controlled externally up to cycle {}", run.cycle());
     let remedy = "continue it with the program that decided for them, or look at it with \
                   `sidestep replay DIR --cycle N`";
     Err(InputError::new(folder.display(), cause, remedy))
@@ -453,6 +453,6 @@ fn storage_error(
 
 /// Returns the error of a simulation that broke one of its own rules.
 fn internal_error(run: &dyn Simulation) -> Error {
-    let cause = format!("this is a bug in sidestep, met shortly after\n  {}", replay_hint(run));
+    let cause = format!("internal error (a bug in Sidestep) shortly after\n  {}", replay_hint(run));
     Error::other(cause, "please report it with the scenario and the lines above")
 }

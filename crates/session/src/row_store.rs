@@ -47,7 +47,7 @@ impl RowStore {
             let cause = format!("there is no table `{unknown}`");
             let remedy = match names.is_empty() {
                 true => "the scenario records none: see its section [record]".to_string(),
-                false => format!("name some of {}", names.join(", ")),
+                false => format!("give some of {}", names.join(", ")),
             };
             return Err(InputError::new("record", cause, remedy));
         }

@@ -119,7 +119,11 @@
 //! worlds       the list of worlds, and each of them
 //! experiment   many runs and sweeps, and their results with confidence intervals
 //! session      runs that are recorded, resumed, replayed, filmed, exported and reported
+//! arms         arms: URDF -> joints, inverse kinematics, plans
+//! rods         chains of constraints: one motion through all parts
 //! learn        logs of a real robot -> error tables that a scenario loads
+//! error_models sensors and effectors that err, as plain types
+//! exact        the Markov chain of one robot, computed without random draws
 //! scenario     TOML text + overrides -> typed sections, and errors with positions
 //! import       ROS, MovingAI, CARMEN, MRCLAM and BlueSky files; URDF
 //! map          floors of boxes, generated offices, paths on them
@@ -142,6 +146,7 @@ pub use sidestep_arms as arms;
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_error_models as error_models;
+pub use sidestep_exact as exact;
 pub use sidestep_experiment as experiment;
 pub use sidestep_import as import;
 pub use sidestep_kernel as kernel;

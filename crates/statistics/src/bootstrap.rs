@@ -2,7 +2,7 @@
 //!
 //! Efron, "Better bootstrap confidence intervals", Journal of the American Statistical Association
 //! 82 (1987); Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 14. Resamples
-//! show how the statistic varies; `z0` corrects for a statistic that is biased, `a` (by the
+//! show how the statistic varies; `z0` corrects for a statistic that is biased, the acceleration `a` (by the
 //! jackknife) for one with a spread that depends on its value. Its coverage error decreases with
 //! `1 / n`, that of Student's interval with `1 / sqrt(n)` on skewed values.
 
@@ -16,7 +16,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// The purpose of draws that choose the members of a resample.
 const RESAMPLE_PURPOSE: Purpose = Purpose(0xB007);
 
-/// Number of values chosen from one stream. A stream has 2^18 words before it repeats, and choosing
+/// Number of values drawn from one stream. A stream has 2^18 words before it repeats, and drawing
 /// one of `n` takes less than two on average.
 const MAX_VALUES_PER_STREAM: usize = 1 << 16;
 
@@ -51,13 +51,15 @@ impl Bootstrap {
         }
         // The mean of deviations, because it loses no digits and the jackknife has a closed form.
         let deviations: Vec<f64> = values.iter().map(|v| v - center).collect();
-        let mean_of = |chosen: &[f64]| Some(chosen.iter().sum::<f64>() / chosen.len() as f64);
-        let interval = self.bca_interval(&deviations, 0.0, acceleration(&deviations), mean_of)?;
+        let interval =
+            self.bca_interval(&deviations, 0.0, acceleration(&deviations), |resample| {
+                Some(resample.iter().sum::<f64>() / resample.len() as f64)
+            })?;
         Some(Interval { low: center + interval.low, high: center + interval.high })
     }
 
     /// Returns the interval of any `statistic` of independent, identically distributed items; an
-    /// item may be a pair. Takes `resamples + n` evaluations.
+    /// item may be a pair. Evaluates the statistic `resamples + n` times.
     ///
     /// The statistic must vary smoothly with its items: for a quantile see
     /// [`super::quantile_interval`]. `None` as for [`Self::mean`], and where the statistic of the
@@ -71,12 +73,12 @@ impl Bootstrap {
             return None;
         }
         let estimate = statistic(items)?;
-        let without = |left_out: usize| {
+        let mut jackknife = Vec::with_capacity(items.len());
+        for left_out in 0..items.len() {
             let mut rest = items.to_vec();
             rest.remove(left_out);
-            statistic(&rest)
-        };
-        let jackknife: Vec<f64> = (0..items.len()).map(without).collect::<Option<_>>()?;
+            jackknife.push(statistic(&rest)?);
+        }
         let center = mean(&jackknife)?;
         let influences: Vec<f64> = jackknife.iter().map(|v| center - v).collect();
         self.bca_interval(items, estimate, acceleration(&influences), statistic)
@@ -93,12 +95,12 @@ impl Bootstrap {
         if items.len() < 3 || u32::try_from(items.len()).is_err() {
             return None;
         }
-        let mut chosen = Vec::with_capacity(items.len());
-        let of = |resample| {
-            self.resample(items, resample, &mut chosen);
-            statistic(&chosen)
-        };
-        let mut resampled: Vec<f64> = (0..self.resamples).map(of).collect::<Option<_>>()?;
+        let mut resample = Vec::with_capacity(items.len());
+        let mut resampled = Vec::with_capacity(self.resamples as usize);
+        for number in 0..self.resamples {
+            self.draw_resample(items, number, &mut resample);
+            resampled.push(statistic(&resample)?);
+        }
         if is_constant(&resampled) || !resampled.iter().all(|v| v.is_finite()) {
             return None;
         }
@@ -107,40 +109,46 @@ impl Bootstrap {
         let rounding = 1e-10 * (resampled[resampled.len() - 1] - resampled[0]);
         let below = resampled.partition_point(|v| *v < estimate - rounding);
         let ties = resampled.partition_point(|v| *v <= estimate + rounding) - below;
-        let share = (below as f64 + 0.5 * ties as f64) / f64::from(self.resamples);
+        let fraction_below = (below as f64 + 0.5 * ties as f64) / f64::from(self.resamples);
         let normal = Normal::standard();
-        let z0 = inverse_cdf(&normal, share)?;
+        let z0 = inverse_cdf(&normal, fraction_below)?;
+        // Efron and Tibshirani, equation 14.10.
         let end = |p: f64| {
             let z = z0 + inverse_cdf(&normal, p)?;
             let stretch = 1.0 - acceleration * z;
-            (stretch > 0.0).then_some(())?;
+            let is_defined = stretch > 0.0;
+            if !is_defined {
+                return None;
+            }
             order_statistic(&resampled, normal.cdf(z0 + z / stretch))
         };
         let tail = 0.5 * (1.0 - self.level);
         Some(Interval { low: end(tail)?, high: end(1.0 - tail)? })
     }
 
-    /// Draws as many of `items` as there are, each from all of them, into `chosen`.
-    fn resample<T: Copy>(&self, items: &[T], resample: EntityId, chosen: &mut Vec<T>) {
-        chosen.clear();
-        let (streams, n) = (Streams::new(self.seed), items.len() as u32);
+    /// Draws as many of `items` as there are, each from all of them, into `resample`.
+    fn draw_resample<T: Copy>(&self, items: &[T], number: EntityId, resample: &mut Vec<T>) {
+        resample.clear();
+        let streams = Streams::new(self.seed);
+        let n = items.len() as u32;
         for (k, start) in (0..items.len()).step_by(MAX_VALUES_PER_STREAM).enumerate() {
-            let mut draws = streams.draws(resample, k as u64, RESAMPLE_PURPOSE);
+            let mut draws = streams.draws(number, k as u64, RESAMPLE_PURPOSE);
             let count = MAX_VALUES_PER_STREAM.min(items.len() - start);
-            chosen.extend((0..count).map(|_| items[draws.uniform_below(n) as usize]));
+            resample.extend((0..count).map(|_| items[draws.uniform_below(n) as usize]));
         }
     }
 }
 
 /// Returns a sixth of the skewness of the influences: how fast the spread changes with the value.
 fn acceleration(influences: &[f64]) -> f64 {
-    let largest = influences.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let largest = influences.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
     if largest == 0.0 {
         return 0.0;
     }
-    let unit = || influences.iter().map(|v| v / largest);
-    let square = sum(unit().map(|v| v * v));
-    sum(unit().map(|v| v * v * v)) / (6.0 * square * square.sqrt())
+    // In units of the largest, so that no cube overflows.
+    let scaled: Vec<f64> = influences.iter().map(|v| v / largest).collect();
+    let squares = sum(scaled.iter().map(|v| v * v));
+    sum(scaled.iter().map(|v| v * v * v)) / (6.0 * squares * squares.sqrt())
 }
 
 fn inverse_cdf(normal: &Normal, p: f64) -> Option<f64> {
@@ -150,8 +158,11 @@ fn inverse_cdf(normal: &Normal, p: f64) -> Option<f64> {
 /// Returns the value at rank `p * (n + 1)` of `sorted`, by linear interpolation between two values.
 fn order_statistic(sorted: &[f64], p: f64) -> Option<f64> {
     let rank = p * (sorted.len() + 1) as f64;
-    let inside = rank >= 1.0 && rank <= sorted.len() as f64;
-    inside.then(|| percentile(sorted, (rank - 1.0) / (sorted.len() - 1) as f64))?
+    let is_inside = rank >= 1.0 && rank <= sorted.len() as f64;
+    if !is_inside {
+        return None;
+    }
+    percentile(sorted, (rank - 1.0) / (sorted.len() - 1) as f64)
 }
 
 #[cfg(test)]
@@ -237,7 +248,7 @@ mod tests {
     fn more_values_than_a_stream_has_words_for_are_drawn_from_several() {
         let items: Vec<u32> = (0..(3 * MAX_VALUES_PER_STREAM as u32 + 5)).collect();
         let mut chosen = Vec::new();
-        Bootstrap::default().resample(&items, 4, &mut chosen);
+        Bootstrap::default().draw_resample(&items, 4, &mut chosen);
         assert_eq!(chosen.len(), items.len());
         assert_ne!(chosen[..100], chosen[MAX_VALUES_PER_STREAM..MAX_VALUES_PER_STREAM + 100]);
         let mut distinct = chosen;

@@ -70,23 +70,28 @@ pub fn wilson(successes: f64, n: f64) -> Interval {
 /// When `successes` exceeds `n`.
 pub fn clopper_pearson(successes: u64, n: u64) -> Interval {
     assert!(successes <= n, "more successes than trials");
-    let (k, n) = (successes as f64, n as f64);
-    let quantile =
-        |a: f64, b: f64, p: f64| Beta::new(a, b).expect("positive shapes").inverse_cdf(p);
+    let k = successes as f64;
+    let n = n as f64;
+    // Quantiles of the binomial's tails are quantiles of beta distributions.
     Interval {
-        low: if k > 0.0 { quantile(k, n - k + 1.0, 0.025) } else { 0.0 },
-        high: if k < n { quantile(k + 1.0, n - k, 0.975) } else { 1.0 },
+        low: if k > 0.0 { beta_quantile(k, n - k + 1.0, 0.025) } else { 0.0 },
+        high: if k < n { beta_quantile(k + 1.0, n - k, 0.975) } else { 1.0 },
     }
 }
 
-/// Returns the two-sided p-value of the exact binomial test that a probability is `share`, inside
+fn beta_quantile(a: f64, b: f64, p: f64) -> f64 {
+    Beta::new(a, b).expect("positive shapes").inverse_cdf(p)
+}
+
+/// Returns the two-sided p-value of the exact binomial test that a probability is `probability`, inside
 /// (0, 1), after `successes` in `n` trials.
 ///
-/// Below 0.05 where the interval of [`clopper_pearson`] excludes `share`.
-pub fn proportion_p_value(successes: u64, n: u64, share: f64) -> f64 {
-    let (k, n) = (successes as usize, n as usize);
-    let at_least = if k == 0 { 1.0 } else { 1.0 - binomial_cdf(k - 1, n, share) };
-    (2.0 * binomial_cdf(k, n, share).min(at_least)).min(1.0)
+/// Below 0.05 where the interval of [`clopper_pearson`] excludes `probability`.
+pub fn proportion_p_value(successes: u64, n: u64, probability: f64) -> f64 {
+    let k = successes as usize;
+    let n = n as usize;
+    let at_least = if k == 0 { 1.0 } else { 1.0 - binomial_cdf(k - 1, n, probability) };
+    (2.0 * binomial_cdf(k, n, probability).min(at_least)).min(1.0)
 }
 
 /// Returns the two-sided p-value of Student's test that a mean is `value`, from the 95 % interval
@@ -95,12 +100,13 @@ pub fn proportion_p_value(successes: u64, n: u64, share: f64) -> f64 {
 /// Below 0.05 where the interval excludes `value`. An interval without width says that all values
 /// are equal: then 1 if they are `value`, and 0 otherwise.
 pub fn mean_p_value(interval: Interval, n: usize, value: f64) -> f64 {
-    let (half_width, freedom) = (interval.half_width(), n.max(2) - 1);
-    let off = (0.5 * interval.low + 0.5 * interval.high - value).abs();
-    if half_width == 0.0 || off == 0.0 {
-        return f64::from(off == 0.0);
+    let half_width = interval.half_width();
+    let freedom = n.max(2) - 1;
+    let deviation = (0.5 * interval.low + 0.5 * interval.high - value).abs();
+    if half_width == 0.0 || deviation == 0.0 {
+        return f64::from(deviation == 0.0);
     }
-    student_p_value(off / half_width * student_t(freedom), freedom).unwrap_or(1.0)
+    student_p_value(deviation / half_width * student_t(freedom), freedom).unwrap_or(1.0)
 }
 
 /// Returns the probability that Student's t is at least this far from 0; `None` if `t` is no number.
@@ -119,7 +125,8 @@ pub(super) fn student_t(freedom: usize) -> f64 {
     if freedom < 100 {
         return StudentsT::new(0.0, 1.0, n).expect("positive freedom").inverse_cdf(0.975);
     }
-    let (z, z2) = (Z_975, Z_975 * Z_975);
+    let z = Z_975;
+    let z2 = z * z;
     let terms = [
         (z2 + 1.0) / 4.0,
         ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0,
@@ -137,7 +144,8 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     if !values.iter().all(|v| v.is_finite()) {
         return None;
     }
-    let (center, sd) = (mean(values)?, sample_sd(values)?);
+    let center = mean(values)?;
+    let sd = sample_sd(values)?;
     let t = student_t(values.len() - 1);
     Some(Interval::from_center(center, t * (sd / (values.len() as f64).sqrt())))
 }
@@ -164,15 +172,16 @@ pub fn runs_for_half_width(sd: f64, half_width: f64) -> Option<u64> {
     if !(sd >= 0.0 && sd.is_finite() && half_width >= 0.0) {
         return None;
     }
-    let enough = |n: u64| student_t(n as usize - 1) * sd <= half_width * (n as f64).sqrt();
+    let is_enough = |n: u64| student_t(n as usize - 1) * sd <= half_width * (n as f64).sqrt();
+    // Doubling, and bisection between the last two, because t depends on the number that is sought.
     let mut high = 2_u64;
-    while !enough(high) {
+    while !is_enough(high) {
         high = high.checked_mul(2).filter(|n| *n < 1 << 53)?;
     }
     let mut low = high / 2;
     while high - low > 1 {
         let middle = low + (high - low) / 2;
-        if enough(middle) { high = middle } else { low = middle }
+        if is_enough(middle) { high = middle } else { low = middle }
     }
     Some(high)
 }

@@ -30,26 +30,28 @@ impl Fit {
     /// When the rows differ in length or in number from `y`.
     pub fn new(x: &[Vec<f64>], y: &[f64]) -> Option<Self> {
         assert_eq!(x.len(), y.len(), "one row per observation");
-        let (n, k) = (y.len(), x.first()?.len());
+        let n = y.len();
+        let k = x.first()?.len();
         // Columns are scaled to length 1, because the condition of the system must not depend on
         // units.
         let lengths: Vec<f64> = (0..k).map(|j| dot(x, j, j).sqrt()).collect();
         if n < k || lengths.contains(&0.0) {
             return None;
         }
-        let scaled = |i: usize, j: usize| dot(x, i, j) / (lengths[i] * lengths[j]);
-        let gram: Vec<Vec<f64>> = (0..k).map(|i| (0..k).map(|j| scaled(i, j)).collect()).collect();
+        // The normal equations: gram * coefficients = moments.
+        let gram: Vec<Vec<f64>> = (0..k)
+            .map(|i| (0..k).map(|j| dot(x, i, j) / (lengths[i] * lengths[j])).collect())
+            .collect();
         let inverse = invert(gram)?;
-        let moment =
-            |j: usize| x.iter().zip(y).map(|(row, y)| row[j] * y).sum::<f64>() / lengths[j];
-        let moments: Vec<f64> = (0..k).map(moment).collect();
-        let coefficient = |i: usize| {
-            inverse[i].iter().zip(&moments).map(|(a, b)| a * b).sum::<f64>() / lengths[i]
-        };
-        let coefficients: Vec<f64> = (0..k).map(coefficient).collect();
-        let spread = |j: usize| inverse[j][j].sqrt() / lengths[j];
+        let moments: Vec<f64> = (0..k)
+            .map(|j| x.iter().zip(y).map(|(row, y)| row[j] * y).sum::<f64>() / lengths[j])
+            .collect();
+        let coefficients: Vec<f64> = (0..k)
+            .map(|i| inverse[i].iter().zip(&moments).map(|(a, b)| a * b).sum::<f64>() / lengths[i])
+            .collect();
+        let spreads: Vec<f64> = (0..k).map(|j| inverse[j][j].sqrt() / lengths[j]).collect();
         let residual = residual_sum_of_squares(x, y, &coefficients);
-        let intervals = intervals(&coefficients, residual, n, spread);
+        let intervals = intervals(&coefficients, residual, n, &spreads);
         let r_squared = 1.0 - residual / total_sum_of_squares(y).max(f64::MIN_POSITIVE);
         Some(Self { coefficients, intervals, r_squared, n })
     }
@@ -65,8 +67,13 @@ fn dot(x: &[Vec<f64>], i: usize, j: usize) -> f64 {
 }
 
 fn residual_sum_of_squares(x: &[Vec<f64>], y: &[f64], coefficients: &[f64]) -> f64 {
-    let predicted = |row: &[f64]| row.iter().zip(coefficients).map(|(x, c)| x * c).sum::<f64>();
-    x.iter().zip(y).map(|(row, y)| (y - predicted(row)) * (y - predicted(row))).sum()
+    x.iter()
+        .zip(y)
+        .map(|(row, y)| {
+            let prediction = row.iter().zip(coefficients).map(|(x, c)| x * c).sum::<f64>();
+            (y - prediction) * (y - prediction)
+        })
+        .sum()
 }
 
 fn total_sum_of_squares(y: &[f64]) -> f64 {
@@ -74,25 +81,27 @@ fn total_sum_of_squares(y: &[f64]) -> f64 {
     y.iter().map(|v| (v - mean) * (v - mean)).sum()
 }
 
+/// Returns the intervals of the coefficients; `spreads` are their standard errors for residuals of variance 1.
 fn intervals(
     coefficients: &[f64],
     residual: f64,
     n: usize,
-    spread: impl Fn(usize) -> f64,
+    spreads: &[f64],
 ) -> Option<Vec<Interval>> {
     let freedom = n.checked_sub(coefficients.len()).filter(|&f| f > 0)? as f64;
     let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
-    let around = |(j, &c): (usize, &f64)| {
-        let half_width = t * (residual / freedom).sqrt() * spread(j);
-        Interval { low: c - half_width, high: c + half_width }
-    };
-    Some(coefficients.iter().enumerate().map(around).collect())
+    let intervals = coefficients.iter().zip(spreads).map(|(&coefficient, spread)| {
+        let half_width = t * (residual / freedom).sqrt() * spread;
+        Interval { low: coefficient - half_width, high: coefficient + half_width }
+    });
+    Some(intervals.collect())
 }
 
 /// Returns the inverse of a symmetric positive matrix with ones on its diagonal, by Gauss and
 /// Jordan.
 fn invert(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     let k = a.len();
+    // Without exchanges of rows: the pivots of a positive matrix are positive.
     for pivot in 0..k {
         let divisor = a[pivot][pivot];
         if divisor < MIN_PIVOT_FRACTION {

@@ -1,42 +1,5 @@
 #![deny(clippy::disallowed_methods)]
-//! Intervals, moments and tests that qualify every reported number.
-//!
-//! Intervals are two-sided at 95 % unless a function says otherwise. The bootstrap draws from the
-//! kernel's streams, so it always gives the same ends for the same values; nothing else here draws
-//! random numbers. Sums run in the order of the values and are compensated, so that huge and tiny
-//! magnitudes keep their digits.
-//!
-//! ```text
-//! moments.rs     mean, standard deviation, Moments; Sample: the values of a metric
-//! interval.rs    intervals of shares (Wilson, Clopper and Pearson) and of means (Student)
-//! quantile.rs    percentiles, and their intervals by order statistics
-//! bootstrap.rs   BCa intervals of the mean and of any other statistic
-//! paired.rs      two treatments of the same cases: differences, ratios, signs, p-values, Holm
-//! rank.rs        rank correlation of two quantities
-//! least_squares.rs  linear models fitted to measurements
-//! stopping.rs    how many runs are enough
-//! ```
-//!
-//! # Which interval to trust when
-//!
-//! | the question | use | trust it | do not |
-//! |---|---|---|---|
-//! | how often does it happen (a share of runs) | [`wilson`] | from the first run on; its coverage is 95 % on average over shares | where coverage must never fall below 95 %: [`clopper_pearson`] |
-//! | mean of a roughly symmetric metric | [`mean_interval`] | from 5 runs on; exact for normal values at any n >= 2 | with a long tail and fewer than 50 runs: it is too low on the side of the tail |
-//! | mean of a skewed metric | [`Bootstrap::mean`] | from some 20 runs on; it leans to the side of the tail | below 10 runs: it cannot know a tail it has not seen, and is too narrow |
-//! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, for any distribution; it reports its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
-//! | is A better than B | [`Pairs`]: run both on the same seeds | the interval of the difference; `k of n pairs` needs no assumption | the two separate intervals: their overlap says nothing about pairs |
-//! | by which factor does A differ from B | [`Pairs::ratio`] (Fieller) | with a baseline mean that is well away from 0 | a ratio to a mean that may be 0: it is absent |
-//! | does one quantity go with another | [`rank_correlation`] | from some 10 pairs on; it sees any steady rise or fall | for a rise that turns into a fall: it may be 0 |
-//! | which of many variants differ | [`holm`] on the p-values | the adjusted ones | the smallest of twenty raw p-values |
-//!
-//! Where Student's interval and the bootstrap's differ much, the values are skewed and n is small:
-//! trust neither to its last digit, and run more. All of them take runs as independent, which
-//! different seeds make them; robots of one run are not. Constant values give Student's interval no
-//! width: by the rule of three (Hanley and Lippman-Hand 1983), `n` equal values only show that at
-//! most about `3 / n` of all runs differ.
-//!
-//! A number that is not finite does not count as a value: [`Sample`] counts it as missing instead.
+#![doc = include_str!("../README.md")]
 
 mod bootstrap;
 mod interval;
@@ -67,8 +30,8 @@ pub fn chi_square_p_value(statistic: f64, degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 1.0;
     }
-    let law = ChiSquared::new(degrees_of_freedom as f64).expect("positive freedom");
-    law.sf(statistic.max(0.0))
+    let distribution = ChiSquared::new(degrees_of_freedom as f64).expect("positive freedom");
+    distribution.sf(statistic.max(0.0))
 }
 
 #[cfg(test)]

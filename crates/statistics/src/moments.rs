@@ -42,14 +42,16 @@ impl Sample {
 /// Returns a power of two near the largest magnitude: a value divided by it can be squared and
 /// summed without overflow, and loses no digit by the division.
 fn scale(values: &[f64]) -> f64 {
-    let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let largest = values.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    // Its exponent alone.
     let power = f64::from_bits(largest.to_bits() & 0x7ff0_0000_0000_0000);
     if power > 0.0 && power.is_finite() { power } else { 1.0 }
 }
 
 /// Returns Neumaier's compensated sum: the error does not grow with the number of terms.
 pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
-    let (mut total, mut lost) = (0.0_f64, 0.0);
+    let mut total = 0.0_f64;
+    let mut lost = 0.0;
     for term in terms {
         let next = total + term;
         lost +=
@@ -90,17 +92,17 @@ fn sum_of_squares(values: &[f64]) -> Option<(f64, f64)> {
         return values.first().map(|_| (0.0, 1.0));
     }
     let center = mean(values)?;
-    // Halves, because two values may lie further apart than the largest number.
+    // Halves, because the difference of two values may exceed the largest number.
     let deviations: Vec<f64> = values.iter().map(|v| 0.5 * v - 0.5 * center).collect();
     let scale = scale(&deviations);
-    let square = sum(deviations.iter().map(|d| (d / scale) * (d / scale)));
-    // The error that the rounding of the mean adds to every deviation.
-    let off = sum(deviations.iter().map(|d| d / scale));
-    Some(((square - off * off / values.len() as f64).max(0.0) * 4.0, scale))
+    let squares = sum(deviations.iter().map(|d| (d / scale) * (d / scale)));
+    // The error that the rounding of the mean adds to all deviations, which Chan's corrected two-pass algorithm takes off.
+    let error = sum(deviations.iter().map(|d| d / scale));
+    Some(((squares - error * error / values.len() as f64).max(0.0) * 4.0, scale))
 }
 
-/// The value below which a fraction `q` of `sorted` lies, between two order statistics by
-/// linear interpolation (type 7 of Hyndman and Fan); `None` of nothing.
+/// The value below which a fraction `q` of `sorted` is, between two order statistics by
+/// linear interpolation (type 7 of Hyndman and Fan); `None` without values.
 pub fn percentile(sorted: &[f64], q: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let position = q.clamp(0.0, 1.0) * last as f64;

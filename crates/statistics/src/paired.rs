@@ -17,9 +17,15 @@ impl Pairs {
     /// Creates the pairs `(a[i], b[i])` of which both have a finite value; all others, and the rest
     /// of the longer list, count as incomplete.
     pub fn from_columns(a: &[Option<f64>], b: &[Option<f64>]) -> Self {
-        let finite = |value: &Option<f64>| value.filter(|v| v.is_finite());
-        let complete = |(a, b)| Some((finite(a)?, finite(b)?));
-        let pairs: Vec<(f64, f64)> = a.iter().zip(b).filter_map(complete).collect();
+        let mut pairs: Vec<(f64, f64)> = Vec::new();
+        for pair in a.iter().zip(b) {
+            if let (Some(a), Some(b)) = pair
+                && a.is_finite()
+                && b.is_finite()
+            {
+                pairs.push((*a, *b));
+            }
+        }
         let incomplete = a.len().max(b.len()) - pairs.len();
         Self { pairs, incomplete }
     }
@@ -59,28 +65,36 @@ impl Pairs {
         if self.n() < 2 || self.pairs.iter().any(|(a, b)| *a < 0.0 || *b < 0.0) {
             return None;
         }
-        let (center_a, center_b) = (mean(&a)?, mean(&b)?);
+        let center_a = mean(&a)?;
+        let center_b = mean(&b)?;
         if center_b <= 0.0 {
             return None;
         }
-        // In units of the baseline's mean, so that the equation is about 1.
-        let (unit, t) = (center_b, student_t(self.n() - 1));
-        let relative = |values: &[f64], center: f64| -> Vec<f64> {
-            values.iter().map(|v| (v - center) / unit).collect()
-        };
-        let (u, v) = (relative(&a, center_a), relative(&b, center_b));
+        // In units of the baseline's mean, so that no square overflows and the baseline is 1.
+        let unit = center_b;
+        let u: Vec<f64> = a.iter().map(|a| (a - center_a) / unit).collect();
+        let v: Vec<f64> = b.iter().map(|b| (b - center_b) / unit).collect();
         let n = self.n() as f64;
+        let t = student_t(self.n() - 1);
+        // The covariance of the means, times t squared.
         let covariance = |x: &[f64], y: &[f64]| {
             t * t * sum(x.iter().zip(y).map(|(x, y)| x * y)) / ((n - 1.0) * n)
         };
         let ratio = center_a / unit;
-        let (aa, ab, bb) = (covariance(&u, &u), covariance(&u, &v), covariance(&v, &v));
-        // The ratios r with (ratio - r)^2 <= aa - 2 r ab + r^2 bb lie between two roots.
-        let curve = 1.0 - bb;
-        let root = ((ratio - ab) * (ratio - ab) - curve * (ratio * ratio - aa)).max(0.0).sqrt();
+        let aa = covariance(&u, &u);
+        let ab = covariance(&u, &v);
+        let bb = covariance(&v, &v);
+        // The ratios r with (ratio - r)^2 <= aa - 2 r ab + r^2 bb are between the two roots of a quadratic equation.
+        // Its leading coefficient is positive where the interval of the baseline's mean excludes 0.
+        let leading = 1.0 - bb;
+        let excludes_zero = leading > 0.0;
+        if !excludes_zero || !ratio.is_finite() {
+            return None;
+        }
+        let root = ((ratio - ab) * (ratio - ab) - leading * (ratio * ratio - aa)).max(0.0).sqrt();
         let interval =
-            Interval { low: (ratio - ab - root) / curve, high: (ratio - ab + root) / curve };
-        (curve > 0.0 && ratio.is_finite()).then_some((ratio, interval))
+            Interval { low: (ratio - ab - root) / leading, high: (ratio - ab + root) / leading };
+        Some((ratio, interval))
     }
 
     /// Returns the bootstrap's 95 % interval of the mean difference.
@@ -93,8 +107,9 @@ impl Pairs {
     pub fn ratio_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
         self.ratio()?;
         bootstrap.interval(&self.pairs, |pairs| {
-            let total = |side: fn(&(f64, f64)) -> f64| pairs.iter().map(side).sum::<f64>();
-            Some(total(|p| p.0) / total(|p| p.1)).filter(|r| r.is_finite())
+            let total_a: f64 = pairs.iter().map(|(a, _)| a).sum();
+            let total_b: f64 = pairs.iter().map(|(_, b)| b).sum();
+            Some(total_a / total_b).filter(|ratio| ratio.is_finite())
         })
     }
 
@@ -111,7 +126,8 @@ impl Pairs {
     /// same amount, because the test needs a spread.
     pub fn p_value(&self) -> Option<f64> {
         let differences = self.differences();
-        let (center, sd) = (mean(&differences)?, sample_sd(&differences)?);
+        let center = mean(&differences)?;
+        let sd = sample_sd(&differences)?;
         if sd == 0.0 {
             return (center == 0.0).then_some(1.0);
         }
@@ -132,19 +148,23 @@ impl Pairs {
 }
 
 /// Returns Holm's adjustment ("A simple sequentially rejective multiple test procedure",
-/// Scandinavian Journal of Statistics 6, 1979) of the p-values of one family: calling those below
-/// 0.05 different is wrong anywhere in the family with at most 5 %, however the tests depend on
+/// Scandinavian Journal of Statistics 6, 1979) of the p-values of one family: the probability that
+/// any difference with a value below 0.05 is none is at most 5 %, however the tests depend on
 /// each other. Absent values are not part of the family and stay absent.
 pub fn holm(p_values: &[Option<f64>]) -> Vec<Option<f64>> {
-    let known = |i: &usize| p_values[*i].is_some_and(|p| !p.is_nan());
-    let mut order: Vec<usize> = (0..p_values.len()).filter(known).collect();
-    order
-        .sort_by(|i, j| f64::total_cmp(&p_values[*i].unwrap_or(1.0), &p_values[*j].unwrap_or(1.0)));
+    let mut family: Vec<(usize, f64)> = Vec::new();
+    for (i, p_value) in p_values.iter().enumerate() {
+        if let Some(p) = p_value.filter(|p| !p.is_nan()) {
+            family.push((i, p));
+        }
+    }
+    family.sort_by(|(_, a), (_, b)| a.total_cmp(b));
     let mut adjusted = vec![None; p_values.len()];
+    // An adjusted value is never below that of a smaller p-value: the procedure stops at the first that it accepts.
     let mut largest = 0.0_f64;
-    for (rank, &i) in order.iter().enumerate() {
-        let factor = (order.len() - rank) as f64;
-        largest = largest.max((factor * p_values[i].unwrap_or(1.0)).min(1.0));
+    for (rank, &(i, p)) in family.iter().enumerate() {
+        let factor = (family.len() - rank) as f64;
+        largest = largest.max((factor * p).min(1.0));
         adjusted[i] = Some(largest);
     }
     adjusted

@@ -16,7 +16,7 @@ pub struct QuantileInterval {
     pub coverage: f64,
 }
 
-/// The largest probability of a miss on either side.
+/// The largest probability that the quantile is beyond an end, on either side.
 const MAX_TAIL_PROBABILITY: f64 = 0.025;
 
 /// Above this many values the ranks are those of the normal approximation, widened outward to whole
@@ -47,23 +47,27 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
 /// Returns the smallest number of runs for which [`quantile_interval`] has an answer: 6 for the
 /// median, 72 for the 5th and 95th percentile. `None` for `q` outside (0, 1).
 pub fn runs_for_quantile(q: f64) -> Option<usize> {
+    if !(q > 0.0 && q < 1.0) {
+        return None;
+    }
+    // All values are on one side of the quantile with probability inner^n, which must be small enough.
     let inner = q.max(1.0 - q);
-    (q > 0.0 && q < 1.0).then(|| (math::ln(MAX_TAIL_PROBABILITY) / math::ln(inner)).ceil() as usize)
+    Some((math::ln(MAX_TAIL_PROBABILITY) / math::ln(inner)).ceil() as usize)
 }
 
-/// Returns the smallest rank from 1 on that `holds`, or `n + 1`; where it holds for a rank, it
-/// holds for all above.
-fn first_rank(n: usize, holds: impl Fn(usize) -> bool) -> usize {
-    let (mut below, mut found) = (0, n + 1);
-    while found - below > 1 {
-        let middle = below + (found - below) / 2;
-        if holds(middle) { found = middle } else { below = middle }
+/// Returns the smallest rank from 1 on for which `condition` holds, or `n + 1`; it must then hold for all larger ranks.
+fn first_rank(n: usize, condition: impl Fn(usize) -> bool) -> usize {
+    let mut low = 0;
+    let mut high = n + 1;
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if condition(middle) { high = middle } else { low = middle }
     }
-    found
+    high
 }
 
 fn exact_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
-    // Fewer than `low` values lie below the quantile, or at least `high` do, with at most TAIL.
+    // Fewer than `low` values are below the quantile, or at least `high` are, with at most this probability each.
     let low = first_rank(n, |rank| binomial_cdf(rank - 1, n, q) > MAX_TAIL_PROBABILITY) - 1;
     let high = first_rank(n, |rank| binomial_cdf(rank - 1, n, q) >= 1.0 - MAX_TAIL_PROBABILITY);
     (low >= 1 && high <= n).then_some((low, high))
@@ -72,7 +76,8 @@ fn exact_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
 fn normal_ranks(n: usize, q: f64) -> Option<(usize, usize)> {
     let n_f = n as f64;
     let spread = Z_975 * (n_f * q * (1.0 - q)).sqrt();
-    let (low, high) = ((n_f * q - spread).floor(), (n_f * q + spread).ceil() + 1.0);
+    let low = (n_f * q - spread).floor();
+    let high = (n_f * q + spread).ceil() + 1.0;
     (low >= 1.0 && high <= n_f).then_some((low as usize, high as usize))
 }
 

@@ -1,5 +1,6 @@
 //! Rank correlation.
 
+use crate::interval::Z_975;
 use crate::{Interval, mean};
 use serde::Serialize;
 use sidestep_kernel::math;
@@ -17,33 +18,53 @@ pub struct Correlation {
 /// Returns Spearman's rank correlation of pairs; `None` where one of both is constant.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Correlation> {
     let (x, y): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
-    let (x, y) = (ranks(&x), ranks(&y));
-    let (middle_x, middle_y) = (mean(&x)?, mean(&y)?);
-    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        x.iter().zip(&y).map(|(a, b)| of(a - middle_x, b - middle_y)).sum()
-    };
-    let (across, xx, yy) = (sum(&|a, b| a * b), sum(&|a, _| a * a), sum(&|_, b| b * b));
-    let value = across / (xx * yy).sqrt();
-    let interval = (x.len() > 3 && value.abs() < 1.0).then(|| {
-        const NORMAL_95: f64 = 1.959_963_984_540_054;
-        let half = NORMAL_95 * ((1.0 + 0.5 * value * value) / (x.len() as f64 - 3.0)).sqrt();
-        let middle = 0.5 * math::ln((1.0 + value) / (1.0 - value));
-        let back = |z: f64| 1.0 - 2.0 / (math::exp(2.0 * z) + 1.0);
-        Interval { low: back(middle - half), high: back(middle + half) }
-    });
-    value.is_finite().then_some(Correlation { value, interval })
+    let x = deviations(&ranks(&x))?;
+    let y = deviations(&ranks(&y))?;
+    let xy = sum_of_products(&x, &y);
+    let xx = sum_of_products(&x, &x);
+    let yy = sum_of_products(&y, &y);
+    let value = xy / (xx * yy).sqrt();
+    if !value.is_finite() {
+        return None;
+    }
+    Some(Correlation { value, interval: fisher_interval(value, pairs.len()) })
 }
 
-/// Returns the ranks of values from 1 on; equal values share the middle of their ranks.
+/// Returns the differences of values from their mean.
+fn deviations(values: &[f64]) -> Option<Vec<f64>> {
+    let mean = mean(values)?;
+    Some(values.iter().map(|value| value - mean).collect())
+}
+
+fn sum_of_products(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(a, b)| a * b).sum()
+}
+
+/// Returns the interval of a correlation of `n` pairs, which is symmetric in z = artanh(r).
+fn fisher_interval(correlation: f64, n: usize) -> Option<Interval> {
+    if n <= 3 || correlation.abs() >= 1.0 {
+        return None;
+    }
+    let variance = (1.0 + 0.5 * correlation * correlation) / (n as f64 - 3.0);
+    let half_width = Z_975 * variance.sqrt();
+    let z = 0.5 * math::ln((1.0 + correlation) / (1.0 - correlation));
+    Some(Interval { low: tanh(z - half_width), high: tanh(z + half_width) })
+}
+
+fn tanh(z: f64) -> f64 {
+    1.0 - 2.0 / (math::exp(2.0 * z) + 1.0)
+}
+
+/// Returns the ranks of values from 1 on; equal values share the mean of their ranks.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut ranks = vec![0.0; values.len()];
-    let mut first = 0;
+    let mut lower = 0;
     for group in order.chunk_by(|a, b| values[*a] == values[*b]) {
-        let rank = first as f64 + 0.5 * (group.len() as f64 + 1.0);
+        let rank = lower as f64 + 0.5 * (group.len() as f64 + 1.0);
         group.iter().for_each(|k| ranks[*k] = rank);
-        first += group.len();
+        lower += group.len();
     }
     ranks
 }

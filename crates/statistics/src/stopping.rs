@@ -2,16 +2,16 @@
 //!
 //! # The effect of stopping early on an interval
 //!
-//! A sweep that looks again and again and stops as soon as the interval is narrow stops when the
-//! spread happens to look small, and with a relative target when the mean happens to look large.
+//! A sweep that checks repeatedly and stops as soon as the interval is narrow stops when the
+//! spread happens to be small, and with a relative target when the mean happens to be large.
 //! The interval then contains the true value a little less often than 95 % (Anscombe 1953; Chow and
 //! Robbins 1965: the loss vanishes as the target gets narrower, not before). Three rules keep it
-//! small: no look before [`StoppingRule::min_runs`], looks only at the ends of rounds, and rounds
+//! small: no check before [`StoppingRule::min_runs`], checks only at the ends of rounds, and rounds
 //! that grow by at least a half and at most double the number of runs, toward the number that the
-//! present spread predicts, so that there are few looks. Measured by the tests of this module over
+//! present spread predicts, so that there are few checks. Measured by the tests of this module over
 //! 4,000 sweeps each (standard error 0.4 %), nominal 95 %:
 //!
-//! | values | target | first look | runs | coverage |
+//! | values | target | first check | runs | coverage |
 //! |---|---|---|---|---|
 //! | normal | a quarter sd | 10 | 76 | 94.7 % |
 //! | normal | half an sd | 10 | 21 | 93.8 % |
@@ -25,24 +25,23 @@
 //! So the loss is small, and few runs of skewed values lose as much without any stopping: 20 runs
 //! are few. A first round of 20 costs little.
 //!
-//! Where that matters, take a larger first round, or run a fixed number of runs.
+//! Where that matters, choose a larger first round, or a fixed number of runs.
 
 use super::interval::runs_for_half_width;
 use super::mean_interval;
 use super::moments::{Sample, is_constant, mean, sample_sd};
 use serde::Serialize;
 
-/// The number of equal values from which on they are believed: by the rule of three (`3 / n`) at
-/// most about 5 % of all runs then differ. Before, an interval without width is no evidence of
-/// anything.
+/// The number of equal values from which on they are called constant: by the rule of three (`3 / n`) at
+/// most about 5 % of all runs then differ. With fewer, an interval without width is no evidence.
 const MIN_CONSTANT_RUNS: usize = 60;
 
 /// A rule that ends the runs at a half-width of Student's 95 % interval of the mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StoppingRule {
-    /// The target half-width, in the metric's unit, or as a share of the mean.
+    /// The target half-width, in the metric's unit, or as a fraction of the mean.
     pub half_width: f64,
-    /// Whether it is a share of the mean's magnitude.
+    /// Whether it is a fraction of the mean's magnitude.
     pub relative: bool,
     /// Number of runs of the first round; at least 2.
     pub min_runs: usize,
@@ -54,9 +53,9 @@ pub struct StoppingRule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopDecision {
-    /// Run until there are this many runs in total, then ask again.
+    /// Run until there is this number of runs in total, then decide again.
     Run(usize),
-    /// The first runs, of this number, are the result; those beyond are not part of it.
+    /// The first runs, of this number, are the result; later ones are not part of it.
     Enough(usize, StopReason),
 }
 
@@ -66,18 +65,18 @@ pub enum StopDecision {
 pub enum StopReason {
     /// The interval is as narrow as the target.
     Reached,
-    /// All values are equal, and there are enough of them (60) to believe it.
+    /// All values are equal, and there are enough of them (60) to call the metric constant.
     Constant,
     /// The maximum number of runs is reached, and the interval is wider than the target.
     Maximum,
-    /// The maximum number of runs is reached, and the interval contains 0: no share of a mean that
-    /// may be 0 is narrow enough. Ask for an absolute half-width instead.
+    /// The maximum number of runs is reached, and the interval contains 0: no fraction of a mean that
+    /// may be 0 is narrow enough. Give an absolute half-width instead.
     MeanNearZero,
     /// The maximum number of runs is reached, and fewer than two have a value.
     TooFewValues,
     /// No run of the first round has a value.
     NoValues,
-    /// Seeds change nothing, so one run says all.
+    /// Seeds change nothing, so one run is enough.
     Seedless,
 }
 
@@ -102,9 +101,9 @@ impl StopReason {
 impl StoppingRule {
     /// Returns the next step after these runs, one value each, in the order of the runs.
     ///
-    /// A function of the values alone: it goes through the rounds from the first run on, for any
-    /// number of values. The result therefore does not depend on the number of workers, on how far
-    /// they ran ahead, or on whether a sweep was killed in the middle of a round.
+    /// A function of the values alone: it repeats the rounds from the first run on, for any
+    /// number of values. The result therefore does not depend on the number of workers, on runs that
+    /// they did in advance, or on whether a sweep was killed in the middle of a round.
     pub fn decide(&self, values: &[Option<f64>]) -> StopDecision {
         self.decide_columns(&[values])
     }
@@ -112,34 +111,26 @@ impl StoppingRule {
     /// Returns the next step for several columns at once (metrics, or variants that are run side by
     /// side): enough when all are, with the worst reason. Only runs that all columns have count.
     ///
-    /// Without columns nothing is asked for, and the first round is enough.
+    /// Without columns there is no target, and the first round is enough.
     pub fn decide_columns(&self, columns: &[&[Option<f64>]]) -> StopDecision {
-        let there = columns.iter().map(|c| c.len()).min().unwrap_or(usize::MAX);
+        let runs = columns.iter().map(|c| c.len()).min().unwrap_or(usize::MAX);
         let mut total = self.min_runs.max(2).min(self.max_runs);
-        loop {
-            if there < total {
-                return StopDecision::Run(total);
-            }
-            let looks: Vec<StopDecision> =
-                columns.iter().map(|c| self.decide_round(&c[..total])).collect();
-            let more = looks.iter().filter_map(|look| match look {
-                StopDecision::Run(total) => Some(*total),
-                StopDecision::Enough(..) => None,
-            });
-            let reasons = looks.iter().filter_map(|look| match look {
-                StopDecision::Enough(_, reason) => Some(*reason),
-                StopDecision::Run(_) => None,
-            });
-            match more.max() {
-                Some(more) => total = more,
-                None => {
-                    return StopDecision::Enough(
-                        total,
-                        reasons.max().unwrap_or(StopReason::Reached),
-                    );
+        while runs >= total {
+            let mut next_total = None;
+            let mut worst_reason = StopReason::Reached;
+            for column in columns {
+                match self.decide_round(&column[..total]) {
+                    StopDecision::Run(more) => next_total = next_total.max(Some(more)),
+                    // Reasons are declared from the best to the worst.
+                    StopDecision::Enough(_, reason) => worst_reason = worst_reason.max(reason),
                 }
             }
+            match next_total {
+                Some(next_total) => total = next_total,
+                None => return StopDecision::Enough(total, worst_reason),
+            }
         }
+        StopDecision::Run(total)
     }
 
     /// Decides at the end of a round.
@@ -168,7 +159,6 @@ impl StoppingRule {
     fn reason_at_max(&self, sample: &[f64]) -> StopReason {
         match mean_interval(sample) {
             None => StopReason::TooFewValues,
-            // No share of a mean that may be 0 is narrow enough.
             Some(interval) if self.relative && interval.contains(0.0) => StopReason::MeanNearZero,
             // Too wide, or without width but from too few runs to be called constant.
             Some(_) => StopReason::Maximum,
@@ -177,8 +167,8 @@ impl StoppingRule {
 
     /// Returns the target half-width, in the metric's unit.
     fn target(&self, sample: &[f64]) -> f64 {
-        let of = if self.relative { mean(sample).unwrap_or(0.0).abs() } else { 1.0 };
-        self.half_width * of
+        let unit = if self.relative { mean(sample).unwrap_or(0.0).abs() } else { 1.0 };
+        self.half_width * unit
     }
 
     /// Returns the end of the next round: the number that the spread so far predicts, at least half
@@ -189,11 +179,12 @@ impl StoppingRule {
         } else {
             sample_sd(sample).and_then(|sd| runs_for_half_width(sd, self.target(sample)))
         };
-        // Runs without a value have to be made up for.
-        let share = sample.len() as f64 / runs as f64;
-        let predicted = values.map_or(usize::MAX, |n| (n as f64 / share).ceil() as usize);
-        let (least, most) = (runs + runs.div_ceil(2), runs.saturating_mul(2));
-        predicted.clamp(least, most).min(self.max_runs)
+        // Runs without a value do not count, so more runs are needed than values.
+        let fraction = sample.len() as f64 / runs as f64;
+        let predicted = values.map_or(usize::MAX, |n| (n as f64 / fraction).ceil() as usize);
+        let min_total = runs + runs.div_ceil(2);
+        let max_total = runs.saturating_mul(2);
+        predicted.clamp(min_total, max_total).min(self.max_runs)
     }
 }
 

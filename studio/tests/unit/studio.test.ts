@@ -250,7 +250,7 @@ test("steps that follow each other faster than they are gone add up, forth and b
   session().step(-1);
   session().step(10);
   expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 129 }]);
-  const problem = { place: "cycle 130", cause: "another way was asked for", remedy: "", is_warning: false };
+  const problem = { place: "cycle 130", cause: "replaced by another request", remedy: "", is_warning: false };
   for (const { id } of line().asked.filter(({ call }) => call.do === "step")) line().say({ id, problem });
   await settled();
   await line().answer("seek", { is: "done" });

@@ -24,7 +24,8 @@ pub(super) fn solve<const D: usize>(
     target: Point<D>,
     tolerance_m: f64,
 ) -> (usize, f64) {
-    let (base, tip) = (points[0], points.len() - 1);
+    let base = points[0];
+    let tip = points.len() - 1;
     let mut error_m = distance(points[tip], target);
     let mut idle = 0;
     for double_passes in 0..MAX_DOUBLE_PASSES {

@@ -21,7 +21,7 @@ pub(super) fn solve<const D: usize>(
 ) -> Result<ChainIkResult<D>, InputError> {
     let self_collision = solver.propagator.rules.self_collision;
     let mut search = ConstraintSearch {
-        judge: ConstraintChecker { chain, obstacles, self_collision },
+        checker: ConstraintChecker { chain, obstacles, self_collision },
         goal,
         best: chain.points().to_vec(),
         engine: Engine::Chain,
@@ -46,23 +46,24 @@ pub(super) fn solve<const D: usize>(
 }
 
 struct ConstraintSearch<'a, const D: usize> {
-    judge: ConstraintChecker<'a, D>,
+    checker: ConstraintChecker<'a, D>,
     goal: &'a ChainIkGoal<D>,
-    /// The good posture whose tip is nearest to the target so far.
+    /// The valid posture whose tip is nearest to the target so far.
     best: Vec<Point<D>>,
     engine: Engine,
     iterations: usize,
-    /// The first objection, which is the one on the present posture's way.
+    /// The first objection: the one to the motion from the present posture, which tells a user more than
+    /// those to random starts.
     veto: Option<Veto<D>>,
 }
 
 impl<const D: usize> ConstraintSearch<'_, D> {
     fn search_by_motion(&mut self, solver: &mut IkSolver<D>) -> Result<bool, InputError> {
-        let mut moved = self.judge.chain.clone();
+        let mut moved = self.checker.chain.clone();
         let MotionResult { arrived, attempts, veto } = motion::move_to_goal(
             &mut solver.propagator,
             &mut moved,
-            self.judge.obstacles,
+            self.checker.obstacles,
             self.goal,
         )?;
         self.iterations += attempts;
@@ -72,21 +73,22 @@ impl<const D: usize> ConstraintSearch<'_, D> {
     }
 
     fn search_by_relaxation(&mut self, solver: &mut IkSolver<D>, start: usize) -> bool {
-        let mut points = starts::start(self.judge.chain, self.goal, start);
+        let mut points = starts::start(self.checker.chain, self.goal, start);
         let RelaxResult { rounds, veto } =
-            relax::relax(&self.judge, &mut solver.limb, &mut points, self.goal);
+            relax::relax(&self.checker, &mut solver.limb, &mut points, self.goal);
         self.iterations += rounds;
         self.veto = self.veto.or(veto);
         let tip_m = distance(points[self.goal.k], self.goal.target);
         let is_good = veto.is_none() && tip_m <= self.goal.tolerance_m;
         if is_good {
-            (self.best, self.engine) = (points, Engine::Dls);
+            self.best = points;
+            self.engine = Engine::Dls;
         }
         is_good
     }
 
     fn search_by_closed_form(mut self, solver: &mut IkSolver<D>) -> ChainIkResult<D> {
-        let mut points = self.judge.chain.points().to_vec();
+        let mut points = self.checker.chain.points().to_vec();
         let ChainIkGoal { base, k, target, .. } = *self.goal;
         let limb = &mut solver.limb;
         direct::solve(&mut limb.vectors, &limb.spans, sub(target, points[base]));
@@ -95,8 +97,8 @@ impl<const D: usize> ConstraintSearch<'_, D> {
             at = add(at, *v);
             points[i] = at;
         }
-        super::follow_beyond(&mut points, self.judge.chain, self.goal);
-        self.veto = self.judge.find_veto(&points, k);
+        super::follow_beyond(&mut points, self.checker.chain, self.goal);
+        self.veto = self.checker.find_veto(&points, k);
         self.engine = Engine::Direct;
         if self.veto.is_some() {
             return self.failure(1);

@@ -1,5 +1,5 @@
-//! A check that a posture is good in itself: rods, bends, mobilities, obstacles and the chain's own
-//! body, as propagation judges them, but without a motion that led there.
+//! A validity check of postures (OMPL's state validity checker): rods, bends, mobilities, obstacles and
+//! the chain's own body, as propagation checks them, but without a motion that leads there.
 
 use sidestep_rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
 use sidestep_rods::{
@@ -18,7 +18,7 @@ pub(crate) struct ConstraintChecker<'a, const D: usize> {
 
 impl<const D: usize> ConstraintChecker<'_, D> {
     /// Returns the first objection to a posture, in the order of the connectors. Parts at their old
-    /// places in the chain are not judged.
+    /// places in the chain are not checked: the chain may start in violation, and must be able to move.
     pub(crate) fn find_veto(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
         let veto =
             |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
@@ -48,14 +48,12 @@ impl<const D: usize> ConstraintChecker<'_, D> {
             }
         }
         let around = i.saturating_sub(1)..(i + 2).min(points.len());
-        let bends = connector.max_bend_rad < PI
+        let has_limit = connector.max_bend_rad < PI
             && around.len() == 3
             && around.clone().any(|j| self.has_moved(points, j));
-        (bends && bend_rad(points, i) > connector.max_bend_rad + BEND_TOLERANCE_RAD).then_some((
-            i,
-            VetoReason::BendLimit,
-            None,
-        ))
+        let exceeds =
+            has_limit && bend_rad(points, i) > connector.max_bend_rad + BEND_TOLERANCE_RAD;
+        exceeds.then_some((i, VetoReason::BendLimit, None))
     }
 
     fn check_rod(&self, points: &[Point<D>], i: usize) -> Option<(usize, VetoReason, Option<u32>)> {
@@ -95,11 +93,11 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         ends: &[Point<D>],
         i: usize,
         margin_m: f64,
-        look: impl FnMut(&'a Obstacle<D>),
+        visit: impl FnMut(&'a Obstacle<D>),
     ) {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
-        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), look);
+        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), visit);
     }
 
     /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
@@ -128,7 +126,8 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         i: usize,
         j: usize,
     ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let (rods, connectors) = (self.chain.rods(), self.chain.connectors());
+        let rods = self.chain.rods();
+        let connectors = self.chain.connectors();
         let rod = |r: usize| ([r, r + 1], [points[r], points[r + 1]], rods[r].radius_m);
         let ball = |c: usize| ([c, c], [points[c]; 2], connectors[c].radius_m);
         let pair = |(a, at_a, ra): ([usize; 2], [Point<D>; 2], f64),

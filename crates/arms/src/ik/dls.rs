@@ -6,7 +6,7 @@
 //! `v + y`. It remains to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that is the
 //! gradient of a convex function: damped Newton steps get there from anywhere, each in O(n). Its matrix
 //! is the `J J^T` of damped least squares, and, as in that method, the damping falls by 0.3 after a
-//! step that helped, and rises by 4 after one that did not. In contrast to damped least squares, the
+//! step that helped; one that did not is shortened. In contrast to damped least squares, the
 //! posture is not linearized anew at every step, so steps need no limit, and rods of variable length
 //! are no special case.
 //!
@@ -37,6 +37,14 @@ const STRAIGHT_FRACTION: f64 = 0.9;
 /// Distance to go, as a part of the greatest length, from which on a straight limb is bowed first.
 const FAR_FRACTION: f64 = 0.03;
 
+/// The posture to start from, the lengths of its rods, and the target of its tip.
+#[derive(Clone, Copy)]
+struct TipProblem<'a, const D: usize> {
+    vectors: &'a [Point<D>],
+    spans: &'a [Span],
+    target: Point<D>,
+}
+
 /// The tip's position for a multiplier.
 struct TipPosition<const D: usize> {
     /// The remaining vector to the target.
@@ -58,15 +66,16 @@ pub(super) fn solve<const D: usize>(
     let mut steps = 0;
     let mut error_m = f64::INFINITY;
     for reference in 0..MAX_REFERENCES {
-        let mut start = tip_position(vectors, spans, [0.0; D], target);
+        let mut start = TipProblem { vectors, spans, target }.tip_position([0.0; D]);
         let is_straight = norm(sub(target, start.error)) > STRAIGHT_FRACTION * longest_m
             && start.error_m > FAR_FRACTION * longest_m;
         let is_stuck = reference % BOW_INTERVAL == BOW_INTERVAL / 2;
         if is_stuck || (reference == 0 && is_straight) {
             bow(vectors, target);
-            start = tip_position(vectors, spans, [0.0; D], target);
+            start = TipProblem { vectors, spans, target }.tip_position([0.0; D]);
         }
-        let (y, left_m) = solve_multiplier(vectors, spans, target, tolerance_m, start, &mut steps);
+        let problem = TipProblem { vectors, spans, target };
+        let (y, left_m) = problem.solve_multiplier(start, tolerance_m, &mut steps);
         adopt(vectors, spans, y);
         error_m = left_m;
         if error_m <= tolerance_m {
@@ -76,62 +85,63 @@ pub(super) fn solve<const D: usize>(
     (steps, error_m)
 }
 
-/// Applies Newton's method to the multiplier.
-fn solve_multiplier<const D: usize>(
-    vectors: &[Point<D>],
-    spans: &[Span],
-    target: Point<D>,
-    tolerance_m: f64,
-    start: TipPosition<D>,
-    steps: &mut usize,
-) -> (Point<D>, f64) {
-    let (mut y, mut at, mut damping) = ([0.0; D], start, INITIAL_DAMPING);
-    let mut step = solve_damped(&at.slope, at.error, damping);
-    let mut poor = 0;
-    while at.error_m > tolerance_m && poor < MAX_POOR_STEPS {
-        *steps += 1;
-        let next_y = add(y, step);
-        let next = tip_position(vectors, spans, next_y, target);
-        poor += usize::from(next.error_m > GOOD_STEP_FRACTION * at.error_m);
-        if next.error_m < at.error_m {
-            (y, at, damping) = (next_y, next, 0.3 * damping);
-            step = solve_damped(&at.slope, at.error, damping);
-        } else {
-            let (before, after) = (at.error_m * at.error_m, next.error_m * next.error_m);
-            step = scaled(step, (before / (before + after)).max(MIN_STEP_FRACTION));
-        }
-    }
-    (y, at.error_m)
-}
-
-#[inline]
-fn tip_position<const D: usize>(
-    vectors: &[Point<D>],
-    spans: &[Span],
-    y: Point<D>,
-    target: Point<D>,
-) -> TipPosition<D> {
-    let mut tip = [0.0; D];
-    let mut slope = [[0.0; D]; D];
-    for (v, span) in vectors.iter().zip(spans) {
-        let w = add(*v, y);
-        let r = norm(w).max(f64::MIN_POSITIVE);
-        let length_m = span.nearest_m(r);
-        let per_m = 1.0 / r;
-        let u = scaled(w, per_m);
-        tip = add_scaled(tip, u, length_m);
-        // A rod within its limits follows in every direction, one at a limit only across itself.
-        let across = length_m * per_m;
-        let lengthwise = if span.min_m < r && r < span.max_m { 1.0 } else { 0.0 };
-        for i in 0..D {
-            for j in 0..=i {
-                slope[i][j] += (lengthwise - across) * u[i] * u[j];
+impl<const D: usize> TipProblem<'_, D> {
+    /// Applies Newton's method to the multiplier; returns it and the remaining error.
+    fn solve_multiplier(
+        &self,
+        start: TipPosition<D>,
+        tolerance_m: f64,
+        steps: &mut usize,
+    ) -> (Point<D>, f64) {
+        let mut y = [0.0; D];
+        let mut at = start;
+        let mut damping = INITIAL_DAMPING;
+        let mut step = solve_damped(&at.slope, at.error, damping);
+        let mut poor_steps = 0;
+        while at.error_m > tolerance_m && poor_steps < MAX_POOR_STEPS {
+            *steps += 1;
+            let next_y = add(y, step);
+            let next = self.tip_position(next_y);
+            poor_steps += usize::from(next.error_m > GOOD_STEP_FRACTION * at.error_m);
+            if next.error_m < at.error_m {
+                y = next_y;
+                at = next;
+                damping *= 0.3;
+                step = solve_damped(&at.slope, at.error, damping);
+            } else {
+                // Backtracking line search: the minimum of a parabola through both errors.
+                let before2 = at.error_m * at.error_m;
+                let after2 = next.error_m * next.error_m;
+                step = scaled(step, (before2 / (before2 + after2)).max(MIN_STEP_FRACTION));
             }
-            slope[i][i] += across;
         }
+        (y, at.error_m)
     }
-    let error = sub(target, tip);
-    TipPosition { error, error_m: norm(error), slope }
+
+    #[inline]
+    fn tip_position(&self, y: Point<D>) -> TipPosition<D> {
+        let mut tip = [0.0; D];
+        let mut slope = [[0.0; D]; D];
+        for (v, span) in self.vectors.iter().zip(self.spans) {
+            let w = add(*v, y);
+            let r = norm(w).max(f64::MIN_POSITIVE);
+            let length_m = span.nearest_m(r);
+            let per_m = 1.0 / r;
+            let u = scaled(w, per_m);
+            tip = add_scaled(tip, u, length_m);
+            // A rod within its limits follows in every direction, one at a limit only across itself.
+            let across = length_m * per_m;
+            let lengthwise = if span.min_m < r && r < span.max_m { 1.0 } else { 0.0 };
+            for i in 0..D {
+                for j in 0..=i {
+                    slope[i][j] += (lengthwise - across) * u[i] * u[j];
+                }
+                slope[i][i] += across;
+            }
+        }
+        let error = sub(self.target, tip);
+        TipPosition { error, error_m: norm(error), slope }
+    }
 }
 
 /// Solves `(slope + damping) x = error` by Cholesky decomposition.

@@ -74,7 +74,7 @@ impl<const D: usize> ChainIkGoal<D> {
 /// The kind of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolutionKind {
-    /// A motion: the chain can go there from its present posture, and every state on the way has been
+    /// A motion: the chain can go there from its present posture, and every state of the path has been
     /// checked.
     Motion,
     /// A posture: good in itself; it has not been checked whether the chain can get there.

@@ -89,7 +89,8 @@ impl<const D: usize> Limb<D> {
 /// Returns the connector nearest to `k` on the way to `base` that never moves: the effective base.
 pub(super) fn nearest_fixed<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
     let still = |&i: &usize| i != k && chain.connectors()[i].is_still();
-    let (lo, hi) = (base.min(k), base.max(k));
+    let lo = base.min(k);
+    let hi = base.max(k);
     let found = if k > base { (lo..=hi).rev().find(still) } else { (lo..=hi).find(still) };
     found.unwrap_or(base)
 }

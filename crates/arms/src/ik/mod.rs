@@ -2,19 +2,19 @@
 //! place.
 //!
 //! ```text
-//! goal       a goal, and its answer
-//! limb       the rods from base to tip; their reach
-//! dls        the nearest posture, by damped least squares in O(n)
-//! alternate  the chain's own rule there and back (FABRIK)
-//! direct     closed form: straight except for two bends
-//! guarded    obstacles, bend limits, the chain's own body, connectors that are not free:
-//!            motion, then relax from several postures, judged by legal
+//! goal               a goal, and its result
+//! limb               the rods from base to tip; their reach
+//! dls                the nearest posture, by damped least squares in O(n)
+//! alternate          the chain's own rule there and back (FABRIK)
+//! direct             closed form: straight except for two bends
+//! constraint_search  obstacles, bend limits, the chain's own body, connectors that are not free:
+//!                    motion, then relax from several starts, checked by constraints
 //! ```
 //!
 //! If nothing constrains the connectors every target within reach is reached: the remaining error
-//! of an engine is removed in closed form. Guarded chains are first *moved* there by the rules of
-//! propagation, every state on the way checked; if that fails, postures are searched that are good
-//! in themselves, and [`SolutionKind`] says which of the two an answer is.
+//! of an engine is removed in closed form. Constrained chains are first *moved* there by the rules of
+//! propagation, with every state of the path checked; if that fails, valid postures are searched, and
+//! [`SolutionKind`] says which of the two a result is.
 
 mod alternate;
 mod constraint_search;
@@ -80,19 +80,20 @@ impl<const D: usize> IkSolver<D> {
         self.limb.read(chain, chain.points(), base, goal.k);
         let shell = Shell::from_spans(&self.limb.spans);
         let home = chain.points()[base];
-        let wanted = add(home, shell.nearest(sub(goal.target, home)));
-        let is_guarded = !obstacles.is_empty()
+        // A target out of reach is replaced by the nearest one within it, so that every engine can converge.
+        let reachable = add(home, shell.nearest(sub(goal.target, home)));
+        let is_constrained = !obstacles.is_empty()
             || self.propagator.rules.self_collision
             || !limb::is_unconstrained(chain, base);
-        let answer = if is_guarded {
+        let answer = if is_constrained {
             constraint_search::solve(
                 self,
                 chain,
                 obstacles,
-                &ChainIkGoal { target: wanted, ..*goal },
+                &ChainIkGoal { target: reachable, ..*goal },
             )?
         } else {
-            self.solve_free(chain, &ChainIkGoal { target: wanted, ..*goal })
+            self.solve_free(chain, &ChainIkGoal { target: reachable, ..*goal })
         };
         Ok(answer.relative_to(goal, &shell, home))
     }
@@ -127,9 +128,9 @@ impl<const D: usize> IkSolver<D> {
         };
         let mut iterations = 0;
         for &engine in engines {
-            let by = if engine == Engine::Chain { alternate::solve_vectors } else { dls::solve };
-            let (more, left_m) = by(vectors, spans, target, goal.tolerance_m);
-            iterations += more;
+            let solve = if engine == Engine::Chain { alternate::solve_vectors } else { dls::solve };
+            let (used, left_m) = solve(vectors, spans, target, goal.tolerance_m);
+            iterations += used;
             if left_m <= goal.tolerance_m {
                 return EngineResult { iterations, engine };
             }
@@ -173,12 +174,12 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> Result<(), 
     }
     if goal.base >= n || goal.base == goal.k {
         let cause = format!("is connector {}, of {n}", goal.base);
-        let remedy = "name another connector than the tip, counted from 0";
+        let remedy = "give another connector than the tip, counted from 0";
         return Err(InputError::new("base", cause, remedy));
     }
     if chain.connectors()[goal.k].is_still() {
         let cause = format!("is connector {}, which never moves", goal.k);
-        return Err(InputError::new("tip", cause, "name a connector that is free"));
+        return Err(InputError::new("tip", cause, "give a connector that is free"));
     }
     if !is_finite(&goal.target) || goal.target.iter().any(|x| x.abs() > 1e7) {
         let cause = format!("is {:?}", goal.target);

@@ -1,4 +1,4 @@
-//! Motion of an arm to a target by the chain's rules: at once if possible, otherwise step by step,
+//! Motion of an arm to a target by the chain's rules: in one request if possible, otherwise step by step,
 //! with other headings if one is blocked. The result is a motion: every state was checked.
 
 use super::ChainIkGoal;
@@ -17,11 +17,11 @@ const MAX_ATTEMPTS: usize = 120;
 /// Length of a step of the tip, as a part of the shortest rod.
 const STEP_FRACTION: f64 = 0.5;
 
-/// Result of a motion; the chain is where it got.
+/// Result of a motion; the chain is where it ended.
 pub(super) struct MotionResult<const D: usize> {
     pub(super) arrived: bool,
     pub(super) attempts: usize,
-    /// The last objection to the straight way.
+    /// The last objection to the straight path.
     pub(super) veto: Option<Veto<D>>,
 }
 
@@ -32,28 +32,30 @@ pub(super) fn move_to_goal<const D: usize>(
     obstacles: &Obstacles<D>,
     goal: &ChainIkGoal<D>,
 ) -> Result<MotionResult<D>, InputError> {
-    let mut walk =
+    let mut motion =
         StepwiseMotion { propagator, obstacles, goal, attempts: 0, veto: None, side: 1.0 };
-    if walk.step(chain, goal.target, goal.tolerance_m)? {
-        return Ok(walk.result(true));
+    if motion.step(chain, goal.target, goal.tolerance_m)? {
+        return Ok(motion.result(true));
     }
     let step_m = STEP_FRACTION * chain.rods().iter().map(|r| r.min_m).fold(f64::INFINITY, f64::min);
-    let (mut best, mut idle) = (chain.clone(), 0);
+    let mut best = chain.clone();
+    let mut idle = 0;
     let left_m = |chain: &Chain<D>| distance(chain.points()[goal.k], goal.target);
-    while idle < MAX_IDLE_STEPS && walk.attempts < MAX_ATTEMPTS {
-        if left_m(chain) <= step_m && walk.step(chain, goal.target, goal.tolerance_m)? {
-            return Ok(walk.result(true));
+    while idle < MAX_IDLE_STEPS && motion.attempts < MAX_ATTEMPTS {
+        if left_m(chain) <= step_m && motion.step(chain, goal.target, goal.tolerance_m)? {
+            return Ok(motion.result(true));
         }
-        if !walk.try_fan(chain, step_m.min(left_m(chain)))? {
+        if !motion.try_fan(chain, step_m.min(left_m(chain)))? {
             break;
         }
         idle += 1;
         if left_m(chain) < left_m(&best) - 0.01 * step_m {
-            (best, idle) = (chain.clone(), 0);
+            best = chain.clone();
+            idle = 0;
         }
     }
     *chain = best;
-    Ok(walk.result(false))
+    Ok(motion.result(false))
 }
 
 struct StepwiseMotion<'a, const D: usize> {
@@ -79,8 +81,8 @@ impl<const D: usize> StepwiseMotion<'_, D> {
     ) -> Result<bool, InputError> {
         self.attempts += 1;
         let ChainIkGoal { k, base, .. } = *self.goal;
-        let order = ReachRequest { k, target, base, tolerance_m };
-        match reach(self.propagator, chain, self.obstacles, &order)? {
+        let request = ReachRequest { k, target, base, tolerance_m };
+        match reach(self.propagator, chain, self.obstacles, &request)? {
             ReachOutcome::There { .. } => Ok(true),
             ReachOutcome::Short { veto, .. } => {
                 self.veto = veto.or(self.veto);
@@ -100,7 +102,7 @@ impl<const D: usize> StepwiseMotion<'_, D> {
         let sides = sides(ahead, self.side);
         for turn_rad in FAN_RAD {
             for (i, side) in sides.iter().flatten().enumerate() {
-                let (c, s) = (math::cos(turn_rad), math::sin(turn_rad));
+                let [c, s] = [math::cos(turn_rad), math::sin(turn_rad)];
                 let u = add(scaled(ahead, c), scaled(*side, s));
                 if self.step(chain, add_scaled(from, u, step_m), tolerance_m)? {
                     self.side *= if i % 2 == 0 { 1.0 } else { -1.0 };
@@ -117,7 +119,8 @@ fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
     let e = scaled(perpendicular(u), sign);
     let other = (D == 3).then(|| -> Point<D> {
         std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % D, (i + 2) % D);
+            let j = (i + 1) % D;
+            let k = (i + 2) % D;
             u[j] * e[k] - u[k] * e[j]
         })
     });

@@ -80,7 +80,7 @@ impl ArmSelection {
         let Some(name) = name else { return Ok(self.chain.rest_values()) };
         let Some(semantics) = &self.semantics else {
             let cause = format!("`{name}` is a posture of an SRDF file, and there is none");
-            return Err(InputError::new("--posture", cause, "name the SRDF file as well"));
+            return Err(InputError::new("--posture", cause, "give the SRDF file as well"));
         };
         let posture = semantics.posture("--posture", name)?;
         Ok(self.chain.with_posture(&self.model, &posture))

@@ -75,7 +75,8 @@ impl Bend {
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
         let before = scaled(before, 1.0 / norm(before));
         let after = scaled(after, 1.0 / norm(after));
-        let (u, v) = (rejection(before, axis), rejection(after, axis));
+        let u = rejection(before, axis);
+        let v = rejection(after, axis);
         let product = norm(u) * norm(v);
         if product < ANGLE_TOLERANCE_RAD {
             return None;

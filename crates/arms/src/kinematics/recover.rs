@@ -4,7 +4,7 @@
 //! none, one (an angle about an axis, or a displacement along it), or two (the circles that two axes
 //! draw meet in at most two points; Paden and Kahan's second subproblem, here for axes that need not
 //! meet). If a step has two solutions, both are tried, the one nearer to the reference first. Iiwa arms
-//! and UR5 are solved this way, exactly; a Panda's elbow offsets couple three joints to one connector,
+//! and the UR5 are solved like this, exactly; a Panda's elbow offsets couple three joints to one connector,
 //! which is refused with [`RecoverError::Coupled`].
 
 use std::f64::consts::TAU;
@@ -49,7 +49,7 @@ pub enum RecoverError {
         expected: usize,
     },
     /// Points leave these joints open, or couple them to connectors farther out.
-    #[error("connector {connector} depends on {} at once; its position does not tell them apart", .joints.join(", "))]
+    #[error("connector {connector} depends on {} at once; its position does not distinguish them", .joints.join(", "))]
     Coupled {
         /// Index of the connector.
         connector: usize,
@@ -187,12 +187,13 @@ impl JointSearch<'_> {
                 && self.place_connectors(connector + 1, known, link);
         }
         let joints = &self.chain.joints[known..until];
-        for turn in self.solutions(joints, known, &link, anchor.point_m, target_m) {
+        let placement = PointPlacement { link: &link, p_m: anchor.point_m, target_m };
+        for solution in self.solutions(joints, known, placement) {
             self.tries += 1;
             if self.tries > MAX_TRIES {
                 return false;
             }
-            if self.try_values(connector, known, link, &turn) {
+            if self.try_values(connector, known, link, &solution) {
                 return true;
             }
         }
@@ -252,21 +253,18 @@ impl JointSearch<'_> {
         }
     }
 
-    /// Returns values of one or two joints that bring the point `p_m` of the link behind them to
-    /// `target_m`, those nearer to the reference first.
+    /// Returns values of one or two joints that place a point, those nearer to the reference first.
     fn solutions(
         &self,
         joints: &[MovingJoint],
         known: usize,
-        link: &Transform,
-        p_m: Vector,
-        target_m: Vector,
+        placement: PointPlacement<'_>,
     ) -> Vec<Vec<CandidateValue>> {
         let reference = &self.reference[known..known + joints.len()];
         match joints {
-            [joint] => vec![vec![self.solve_one(joint, link, p_m, target_m, reference[0])]],
+            [joint] => vec![vec![self.solve_one(joint, placement, reference[0])]],
             [inner, outer] => {
-                let mut found = self.solve_two(inner, outer, link, p_m, target_m, reference);
+                let mut found = self.solve_two([inner, outer], placement, reference);
                 found.sort_by(|a, b| {
                     total_change(a, reference).total_cmp(&total_change(b, reference))
                 });
@@ -279,16 +277,14 @@ impl JointSearch<'_> {
     fn solve_one(
         &self,
         joint: &MovingJoint,
-        link: &Transform,
-        p_m: Vector,
-        target_m: Vector,
+        PointPlacement { link, p_m, target_m }: PointPlacement<'_>,
         reference: f64,
     ) -> CandidateValue {
         let line = joint.line(link);
         let p_m = link.compose(&joint.origin).transform_point(p_m);
         match joint.motion {
             JointMotion::Slide => CandidateValue::new(dot(sub(target_m, p_m), line.along)),
-            JointMotion::Turn => self.solve_turn(joint, &line, p_m, target_m, reference),
+            JointMotion::Turn => self.solve_turn(joint, &line, [p_m, target_m], reference),
         }
     }
 
@@ -297,15 +293,13 @@ impl JointSearch<'_> {
         &self,
         joint: &MovingJoint,
         line: &Line,
-        p_m: Vector,
-        target_m: Vector,
+        [p_m, target_m]: [Vector; 2],
         reference: f64,
     ) -> CandidateValue {
         let on_axis_m = ON_AXIS_TOLERANCE * self.skeleton.reach_m;
-        let (from, to) = (
-            rejection(sub(p_m, line.through_m), line.along),
-            rejection(sub(target_m, line.through_m), line.along),
-        );
+        let from = rejection(sub(p_m, line.through_m), line.along);
+        let to = rejection(sub(target_m, line.through_m), line.along);
+        // A point on the axis does not move, and so says nothing about the turn.
         if norm(from) <= on_axis_m || norm(to) <= on_axis_m {
             return CandidateValue { value: reference, is_open: true };
         }
@@ -318,18 +312,16 @@ impl JointSearch<'_> {
     /// inner axis draws through `target_m`.
     fn solve_two(
         &self,
-        inner: &MovingJoint,
-        outer: &MovingJoint,
-        link: &Transform,
-        p_m: Vector,
-        target_m: Vector,
+        [inner, outer]: [&MovingJoint; 2],
+        PointPlacement { link, p_m, target_m }: PointPlacement<'_>,
         reference: &[f64],
     ) -> Vec<Vec<CandidateValue>> {
-        let (first, at_zero) = (inner.line(link), link.compose(&inner.origin));
+        let first = inner.line(link);
+        let at_zero = link.compose(&inner.origin);
         let second = outer.line(&at_zero);
         let p_m = at_zero.compose(&outer.origin).transform_point(p_m);
         let pair = |z: Vector| {
-            let q1 = self.solve_turn(inner, &first, z, target_m, reference[0]);
+            let q1 = self.solve_turn(inner, &first, [z, target_m], reference[0]);
             // An open first turn is at its reference, and the second has to fit it.
             let back = inner.transform(-q1.value);
             let z = if q1.is_open {
@@ -339,7 +331,7 @@ impl JointSearch<'_> {
             } else {
                 z
             };
-            vec![q1, self.solve_turn(outer, &second, p_m, z, reference[1])]
+            vec![q1, self.solve_turn(outer, &second, [p_m, z], reference[1])]
         };
         meeting_points(&first, target_m, &second, p_m).into_iter().map(pair).collect()
     }
@@ -355,6 +347,17 @@ impl JointSearch<'_> {
             values: self.values,
         }
     }
+}
+
+/// A point to be placed by the joints behind a link.
+#[derive(Debug, Clone, Copy)]
+struct PointPlacement<'a> {
+    /// The link before the joints.
+    link: &'a Transform,
+    /// The point in the frame of the link behind the joints.
+    p_m: Vector,
+    /// Its place in the base's frame.
+    target_m: Vector,
 }
 
 /// A joint's value.
@@ -384,8 +387,8 @@ fn outside_limits_error(joint: &MovingJoint, value: f64, limits: Limits) -> Reco
 fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f64 {
     let nearest = reference_rad + wrap_angle(angle_rad - reference_rad);
     let turns = [nearest, nearest - TAU, nearest + TAU];
-    let legal = |value: &f64| limits.is_none_or(|limits| limits.contains(*value));
-    turns.into_iter().find(legal).unwrap_or_else(|| {
+    let is_allowed = |value: &f64| limits.is_none_or(|limits| limits.contains(*value));
+    turns.into_iter().find(is_allowed).unwrap_or_else(|| {
         // Distant references end up here: bring the angle near to the middle of the limits.
         let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
         middle + wrap_angle(angle_rad - middle)

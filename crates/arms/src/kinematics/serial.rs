@@ -133,9 +133,9 @@ impl SerialChain {
     /// When the tip is not attached to the base, or only through a joint that no single value
     /// moves.
     pub fn new(model: &Model, base: usize, tip: usize, place: &str) -> Result<Self, InputError> {
-        let way = model.joint_path(base, tip).ok_or_else(|| {
+        let path = model.joint_path(base, tip).ok_or_else(|| {
             let cause = format!("`{}` does not hang on `{}`", model.links[tip], model.links[base]);
-            InputError::new(place, cause, "name a link that is further from the root")
+            InputError::new(place, cause, "give a link that is further from the root")
         })?;
         let mut chain = Self {
             base: model.links[base].clone(),
@@ -145,7 +145,7 @@ impl SerialChain {
             to_tip: Transform::IDENTITY,
         };
         let mut drivers = Vec::new();
-        for joint in way {
+        for joint in path {
             chain.push(model, joint, &mut drivers, place)?;
         }
         Ok(chain)
@@ -166,7 +166,7 @@ impl SerialChain {
             return Ok(());
         }
         let motion = JointMotion::from_kind(joint.kind).ok_or_else(|| {
-            let cause = format!("joint `{}` moves in more than one way", joint.name);
+            let cause = format!("joint `{}` has more than one degree of freedom", joint.name);
             InputError::new(place, cause, "choose base and tip on one side of it")
         })?;
         let (driver, multiplier, offset) = mimic_source(model, index);
@@ -218,11 +218,11 @@ impl SerialChain {
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
     /// rest. Of several values for one joint the last one holds.
     pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
-        let said = |variable: &Dof| {
+        let given = |variable: &Dof| {
             posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
         };
         let at_rest = self.variables.iter().zip(self.rest_values());
-        at_rest.map(|(variable, rest)| said(variable).map_or(rest, |(_, value)| *value)).collect()
+        at_rest.map(|(variable, rest)| given(variable).map_or(rest, |(_, value)| *value)).collect()
     }
 
     /// Returns the values nearest to zero that are inside the limits.
@@ -308,7 +308,9 @@ impl SerialChain {
 /// Returns the joint at the end of the mimicry from `joint`, and `joint`'s value as a function of
 /// its.
 fn mimic_source(model: &Model, joint: usize) -> (usize, f64, f64) {
-    let (mut driver, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+    let mut driver = joint;
+    let mut multiplier = 1.0;
+    let mut offset = 0.0;
     // Models contain no cycles of mimicry.
     while let Some(mimic) = &model.joints[driver].mimic {
         offset += multiplier * mimic.offset;
@@ -324,6 +326,7 @@ fn to_dof(model: &Model, joint: usize) -> Dof {
         JointKind::Prismatic => JointMotion::Slide,
         _ => JointMotion::Turn,
     };
-    let (limits, max_speed) = (joint.limits, joint.max_speed);
+    let limits = joint.limits;
+    let max_speed = joint.max_speed;
     Dof { name: joint.name.clone(), motion, limits, max_speed }
 }

@@ -158,7 +158,8 @@ impl SkeletonBuilder<'_> {
             self.chain.joints[joint].motion == JointMotion::Turn
                 && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
         };
-        let (mut first, mut last) = (link, link);
+        let mut first = link;
+        let mut last = link;
         while first > 0 && on_axis(first - 1) {
             first -= 1;
         }

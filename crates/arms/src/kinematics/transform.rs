@@ -104,7 +104,8 @@ impl Transform {
 
     /// Returns a turn by `angle_rad` about the unit vector `axis` (Rodrigues' formula).
     pub(super) fn from_axis_angle(axis: Vector, angle_rad: f64) -> Self {
-        let (s, c) = (sin(angle_rad), cos(angle_rad));
+        let s = sin(angle_rad);
+        let c = cos(angle_rad);
         let [x, y, z] = axis;
         let v = 1.0 - c;
         let rotation = [

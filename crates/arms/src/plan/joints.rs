@@ -1,4 +1,4 @@
-//! Postures of an arm's joints, inside their limits, and the straight way between two.
+//! Postures of an arm's joints, inside their limits, and the straight path between two.
 
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
@@ -10,21 +10,23 @@ use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Veto};
 use std::f64::consts::PI;
 
-/// Distinct postures at a target that are looked for, and random ones that the search starts from.
+/// Most distinct postures at a target that are sought.
 const MAX_SOLUTIONS: usize = 12;
+/// Random postures from which that search starts.
 const MAX_RESTARTS: usize = 60;
 /// Most of those from which the second tree grows.
 const MAX_GOALS: usize = 4;
-/// Least step between two postures that are checked, in parts of the arm's reach.
+/// Least step between two postures that are checked, as a fraction of the arm's reach: tiny connectors
+/// would make checks of a path endless.
 const MIN_STEP: f64 = 1e-3;
 
 /// The postures of one arm among obstacles: a value for each of its joints.
 pub struct JointSpace<'a, const D: usize> {
     arm: &'a Arm,
     present: &'a [f64],
-    judge: ConstraintChecker<'a, D>,
+    checker: ConstraintChecker<'a, D>,
     k: usize,
-    /// Longest way of a connector between two postures that are checked, meters.
+    /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
 }
 
@@ -39,28 +41,28 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         self_collision: bool,
         k: usize,
     ) -> Self {
-        let judge = ConstraintChecker { chain, obstacles, self_collision };
+        let checker = ConstraintChecker { chain, obstacles, self_collision };
         let step_m = chain.step_m().max(MIN_STEP * arm.skeleton.reach_m);
-        Self { arm, present, judge, k, step_m }
+        Self { arm, present, checker, k, step_m }
     }
 
     /// Returns the objection to the places of an arm's connectors, if there is one.
     pub fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
-        self.judge.find_veto(points, self.k)
+        self.checker.find_veto(points, self.k)
     }
 
-    /// Returns good postures that reach the target, those nearest to the present one first.
+    /// Returns valid postures that reach the target, those nearest to the present one first.
     pub(super) fn goals(
         &self,
-        errand: &PlanningQuery<D>,
+        query: &PlanningQuery<D>,
         draws: &mut Draws,
     ) -> Result<Vec<Vec<f64>>, InputError> {
-        let (arm, goal) = self.arm.goal(errand.k, errand.target, errand.tolerance_m);
+        let (arm, goal) = self.arm.goal(query.k, query.target, query.tolerance_m);
         let seed = draws.next_u64();
         let goal = ArmGoal { solutions: MAX_SOLUTIONS, restarts: MAX_RESTARTS, seed, ..goal };
-        let answer = arm.solve(&goal, self.present)?;
-        let others = answer.others.into_iter().map(|posture| posture.values);
-        let all = std::iter::once(answer.values).filter(|_| answer.reached).chain(others);
+        let result = arm.solve(&goal, self.present)?;
+        let others = result.others.into_iter().map(|posture| posture.values);
+        let all = std::iter::once(result.values).filter(|_| result.reached).chain(others);
         Ok(all.filter(|values| self.is_free(values)).take(MAX_GOALS).collect())
     }
 }
@@ -72,28 +74,28 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
         self.present.to_vec()
     }
 
-    /// The way of half a turn of all joints at once.
+    /// The travel of half a turn of all joints at once.
     fn length_m(&self) -> f64 {
         PI * self.arm.follower.levers_m().iter().sum::<f64>()
     }
 
-    /// A bound: the sum of the ways that each joint alone may move a connector. So a full turn, which brings each part
-    /// back to its place, counts with its whole way.
+    /// A bound: the sum of the distances by which each joint alone may move a connector. So a full turn, which
+    /// brings each part back to its place, counts with its whole travel.
     fn distance_m(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
-        let ways = a.iter().zip(b).zip(self.arm.follower.levers_m());
-        ways.map(|((a, b), lever_m)| (b - a).abs() * lever_m).sum()
+        let moves = a.iter().zip(b).zip(self.arm.follower.levers_m());
+        moves.map(|((a, b), lever_m)| (b - a).abs() * lever_m).sum()
     }
 
     fn squared_spread(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
-        let ways = a.iter().zip(b).zip(self.arm.follower.levers_m());
-        ways.map(|((a, b), lever_m)| (b - a) * (b - a) * lever_m * lever_m).sum()
+        let moves = a.iter().zip(b).zip(self.arm.follower.levers_m());
+        moves.map(|((a, b), lever_m)| (b - a) * (b - a) * lever_m * lever_m).sum()
     }
 
-    fn interpolate(&self, a: &Vec<f64>, b: &Vec<f64>, part: f64) -> Vec<f64> {
-        match part >= 1.0 {
-            true => b.clone(),
-            false => a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect(),
+    fn interpolate(&self, a: &Vec<f64>, b: &Vec<f64>, fraction: f64) -> Vec<f64> {
+        if fraction >= 1.0 {
+            return b.clone();
         }
+        a.iter().zip(b).map(|(a, b)| a + fraction * (b - a)).collect()
     }
 
     fn is_free(&self, posture: &Vec<f64>) -> bool {
@@ -109,18 +111,19 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     }
 
     fn sample(&self, draws: &mut Draws) -> Vec<f64> {
-        let any = |(variable, [lower, upper]): (&Dof, &[f64; 2])| {
+        let draw = |(variable, [lower, upper]): (&Dof, &[f64; 2])| {
             // A joint that turns without limits gets everywhere within half a turn to either side; slides without
             // limits go as far as the arm is long.
-            let far = match variable.motion {
+            let max = match variable.motion {
                 JointMotion::Turn if lower.is_finite() => f64::INFINITY,
                 JointMotion::Turn => PI,
                 JointMotion::Slide => self.arm.skeleton.reach_m.max(1.0),
             };
-            let (lower, upper) = (lower.max(-far), upper.min(far));
+            let lower = lower.max(-max);
+            let upper = upper.min(max);
             lower + draws.uniform() * (upper - lower)
         };
         let variables = self.arm.serial.variables.iter();
-        variables.zip(self.arm.follower.limits()).map(any).collect()
+        variables.zip(self.arm.follower.limits()).map(draw).collect()
     }
 }

@@ -1,14 +1,14 @@
-//! Ways of chains with a fixed base among obstacles: from the present posture to one that reaches a
-//! target, where no local rule finds one.
+//! Motion planning for chains with a fixed base: a path among obstacles from the present posture to one
+//! that reaches a target, where no local rule finds one.
 //!
 //! ```text
-//! space.rs:  postures of rods, the straight way between two, and whether it is free
+//! space.rs:  postures of rods, the straight path between two, and whether it is free
 //! joints.rs: the same for the joints of an arm
 //! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
 //!
 //! Source: Kuffner and LaValle, "RRT-Connect: an efficient approach to single-query path planning",
-//! ICRA 2000. A way of rods keeps rods, bend limits and mobilities; one of joints keeps their limits as well.
+//! ICRA 2000. A path of rods keeps rods, bend limits and mobilities; one of joints keeps their limits as well.
 
 mod joints;
 mod space;
@@ -24,27 +24,29 @@ use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Rules};
 pub use space::RodSpace;
 
-/// Most postures at the target from which the second tree grows, and searches for them.
+/// Most postures at the target from which the second tree grows: some may be cut off from the present
+/// one, and all of them cost searches.
 const MAX_GOALS: usize = 4;
+/// Most searches for them.
 const MAX_SEARCHES: usize = 12;
 /// Restarts of the search for one of them.
 const MAX_RESTARTS: usize = 25;
 
-/// The target of a way.
+/// A planning query: the goal of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanningQuery<const D: usize> {
-    /// The connector that is to move,
+    /// The connector that is to move.
     pub k: usize,
-    /// where to,
+    /// Its target.
     pub target: Point<D>,
-    /// and how near, meters.
+    /// Distance at which the target counts as reached, meters.
     pub tolerance_m: f64,
 }
 
 /// A posture: the places of all connectors.
 pub type ChainPosture<const D: usize> = Vec<Point<D>>;
 
-/// The postures of a body that moves from one to another.
+/// A configuration space: the postures of a body, and the straight paths between them.
 pub trait ConfigurationSpace {
     /// One posture.
     type Posture: Clone;
@@ -52,31 +54,31 @@ pub trait ConfigurationSpace {
     /// Returns the present posture.
     fn present(&self) -> Self::Posture;
 
-    /// Returns the length in which ways are measured, such as that of the stretched body, meters.
+    /// Returns the length by which strides are scaled, such as that of the stretched body, meters.
     fn length_m(&self) -> f64;
 
-    /// Returns the longest way of a connector between two postures, or a bound on it, meters.
+    /// Returns the longest move of a connector between two postures, or a bound on it, meters.
     fn distance_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
-    /// Returns a measure of nearness: the sum of the squared ways of all moving parts.
+    /// Returns a measure of nearness: the sum of the squared moves of all moving parts.
     fn squared_spread(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
-    /// Returns the posture at a part of the straight way from one to another: all parts turn and change their lengths
-    /// evenly.
-    fn interpolate(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
+    /// Returns the posture at a fraction of the straight path from one to another: all parts turn and change
+    /// their lengths evenly.
+    fn interpolate(&self, a: &Self::Posture, b: &Self::Posture, fraction: f64) -> Self::Posture;
 
-    /// Returns whether a posture is good in itself.
+    /// Returns whether a posture is valid.
     fn is_free(&self, posture: &Self::Posture) -> bool;
 
-    /// Returns whether the straight way from one good posture to another is free.
+    /// Returns whether the straight path from one valid posture to another is free.
     fn is_path_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
 
-    /// Returns any posture, good or not.
+    /// Returns a random posture, valid or not.
     fn sample(&self, draws: &mut Draws) -> Self::Posture;
 }
 
-/// Finds a way of a chain to a target: the postures after the present one, between any two of which
-/// the straight way is free; none if the search found none.
+/// Plans a path of a chain to a target: the postures after the present one, between any two of which the
+/// straight path is free; none if the search found none.
 ///
 /// # Errors
 /// As [`IkSolver::solve`]; also when no connector of the chain keeps its place.
@@ -84,24 +86,24 @@ pub fn plan<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     rules: Rules,
-    errand: &PlanningQuery<D>,
+    query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
-    let space = RodSpace::new(chain, obstacles, rules.self_collision, errand.k)?;
-    let goals = goals(&space, rules, errand, draws)?;
+    let space = RodSpace::new(chain, obstacles, rules.self_collision, query.k)?;
+    let goals = goals(&space, rules, query, draws)?;
     Ok(find_path(&space, goals, draws))
 }
 
-/// Finds a way of an arm to a target, as [`plan`] does: the joint values after the present ones.
+/// Plans a path of an arm to a target, as [`plan`] does: the joint values after the present ones.
 ///
 /// # Errors
 /// As [`SerialChain::solve`](crate::kinematics::SerialChain::solve).
 pub fn plan_joints<const D: usize>(
     space: &JointSpace<'_, D>,
-    errand: &PlanningQuery<D>,
+    query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<Vec<f64>>>, InputError> {
-    let goals = space.goals(errand, draws)?;
+    let goals = space.goals(query, draws)?;
     Ok(find_path(space, goals, draws))
 }
 
@@ -113,16 +115,16 @@ fn find_path<S: ConfigurationSpace>(
     if goals.is_empty() {
         return None;
     }
-    let way = tree::find_path(space, goals, draws)?;
-    Some(tree::shorten(space, way, draws))
+    let path = tree::find_path(space, goals, draws)?;
+    Some(tree::shorten(space, path, draws))
 }
 
-/// Returns good postures that reach the target: the first sought from the present posture, the others
+/// Returns valid postures that reach the target: the first sought from the present posture, the others
 /// from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
     space: &RodSpace<'_, D>,
     rules: Rules,
-    errand: &PlanningQuery<D>,
+    query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Vec<ChainPosture<D>>, InputError> {
     let mut solver = IkSolver::new(rules);
@@ -130,14 +132,14 @@ fn goals<const D: usize>(
     let mut goals: Vec<ChainPosture<D>> = Vec::new();
     for search in 1..=MAX_SEARCHES {
         let goal = ChainIkGoal {
-            tolerance_m: errand.tolerance_m,
+            tolerance_m: query.tolerance_m,
             restarts: MAX_RESTARTS,
             seed: draws.next_u64(),
-            ..ChainIkGoal::new(errand.k, space.base(), errand.target)
+            ..ChainIkGoal::new(query.k, space.base(), query.target)
         };
-        let answer = solver.solve(&from, space.obstacles(), &goal)?;
-        if answer.reached && space.is_free(&answer.points) && !goals.contains(&answer.points) {
-            goals.push(answer.points);
+        let result = solver.solve(&from, space.obstacles(), &goal)?;
+        if result.reached && space.is_free(&result.points) && !goals.contains(&result.points) {
+            goals.push(result.points);
         }
         // Where the first searches find nothing, further ones hardly would.
         if goals.len() == MAX_GOALS || goals.is_empty() && search == MAX_GOALS {

@@ -1,4 +1,4 @@
-//! Postures of a chain with a fixed base, and the straight way between two.
+//! Postures of a chain with a fixed base, and the straight path between two.
 
 use super::{ChainPosture, ConfigurationSpace};
 use crate::ik::constraints::ConstraintChecker;
@@ -13,11 +13,11 @@ use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
 pub struct RodSpace<'a, const D: usize> {
-    judge: ConstraintChecker<'a, D>,
+    checker: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
     k: usize,
-    /// Longest way of a connector between two postures that are checked, meters.
+    /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
 }
 
@@ -43,16 +43,16 @@ impl<'a, const D: usize> RodSpace<'a, D> {
                 return Err(InputError::new("planner", "the chain has no fixed base", remedy));
             }
         };
-        let judge = ConstraintChecker { chain, obstacles, self_collision };
-        Ok(Self { judge, limb, k, step_m: chain.step_m() })
+        let checker = ConstraintChecker { chain, obstacles, self_collision };
+        Ok(Self { checker, limb, k, step_m: chain.step_m() })
     }
 
     pub(super) fn chain(&self) -> &'a Chain<D> {
-        self.judge.chain
+        self.checker.chain
     }
 
     pub(super) fn obstacles(&self) -> &'a Obstacles<D> {
-        self.judge.obstacles
+        self.checker.obstacles
     }
 
     pub(super) fn base(&self) -> usize {
@@ -64,12 +64,12 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     type Posture = ChainPosture<D>;
 
     fn present(&self) -> ChainPosture<D> {
-        self.judge.chain.points().to_vec()
+        self.checker.chain.points().to_vec()
     }
 
     fn length_m(&self) -> f64 {
         let rods = self.limb.windows(2);
-        rods.map(|pair| self.judge.chain.rod_between(pair[0], pair[1]).max_m).sum()
+        rods.map(|pair| self.checker.chain.rod_between(pair[0], pair[1]).max_m).sum()
     }
 
     fn distance_m(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
@@ -80,8 +80,13 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
         self.limb.iter().map(|&i| norm_squared(sub(a[i], b[i]))).sum()
     }
 
-    fn interpolate(&self, a: &ChainPosture<D>, b: &ChainPosture<D>, part: f64) -> ChainPosture<D> {
-        if part >= 1.0 {
+    fn interpolate(
+        &self,
+        a: &ChainPosture<D>,
+        b: &ChainPosture<D>,
+        fraction: f64,
+    ) -> ChainPosture<D> {
+        if fraction >= 1.0 {
             return b.clone();
         }
         let mut posture = a.clone();
@@ -89,16 +94,16 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
             let [inner, outer] = [pair[0], pair[1]];
             let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
             let [from_m, to_m] = [norm(from), norm(to)];
-            let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), part);
+            let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), fraction);
             // Opposite directions have no mean; just beside it they turn one way or the other.
             let u = normalized(mean).or(normalized(from)).unwrap_or(first_axis());
-            posture[outer] = add_scaled(posture[inner], u, from_m + part * (to_m - from_m));
+            posture[outer] = add_scaled(posture[inner], u, from_m + fraction * (to_m - from_m));
         }
         posture
     }
 
     fn is_free(&self, posture: &ChainPosture<D>) -> bool {
-        self.judge.find_veto(posture, self.k).is_none()
+        self.checker.find_veto(posture, self.k).is_none()
     }
 
     fn is_path_free(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> bool {
@@ -107,7 +112,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
         (1..=n).all(|step| {
             interrupt::check();
             let next = self.interpolate(a, b, step as f64 / n as f64);
-            // Rods that nearly turn around jump in between.
+            // Rods that nearly turn around jump in between, and a jump may pass through an obstacle.
             let is_near = self.distance_m(&before, &next) <= MAX_STEPS * self.step_m;
             before = next;
             is_near && self.is_free(&before)
@@ -120,7 +125,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
         let mut u: Point<D> = direction(draws);
         for pair in self.limb.windows(2) {
             let [inner, outer] = [pair[0], pair[1]];
-            let rod = self.judge.chain.rod_between(inner, outer);
+            let rod = self.checker.chain.rod_between(inner, outer);
             let length_m = rod.min_m + draws.uniform() * (rod.max_m - rod.min_m);
             posture[outer] = add_scaled(posture[inner], u, length_m);
             let side = scaled(direction(draws), stiffness * PI);
@@ -130,8 +135,8 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     }
 }
 
-/// Longest way of a connector between two postures that are checked, in steps: turning evenly, the
-/// middle of a wide turn is faster than its ends.
+/// Longest move of a connector between two postures that are checked, in steps: with linear interpolation
+/// of directions, the middle of a wide turn is faster than its ends.
 const MAX_STEPS: f64 = 3.0;
 /// The largest angle by which a rod of a random posture may differ in direction from the one before.
 const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];

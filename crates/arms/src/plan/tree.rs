@@ -6,22 +6,22 @@ use sidestep_kernel::stream::Draws;
 
 /// Most random postures that the trees grow toward.
 const MAX_SAMPLES: usize = 2_000;
-/// Longest way of a connector between two postures of a tree, in lengths of the chain.
+/// Longest move of a connector between two postures of a tree, in lengths of the chain.
 const MAX_STRIDE: f64 = 0.1;
-/// Longest straight way of a connector, in lengths of the chain.
+/// Longest straight move of a connector, in lengths of the chain: what a growth of one tree may add.
 const MAX_SEGMENT: f64 = 4.0;
-/// Attempts to shorten a way.
+/// Attempts to shorten a path.
 const MAX_SHORTCUTS: usize = 120;
 
-/// Postures, each with the one that it grew from.
+/// Postures, each with its parent.
 struct Tree<S: ConfigurationSpace> {
     postures: Vec<S::Posture>,
-    from: Vec<Option<usize>>,
+    parents: Vec<Option<usize>>,
 }
 
 impl<S: ConfigurationSpace> Tree<S> {
     fn new(roots: Vec<S::Posture>) -> Self {
-        Self { from: vec![None; roots.len()], postures: roots }
+        Self { parents: vec![None; roots.len()], postures: roots }
     }
 
     /// Returns the posture nearest to another; of equal ones the first.
@@ -31,27 +31,27 @@ impl<S: ConfigurationSpace> Tree<S> {
         all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, i)| i)
     }
 
-    /// Grows toward a posture stride by stride, as far as the way is free; returns the last posture
+    /// Grows toward a posture stride by stride, as far as the path is free; returns the last posture
     /// and whether that is the target, or `None` if there was no stride at all.
     fn grow(
         &mut self,
         space: &S,
         to: &S::Posture,
         stride_m: f64,
-        most: usize,
+        max_strides: usize,
     ) -> Option<(usize, bool)> {
         let mut last = self.nearest(space, to);
-        for stride in 0..most {
+        for stride in 0..max_strides {
             let from = &self.postures[last];
-            let part = stride_m / space.distance_m(from, to).max(f64::MIN_POSITIVE);
-            let next = space.interpolate(from, to, part);
+            let fraction = stride_m / space.distance_m(from, to).max(f64::MIN_POSITIVE);
+            let next = space.interpolate(from, to, fraction);
             if !space.is_path_free(from, &next) {
                 return (stride > 0).then_some((last, false));
             }
             self.postures.push(next);
-            self.from.push(Some(last));
+            self.parents.push(Some(last));
             last = self.postures.len() - 1;
-            if part >= 1.0 {
+            if fraction >= 1.0 {
                 return Some((last, true));
             }
         }
@@ -60,12 +60,12 @@ impl<S: ConfigurationSpace> Tree<S> {
 
     /// Returns the postures from one back to its root.
     fn path_to_root(&self, mut i: usize) -> Vec<S::Posture> {
-        let mut way = vec![self.postures[i].clone()];
-        while let Some(from) = self.from[i] {
+        let mut path = vec![self.postures[i].clone()];
+        while let Some(from) = self.parents[i] {
             i = from;
-            way.push(self.postures[i].clone());
+            path.push(self.postures[i].clone());
         }
-        way
+        path
     }
 }
 
@@ -77,9 +77,9 @@ pub(super) fn find_path<S: ConfigurationSpace>(
 ) -> Option<Vec<S::Posture>> {
     let present = space.present();
     let stride_m = MAX_STRIDE * space.length_m();
-    let most = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
+    let max_strides = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
     let mut trees = [Tree::new(vec![present.clone()]), Tree::new(goals.clone())];
-    let towards_goals = goals.into_iter().map(|goal| (goal, most));
+    let towards_goals = goals.into_iter().map(|goal| (goal, max_strides));
     let drawn = std::iter::repeat_with(|| None).take(MAX_SAMPLES);
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
         interrupt::check();
@@ -88,34 +88,35 @@ pub(super) fn find_path<S: ConfigurationSpace>(
         let (to, strides) = toward.unwrap_or_else(|| (space.sample(draws), 1));
         let Some((tip, _)) = trees[one].grow(space, &to, stride_m, strides) else { continue };
         let tip_posture = trees[one].postures[tip].clone();
-        let Some((meeting, true)) = trees[other].grow(space, &tip_posture, stride_m, most) else {
+        let Some((meeting, true)) = trees[other].grow(space, &tip_posture, stride_m, max_strides)
+        else {
             continue;
         };
         let ends = if one == 0 { [tip, meeting] } else { [meeting, tip] };
-        let mut way = trees[0].path_to_root(ends[0]);
-        way.reverse();
-        way.extend(trees[1].path_to_root(ends[1]).into_iter().skip(1));
-        return Some(way);
+        let mut path = trees[0].path_to_root(ends[0]);
+        path.reverse();
+        path.extend(trees[1].path_to_root(ends[1]).into_iter().skip(1));
+        return Some(path);
     }
     None
 }
 
-/// Returns the way after its first posture, with straight ways between random places of it where
-/// they are free.
+/// Returns the path after its first posture, with shortcuts between random postures of it where they are
+/// free.
 pub(super) fn shorten<S: ConfigurationSpace>(
     space: &S,
-    mut way: Vec<S::Posture>,
+    mut path: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Vec<S::Posture> {
     for _ in 0..MAX_SHORTCUTS {
-        if way.len() < 3 {
+        if path.len() < 3 {
             break;
         }
-        let [i, j] = [0, 1].map(|_| draws.uniform_below(way.len() as u32) as usize);
+        let [i, j] = [0, 1].map(|_| draws.uniform_below(path.len() as u32) as usize);
         let [i, j] = [i.min(j), i.max(j)];
-        if j > i + 1 && space.is_path_free(&way[i], &way[j]) {
-            way.drain(i + 1..j);
+        if j > i + 1 && space.is_path_free(&path[i], &path[j]) {
+            path.drain(i + 1..j);
         }
     }
-    way.split_off(1)
+    path.split_off(1)
 }

@@ -7,7 +7,7 @@ use crate::scenario_args::{ScenarioArgs, WorkersArg, downcast_scenario};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::world::Method;
+use sidestep::worlds::airspace::settings::Method;
 use sidestep_document::Table;
 use sidestep_papers::methods::{SeedSpan, compare as run_all, table};
 

@@ -4,11 +4,12 @@ use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
 use crate::scenario_args::{ScenarioArgs, downcast_scenario};
 use clap::Args;
+use sidestep::exact::{
+    Beam, Comparison, MarkovModel, POLICIES, PomdpOptions, PomdpSize, Summary, policy,
+};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::exact::{
-    Beam, Comparison, MarkovModel, POLICIES, PomdpOptions, PomdpSize, Summary, compare, policy,
-};
+use sidestep::worlds::robots::exact::{compare, markov_model};
 use sidestep::worlds::robots::scenario::Compiled;
 use sidestep_session::write_atomically;
 use std::io::Write;
@@ -21,10 +22,10 @@ Examples:
   sidestep exact one-robot.toml --runs 2000 --cycles 50  compare the simulator
   sidestep exact one-robot.toml --pomdp model.pomdp --goal 5,3 --beam sonar-8:0
 
-The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the \
+The scenario has one robot; doors stay closed, and nothing else moves. The policy replaces the \
 robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes \
 ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit \
-code 1, and so do runs that are too few to tell.";
+code 1, and so do too few runs for a verdict.";
 
 /// Compute the exact Markov chain of a scenario with one robot.
 #[derive(Debug, Args)]
@@ -108,7 +109,7 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
     let compiled: &Compiled = downcast_scenario(compiled.as_ref(), &source, "robots")?;
     // A scenario without a name is named by its file.
     let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
-    let model = MarkovModel::new(compiled).map_err(in_file)?;
+    let model = markov_model(compiled).map_err(in_file)?;
     let chosen = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &chosen, args.top)?;
     if let Some(runs) = args.runs {
@@ -181,7 +182,7 @@ fn comparison_text(c: &Comparison) -> String {
         Some(true) => "agrees".to_string(),
         Some(false) => "DISAGREES".to_string(),
         None => {
-            format!("too few runs to tell, --runs {} or more would do", c.runs_to_tell)
+            format!("too few runs for a verdict; --runs {} or more would suffice", c.runs_to_tell)
         }
     };
     format!(

@@ -68,7 +68,7 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_speed)]
     speed: f64,
 
-    /// Network topology: the way of packets from node to node
+    /// Network topology: the route of packets from node to node
     #[arg(long, value_enum, default_value_t = TopologyArg::Mesh)]
     topology: TopologyArg,
 

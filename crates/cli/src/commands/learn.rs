@@ -363,7 +363,7 @@ fn learn_effector(args: &EffectorArgs, console: Console) -> Result<LearnedEffect
     let options = args.estimate.options();
     let log = &args.log;
     if args.box_size_m.is_some() && log.mrclam.is_none() && log.bag.is_none() {
-        console.warn("--box changes nothing here: this log tells moves in units of the command");
+        console.warn("--box has no effect: this log gives moves in command units");
     }
     let box_m = |default_m: f64| args.box_size_m.unwrap_or(default_m);
     match (&log.mrclam, &log.carmen, &log.bag, &log.csv, &log.run) {
@@ -379,7 +379,7 @@ fn learn_effector(args: &EffectorArgs, console: Console) -> Result<LearnedEffect
 }
 
 fn no_log() -> InputError {
-    InputError::new("sidestep learn", "no log is named", "see `sidestep learn --help`")
+    InputError::new("sidestep learn", "no log is given", "see `sidestep learn --help`")
 }
 
 /// Largest profile in bytes that can be added to.

@@ -30,7 +30,7 @@ pub(crate) struct ManArgs {
 pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = &args.folder;
     write_pages(folder).map_err(|e| {
-        let remedy = "name a folder where you may write";
+        let remedy = "give a folder where you may write";
         InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
     })?;
     let said = || format!("Wrote manual pages to {}.\n", folder.display());

@@ -54,7 +54,7 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
 
 fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
     let refuse = |e: std::io::Error| {
-        let remedy = "name a file that is not there yet, in a folder where you may write";
+        let remedy = "give a file that is not there yet, in a folder where you may write";
         InputError::new(path.display(), format!("cannot make the file: {e}"), remedy)
     };
     if let Some(folder) = path.parent() {

@@ -88,7 +88,7 @@ fn print_end(replayed: &ReplayReport, is_complete: bool, console: Console) -> Re
     let short = || format!("{digest}\n");
     console.print_result_or_short(&json, short, || {
         let cycles = group_thousands(run.cycle());
-        format!("Confirmed: {cycles} cycles come to the recorded digest\n  digest {digest}\n")
+        format!("Confirmed: {cycles} cycles give the recorded digest\n  digest {digest}\n")
     })
 }
 

@@ -176,7 +176,7 @@ fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
 fn parse_label(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {
-        let cause = format!("`{text}` names no words");
+        let cause = format!("`{text}` has no label text");
         InputError::new("--label", cause, "write what stands there = what shall stand there")
     })?;
     Ok((from.into(), to.into()))

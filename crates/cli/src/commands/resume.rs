@@ -22,7 +22,7 @@ Examples:
   sidestep resume runs/office --cycles 20000     to cycle 20000 only
 
 The result has the same digest and the same rows as an uninterrupted run. Of a run that is complete \
-already, the result is told and nothing is written.";
+already, the result is printed and nothing is written.";
 
 /// Continue a recorded run or a sweep that was stopped or killed.
 #[derive(Debug, Args)]

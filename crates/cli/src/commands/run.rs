@@ -75,13 +75,11 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     if args.many.is_requested() {
         if args.foxglove.is_some() {
             let remedy = "leave it out, or run one of them alone";
-            return Err(
-                InputError::new("--foxglove", "many runs have no one picture", remedy).into()
-            );
+            return Err(InputError::new("--foxglove", "a sweep has no single view", remedy).into());
         }
         if args.mcap.is_some() || args.replace {
             let remedy = "record the runs with --record-runs, then `sidestep export DIR/runs/N`";
-            let cause = "many runs have no one film, and a sweep is never replaced";
+            let cause = "a sweep has no single recording, and its folder is never overwritten";
             return Err(InputError::new("--mcap or --replace", cause, remedy).into());
         }
         let workers = args.workers.count();

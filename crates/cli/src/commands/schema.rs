@@ -83,7 +83,7 @@ fn schema_comment(file: &Path, schema: &Value) -> String {
 
 fn write(file: &Path, text: &str) -> Result<(), InputError> {
     std::fs::write(file, text).map_err(|e| {
-        let remedy = "name a file in a folder where you may write";
+        let remedy = "give a file in a folder where you may write";
         InputError::new(file.display(), format!("cannot be written: {e}"), remedy)
     })
 }

@@ -26,8 +26,8 @@ Examples:
   sidestep studio office.toml --foxglove 127.0.0.1:8765
   sidestep studio tcp/127.0.0.1:7600       watch the fleet that flies there
 
-The page may read what lies below the folders that are named, the folders of the files that are \
-named, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
+The page may read what lies below the given folders, the folders of the given \
+files, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
 
 /// The time between two looks at whether to end.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -109,7 +109,7 @@ fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Fail
         );
     }
     if studio.is_open_to_others() && studio.has_local_address() {
-        console.note("Others put this machine's name or number into the address.");
+        console.note("From another machine, use this machine's host name or IP address instead.");
     }
     console.print_result_or_short(
         &json!({ "url": url }),

@@ -131,7 +131,7 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
             run_sweep(file, changes, many, out.as_deref(), workers.count(), console)
         }
         (None, None) => {
-            let remedy = "name a sweep file or a scenario; see `sidestep sweep --help`";
+            let remedy = "give a sweep file or a scenario; see `sidestep sweep --help`";
             Err(InputError::new("sidestep sweep", "there is nothing to run", remedy).into())
         }
     }

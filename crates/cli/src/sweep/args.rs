@@ -95,7 +95,7 @@ fn parse_baseline(texts: &[String]) -> Result<BaselineSpec, InputError> {
     let (values, names): (Vec<String>, Vec<String>) =
         texts.iter().cloned().partition(|text| text.contains('='));
     if let [first, second, ..] = &names[..] {
-        let cause = format!("`{first}` and `{second}` are both names of variants");
+        let cause = format!("`{first}` and `{second}` are both variants");
         return Err(InputError::new("--baseline", cause, "give one name, or values as KEY=V"));
     }
     Ok(BaselineSpec { name: names.into_iter().next(), settings: parse_settings(&values)? })

@@ -1,8 +1,8 @@
 //! Many runs: options -> a sweep, and its results as text.
 //!
 //! ```text
-//! ask.rs      options and files -> a sweep         say.rs       its results, as text and JSON
-//! status.rs   how far it is
+//! args.rs     options and files -> a sweep         output.rs    its results, as text and JSON
+//! status.rs   its progress
 //! ```
 
 mod args;

@@ -18,7 +18,7 @@ const MAX_LISTED_FAILURES: usize = 5;
 
 fn timing_text(effort: &SweepTiming) -> String {
     format!(
-        "{} for {}, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
+        "{} for {}, {} at once; {:.1} ms of simulation and {:.1} ms of overhead per run",
         format_duration(effort.wall_s),
         format_count(effort.runs as usize, "run"),
         effort.at_once,
@@ -82,7 +82,7 @@ fn print_interrupted(told: SweepOutput<'_>, finished: usize) -> Result<ExitCode,
             let all = plan.runs();
             let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
             console.note(format!(
-                "{finished}{of} runs are finished; `sidestep resume {path}` goes on."
+                "{finished}{of} runs are finished; `sidestep resume {path}` continues."
             ));
         }
     }

@@ -21,7 +21,7 @@ fn runs_that_are_too_few_to_disagree_confirm_nothing() {
     let few = compare("40");
     let told = few.out();
     assert_eq!(few.code(), 1, "{told}");
-    assert!(!told.contains("agrees") && told.contains("too few runs to tell"), "{told}");
+    assert!(!told.contains("agrees") && told.contains("too few runs for a verdict"), "{told}");
     let enough = told.split_once("--runs ").expect("a number of runs").1;
     let enough = enough.split(' ').next().expect("a number");
     let told = compare(enough);

@@ -174,5 +174,5 @@ fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
     }
     let ended = place.run(&["studio", "--no-open", "tcp/127.0.0.1:9"]);
     assert_eq!((ended.code(), ended.out()), (1, String::new()));
-    assert!(ended.err().contains("nobody answers at tcp/127.0.0.1:9"), "{}", ended.err());
+    assert!(ended.err().contains("no answer from tcp/127.0.0.1:9"), "{}", ended.err());
 }

@@ -97,7 +97,7 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
         ("--figure-size", "9x9", "30 to 500 mm"),
         ("--figure-font", "99", "4 to 40"),
         ("--label", "none such=x", "no figure has the words"),
-        ("--label", "=x", "names no words"),
+        ("--label", "=x", "has no label text"),
     ] {
         let ended = place.run(&["report", "r", "--figure", "svg", option, value]);
         assert_eq!(ended.code(), 2, "{option} {value}");

@@ -120,13 +120,13 @@ fn a_sweep_runs_until_it_is_precise_and_shares_of_it_are_refused() {
     assert_eq!(again["summary"], done["summary"], "nothing is run again");
     assert_eq!(again["stopped"], done["stopped"], "why it was enough is still told");
     place.json(&["report", "d"]);
-    assert!(place.read("d/report.md").contains("Why so many runs"));
+    assert!(place.read("d/report.md").contains("Why this number of runs"));
     let planned = [&["sweep", "plan"], &args[1..]].concat();
     let planned: Vec<&str> = planned.iter().map(|a| if *a == "d" { "p" } else { a }).collect();
     place.json(&planned);
     let refused = place.run(&["sweep", "run", "p", "--shard", "0/2"]);
     assert_eq!(refused.code(), 2);
-    assert!(refused.err().contains("stops by its precision"), "{}", refused.err());
+    assert!(refused.err().contains("target precision cannot be sharded"), "{}", refused.err());
     assert_eq!(place.json(&["resume", "p"])["summary"], done["summary"]);
 }
 

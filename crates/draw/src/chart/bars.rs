@@ -130,7 +130,8 @@ impl BarChart {
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut frame, index, series);
         }
-        let (base, area) = (frame.y.base_px(), frame.area);
+        let base = frame.y.base_px();
+        let area = frame.area;
         frame.svg.line((area.x, base), (area.right(), base), format_args!(r#"stroke="{INK}""#));
         frame.svg.close_group();
         Ok(frame.finish())
@@ -149,8 +150,9 @@ impl BarChart {
     fn legend(&self) -> Vec<LegendEntry> {
         let entry = |(index, series): (usize, &BarSeries)| {
             let (opacity, rim) = series_fill(index);
-            let (fill, rim) = (series_color(index).into(), rim.into());
-            LegendEntry::new(LegendSymbol::Swatch { fill, rim, opacity }, &series.label)
+            let fill = series_color(index).into();
+            let symbol = LegendSymbol::Swatch { fill, rim: rim.into(), opacity };
+            LegendEntry::new(symbol, &series.label)
         };
         self.series.iter().enumerate().map(entry).collect()
     }
@@ -182,12 +184,14 @@ fn draw_bar(frame: &mut ChartFrame, bar: &Bar, center: f64, width: f64, index: u
 
 /// Draws a filled column from the axis's base to `value`, its left edge at `x`.
 fn column(frame: &mut ChartFrame, x: f64, width: f64, value: f64, index: usize) {
-    let (base, end) = (frame.y.base_px(), frame.y.px(value));
+    let base = frame.y.base_px();
+    let end = frame.y.px(value);
     let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };
-    let (color, (opacity, rim)) = (series_color(index), series_fill(index));
-    let look = match opacity {
+    let color = series_color(index);
+    let (opacity, rim) = series_fill(index);
+    let attributes = match opacity {
         1.0 => format!(r#"fill="{color}""#),
         _ => format!(r#"fill="{color}" fill-opacity="{opacity}" stroke="{rim}""#),
     };
-    frame.svg.rect(column, look);
+    frame.svg.rect(column, attributes);
 }

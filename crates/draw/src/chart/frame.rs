@@ -98,9 +98,9 @@ impl SlotNames {
     fn wrap(style: &Style, across: &XAxis<'_>, width: f64) -> Self {
         let XAxis::Categories(names) = across else { return Self::default() };
         let size = style.small_px();
-        let room = width / names.len().max(1) as f64 - 6.0;
+        let slot_px = width / names.len().max(1) as f64 - 6.0;
         let measure = |text: &str| text::width(text, size, Weight::Regular);
-        let too_wide = |name: &String| name.split(' ').any(|word| measure(word) > room);
+        let too_wide = |name: &String| name.split(' ').any(|word| measure(word) > slot_px);
         if names.iter().any(too_wide) {
             let most = 0.4 * style.height_px;
             let short = |name: &String| vec![text::shorten(name, size, Weight::Regular, most)];
@@ -108,7 +108,7 @@ impl SlotNames {
             let height_px = names.iter().flatten().map(|name| measure(name)).fold(0.0, f64::max);
             return Self { names, upright: true, height_px: height_px + 4.0 };
         }
-        let lines = |name: &String| text::wrap(name, size, Weight::Regular, room);
+        let lines = |name: &String| text::wrap(name, size, Weight::Regular, slot_px);
         let names: Vec<_> = names.iter().map(lines).collect();
         let most_lines = names.iter().map(Vec::len).max().unwrap_or(0);
         Self { names, upright: false, height_px: most_lines as f64 * size * 1.35 }
@@ -158,9 +158,9 @@ impl ChartFrame {
 
     /// Returns the finished picture.
     pub(crate) fn finish(mut self) -> String {
-        let look =
+        let text_style =
             TextStyle { fill: FAINT_INK, ..TextStyle::new(self.style.small_px(), Anchor::Start) };
-        let end = paragraph(&mut self.svg, &self.note, (EDGE_PX, self.note_top), &look);
+        let end = paragraph(&mut self.svg, &self.note, (EDGE_PX, self.note_top), &text_style);
         self.svg.finish(self.style.width_px, (end + EDGE_PX).max(self.style.height_px), &self.title)
     }
 
@@ -179,14 +179,14 @@ impl ChartFrame {
 
     fn draw_y_ticks(&mut self, up: &FittedAxis) {
         let (left, right) = (self.area.x, self.area.right());
-        let look = TextStyle::new(self.style.small_px(), Anchor::End);
+        let text_style = TextStyle::new(self.style.small_px(), Anchor::End);
         let mut spacing = LabelSpacing::new();
         for (value, label) in &up.ticks.major {
             let y = self.y.px(*value);
             self.svg.line((left, y), (right, y), grid_ink());
             self.svg.line((left - TICK_PX, y), (left, y), axis_ink());
-            if spacing.try_place(-y, look.size_px) {
-                self.svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+            if spacing.try_place(-y, text_style.size_px) {
+                self.svg.text(left - TICK_PX - 3.0, y + text_style.middle_px(), label, &text_style);
             }
         }
         for value in &up.ticks.minor {
@@ -198,16 +198,16 @@ impl ChartFrame {
     fn draw_x_ticks(&mut self, across: &FittedAxis) {
         let x = self.x_scale(across);
         let (top, bottom) = (self.area.y, self.area.bottom());
-        let look = TextStyle::new(self.style.small_px(), Anchor::Middle);
+        let text_style = TextStyle::new(self.style.small_px(), Anchor::Middle);
         let mut spacing = LabelSpacing::new();
         for (value, label) in &across.ticks.major {
             let at = x.px(*value);
             self.svg.line((at, top), (at, bottom), grid_ink());
             self.svg.line((at, bottom), (at, bottom + TICK_PX), axis_ink());
-            let label_px = text::width(label, look.size_px, Weight::Regular);
+            let label_px = text::width(label, text_style.size_px, Weight::Regular);
             // Given ticks may be too close together for all their labels.
-            if spacing.try_place(at, label_px + 0.4 * look.size_px) {
-                self.svg.text(at, bottom + TICK_PX + 2.0 + look.size_px, label, &look);
+            if spacing.try_place(at, label_px + 0.4 * text_style.size_px) {
+                self.svg.text(at, bottom + TICK_PX + 2.0 + text_style.size_px, label, &text_style);
             }
         }
         for value in &across.ticks.minor {
@@ -220,14 +220,14 @@ impl ChartFrame {
         let slot = self.area.width / slots.names.len().max(1) as f64;
         let top = self.area.bottom() + TICK_PX;
         let anchor = if slots.upright { Anchor::End } else { Anchor::Middle };
-        let look =
+        let text_style =
             TextStyle { upward: slots.upright, ..TextStyle::new(self.style.small_px(), anchor) };
         for (index, lines) in slots.names.iter().enumerate() {
             let center = self.area.x + (index as f64 + 0.5) * slot;
             if slots.upright {
-                self.svg.text(center + look.middle_px(), top, &lines.concat(), &look);
+                self.svg.text(center + text_style.middle_px(), top, &lines.concat(), &text_style);
             } else {
-                paragraph(&mut self.svg, lines, (center, top), &look);
+                paragraph(&mut self.svg, lines, (center, top), &text_style);
             }
         }
     }
@@ -235,10 +235,10 @@ impl ChartFrame {
     fn draw_axis_labels(&mut self, labels: &WrappedLabels) {
         let Rect { x, y, width, height } = self.area;
         let line = line_px(&self.style);
-        let look = TextStyle::new(self.style.font_px, Anchor::Middle);
+        let text_style = TextStyle::new(self.style.font_px, Anchor::Middle);
         let top = self.note_top - labels.x.len() as f64 * line - NOTE_GAP_PX;
-        paragraph(&mut self.svg, &labels.x, (x + width / 2.0, top), &look);
-        let upward = TextStyle { upward: true, ..look };
+        paragraph(&mut self.svg, &labels.x, (x + width / 2.0, top), &text_style);
+        let upward = TextStyle { upward: true, ..text_style };
         for (row, text) in labels.y.iter().enumerate() {
             let baseline = EDGE_PX + row as f64 * line + self.style.font_px;
             self.svg.text(baseline, y + height / 2.0, text, &upward);

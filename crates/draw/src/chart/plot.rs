@@ -41,15 +41,15 @@ impl Point {
     }
 }
 
-/// The way in which the points of a series are drawn.
+/// The form in which the points of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     /// A line, with markers if the points are few.
     Line,
     /// A line alone, within a band of the intervals.
     Band,
-    /// A way in the plane: a line alone, with a ring where it starts and an arrowhead where it ends.
-    Way,
+    /// A path in the plane: a line alone, with a ring where it starts and an arrowhead where it ends.
+    Path,
     /// Markers only.
     Points,
 }
@@ -85,7 +85,7 @@ impl Series {
         match self.mark {
             Mark::Points => true,
             Mark::Line => self.points.len() <= MAX_MARKERS,
-            Mark::Band | Mark::Way => false,
+            Mark::Band | Mark::Path => false,
         }
     }
 }
@@ -113,7 +113,7 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// Returns an empty plot with linear axes `x` and `y`. An empty title takes no room.
+    /// Returns an empty plot with linear axes `x` and `y`. An empty title takes no space.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -184,8 +184,8 @@ impl Plot {
         for ideal in &self.ideals {
             draw_ideal_line(&mut frame, ideal, &x, x_scale, &self.y);
         }
-        for (index, series) in self.series.iter().enumerate() {
-            self.draw_series(&mut frame, x_scale, index, series, style);
+        for index in 0..self.series.len() {
+            self.draw_series(&mut frame, x_scale, index, style);
         }
         frame.svg.close_group();
         Ok(frame.finish())
@@ -202,10 +202,11 @@ impl Plot {
     /// Returns one entry per series and ideal line.
     fn legend(&self) -> Vec<LegendEntry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
-            let (color, marker) = (series_color(index).into(), Marker::of_series(index));
+            let color = series_color(index).into();
+            let marker = Marker::of_series(index);
             let symbol = match series.mark {
                 Mark::Points => LegendSymbol::Marker { color, marker },
-                Mark::Line | Mark::Band | Mark::Way => {
+                Mark::Line | Mark::Band | Mark::Path => {
                     let marker = series.shows_markers().then_some(marker);
                     LegendSymbol::Line { color, marker, dash: series_dash(index) }
                 }
@@ -216,30 +217,15 @@ impl Plot {
         series.chain(self.ideals.iter().map(|line| ideal(&line.label))).collect()
     }
 
-    fn draw_series(
-        &self,
-        frame: &mut ChartFrame,
-        x: Scale,
-        index: usize,
-        series: &Series,
-        style: &Style,
-    ) {
+    fn draw_series(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
+        let series = &self.series[index];
         let color = &series_color(index);
         let y = frame.y;
         if series.mark == Mark::Band {
             self.draw_band(frame, x, color, series);
         }
         if series.mark != Mark::Points {
-            for run in series.points.split(|p| !self.contains(p)).filter(|run| run.len() > 1) {
-                let data = polyline(decimate(run.iter().map(|p| (x.px(p.x), y.px(p.y)))));
-                let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
-                let dash = series_dash(index);
-                frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}{dash}"#));
-                if series.mark == Mark::Way {
-                    let places: Vec<Px> = run.iter().map(|p| (x.px(p.x), y.px(p.y))).collect();
-                    draw_ends(&mut frame.svg, &places, color, 0.7 * style.font_px);
-                }
-            }
+            self.draw_line(frame, x, index, style);
         }
         for point in series.points.iter().filter(|p| self.contains(p)) {
             let at = (x.px(point.x), y.px(point.y));
@@ -258,7 +244,24 @@ impl Plot {
         }
     }
 
-    /// Fills the area between the ends of the intervals, over each stretch that has them.
+    /// Draws the line of a series, interrupted at points that have no place on the axes.
+    fn draw_line(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
+        let series = &self.series[index];
+        let color = &series_color(index);
+        let dash = series_dash(index);
+        let y = frame.y;
+        for run in series.points.split(|p| !self.contains(p)).filter(|run| run.len() > 1) {
+            let places: Vec<Px> = run.iter().map(|p| (x.px(p.x), y.px(p.y))).collect();
+            let data = polyline(decimate(places.iter().copied()));
+            let attributes = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
+            frame.svg.path(&data, format_args!(r#"stroke="{color}" {attributes}{dash}"#));
+            if series.mark == Mark::Path {
+                draw_ends(&mut frame.svg, &places, color, 0.7 * style.font_px);
+            }
+        }
+    }
+
+    /// Fills the area between the ends of the intervals, over each run of points that have them.
     fn draw_band(&self, frame: &mut ChartFrame, x: Scale, color: &str, series: &Series) {
         let y = frame.y;
         let is_out = |p: &Point| !self.contains(p) || bounds(p).is_none();
@@ -323,7 +326,7 @@ fn draw_ideal_line(
 /// A point in pixels, y downward.
 type Px = (f64, f64);
 
-/// Marks where a way starts, and where and in which direction it ends.
+/// Marks where a path starts, and where and in which direction it ends.
 fn draw_ends(svg: &mut Svg, places: &[Px], color: &str, head_px: f64) {
     let [start, .., end] = places else { return };
     start_mark(svg, *start, 0.4 * head_px, color);

@@ -35,9 +35,9 @@ const MIN_SEAMED_PX: f64 = 8.0;
 const MAX_SEPARATE_BALLS: usize = 400;
 /// Shades of such balls.
 const SHADES: f64 = 16.0;
-/// The look that lines share.
+/// The attributes that lines share.
 const LINE_ATTRIBUTES: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
-/// Time of the way that a moving body's arrow shows, seconds.
+/// Duration of the movement that a body's arrow shows, in seconds.
 const ARROW_TIME_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
 const CORNERS: usize = 32;
@@ -55,9 +55,9 @@ pub(super) fn draw_walls(svg: &mut Svg, scenery: &Scenery, canvas: &Canvas) {
         }
     }
     if !data.is_empty() {
-        let (wall, look) =
+        let (wall, attributes) =
             (hex(WALL_COLOR), r#"fill="none" stroke-width="1.5" stroke-linecap="round""#);
-        svg.path(&data, format_args!(r#"class="walls" stroke="{wall}" {look}"#));
+        svg.path(&data, format_args!(r#"class="walls" stroke="{wall}" {attributes}"#));
     }
 }
 
@@ -82,11 +82,11 @@ pub(super) fn draw_layers(
     shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
 }
 
-/// A body in space, or one stretch of a line with many points.
+/// A body in space, or one segment of a line with many points.
 struct DepthItem<'a> {
     depth_m: f64,
     body: &'a Body,
-    /// The first point of the stretch.
+    /// The first point of the segment.
     from: Option<usize>,
 }
 
@@ -140,17 +140,18 @@ fn is_ball(body: &Body) -> bool {
     body.kind == BodyKind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
 }
 
-/// Returns the look of a ball among many.
+/// Returns the attributes of a ball among many.
 fn dot_attributes(canvas: &Canvas, body: &Body) -> String {
     let radius_m = if let Shape::Sphere { radius_m } = body.shape { radius_m } else { 0.0 };
-    let look = body.appearance(3);
+    let appearance = body.appearance(3);
     let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
-    let (color, opacity) = (hex(paler(look.color, shade)), look.opacity);
+    let color = hex(paler(appearance.color, shade));
+    let opacity = appearance.opacity;
     let width = SvgNumber(2.0 * (radius_m * canvas.px_per_m).max(MIN_RADIUS_PX));
     format!(r#"stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}""#)
 }
 
-/// Draws balls of one look as one path: thousands of circles would be most of a picture's bytes.
+/// Draws balls with the same attributes as one path: thousands of circles would be most of a picture's bytes.
 fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[DepthItem<'_>]) {
     let mut data = String::new();
     for ball in balls {
@@ -172,18 +173,19 @@ fn depth(canvas: &Canvas, at: Vec3) -> f64 {
 
 /// Returns the color of a body, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
-    let look = body.appearance(scene.scenery.dimensions);
+    let appearance = body.appearance(scene.scenery.dimensions);
     let acts = body.kind.is_agent() || body.kind == BodyKind::Rods;
     if acts
         && matches!(body.state, Condition::Plain | Condition::Leading)
         && scene.lacks_trail(body)
     {
-        return (UNTRACED_COLOR, look.opacity);
+        return (UNTRACED_COLOR, appearance.opacity);
     }
     if body.kind == BodyKind::Obstacle && !canvas.is_above() {
-        return (paler(look.color, canvas.nearness(body.pose.at_m)), look.opacity);
+        let color = paler(appearance.color, canvas.nearness(body.pose.at_m));
+        return (color, appearance.opacity);
     }
-    (look.color, look.opacity)
+    (appearance.color, appearance.opacity)
 }
 
 impl Scene<'_> {
@@ -239,26 +241,26 @@ fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
 fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
     let (color, opacity) = fill(scene, canvas, body);
     let hides = if opacity < 1.0 { format!(r#" fill-opacity="{opacity}""#) } else { String::new() };
-    let look = format!(r#"fill="{}"{hides} {}"#, hex(color), rim(canvas, body, color));
+    let attributes = format!(r#"fill="{}"{hides} {}"#, hex(color), rim(canvas, body, color));
     match &body.shape {
         Shape::Line { points_m, .. } => draw_line(svg, scene, canvas, body, points_m),
         Shape::Cuboid { size_m } => {
             for face in faces(&body.pose, *size_m, canvas) {
-                svg.path(&outline(face.map(|p| canvas.px(p))), &look);
+                svg.path(&outline(face.map(|p| canvas.px(p))), &attributes);
             }
         }
         Shape::Cylinder { radius_m, .. } if !canvas.is_above() => {
-            svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.px(p))), look);
+            svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.px(p))), attributes);
         }
         Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
             let least_px = if body.kind == BodyKind::Goal { MIN_GOAL_PX } else { MIN_RADIUS_PX };
             let radius_px = (radius_m * canvas.px_per_m).max(least_px);
-            svg.circle(canvas.px(body.pose.at_m), radius_px, look);
+            svg.circle(canvas.px(body.pose.at_m), radius_px, attributes);
         }
         Shape::Dart { length_m, width_m } => {
             let grown = (MIN_DART_PX / (length_m * canvas.px_per_m)).max(1.0);
             let corners = dart(&body.pose, length_m * grown, width_m * grown);
-            svg.path(&outline(corners.map(|p| canvas.px(p))), look);
+            svg.path(&outline(corners.map(|p| canvas.px(p))), attributes);
         }
     }
     draw_heading(svg, canvas, body);
@@ -278,8 +280,8 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
         let around = SvgNumber(width_px + 2.0 * SEAM_PX);
         svg.path(&data, format_args!(r##"stroke="#FFFFFF" stroke-width="{around}""##));
     }
-    let look = format!(r#"stroke="{}" stroke-width="{width}"{hides}{ends}"#, hex(color));
-    svg.path(&data, look);
+    let attributes = format!(r#"stroke="{}" stroke-width="{width}"{hides}{ends}"#, hex(color));
+    svg.path(&data, attributes);
 }
 
 /// Draws an arrowhead on a robot that shows its heading.
@@ -332,11 +334,11 @@ fn draw_target(svg: &mut Svg, canvas: &Canvas, goal: &Body, number: Option<u32>)
     let (x, y) = canvas.px(goal.pose.at_m);
     let (radius_px, color) =
         ((radius_m * canvas.px_per_m).max(MIN_GOAL_PX), hex(darker(body_color(goal.number))));
-    let look = format!(r#"stroke="{color}" stroke-width="1.3""#);
-    svg.circle((x, y), radius_px, format_args!(r#"class="target" fill="none" {look}"#));
+    let attributes = format!(r#"stroke="{color}" stroke-width="1.3""#);
+    svg.circle((x, y), radius_px, format_args!(r#"class="target" fill="none" {attributes}"#));
     let reach = radius_px + TARGET_PX;
-    svg.line((x - reach, y), (x + reach, y), &look);
-    svg.line((x, y - reach), (x, y + reach), &look);
+    svg.line((x - reach, y), (x + reach, y), &attributes);
+    svg.line((x, y - reach), (x, y + reach), &attributes);
     if let Some(number) = number {
         let words = TextStyle { halo: true, ..TextStyle::new(TARGET_LETTERS_PX, Anchor::Start) };
         svg.text(x + reach, y - radius_px, &number.to_string(), &words);
@@ -354,7 +356,7 @@ fn middle(body: &Body) -> Vec3 {
     }
 }
 
-/// Returns the faces of a box that look toward the viewer.
+/// Returns the faces of a box that face the viewer.
 fn faces(pose: &Pose, size_m: Vec3, canvas: &Canvas) -> Vec<[Vec3; 4]> {
     let half = size_m.map(|side_m| 0.5 * side_m);
     let corners = corners([half.map(|m| -m), half]).map(|corner| pose.transform_point(corner));
@@ -366,7 +368,8 @@ fn faces(pose: &Pose, size_m: Vec3, canvas: &Canvas) -> Vec<[Vec3; 4]> {
     // A face that is seen edge-on has no extent.
     let facing = (0..3).map(|k| (k, turn(k))).filter(|(_, turn)| turn.abs() > 1e-9);
     let face = |(k, turn): (usize, f64)| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        let i = (k + 1) % 3;
+        let j = (k + 2) % 3;
         let side = usize::from(turn > 0.0) << k;
         [0, 1 << i, 1 << i | 1 << j, 1 << j].map(|bits: usize| corners[side | bits])
     };
@@ -383,7 +386,8 @@ fn circle(pose: &Pose, radius_m: f64) -> [Vec3; CORNERS] {
 
 /// Returns an arrowhead with its middle at the pose.
 fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Vec3; 4] {
-    let (half_m, wing_m) = (0.5 * length_m, 0.5 * width_m);
+    let half_m = 0.5 * length_m;
+    let wing_m = 0.5 * width_m;
     let corners = [[half_m, 0.0], [-half_m, wing_m], [-0.5 * half_m, 0.0], [-half_m, -wing_m]];
     corners.map(|[x, y]| pose.transform_point([x, y, 0.0]))
 }
@@ -391,12 +395,14 @@ fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Vec3; 4] {
 /// Draws an arrow, unless it is shorter than its head.
 fn arrow(svg: &mut Svg, from: Px, to: Px) {
     const HEAD_PX: f64 = 6.0;
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let dx = to.0 - from.0;
+    let dy = to.1 - from.1;
     let length = (dx * dx + dy * dy).sqrt();
     if length <= HEAD_PX {
         return;
     }
-    let (ux, uy) = (HEAD_PX * dx / length, HEAD_PX * dy / length);
+    let ux = HEAD_PX * dx / length;
+    let uy = HEAD_PX * dy / length;
     let neck = (to.0 - ux, to.1 - uy);
     svg.line(from, neck, format_args!(r#"class="arrow" stroke="{INK}" stroke-width="1.3""#));
     let wings =

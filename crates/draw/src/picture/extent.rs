@@ -42,8 +42,11 @@ pub(crate) fn check_content(
 fn check_floor(floor: &OccupancyGrid) -> Result<(), DrawError> {
     let boxes = u64::from(floor.width) * u64::from(floor.height);
     if boxes > MAX_BOXES {
-        let (what, limit) = ("boxes of the map", MAX_BOXES);
-        return Err(DrawError::TooLarge { what, found: boxes, limit });
+        return Err(DrawError::TooLarge {
+            what: "boxes of the map",
+            found: boxes,
+            limit: MAX_BOXES,
+        });
     }
     DrawError::positive("number of the map's boxes", boxes as f64)?;
     DrawError::length("boxes of the map", boxes as usize, floor.boxes.len())?;
@@ -83,10 +86,10 @@ fn check_place(at: &Vec3) -> Result<(), DrawError> {
 }
 
 fn check_size(value: f64) -> Result<(), DrawError> {
-    match (0.0..=MAX_COORDINATE_M).contains(&value) {
-        true => Ok(()),
-        false => Err(DrawError::Value { what: "a size in m", value, must: "from 0 to 1e9" }),
+    if !(0.0..=MAX_COORDINATE_M).contains(&value) {
+        return Err(DrawError::Value { what: "a size in m", value, must: "from 0 to 1e9" });
     }
+    Ok(())
 }
 
 fn floor_bounds(floor: &OccupancyGrid) -> [Vec3; 2] {
@@ -97,13 +100,15 @@ fn floor_bounds(floor: &OccupancyGrid) -> [Vec3; 2] {
 
 /// Returns the lower and upper corner of everything shown; never empty.
 pub(super) fn scene_bounds(scene: &Scene<'_>) -> Result<[Vec3; 2], DrawError> {
-    if let (Some(floor), true) = (&scene.scenery.floor, scene.is_plane()) {
+    if let Some(floor) = &scene.scenery.floor
+        && scene.is_plane()
+    {
         return Ok(floor_bounds(floor));
     }
     let mut bounds = BoundingBox::default();
     let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
     bodies.for_each(|body| bounds.include_body(body));
-    let places = scene.trails.iter().flat_map(|trail| trail.way);
+    let places = scene.trails.iter().flat_map(|trail| trail.points);
     places.for_each(|(_, at)| bounds.include(*at, 0.0));
     bounds.with_margin()
 }
@@ -114,7 +119,9 @@ pub(crate) fn animation_bounds(
     scenery: &Scenery,
     frames: &[Frame],
 ) -> Result<[Vec3; 2], DrawError> {
-    if let (Some(floor), 2) = (&scenery.floor, scenery.dimensions) {
+    if let Some(floor) = &scenery.floor
+        && scenery.dimensions == 2
+    {
         check_floor(floor)?;
         return Ok(floor_bounds(floor));
     }
@@ -130,7 +137,8 @@ pub(crate) fn animation_bounds(
 
 /// Returns the rectangle in which a box is seen.
 pub(crate) fn projected_bounds(camera: Camera, box_m: [Vec3; 2]) -> [[f64; 2]; 2] {
-    let (across, upward) = (Camera::range(camera.right, box_m), Camera::range(camera.up, box_m));
+    let across = Camera::range(camera.right, box_m);
+    let upward = Camera::range(camera.up, box_m);
     [[across[0], upward[0]], [across[1], upward[1]]]
 }
 

@@ -23,12 +23,16 @@ struct FloorBlock {
 pub(super) fn draw(svg: &mut Svg, floor: &OccupancyGrid, canvas: &Canvas) {
     let [x_m, y_m] = floor.plane.origin_m;
     let (x, y) = canvas.px([x_m, y_m, 0.0]);
-    let (x, y, px) = (SvgNumber(x), SvgNumber(y), canvas.px_per_m * floor.box_m);
+    let x = SvgNumber(x);
+    let y = SvgNumber(y);
+    let box_px = canvas.px_per_m * floor.box_m;
     let turn = match floor.plane.yaw_rad {
         0.0 => String::new(),
         yaw_rad => format!(" rotate({})", yaw_rad.to_degrees()),
     };
-    svg.push_raw(format_args!(r#"<g transform="translate({x} {y}) scale({px} -{px}){turn}">"#));
+    svg.push_raw(format_args!(
+        r#"<g transform="translate({x} {y}) scale({box_px} -{box_px}){turn}">"#
+    ));
     for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN_COLOR), (Occupancy::Wall, WALL_COLOR)] {
         let is = |col: u32, row: u32| {
             floor.boxes[row as usize * floor.width as usize + col as usize] == occupancy
@@ -63,7 +67,8 @@ fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
 /// Covers the boxes for which `is` holds with blocks that do not overlap: runs of a row, merged
 /// with the equal run in the row below. Returns `None` above [`MAX_RECTANGLES`].
 fn merged(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> Option<Vec<FloorBlock>> {
-    let (mut done, mut open) = (Vec::new(), Vec::<FloorBlock>::new());
+    let mut done = Vec::new();
+    let mut open: Vec<FloorBlock> = Vec::new();
     for row in 0..height {
         let mut above = Vec::new();
         let mut old = open.into_iter().peekable();

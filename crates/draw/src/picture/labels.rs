@@ -10,43 +10,45 @@ use crate::text::{self, Weight};
 use sidestep_kernel::math::hypot;
 use sidestep_kernel::view::{Body, BodyKind, Shape};
 
-/// Most trails in a picture with names: with more there is no room.
+/// Most trails in a picture with names: with more there is no space.
 const MAX_LABELS: usize = 12;
 /// Distance between a name and the named body.
 const GAP_PX: f64 = 4.0;
 /// Radius of the mark at the start of a line, and length of the head that shows its direction.
 const LINE_START_PX: f64 = 2.6;
 const HEAD_PX: f64 = 8.0;
-/// Distances at which room is searched for, in gaps.
+/// Distances at which space is searched for, in gaps.
 const LABEL_DISTANCES_GAPS: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
 
-/// Marks where a trail starts and ends, and writes the name of its body if there is room.
-pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect, style: &Style) {
+/// Marks where a trail starts and ends, and writes the name of its body if there is space.
+pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, area: Rect, style: &Style) {
     let mut taken: Vec<Rect> = Vec::new();
     let mut wanted = Vec::new();
     for trail in &scene.trails {
-        let Some((&(_, start), &(_, end))) = trail.way.first().zip(trail.way.last()) else {
+        let Some((&(_, start), &(_, end))) = trail.points.first().zip(trail.points.last()) else {
             continue;
         };
-        let (start, end, color) = (canvas.px(start), canvas.px(end), hex(trail.color));
+        let start = canvas.px(start);
+        let end = canvas.px(end);
+        let color = hex(trail.color);
         let body = scene.frame.bodies.iter().find(|body| body.id() == trail.of);
         let radius_px = body.map_or(0.0, |body| radius_m(body) * canvas.px_per_m);
         let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
         // If the body itself is drawn there, it needs no mark.
-        if contains(room, start) {
+        if contains(area, start) {
             let start_px = if trail.width_m.is_some() { mark_px } else { LINE_START_PX };
             start_mark(svg, start, start_px, &color);
         }
         if trail.width_m.is_none() {
             draw_direction(svg, trail, canvas, &color);
         }
-        if body.is_none() && contains(room, end) {
+        if body.is_none() && contains(area, end) {
             end_mark(svg, end, 3.0, &color);
         }
         let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
         taken.push(square_around(end, clear_px));
         // Parts of a body have no name of their own.
-        if trail.of.part.is_none() && contains(room, end) {
+        if trail.of.part.is_none() && contains(area, end) {
             wanted.push((
                 end,
                 clear_px,
@@ -60,11 +62,11 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
     taken.extend(body_rects(scene, canvas));
     for (at, clear_px, words) in wanted {
         let label = Label { at, clear_px, words: &words };
-        write_label(svg, label, room, &mut taken, style);
+        write_label(svg, label, area, &mut taken, style);
     }
 }
 
-/// Returns the rooms of bodies that no name may cover.
+/// Returns the rectangles of bodies that no name may cover.
 fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
     let matters = |body: &&Body| {
         body.kind.is_agent()
@@ -76,17 +78,17 @@ fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> 
 
 /// Draws an arrowhead in the middle of a line, which shows where it goes.
 fn draw_direction(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas, color: &str) {
-    let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.px(at)).collect();
+    let points: Vec<Px> = trail.points.iter().map(|&(_, at)| canvas.px(at)).collect();
     let length = |pair: &[Px]| hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
     let half = 0.5 * points.windows(2).map(length).sum::<f64>();
-    // A short line has no room for a head.
+    // A short line has no space for a head.
     if half < 3.0 * HEAD_PX {
         return;
     }
-    let mut gone = 0.0;
+    let mut passed = 0.0;
     let middle = points.windows(2).find(|pair| {
-        gone += length(pair);
-        gone >= half && length(pair) > 0.0
+        passed += length(pair);
+        passed >= half && length(pair) > 0.0
     });
     let Some(&[(x0, y0), (x, y)]) = middle else { return };
     arrowhead(svg, (x0, y0), (x, y), HEAD_PX, color);
@@ -105,8 +107,8 @@ fn square_around((x, y): Px, radius: f64) -> Rect {
     Rect { x: x - radius, y: y - radius, width: 2.0 * radius, height: 2.0 * radius }
 }
 
-fn contains(room: Rect, (x, y): Px) -> bool {
-    (room.x..=room.right()).contains(&x) && (room.y..=room.bottom()).contains(&y)
+fn contains(area: Rect, (x, y): Px) -> bool {
+    (area.x..=area.right()).contains(&x) && (area.y..=area.bottom()).contains(&y)
 }
 
 /// Words for a point.
@@ -117,18 +119,20 @@ struct Label<'a> {
     words: &'a str,
 }
 
-/// Writes words beside a point if there is room; otherwise nothing.
-fn write_label(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect>, style: &Style) {
+/// Writes words beside a point if there is space; otherwise nothing.
+fn write_label(svg: &mut Svg, label: Label<'_>, area: Rect, taken: &mut Vec<Rect>, style: &Style) {
     let Label { at: (x, y), clear_px, words } = label;
     let size = style.small_px();
-    let look =
+    let text_style =
         TextStyle { halo: true, weight: Weight::Bold, ..TextStyle::new(size, Anchor::Start) };
     let width = text::width(words, size, Weight::Bold);
     // Letters reach slightly beyond their font size.
     let height = 1.3 * size;
     let places = LABEL_DISTANCES_GAPS.iter().flat_map(|&gaps| {
         let out = clear_px + gaps * GAP_PX;
-        let (left, middle, up) = (x - out - width, x - 0.5 * width, y - out - height);
+        let left = x - out - width;
+        let middle = x - 0.5 * width;
+        let up = y - out - height;
         [
             (x + out, y - 0.5 * height),
             (left, y - 0.5 * height),
@@ -142,15 +146,15 @@ fn write_label(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect
     });
     let mut rects = places.map(|(x, y)| Rect { x, y, width, height });
     let is_free =
-        |rect: &Rect| is_within(*rect, room) && taken.iter().all(|t| is_disjoint(*t, *rect));
+        |rect: &Rect| is_within(*rect, area) && taken.iter().all(|t| is_disjoint(*t, *rect));
     if let Some(rect) = rects.find(is_free) {
-        svg.text(rect.x, rect.y + 0.5 * height + look.middle_px(), words, &look);
+        svg.text(rect.x, rect.y + 0.5 * height + text_style.middle_px(), words, &text_style);
         taken.push(rect);
     }
 }
 
-fn is_within(rect: Rect, room: Rect) -> bool {
-    contains(room, (rect.x, rect.y)) && contains(room, (rect.right(), rect.bottom()))
+fn is_within(rect: Rect, area: Rect) -> bool {
+    contains(area, (rect.x, rect.y)) && contains(area, (rect.right(), rect.bottom()))
 }
 
 fn is_disjoint(a: Rect, b: Rect) -> bool {

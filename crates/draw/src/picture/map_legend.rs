@@ -7,7 +7,6 @@ use super::{Scene, bodies};
 use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{body_dashes, hex};
 use crate::ticks::group_thousands;
-use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
     Body, BodyKind, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
 };
@@ -23,12 +22,14 @@ const RIBBON_OPACITY: f64 = 0.5;
 pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
     let agents = agents(scenery, frame);
     let Some((kind, _)) = agents.first() else { return String::new() };
-    let (scene, all, to) = (Scene::new(scenery, frame, trails), agents.len(), frame.cycle);
-    let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.number).collect();
-    let from = scene.trails.first().map_or(0, |trail| trail.span[0]);
-    let said = |cycle: Cycle| group_thousands(&cycle.to_string());
-    let (plural, to, from) = (plural(*kind, all), said(to), said(from));
-    match of.len() {
+    let scene = Scene::new(scenery, frame, trails);
+    let with_trail: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.number).collect();
+    let first_cycle = scene.trails.first().map_or(0, |trail| trail.span[0]);
+    let all = agents.len();
+    let plural = plural(*kind, all);
+    let from = group_thousands(&first_cycle.to_string());
+    let to = group_thousands(&frame.cycle.to_string());
+    match with_trail.len() {
         0 => format!("{} {plural} before cycle {to}.", group_thousands(&all.to_string())),
         1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
         n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
@@ -57,23 +58,28 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
         entries.push(LegendEntry::new(swatch(WALL_COLOR, 1.0), "wall"));
     }
     if has(Occupancy::Unknown) {
-        let (fill, rim) = (hex(UNKNOWN_COLOR).into(), "#CCCCCC".into());
-        entries.push(LegendEntry::new(LegendSymbol::Swatch { fill, rim, opacity: 1.0 }, "unknown"));
+        // Unknown ground is nearly white: without a rim its swatch would not be visible.
+        let swatch = LegendSymbol::Swatch {
+            fill: hex(UNKNOWN_COLOR).into(),
+            rim: "#CCCCCC".into(),
+            opacity: 1.0,
+        };
+        entries.push(LegendEntry::new(swatch, "unknown"));
     }
     // By layer, then alphabetically.
     let mut kinds = BTreeMap::new();
     for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
-        let look = body.appearance(scene.scenery.dimensions);
-        if !look.legend.is_empty() {
-            let is_own = look.color == body_color(body.number);
-            let color = if is_own { ANY_COLOR } else { look.color };
-            kinds.entry((look.layer, look.legend)).or_insert((color, look.opacity));
+        let appearance = body.appearance(scene.scenery.dimensions);
+        if !appearance.legend.is_empty() {
+            let is_own = appearance.color == body_color(body.number);
+            let color = if is_own { ANY_COLOR } else { appearance.color };
+            let key = (appearance.layer, appearance.legend);
+            kinds.entry(key).or_insert((color, appearance.opacity));
         }
     }
-    let words = kinds.into_iter().map(|((_, words), (color, opacity))| (words, color, opacity));
-    entries.extend(
-        words.map(|(words, color, opacity)| LegendEntry::new(swatch(color, opacity), words)),
-    );
+    for ((_, words), (color, opacity)) in kinds {
+        entries.push(LegendEntry::new(swatch(color, opacity), words));
+    }
     if scene.frame.bodies.iter().any(bodies::is_leader) {
         entries.push(LegendEntry::new(LegendSymbol::Leader, "leader"));
     }

@@ -1,11 +1,11 @@
-//! Pictures of a run: scenery, a frame, and the ways that led to it.
+//! Pictures of a run: scenery, a frame, and the trails that led to it.
 //!
 //! ```text
-//! trails.rs   the choice of ways, and their lengths         canvas.rs   from meters to pixels
-//! ways.rs     a way as a line that fades with age           sheet.rs    axes, scale bar, caption
-//! floor.rs    walls as few rectangles                       space.rs    the edges of the shown box
-//! bodies.rs   everything that has a shape                   labels.rs   names that do not overlap
-//! key.rs      the legend, and the content in words          extent.rs   the extent of the content
+//! trails.rs       the choice of trails, and their lengths    canvas.rs  from meters to pixels
+//! trail_lines.rs  a trail as a line that fades with age      sheet.rs   axes, scale bar, caption
+//! floor.rs        walls as few rectangles                    space.rs   the edges of the shown box
+//! bodies.rs       everything that has a shape                labels.rs  names that do not overlap
+//! map_legend.rs   the legend, and the content in words       extent.rs  the extent of the content
 //! ```
 
 mod bodies;
@@ -40,7 +40,7 @@ const MAX_BOX_PX: f64 = 28.0;
 /// Options of a picture, and the words around it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureOptions {
-    /// The room that it may take.
+    /// Its largest size, and the size of its text.
     pub style: Style,
     /// Its heading; may be empty.
     pub title: String,
@@ -55,7 +55,7 @@ impl PictureOptions {
     }
 }
 
-/// Draws a moment of a run, with the ways that led to it: from above if everything lies in a plane,
+/// Draws a moment of a run, with the trails that led to it: from above if everything lies in a plane,
 /// otherwise in parallel projection from a corner. The scale is the same in all directions.
 ///
 /// Only trails that can be distinguished are drawn ([`bodies_with_trails`]): as wide as the body on a
@@ -75,10 +75,7 @@ pub fn draw(
     options.style.check()?;
     check_content(scenery, frame, trails)?;
     let scene = Scene::new(scenery, frame, trails);
-    match scene.is_plane() {
-        true => from_above(&scene, options),
-        false => space::draw(&scene, options),
-    }
+    if scene.is_plane() { from_above(&scene, options) } else { space::draw(&scene, options) }
 }
 
 /// The content of a picture: a moment, and the trails that are shown.
@@ -162,7 +159,7 @@ fn from_above(scene: &Scene<'_>, options: &PictureOptions) -> Result<String, Dra
     Ok(sheet.close(svg, &area, map_legend::legend_entries(scene), &options.style))
 }
 
-/// Returns the scale at which everything fits the style's room; whole pixels per box if boxes are
+/// Returns the scale at which everything fits the style's size; whole pixels per box if boxes are
 /// large, so that walls have sharp edges.
 fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], style: &Style) -> f64 {
     let px = (style.width_px / size_m[0]).min(style.height_px / size_m[1]);

@@ -69,23 +69,31 @@ impl Sheet {
     /// Draws title and axes, and returns the place of the map.
     pub(super) fn open(svg: &mut Svg, area: &SheetContent<'_>, style: &Style, px: f64) -> Self {
         let size = style.small_px();
-        let ([x0, y0], [width, height]) = (area.origin_m, area.size_m);
+        let [x0, y0] = area.origin_m;
+        let [width, height] = area.size_m;
         let unit = unit(width.max(height));
         let edge = |from: f64, length: f64, room_px| {
             SheetEdge::new(from / unit.1, length / unit.1, length * px, room_px)
         };
-        let (across, upward) = (edge(x0, width, 6.0 * size), edge(y0, height, 4.0 * size));
+        let across = edge(x0, width, 6.0 * size);
+        let upward = edge(y0, height, 4.0 * size);
         let labels = upward.ticks.max_label_px(|label| text::width(label, size, Weight::Regular));
         let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
-        let (map_width, map_height) = (width * px, height * px);
+        let map_width = width * px;
+        let map_height = height * px;
         let width =
             (left + map_width + 2.0 * EDGE_PX + size).max(MIN_WIDTH_LETTERS * style.font_px);
         let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
         let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
-        // Whole pixels, for sharp edges.
+        // The label of the y axis may be longer than a low map: it then needs space above and below.
         let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
-        let (x, y) = (left.ceil(), (top + spill + 8.0).ceil());
-        let map = Rect { x, y, width: map_width, height: map_height };
+        // Whole pixels, for sharp edges.
+        let map = Rect {
+            x: left.ceil(),
+            y: (top + spill + 8.0).ceil(),
+            width: map_width,
+            height: map_height,
+        };
         let sheet = Self { map, px, unit, width, spill };
         sheet.draw_across(svg, style, &across);
         sheet.draw_upward(svg, style, &upward);
@@ -115,40 +123,42 @@ impl Sheet {
 
     fn draw_across(&self, svg: &mut Svg, style: &Style, edge: &SheetEdge) {
         let bottom = self.map.bottom();
-        let look = TextStyle::new(style.small_px(), Anchor::Middle);
-        let baseline = bottom + TICK_PX + 3.0 + look.size_px;
+        let text_style = TextStyle::new(style.small_px(), Anchor::Middle);
+        let baseline = bottom + TICK_PX + 3.0 + text_style.size_px;
         let mut spacing = LabelSpacing::new();
         for (part, label) in edge.marks() {
             let x = self.map.x + part * self.map.width;
-            let label_px = text::width(label, look.size_px, Weight::Regular) + 0.5 * look.size_px;
+            let label_px =
+                text::width(label, text_style.size_px, Weight::Regular) + 0.5 * text_style.size_px;
             if spacing.try_place(x, label_px) {
                 svg.line((x, bottom), (x, bottom + TICK_PX), format_args!(r#"stroke="{INK}""#));
-                svg.text(x, baseline, label, &look);
+                svg.text(x, baseline, label, &text_style);
             }
         }
-        let look = TextStyle::new(style.font_px, Anchor::Middle);
+        let text_style = TextStyle::new(style.font_px, Anchor::Middle);
         svg.text(
             self.map.x + self.map.width / 2.0,
             baseline + 1.45 * style.font_px,
             &format!("x ({})", self.unit.0),
-            &look,
+            &text_style,
         );
     }
 
     fn draw_upward(&self, svg: &mut Svg, style: &Style, edge: &SheetEdge) {
         let left = self.map.x;
-        let look = TextStyle::new(style.small_px(), Anchor::End);
+        let text_style = TextStyle::new(style.small_px(), Anchor::End);
         let mut spacing = LabelSpacing::new();
         for (part, label) in edge.marks() {
             let y = self.map.bottom() - part * self.map.height;
-            if spacing.try_place(-y, look.size_px) {
+            if spacing.try_place(-y, text_style.size_px) {
                 svg.line((left - TICK_PX, y), (left, y), format_args!(r#"stroke="{INK}""#));
-                svg.text(left - TICK_PX - 3.0, y + look.middle_px(), label, &look);
+                svg.text(left - TICK_PX - 3.0, y + text_style.middle_px(), label, &text_style);
             }
         }
-        let look = TextStyle { upward: true, ..TextStyle::new(style.font_px, Anchor::Middle) };
+        let text_style =
+            TextStyle { upward: true, ..TextStyle::new(style.font_px, Anchor::Middle) };
         let words = format!("y ({})", self.unit.0);
-        svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &look);
+        svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &text_style);
     }
 
     /// Draws a bar of round length, about a fifth of the map's longer side but less than half the
@@ -162,8 +172,8 @@ impl Sheet {
             return 0.0;
         }
         let words = format!("{} {}", label(length, decimals(length)), self.unit.0);
-        let look = TextStyle::new(style.small_px(), Anchor::Middle);
-        let text_px = text::width(&words, look.size_px, Weight::Regular);
+        let text_style = TextStyle::new(style.small_px(), Anchor::Middle);
+        let text_px = text::width(&words, text_style.size_px, Weight::Regular);
         let bar = Rect {
             x: self.map.x + ((text_px - length_px) / 2.0).max(0.0),
             y: top,
@@ -171,7 +181,7 @@ impl Sheet {
             height: 4.0,
         };
         svg.rect(bar, format_args!(r#"class="scale-bar" fill="{INK}""#));
-        svg.text(bar.x + length_px / 2.0, top + 8.0 + look.size_px, &words, &look);
+        svg.text(bar.x + length_px / 2.0, top + 8.0 + text_style.size_px, &words, &text_style);
         text_px.max(length_px)
     }
 }

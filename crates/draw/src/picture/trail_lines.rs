@@ -36,13 +36,14 @@ pub(super) fn draw(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas) {
         None => (LINE_PX, r#"stroke-linecap="round" stroke-linejoin="round""#),
     };
     let dash = trail.dash;
-    let points = trail.way.iter().map(|&(_, at)| canvas.px(at));
-    let shades = trail.way.iter().map(|(cycle, _)| trail.shade(*cycle, SHADES));
+    let points = trail.points.iter().map(|&(_, at)| canvas.px(at));
+    let shades = trail.points.iter().map(|(cycle, _)| trail.shade(*cycle, SHADES));
     let points: Vec<(usize, Px)> = match trail.width_m {
         Some(_) => shades.zip(points).collect(),
         None => decimate(shades.zip(points)),
     };
-    let (width, opacity) = (SvgNumber(width_px), OPACITY[usize::from(trail.width_m.is_none())]);
+    let width = SvgNumber(width_px);
+    let opacity = OPACITY[usize::from(trail.width_m.is_none())];
     svg.push_raw(format_args!(
         r#"<g class="trail" opacity="{opacity}" fill="none" stroke-width="{width}" {ends}{dash}>"#
     ));
@@ -77,7 +78,7 @@ fn decimate(points: impl Iterator<Item = (usize, Px)>) -> Vec<(usize, Px)> {
     kept
 }
 
-/// Returns path data of every shade: only corners, and every stretch once however often the body
+/// Returns path data of every shade: only corners, and every segment once however often the body
 /// went there, in the shade of the last time.
 fn path_data(points: &[(usize, Px)]) -> [String; SHADES] {
     let mut pieces: [Vec<Vec<CentiPxPoint>>; SHADES] = std::array::from_fn(|_| Vec::new());
@@ -112,7 +113,7 @@ fn hundredths((x, y): Px) -> CentiPxPoint {
     (whole(x), whole(y))
 }
 
-/// Leaves out points on the straight way between their neighbors.
+/// Leaves out points on the straight line between their neighbors.
 fn corners(points: &[CentiPxPoint]) -> Vec<CentiPxPoint> {
     let mut kept: Vec<CentiPxPoint> = Vec::new();
     for &point in points {
@@ -126,12 +127,13 @@ fn corners(points: &[CentiPxPoint]) -> Vec<CentiPxPoint> {
     kept
 }
 
-/// Returns whether the way from `a` over `b` to `c` is straight and does not turn back.
+/// Returns whether the path from `a` over `b` to `c` is straight and does not turn back.
 fn is_straight(a: CentiPxPoint, b: CentiPxPoint, c: CentiPxPoint) -> bool {
     let step = |from: CentiPxPoint, to: CentiPxPoint| {
         (i128::from(to.0 - from.0), i128::from(to.1 - from.1))
     };
-    let ((ax, ay), (bx, by)) = (step(a, b), step(b, c));
+    let (ax, ay) = step(a, b);
+    let (bx, by) = step(b, c);
     ax * by == ay * bx && ax * bx + ay * by > 0
 }
 
@@ -188,8 +190,8 @@ mod tests {
 
     #[test]
     fn a_stretch_has_the_shade_of_the_last_time() {
-        let way = [(0, (0.0, 0.0)), (1, (1.0, 0.0)), (2, (2.0, 0.0)), (3, (1.0, 0.0))];
-        let data = path_data(&way);
+        let path = [(0, (0.0, 0.0)), (1, (1.0, 0.0)), (2, (2.0, 0.0)), (3, (1.0, 0.0))];
+        let data = path_data(&path);
         let drawn: Vec<_> = data.iter().filter(|data| !data.is_empty()).collect();
         assert_eq!(drawn, ["M0 0L1 0", "M2 0L1 0"]);
         assert_eq!((&data[1], &data[3]), (drawn[0], drawn[1]));

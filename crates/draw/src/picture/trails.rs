@@ -22,7 +22,8 @@ const MAX_OVERLAP_FRACTION: f64 = 0.3;
 #[derive(Debug, Clone)]
 pub(crate) struct DrawnTrail<'a> {
     pub(crate) of: BodyId,
-    pub(crate) way: &'a [(Cycle, Vec3)],
+    /// The shown part of the trail: its last places.
+    pub(crate) points: &'a [(Cycle, Vec3)],
     pub(crate) color: Color,
     /// The body's width, if the trail is the area that it has swept on a floor.
     pub(crate) width_m: Option<f64>,
@@ -36,13 +37,14 @@ impl DrawnTrail<'_> {
     /// Returns the shade of a cycle, one of `shades`, 0 for the oldest.
     pub(super) fn shade(&self, cycle: Cycle, shades: usize) -> usize {
         let [from, to] = self.span;
-        let (age, span) = (cycle.saturating_sub(from), to.saturating_sub(from).max(1));
-        ((age as f64 / span as f64 * shades as f64) as usize).min(shades - 1)
+        let elapsed = cycle.saturating_sub(from);
+        let span = to.saturating_sub(from).max(1);
+        ((elapsed as f64 / span as f64 * shades as f64) as usize).min(shades - 1)
     }
 }
 
-/// Returns agents with ways that can be distinguished in one picture: at most one of each
-/// color, or sixty if ways are thin lines; for chains the leader and the other end.
+/// Returns agents with trails that can be distinguished in one picture: at most one of each
+/// color, or sixty if trails are thin lines; for chains the leader and the other end.
 pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
@@ -105,22 +107,22 @@ pub(super) fn drawn_trails<'a>(
     frame: &Frame,
     trails: &'a [Trail],
 ) -> Vec<DrawnTrail<'a>> {
-    let worth = bodies_with_trails(scenery, frame);
+    let chosen = bodies_with_trails(scenery, frame);
     let sizes = sizes(scenery, frame);
     let drawn = |trail: &'a Trail| DrawnTrail {
         of: trail.of,
-        way: &trail.points,
+        points: &trail.points,
         color: body_color(trail.of.number),
         width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
         span: [0, 0],
         dash: "",
     };
-    let is_shown = |trail: &&Trail| worth.contains(&trail.of) && !trail.points.is_empty();
+    let is_shown = |trail: &&Trail| chosen.contains(&trail.of) && !trail.points.is_empty();
     let mut shown: Vec<DrawnTrail<'_>> = trails.iter().filter(is_shown).map(drawn).collect();
     if let Some(floor) = scenery.floor.as_ref().filter(|_| !sizes.is_empty()) {
         shorten_ribbons(&mut shown, floor, &sizes);
     }
-    let cycles = || shown.iter().flat_map(|trail| trail.way).map(|(cycle, _)| *cycle);
+    let cycles = || shown.iter().flat_map(|trail| trail.points).map(|(cycle, _)| *cycle);
     let span = [cycles().min().unwrap_or(0), cycles().max().unwrap_or(0)];
     let dashes = body_dashes(&shown.iter().map(|trail| trail.of.number).collect());
     for trail in &mut shown {
@@ -151,12 +153,12 @@ fn shorten_ribbons(
     floor: &OccupancyGrid,
     sizes: &BTreeMap<BodyId, [f64; 2]>,
 ) {
-    let now = trails.iter().filter_map(|trail| trail.way.last()).map(|(cycle, _)| *cycle).max();
+    let now = trails.iter().filter_map(|trail| trail.points.last()).map(|(cycle, _)| *cycle).max();
     let now = now.unwrap_or(0);
     for length in RIBBON_LENGTHS_CYCLES {
         for trail in trails.iter_mut() {
             let is_before = |(cycle, _): &(Cycle, Vec3)| cycle + length < now;
-            trail.way = &trail.way[trail.way.partition_point(is_before)..];
+            trail.points = &trail.points[trail.points.partition_point(is_before)..];
         }
         if overlap_fraction(trails, floor, sizes) <= MAX_OVERLAP_FRACTION {
             return;
@@ -170,6 +172,7 @@ fn overlap_fraction(
     floor: &OccupancyGrid,
     sizes: &BTreeMap<BodyId, [f64; 2]>,
 ) -> f64 {
+    // One bit for each trail. Ribbons are at most as many as there are colors, far below 64.
     let mut covered_by = BTreeMap::<(i64, i64), u64>::new();
     for (index, trail) in trails.iter().enumerate() {
         let Some(size_m) = sizes.get(&trail.of) else { continue };
@@ -177,13 +180,14 @@ fn overlap_fraction(
         let boxes = |k: usize, most: u32| {
             ((size_m[k] / floor.box_m).round() as i64).clamp(1, i64::from(most))
         };
-        let (width, height) = (boxes(0, floor.width), boxes(1, floor.height));
+        let width = boxes(0, floor.width);
+        let height = boxes(1, floor.height);
         let corner = |&(_, [x, y, _]): &(Cycle, Vec3)| {
             let middle_m = floor.plane.inverse_transform_point([x, y]);
             let low = |k: usize| ((middle_m[k] - 0.5 * size_m[k]) / floor.box_m).round() as i64;
             (low(0), low(1))
         };
-        let corners: BTreeSet<(i64, i64)> = trail.way.iter().map(corner).collect();
+        let corners: BTreeSet<(i64, i64)> = trail.points.iter().map(corner).collect();
         for (col, row) in corners {
             let boxes = (0..height).flat_map(|y| (0..width).map(move |x| (col + x, row + y)));
             boxes.for_each(|at| *covered_by.entry(at).or_default() |= 1 << (index % 64));

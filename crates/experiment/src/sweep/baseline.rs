@@ -163,7 +163,7 @@ impl BaselineMatcher<'_> {
             && !names.contains(&name.as_str())
         {
             let remedy = match names.is_empty() {
-                true => "give a value, e.g. regime=both, or name the variants of the sweep's file",
+                true => "give a value, e.g. regime=both, or give the variants of the sweep's file",
                 false => &suggestion(name, &names),
             };
             return wrong(format!("no variant has the name `{name}`"), remedy.into());

@@ -2,17 +2,17 @@
 //!
 //! ```text
 //! file.rs      a sweep file (TOML) -> Sweep, with errors that point
-//! changes.rs   changes that a command or a program makes to it
+//! overrides.rs changes that a command or a program makes to it
 //! variant.rs   a scenario and a variant of it: settings, and perhaps a name
 //! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
 //! baseline.rs  the variant that each is compared with, within the other factors
 //! plan.rs      variants x replicates -> cells, and shares of them
 //! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
 //! seeds.rs     variants in which seeds change nothing
-//! work.rs      cells -> results, many at once
+//! scheduler.rs cells -> results, many at once
 //! rounds.rs    the next cells, if a requested precision decides when to stop
 //! rows.rs      outcomes -> a table of runs, the same for any order of arrival
-//! shape.rs     the columns of that table, for writing it block by block
+//! column_schema.rs  the columns of that table, for writing it block by block
 //!
 //! table.rs     a table of runs: one row per run, typed columns with a role
 //! label.rs     the label of a column on an axis, with its unit
@@ -20,7 +20,8 @@
 //! compare.rs   a variant against the baseline, on the same replicates
 //! summary.rs   a summary of the table: every number with its interval and number of runs
 //! summarize.rs a table -> its summary
-//! told.rs      a plan's runs -> their summary
+//! options.rs   options of a summary
+//! plan_summary.rs  a plan's runs -> their summary
 //! text.rs      the summary as tables
 //! charts.rs    the summary as figures
 //! ```

@@ -50,7 +50,7 @@ impl Sweep {
         }
         if let Some(max) = changes.max_runs {
             if self.until.is_none() {
-                let cause = "it bounds the runs of a sweep that goes on until it is precise";
+                let cause = "it bounds the runs of a sweep with a target precision";
                 return Err(InputError::new("--max", cause, "give --until ci=0.05 as well"));
             }
             self.replicates = max;

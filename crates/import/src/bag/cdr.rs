@@ -1,10 +1,9 @@
 //! CDR, the encoding of ROS 2 messages: values one after the other, each aligned to its own size.
 //!
-//! The first four bytes of a message tell the encoding and the order of bytes; offsets of alignment count
-//! from behind them. The fields of a message are listed once, by `message!`, which serves reading and
-//! writing.
+//! The first four bytes of a message give the encoding and the byte order; alignment is relative to the byte
+//! after them. The fields of a message are listed once, by `message!`, for reading and writing.
 
-/// The first four bytes of messages that are written here: plain CDR, little end first.
+/// The first four bytes of messages that are written here: plain CDR, little-endian.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
 /// Reads one message from its bytes, the header included.
@@ -18,7 +17,7 @@ pub fn decode<T: Cdr>(bytes: &[u8]) -> Result<T, CdrError> {
         [0, 1] => true,
         _ => return Err(CdrError::Encoding([head[0], head[1]])),
     };
-    T::read(&mut Reader { body, at: 0, is_little })
+    T::read(&mut Reader { body, offset: 0, is_little })
 }
 
 /// Returns a message as bytes, the header included.
@@ -33,14 +32,14 @@ pub fn encode<T: Cdr>(message: &T) -> Vec<u8> {
 pub enum CdrError {
     /// The encoding is not one that is read here; its two bytes.
     Encoding([u8; 2]),
-    /// A value or its list lies beyond the end.
+    /// A value or its list is beyond the end.
     Cut {
-        /// The offset of the value behind the header.
+        /// The offset of the value, after the header.
         at: usize,
     },
-    /// A text is no UTF-8, or does not end with a zero.
+    /// A text is not UTF-8, or does not end with a zero.
     Text {
-        /// The offset of the text behind the header.
+        /// The offset of the text, after the header.
         at: usize,
     },
 }
@@ -57,8 +56,7 @@ impl std::fmt::Display for CdrError {
 
 /// A value that can be read from CDR and written to it.
 pub trait Cdr: Sized {
-    /// The least number of bytes that a value takes, so that no list can claim more values than there
-    /// are bytes for.
+    /// The minimum number of bytes of a value: a damaged length of a list is found before memory is allocated for it.
     const MIN_BYTES: usize;
 
     /// Reads a value.
@@ -73,19 +71,21 @@ pub trait Cdr: Sized {
 
 /// The bytes of a message that is being read.
 pub struct Reader<'a> {
+    /// The bytes after the header.
     body: &'a [u8],
-    at: usize,
+    /// The offset of the next value in `body`.
+    offset: usize,
     is_little: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// Returns the next bytes, which begin at a multiple of `alignment`.
+    /// Reads the next bytes, which start at a multiple of `alignment`.
     fn read_bytes(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
-        let start = self.at.next_multiple_of(alignment);
-        let taken = self.body.get(start..).and_then(|rest| rest.get(..n));
-        let taken = taken.ok_or(CdrError::Cut { at: start })?;
-        self.at = start + n;
-        Ok(taken)
+        let start = self.offset.next_multiple_of(alignment);
+        let bytes = self.body.get(start..).and_then(|rest| rest.get(..n));
+        let bytes = bytes.ok_or(CdrError::Cut { at: start })?;
+        self.offset = start + n;
+        Ok(bytes)
     }
 
     fn number<const N: usize>(&mut self) -> Result<[u8; N], CdrError> {
@@ -111,7 +111,7 @@ impl Writer {
         self.bytes.extend(bytes);
     }
 
-    /// A longer list than can be counted is no message of a robot.
+    /// Panics where the length does not fit: no message of a robot has a list of that length.
     fn write_length(&mut self, length: usize) {
         u32::try_from(length).expect("fewer than four billion values").write(self);
     }
@@ -140,7 +140,8 @@ impl Cdr for String {
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
         let length = u32::read(reader)? as usize;
-        let (at, bytes) = (reader.at, reader.read_bytes(length, 1)?);
+        let at = reader.offset;
+        let bytes = reader.read_bytes(length, 1)?;
         // Some programs write an empty text without the zero at its end.
         let Some((&0, text)) = bytes.split_last() else {
             return if bytes.is_empty() { Ok(Self::new()) } else { Err(CdrError::Text { at }) };
@@ -160,9 +161,9 @@ impl<T: Cdr> Cdr for Vec<T> {
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
         let length = u32::read(reader)? as usize;
-        let left = reader.body.len() - reader.at;
-        if length > left / T::MIN_BYTES {
-            return Err(CdrError::Cut { at: reader.at });
+        let remaining = reader.body.len() - reader.offset;
+        if length > remaining / T::MIN_BYTES {
+            return Err(CdrError::Cut { at: reader.offset });
         }
         (0..length).map(|_| T::read(reader)).collect()
     }

@@ -6,12 +6,12 @@ use super::messages::LaserScan;
 use super::poses::StampedPose;
 use crate::mrclam::StampedPose2;
 
-/// Messages may overtake each other by this much; a stamp further back is a clock that was set back.
+/// Messages on a network may overtake each other by up to this; a stamp further back is from a clock that was set back.
 const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
-/// A stamp this far ahead of the one before is a clock that was set forward.
+/// A stamp further ahead of the previous one is from a clock that was set forward, such as from 1970 to the present.
 const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 
-/// Something with a time.
+/// A value of a message with a stamp.
 pub(super) trait HasStamp {
     /// Returns the time in s.
     fn t_secs(&self) -> f64;
@@ -61,14 +61,19 @@ pub(super) fn sort_by_stamp<T: HasStamp>(
 }
 
 fn clock_jump(place: &str, message: u64, step_secs: f64) -> InputError {
-    let side = if step_secs < 0.0 { "before" } else { "after" };
+    let direction = if step_secs < 0.0 { "before" } else { "after" };
     let cause = format!(
-        "the clock jumps: message {message} is stamped {:.3} s {side} an earlier one",
+        "the clock jumps: message {message} is stamped {:.3} s {direction} an earlier one",
         step_secs.abs()
     );
     let remedy = "cut the bag at the jump, or record it again once the clock is set; a bag that was played in \
                   a loop has to be recorded once only";
     InputError::new(place, cause, remedy)
+}
+
+/// Returns the times of the first and the last pose, in s.
+fn time_range(track: &[StampedPose2]) -> Option<[f64; 2]> {
+    Some([track.first()?.t_secs, track.last()?.t_secs])
 }
 
 /// Checks that two tracks have some time in common.
@@ -79,14 +84,15 @@ pub(super) fn check_overlap(
     bag: &str,
     [(a_name, a), (b_name, b)]: [(&str, &[StampedPose2]); 2],
 ) -> Result<(), InputError> {
-    let ends = |track: &[StampedPose2]| Some((track.first()?.t_secs, track.last()?.t_secs));
-    let (Some(first), Some(second)) = (ends(a), ends(b)) else { return Ok(()) };
-    if first.0 <= second.1 && second.0 <= first.1 {
+    let (Some([a_start, a_end]), Some([b_start, b_end])) = (time_range(a), time_range(b)) else {
+        return Ok(());
+    };
+    if a_start <= b_end && b_start <= a_end {
         return Ok(());
     }
     let cause = format!(
-        "{a_name} ({:.1} to {:.1} s) and {b_name} ({:.1} to {:.1} s) have no time in common",
-        first.0, first.1, second.0, second.1
+        "{a_name} ({a_start:.1} to {a_end:.1} s) and {b_name} ({b_start:.1} to {b_end:.1} s) have no time \
+         in common"
     );
     let remedy = "stamp both by one clock: synchronize the machines, or set use_sim_time in all nodes or in none";
     Err(InputError::new(bag, cause, remedy))

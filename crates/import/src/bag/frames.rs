@@ -1,4 +1,4 @@
-//! Tracks of one frame in another, through the frames between them.
+//! Trajectories of one frame in another, through the frames between them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,52 +10,48 @@ use super::clock::sort_by_stamp;
 use super::poses::{StampedPose, compose};
 use crate::mrclam::StampedPose2;
 
-/// Most frames between two frames; more are a circle.
+/// Maximum number of frames between two frames: more than any robot has, so more are a cycle.
 const MAX_DEPTH: usize = 64;
-/// Most pairs of frames that an error lists.
+/// Maximum number of pairs of frames that an error lists.
 const MAX_LISTED: usize = 12;
 
 /// A frame in another over time.
 #[derive(Debug)]
 pub(super) struct Trajectory {
     pub(super) poses: Vec<StampedPose2>,
-    /// The frame that is placed; empty where messages do not say.
+    /// The frame whose poses these are; empty where messages do not give it.
     pub(super) child: String,
 }
 
-/// Returns the track that `source` asks for, out of the poses on its topic in the order of the recording.
+/// Returns the trajectory of the frames of `source`, from the poses on its topic in the order of the recording.
 ///
 /// # Errors
-/// When the frames are not there or several are and none is named, or the clock jumps.
+/// When the frames are missing, `source` gives none and there are several, or the clock jumps.
 pub(super) fn trajectory(
     bag: &str,
     source: &PoseTopic,
     all: &[StampedPose],
 ) -> Result<Trajectory, InputError> {
+    let place = format!("{bag}: {}", source.topic);
     let edges = by_child(all);
     let pairs: BTreeSet<(&str, &str)> =
-        all.iter().map(|placed| (placed.parent.as_str(), placed.child.as_str())).collect();
-    let refuse = |cause: String, remedy: String| {
-        Err(InputError::new(format!("{bag}: {}", source.topic), cause, remedy))
-    };
+        all.iter().map(|pose| (pose.parent.as_str(), pose.child.as_str())).collect();
     if pairs.is_empty() {
-        return refuse("its messages hold no transforms".into(), "name another topic".into());
+        let cause = "its messages hold no transforms";
+        return Err(InputError::new(place, cause, "give another topic"));
     }
     let chain = match &source.frames {
-        Some((parent, child)) => chain(&edges, parent, child),
-        None if pairs.len() == 1 => pairs.first().map(|(_, child)| vec![*child]),
+        Some((parent, child)) => chain(&edges, parent, child).ok_or_else(|| {
+            let cause = format!("no transforms lead from `{parent}` to `{child}`");
+            InputError::new(&place, cause, format!("it has {}", describe_pairs(&pairs)))
+        })?,
+        None if pairs.len() == 1 => pairs.iter().map(|(_, child)| *child).collect(),
         None => {
-            let cause = format!("it places several frames: {}", describe_pairs(&pairs));
-            let remedy = format!("name two of them: {}:map:base_link", source.topic);
-            return refuse(cause, remedy);
+            let cause = format!("it has several frames: {}", describe_pairs(&pairs));
+            let remedy = format!("give two of them: {}:map:base_link", source.topic);
+            return Err(InputError::new(place, cause, remedy));
         }
     };
-    let Some(chain) = chain else {
-        let (parent, child) = source.frames.clone().unwrap_or_default();
-        let cause = format!("no transforms lead from `{parent}` to `{child}`");
-        return refuse(cause, format!("it has {}", describe_pairs(&pairs)));
-    };
-    let place = format!("{bag}: {}", source.topic);
     let links: Vec<Vec<&StampedPose>> = chain
         .iter()
         .map(|child| sort_by_stamp(&place, edges[child].clone()))
@@ -64,8 +60,8 @@ pub(super) fn trajectory(
     Ok(Trajectory { poses: compose_chain(&links), child })
 }
 
-/// Returns the pose of frame `child` in the farthest frame that static transforms lead up to, or in one of
-/// `ends` where they pass one; `None` where they do not name the frame.
+/// Returns the pose of frame `child` in the outermost frame that static transforms lead to, or in the first of
+/// `ends` on that chain; `None` where no transform has the frame.
 pub(super) fn mount(statics: &[StampedPose], child: &str, ends: &[&str]) -> Option<Pose> {
     if ends.contains(&child) {
         return Some(Pose::from_position([0.0; 3]));
@@ -74,55 +70,63 @@ pub(super) fn mount(statics: &[StampedPose], child: &str, ends: &[&str]) -> Opti
     let mut link = edges.get(child)?.last()?;
     let mut pose = link.pose;
     for _ in 0..MAX_DEPTH {
-        let next =
-            edges.get(link.parent.as_str()).filter(|_| !ends.contains(&link.parent.as_str()));
-        let Some(next) = next.and_then(|found| found.last()) else { break };
-        (link, pose) = (next, compose(&next.pose, &pose));
+        let parent = link.parent.as_str();
+        if ends.contains(&parent) {
+            break;
+        }
+        // The last transform of a frame is in force.
+        let Some(next) = edges.get(parent).and_then(|transforms| transforms.last()) else { break };
+        pose = compose(&next.pose, &pose);
+        link = next;
     }
     Some(pose)
 }
 
 fn by_child(all: &[StampedPose]) -> BTreeMap<&str, Vec<&StampedPose>> {
     let mut edges: BTreeMap<&str, Vec<&StampedPose>> = BTreeMap::new();
-    for placed in all {
-        edges.entry(&placed.child).or_default().push(placed);
+    for pose in all {
+        edges.entry(&pose.child).or_default().push(pose);
     }
     edges
 }
 
-/// Returns the frames on the way from `parent` down to `child`, which comes last.
+/// Returns the frames from `parent`, which is left out, down to `child`, which is last.
 fn chain<'a>(
     edges: &BTreeMap<&'a str, Vec<&'a StampedPose>>,
     parent: &str,
     child: &str,
 ) -> Option<Vec<&'a str>> {
-    let (mut chain, mut at) = (Vec::new(), child);
-    while at != parent && chain.len() < MAX_DEPTH {
-        let (own, links) = edges.get_key_value(at)?;
-        chain.push(*own);
-        at = &links.first()?.parent;
+    let mut chain = Vec::new();
+    let mut frame = child;
+    while frame != parent && chain.len() < MAX_DEPTH {
+        let (name, transforms) = edges.get_key_value(frame)?;
+        chain.push(*name);
+        frame = &transforms.first()?.parent;
     }
     chain.reverse();
-    (at == parent && !chain.is_empty()).then_some(chain)
+    (frame == parent && !chain.is_empty()).then_some(chain)
 }
 
 /// Returns the poses of the last link's child in the first link's parent, at the times of the last; the
 /// others stay as they were last reported, as those of a localization program do.
 fn compose_chain(links: &[Vec<&StampedPose>]) -> Vec<StampedPose2> {
-    let Some((last, before)) = links.split_last() else { return Vec::new() };
-    let at = |placed: &&StampedPose| {
-        let mut whole = (*placed).clone();
-        for link in before.iter().rev() {
-            let known = link.partition_point(|outer| outer.t_secs <= placed.t_secs);
-            whole.pose = compose(&link.get(known.checked_sub(1)?)?.pose, &whole.pose);
-        }
-        Some(whole.to_planar())
-    };
-    last.iter().filter_map(at).collect()
+    let Some((last, outer_links)) = links.split_last() else { return Vec::new() };
+    last.iter().filter_map(|pose| compose_at(pose, outer_links)).collect()
+}
+
+/// Returns a pose in the frame of the first link's parent; `None` before the first pose of a link.
+fn compose_at(inner: &StampedPose, outer_links: &[Vec<&StampedPose>]) -> Option<StampedPose2> {
+    let mut stamped = inner.clone();
+    for link in outer_links.iter().rev() {
+        let reported = link.partition_point(|outer| outer.t_secs <= inner.t_secs);
+        let outer = link.get(reported.checked_sub(1)?)?;
+        stamped.pose = compose(&outer.pose, &stamped.pose);
+    }
+    Some(stamped.to_planar())
 }
 
 fn describe_pairs(pairs: &BTreeSet<(&str, &str)>) -> String {
-    let some = pairs.iter().take(MAX_LISTED).map(|(parent, child)| format!("{parent} > {child}"));
+    let listed = pairs.iter().take(MAX_LISTED).map(|(parent, child)| format!("{parent} > {child}"));
     let more = if pairs.len() > MAX_LISTED { ", ..." } else { "" };
-    some.collect::<Vec<_>>().join(", ") + more
+    listed.collect::<Vec<_>>().join(", ") + more
 }

@@ -4,7 +4,7 @@ use super::cdr::{Cdr, CdrError, Reader, Writer, message};
 
 /// A message that is recorded under a name.
 pub trait Message: Cdr {
-    /// The name of its type in ROS 2.
+    /// The type of the message in ROS 2.
     const NAME: &'static str;
     /// Its definition in the format `ros2msg`, with those of the messages in it.
     const DEFINITION: &'static str;
@@ -79,15 +79,15 @@ message!(
 );
 
 message!(
-    /// `nav_msgs/msg/Odometry`: the pose that a robot's wheels claim.
+    /// `nav_msgs/msg/Odometry`: the pose of a robot by its odometry.
     Odometry {
         /// The time, and the frame of the pose.
         header: Header,
         /// The frame of the velocity.
         child_frame_id: String,
-        /// The claimed pose.
+        /// The estimated pose.
         pose: PoseWithCovariance,
-        /// The claimed velocity.
+        /// The estimated velocity.
         twist: TwistWithCovariance,
     }
 );
@@ -117,7 +117,7 @@ message!(
     TransformStamped {
         /// The time, and the frame of the transform.
         header: Header,
-        /// The frame that is placed.
+        /// The child frame.
         child_frame_id: String,
         /// The pose of the child in its parent.
         transform: Pose,
@@ -147,9 +147,9 @@ message!(
         time_increment_s: f32,
         /// The time between scans.
         scan_time_s: f32,
-        /// The least range that the scanner measures.
+        /// The minimum range of the scanner.
         range_min_m: f32,
-        /// The greatest range that the scanner measures.
+        /// The maximum range of the scanner.
         range_max_m: f32,
         /// The ranges; infinite where there is nothing.
         ranges_m: Vec<f32>,

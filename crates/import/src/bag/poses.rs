@@ -1,7 +1,7 @@
 //! Poses in messages: odometry, motion capture, localization, transforms.
 
 use sidestep_kernel::math::atan2;
-use sidestep_kernel::view::Pose as Turned;
+use sidestep_kernel::view::Pose as Pose3;
 
 use super::cdr::{CdrError, decode};
 use super::messages::{
@@ -18,7 +18,7 @@ pub(super) const SCHEMAS: [&str; 5] = [
     "geometry_msgs/msg/TransformStamped",
     TfMessage::NAME,
 ];
-/// An orientation with a smaller norm than this is none.
+/// Minimum norm of a quaternion: programs without an orientation write zeros, and a norm near 0 has lost its digits.
 const MIN_NORM: f64 = 1e-3;
 
 /// A pose at a time, of one frame in another.
@@ -28,15 +28,15 @@ pub(super) struct StampedPose {
     pub(super) message: u64,
     pub(super) t_secs: f64,
     pub(super) parent: String,
-    /// Empty where the message does not say.
+    /// Empty where the message does not give it.
     pub(super) child: String,
-    pub(super) pose: Turned,
+    pub(super) pose: Pose3,
 }
 
 impl StampedPose {
     fn new(header: Header, child: String, pose: Pose) -> Self {
         let t_secs = header.stamp.secs();
-        let pose = Turned { at_m: pose.position, turn: pose.orientation };
+        let pose = Pose3 { at_m: pose.position, turn: pose.orientation };
         Self { message: 0, t_secs, parent: header.frame_id, child, pose }
     }
 
@@ -44,7 +44,7 @@ impl StampedPose {
         Self::new(transform.header, transform.child_frame_id, transform.transform)
     }
 
-    /// Returns the pose with an orientation of norm 1; or the reason why it is wrong.
+    /// Returns the pose with an orientation of norm 1; or the reason why it is invalid.
     fn checked(mut self) -> Result<Self, &'static str> {
         let numbers = self.pose.at_m.iter().chain(&self.pose.turn);
         if !numbers.copied().all(f64::is_finite) {
@@ -58,11 +58,11 @@ impl StampedPose {
         Ok(self)
     }
 
-    /// Returns where the frame is and looks in the plane.
+    /// Returns position and heading in the plane.
     pub(super) fn to_planar(&self) -> StampedPose2 {
         let [x_m, y_m, _] = self.pose.at_m;
-        let ahead = self.pose.rotate([1.0, 0.0, 0.0]);
-        let heading_rad = atan2(ahead[1], ahead[0]);
+        let forward = self.pose.rotate([1.0, 0.0, 0.0]);
+        let heading_rad = atan2(forward[1], forward[0]);
         StampedPose2 { t_secs: self.t_secs, position_m: [x_m, y_m], heading_rad }
     }
 }
@@ -73,8 +73,8 @@ pub(super) fn decode_poses(
     message: u64,
     bytes: &[u8],
 ) -> Result<Vec<StampedPose>, String> {
-    let found = decode_message(schema, bytes).map_err(|e| e.to_string())?;
-    let numbered = found.into_iter().map(|placed| StampedPose { message, ..placed });
+    let poses = decode_message(schema, bytes).map_err(|e| e.to_string())?;
+    let numbered = poses.into_iter().map(|pose| StampedPose { message, ..pose });
     Ok(numbered.map(StampedPose::checked).collect::<Result<_, _>>()?)
 }
 
@@ -100,11 +100,12 @@ fn decode_message(schema: &str, bytes: &[u8]) -> Result<Vec<StampedPose>, CdrErr
     })
 }
 
-/// Returns the pose in the outermost frame of a thing that has the pose `inner` in a frame with the pose `outer`.
-pub(super) fn compose(outer: &Turned, inner: &Turned) -> Turned {
+/// Returns the pose in the outer frame of a body with the pose `inner` in a frame with the pose `outer`: the product of
+/// the quaternions, and the rotated position.
+pub(super) fn compose(outer: &Pose3, inner: &Pose3) -> Pose3 {
     let [ax, ay, az, aw] = outer.turn;
     let [bx, by, bz, bw] = inner.turn;
-    Turned {
+    Pose3 {
         at_m: outer.transform_point(inner.at_m),
         turn: [
             aw * bx + ax * bw + ay * bz - az * by,
@@ -122,8 +123,8 @@ mod tests {
 
     #[test]
     fn poses_one_in_the_other_are_placed_and_turned_by_both() {
-        let outer = Turned::from_heading([1.0, 2.0, 0.0], FRAC_PI_2);
-        let whole = compose(&outer, &Turned::from_heading([3.0, 0.0, 0.5], FRAC_PI_2));
+        let outer = Pose3::from_heading([1.0, 2.0, 0.0], FRAC_PI_2);
+        let whole = compose(&outer, &Pose3::from_heading([3.0, 0.0, 0.5], FRAC_PI_2));
         assert!((whole.at_m[0] - 1.0).abs() < 1e-12 && (whole.at_m[1] - 5.0).abs() < 1e-12);
         let back = whole.rotate([1.0, 0.0, 0.0]);
         assert!((back[0] + 1.0).abs() < 1e-12, "{back:?}");

@@ -16,7 +16,7 @@ use crate::local_plane::LatLon;
 use crate::table::Token;
 use sidestep_kernel::InputError;
 
-/// Commands to one aircraft; its name may stand in front of them.
+/// Commands to one aircraft; its identifier may precede them.
 const AIRCRAFT_COMMANDS: [&str; 27] = [
     "ADDWPT", "AFTER", "ALT", "AT", "ATALT", "ATDIST", "ATSPD", "BEFORE", "DEL", "DELETE",
     "DELRTE", "DELWPT", "DEST", "DIRECT", "HDG", "HEADING", "LISTRTE", "LNAV", "MOVE", "ORIG",
@@ -39,14 +39,14 @@ const DISPLAY_COMMANDS: [&str; 12] = [
     "ZOOM",
 ];
 
-/// Modes that `ADDWPT` takes in place of a way-point. All way-points are flown by, so both change
-/// nothing.
+/// Modes that `ADDWPT` takes in place of a way-point. Airplanes here fly by all way-points, so both have no
+/// effect.
 const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
 
 /// The result of a command.
 enum CommandOutcome {
     Done,
-    /// It has no effect here, and is counted under this name.
+    /// It has no effect, and is counted under this name.
     NotUnderstood(String),
 }
 
@@ -67,7 +67,7 @@ type CommandResult = Result<CommandOutcome, CommandError>;
 /// An aircraft that is being built.
 struct AircraftBuilder {
     aircraft: ScnAircraft,
-    /// The name of its starting place, where the position of that is not known.
+    /// The name of its start, where the position of that is not known.
     unresolved_start: Option<String>,
 }
 
@@ -75,8 +75,8 @@ struct AircraftBuilder {
 pub(super) struct Interpreter<'p> {
     place: &'p dyn fmt::Display,
     file: ScnFile,
-    drafts: Vec<AircraftBuilder>,
-    /// The last draft with each identifier.
+    builders: Vec<AircraftBuilder>,
+    /// The last builder with each identifier.
     by_id: BTreeMap<String, usize>,
     /// The way-points that `DEFWPT` has defined.
     defined: BTreeMap<String, LatLon>,
@@ -84,8 +84,7 @@ pub(super) struct Interpreter<'p> {
 
 impl<'p> Interpreter<'p> {
     pub(super) fn new(place: &'p dyn fmt::Display, file: ScnFile) -> Self {
-        let (drafts, by_id, defined) = Default::default();
-        Self { place, file, drafts, by_id, defined }
+        Self { place, file, builders: Vec::new(), by_id: BTreeMap::new(), defined: BTreeMap::new() }
     }
 
     /// Carries out `commands`, which are sorted by time.
@@ -93,7 +92,7 @@ impl<'p> Interpreter<'p> {
         for command in commands {
             self.execute(command);
         }
-        for AircraftBuilder { aircraft, unresolved_start } in self.drafts {
+        for AircraftBuilder { aircraft, unresolved_start } in self.builders {
             match unresolved_start {
                 None => self.file.traffic.aircraft.push(aircraft),
                 Some(place) => {
@@ -112,7 +111,7 @@ impl<'p> Interpreter<'p> {
         if is_display(&name) {
             return count(&mut self.file.ignored, name);
         }
-        match self.act(&name, time_s, &mut arguments) {
+        match self.dispatch(&name, time_s, &mut arguments) {
             Ok(CommandOutcome::Done) => {}
             Ok(CommandOutcome::NotUnderstood(what)) => count(&mut self.file.not_understood, what),
             Err(CommandError::Unparsed(error)) => self.file.unparsed.push(error),
@@ -120,14 +119,14 @@ impl<'p> Interpreter<'p> {
         }
     }
 
-    /// Moves an aircraft that stands in front of its command behind it.
+    /// Splits a command into its name and its arguments; an aircraft before the name becomes the first argument.
     fn name_and_arguments<'a>(&self, mut words: Vec<Token<'a>>) -> (String, Arguments<'a>)
     where
         'p: 'a,
     {
         let first = upper(words[0]);
         let second = words.get(1).map(|word| upper(*word));
-        // An aircraft that was created in an unknown way, as by MCRE, is recognized by its command.
+        // An aircraft that a command without effect here has created, such as MCRE, is recognized by its command.
         let is_aircraft = self.by_id.contains_key(&first)
             || (!is_command(&first)
                 && second.as_ref().is_some_and(|name| AIRCRAFT_COMMANDS.contains(&&**name)));
@@ -139,7 +138,7 @@ impl<'p> Interpreter<'p> {
         (name, Arguments::new(self.place, command, words))
     }
 
-    fn act(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
+    fn dispatch(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
         match name {
             "CRE" | "CREATE" => self.create(time_s, arguments),
             "DEL" | "DELETE" => self.delete(time_s, arguments),
@@ -194,20 +193,20 @@ impl<'p> Interpreter<'p> {
     }
 
     /// Adds a new aircraft; errors point at `word`.
-    fn add_aircraft(&mut self, word: Token, draft: AircraftBuilder) -> Result<(), CommandError> {
-        if self.drafts.len() >= MAX_AIRCRAFT {
+    fn add_aircraft(&mut self, word: Token, builder: AircraftBuilder) -> Result<(), CommandError> {
+        if self.builders.len() >= MAX_AIRCRAFT {
             let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");
             return Err(self.refusal(word, cause, "create fewer"));
         }
-        let id = draft.aircraft.id.clone();
+        let id = builder.aircraft.id.clone();
         if let Some(&earlier) = self.by_id.get(&id)
-            && self.drafts[earlier].aircraft.deleted_s.is_none()
+            && self.builders[earlier].aircraft.deleted_s.is_none()
         {
             let cause = format!("aircraft {id} exists already");
             return Err(self.refusal(word, cause, "delete it first, or take another identifier"));
         }
-        self.by_id.insert(id, self.drafts.len());
-        self.drafts.push(draft);
+        self.by_id.insert(id, self.builders.len());
+        self.builders.push(builder);
         Ok(())
     }
 
@@ -219,7 +218,7 @@ impl<'p> Interpreter<'p> {
         }
         loop {
             let index = self.existing_aircraft(arguments)?;
-            self.drafts[index].aircraft.deleted_s = Some(time_s);
+            self.builders[index].aircraft.deleted_s = Some(time_s);
             if arguments.remaining() == 0 {
                 return Ok(CommandOutcome::Done);
             }
@@ -229,13 +228,12 @@ impl<'p> Interpreter<'p> {
     /// Returns the next argument, which must be an existing aircraft.
     fn existing_aircraft(&self, arguments: &mut Arguments) -> Result<usize, CommandError> {
         let word = arguments.required("an aircraft")?;
-        let found = self.by_id.get(&upper(word)).copied();
-        let why = match found {
-            Some(index) if self.drafts[index].aircraft.deleted_s.is_none() => return Ok(index),
+        let problem = match self.by_id.get(&upper(word)).copied() {
+            Some(index) if self.builders[index].aircraft.deleted_s.is_none() => return Ok(index),
             Some(_) => "was deleted before",
             None => "was not created before",
         };
-        let cause = format!("aircraft {} {why}", word.text);
+        let cause = format!("aircraft {} {problem}", word.text);
         Err(self.refusal(word, cause, "check the identifier and the times"))
     }
 
@@ -260,7 +258,10 @@ impl<'p> Interpreter<'p> {
         }
         let way_point = self.way_point(time_s, arguments)?;
         let after = arguments.next();
-        self.insert_way_point(index, way_point, after, arguments.command, id)
+        let slot = self.route_slot(index, after, arguments.command)?;
+        self.add_unresolved(arguments.command, id, &way_point.place);
+        self.builders[index].aircraft.way_points.insert(slot, way_point);
+        Ok(CommandOutcome::Done)
     }
 
     /// `AFTER aircraft,after,ADDWPT,place[,altitude[,speed]]`
@@ -268,12 +269,15 @@ impl<'p> Interpreter<'p> {
         let id = arguments.peek();
         let index = self.existing_aircraft(arguments)?;
         let after = arguments.required("a way-point of the route")?;
-        let what = upper(arguments.required("ADDWPT")?);
-        if what != "ADDWPT" {
-            return Ok(CommandOutcome::NotUnderstood(format!("AFTER {what}")));
+        let variant = upper(arguments.required("ADDWPT")?);
+        if variant != "ADDWPT" {
+            return Ok(CommandOutcome::NotUnderstood(format!("AFTER {variant}")));
         }
         let way_point = self.way_point(time_s, arguments)?;
-        self.insert_way_point(index, way_point, Some(after), arguments.command, id)
+        let slot = self.route_slot(index, Some(after), arguments.command)?;
+        self.add_unresolved(arguments.command, id, &way_point.place);
+        self.builders[index].aircraft.way_points.insert(slot, way_point);
+        Ok(CommandOutcome::Done)
     }
 
     fn way_point(&self, added_s: f64, arguments: &mut Arguments) -> Result<WayPoint, InputError> {
@@ -285,33 +289,28 @@ impl<'p> Interpreter<'p> {
         })
     }
 
-    /// Inserts into a route after the last way-point called `after`, or at its end.
-    fn insert_way_point(
-        &mut self,
+    /// Returns the position of a new way-point in an aircraft's route: after the last one called `after`, or at the
+    /// end.
+    fn route_slot(
+        &self,
         index: usize,
-        way_point: WayPoint,
         after: Option<Token>,
         command: Token,
-        id: Option<&str>,
-    ) -> CommandResult {
-        let route = &self.drafts[index].aircraft.way_points;
+    ) -> Result<usize, CommandError> {
+        let route = &self.builders[index].aircraft.way_points;
         if route.len() >= MAX_WAY_POINTS {
             let cause = format!("the route has more than {MAX_WAY_POINTS} way-points");
             return Err(self.refusal(command, cause, "write fewer"));
         }
-        let mut slot = route.len();
-        if let Some(after) = after {
-            let name = upper(after);
-            let found = route.iter().rposition(|earlier| earlier.place.name() == Some(&name));
-            let Some(found) = found else {
+        let Some(after) = after else { return Ok(route.len()) };
+        let name = upper(after);
+        match route.iter().rposition(|earlier| earlier.place.name() == Some(&name)) {
+            Some(earlier) => Ok(earlier + 1),
+            None => {
                 let cause = format!("no way-point {name} is on the route");
-                return Err(self.refusal(after, cause, "add that one first"));
-            };
-            slot = found + 1;
+                Err(self.refusal(after, cause, "add that one first"))
+            }
         }
-        self.add_unresolved(command, id, &way_point.place);
-        self.drafts[index].aircraft.way_points.insert(slot, way_point);
-        Ok(CommandOutcome::Done)
     }
 
     /// `ORIG aircraft,place` and `DEST aircraft,place`
@@ -329,11 +328,12 @@ impl<'p> Interpreter<'p> {
         }
         let place = self.place(arguments)?;
         self.add_unresolved(arguments.command, id, &place);
-        let aircraft = &mut self.drafts[index].aircraft;
+        let aircraft = &mut self.builders[index].aircraft;
         if name == "ORIG" {
             aircraft.origin = Some(place);
         } else {
-            (aircraft.destination, aircraft.destination_s) = (Some(place), Some(time_s));
+            aircraft.destination = Some(place);
+            aircraft.destination_s = Some(time_s);
         }
         Ok(CommandOutcome::Done)
     }
@@ -355,7 +355,7 @@ impl<'p> Interpreter<'p> {
         // ALT may have the vertical speed as a further argument.
         let climb = if name == "ALT" { arguments.optional(vertical_speed_fpm)? } else { None };
         let changes = change.into_iter().chain(climb.map(AircraftCommand::VerticalSpeedFpm));
-        self.drafts[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
+        self.builders[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
         Ok(CommandOutcome::Done)
     }
 

@@ -50,15 +50,13 @@ pub(super) fn join_lines(text: &str) -> (Vec<LogicalLine<'_>>, u64) {
             short_lines += 1;
             continue;
         }
-        let (content, continues) = match content.trim_end().strip_suffix('\\') {
-            Some(content) => (content, true),
-            None => (content, false),
-        };
+        let continued = content.trim_end().strip_suffix('\\');
+        let content = continued.unwrap_or(content);
         match lines.last_mut().filter(|_| is_continued) {
             Some(line) => line.append(number, content),
             None => lines.push(LogicalLine { text: content.into(), pieces: vec![(0, number)] }),
         }
-        is_continued = continues;
+        is_continued = continued.is_some();
     }
     (lines, short_lines)
 }
@@ -96,7 +94,7 @@ impl<'a> LogicalLine<'a> {
         }
         let Some((stamp, content)) = self.text.split_once('>') else {
             let word = self.token(self.text.trim());
-            return Err(word.error(place, "no `>` behind a time".to_string(), STAMP_REMEDY));
+            return Err(word.error(place, "no `>` after a time".to_string(), STAMP_REMEDY));
         };
         let time_s = parse_stamp(place, self.token(stamp.trim()))?;
         let commands =
@@ -136,21 +134,19 @@ const STAMP_REMEDY: &str =
 
 /// Reads `HH:MM:SS.ss` in seconds; one digit per part is enough.
 fn parse_stamp(place: &dyn fmt::Display, stamp: Token) -> Result<f64, InputError> {
-    let parts: Vec<&str> = stamp.text.split(':').map(str::trim).collect();
-    let seconds = match parts[..] {
-        [hours, minutes, seconds] => hours
-            .parse::<u32>()
-            .ok()
-            .filter(|hours| *hours <= MAX_HOURS)
-            .zip(minutes.parse::<u32>().ok().filter(|minutes| *minutes < 60))
-            .zip(seconds.parse::<f64>().ok().filter(|seconds| (0.0..60.0).contains(seconds))),
-        _ => None,
-    };
-    let Some(((hours, minutes), seconds)) = seconds else {
-        let cause = "no time of the form HH:MM:SS.ss in front of `>`".to_string();
-        return Err(stamp.error(place, cause, STAMP_REMEDY));
-    };
-    Ok(f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0 + seconds)
+    stamp_seconds(stamp.text).ok_or_else(|| {
+        let cause = "no time of the form HH:MM:SS.ss before `>`".to_string();
+        stamp.error(place, cause, STAMP_REMEDY)
+    })
+}
+
+fn stamp_seconds(text: &str) -> Option<f64> {
+    let parts: Vec<&str> = text.split(':').map(str::trim).collect();
+    let [hours, minutes, seconds] = parts[..] else { return None };
+    let hours = hours.parse::<u32>().ok().filter(|hours| *hours <= MAX_HOURS)?;
+    let minutes = minutes.parse::<u32>().ok().filter(|minutes| *minutes < 60)?;
+    let seconds = seconds.parse::<f64>().ok().filter(|seconds| (0.0..60.0).contains(seconds))?;
+    Some(f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0 + seconds)
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ use interpreter::Interpreter;
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
-/// The maximum size of a scenario in bytes after unpacking: some 160 times the longest known.
+/// The maximum size of a scenario in bytes after decompression: some 160 times the longest known.
 pub const MAX_SCN_BYTES: u64 = 1 << 24;
 
 /// The maximum number of aircraft that one scenario may create.
@@ -75,7 +75,7 @@ pub struct ScnFile {
 pub struct UnresolvedPosition {
     /// The name of the airport, runway or fix, in capital letters.
     pub name: String,
-    /// The command that names it.
+    /// The command that uses it.
     pub command: String,
     /// The aircraft it is for, if any.
     pub aircraft: Option<String>,
@@ -108,6 +108,7 @@ pub struct Traffic {
     pub noise: bool,
 }
 
+/// The defaults of the simulator BlueSky.
 impl Default for Traffic {
     fn default() -> Self {
         Self {
@@ -271,7 +272,7 @@ pub enum AircraftCommand {
     VerticalNavigation(bool),
 }
 
-/// Reads a scenario file, plain or packed with gzip.
+/// Reads a scenario file, plain or compressed with gzip.
 ///
 /// # Errors
 /// When it cannot be read; errors in its text are listed in the result.
@@ -279,16 +280,16 @@ pub fn read(path: &Path) -> Result<ScnFile, InputError> {
     Ok(parse(&path.display(), &read_text(path, MAX_SCN_BYTES)?))
 }
 
-/// Parses the text of a scenario; `place` is named in errors.
+/// Parses the text of a scenario; `place` is its name in errors.
 pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
     let (lines, short_lines) = lines::join_lines(text);
     let mut file = ScnFile { short_lines, ..ScnFile::default() };
     let mut commands = Vec::new();
     for line in &lines {
         match line.commands(place) {
-            Ok(of_line) => {
-                file.command_lines += u64::from(!of_line.is_empty());
-                commands.extend(of_line);
+            Ok(line_commands) => {
+                file.command_lines += u64::from(!line_commands.is_empty());
+                commands.extend(line_commands);
             }
             Err(error) => file.unparsed.push(error),
         }

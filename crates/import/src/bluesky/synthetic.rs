@@ -34,32 +34,33 @@ const MATRIX_APPROACH_S: f64 = 330.0;
 
 /// Returns `n` aircraft, evenly spaced on a circle of half a degree, each with the opposite goal.
 pub(super) fn super_conflict(n: u32, created_s: f64) -> Vec<ScnAircraft> {
-    let on_circle = |i: u32| {
+    let pattern = Pattern { kind: "SUPER", created_s };
+    let mut aircraft = Vec::with_capacity(n as usize);
+    for i in 0..n {
         let turn = f64::from(i) / f64::from(n);
         let lat_deg = -SUPER_RADIUS_DEG * math::cos(TAU * turn);
         let lon_deg = SUPER_RADIUS_DEG * math::sin(TAU * turn);
+        // Not 360, which is outside of the range of headings.
         let heading_deg = if i == 0 { 0.0 } else { 360.0 * (1.0 - turn) };
         let goal = LatLon { lat_deg: -lat_deg, lon_deg: -lon_deg };
-        let pattern = Pattern { kind: "SUPER", created_s };
-        pattern.aircraft(format!("SUP{i}"), [lat_deg, lon_deg], heading_deg, goal)
-    };
-    (0..n).map(on_circle).collect()
+        aircraft.push(pattern.aircraft(format!("SUP{i}"), [lat_deg, lon_deg], heading_deg, goal));
+    }
+    aircraft
 }
 
 /// Returns one aircraft that flies east against a wall of 20 that fly west, 1.1 zone radii apart.
 pub(super) fn wall(zone_radius_nm: f64, created_s: f64) -> Vec<ScnAircraft> {
     let pattern = Pattern { kind: "WALL", created_s };
-    let across = |id: String, lat_deg: f64, lon_deg: f64| {
-        let heading_deg = if lon_deg < 0.0 { 90.0 } else { 270.0 };
-        let goal = LatLon { lat_deg, lon_deg: -lon_deg };
-        pattern.aircraft(id, [lat_deg, lon_deg], heading_deg, goal)
-    };
-    let own = across("OWNSHIP".to_string(), 0.0, -WALL_DISTANCE_DEG);
-    let others = (0..WALL_SIZE).map(|i| {
+    let goal = LatLon { lat_deg: 0.0, lon_deg: WALL_DISTANCE_DEG };
+    let start = [0.0, -WALL_DISTANCE_DEG];
+    let mut aircraft = vec![pattern.aircraft("OWNSHIP".to_string(), start, 90.0, goal)];
+    for i in 0..WALL_SIZE {
         let lat_deg = (f64::from(i) - f64::from(WALL_SIZE / 2)) * spacing_deg(zone_radius_nm);
-        across(format!("OTHER{i}"), lat_deg, WALL_DISTANCE_DEG)
-    });
-    [own].into_iter().chain(others).collect()
+        let goal = LatLon { lat_deg, lon_deg: -WALL_DISTANCE_DEG };
+        let start = [lat_deg, WALL_DISTANCE_DEG];
+        aircraft.push(pattern.aircraft(format!("OTHER{i}"), start, 270.0, goal));
+    }
+    aircraft
 }
 
 /// Returns `n` aircraft from each side, 1.1 zone radii apart, that cross in a grid.
@@ -67,20 +68,20 @@ pub(super) fn matrix(n: u32, zone_radius_nm: f64, created_s: f64) -> Vec<ScnAirc
     let pattern = Pattern { kind: "MATRIX", created_s };
     let half_deg = spacing_deg(zone_radius_nm) * (f64::from(n) - 1.0) / 2.0;
     let out_deg = half_deg + MATRIX_APPROACH_S * SPEED_MPS / M_PER_DEG;
-    let four = |i: u32| {
+    let mut aircraft = Vec::with_capacity(4 * n as usize);
+    for i in 0..n {
         let along_deg = f64::from(i) * spacing_deg(zone_radius_nm) - half_deg;
-        [
+        for (side, start, heading_deg, [lat_deg, lon_deg]) in [
             ("NORTH", [out_deg, along_deg], 180.0, [-out_deg, along_deg]),
             ("SOUTH", [-out_deg, along_deg], 0.0, [out_deg, along_deg]),
             ("EAST", [along_deg, out_deg], 270.0, [along_deg, -out_deg]),
             ("WEST", [along_deg, -out_deg], 90.0, [along_deg, out_deg]),
-        ]
-        .map(|(side, start, heading_deg, [lat_deg, lon_deg])| {
+        ] {
             let goal = LatLon { lat_deg, lon_deg };
-            pattern.aircraft(format!("{side}{i}"), start, heading_deg, goal)
-        })
-    };
-    (0..n).flat_map(four).collect()
+            aircraft.push(pattern.aircraft(format!("{side}{i}"), start, heading_deg, goal));
+        }
+    }
+    aircraft
 }
 
 /// Returns the distance of neighbors in degrees.

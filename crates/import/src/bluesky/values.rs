@@ -61,7 +61,7 @@ impl<'a> Arguments<'a> {
     pub(super) fn lat_lon(&mut self) -> Result<LatLon, InputError> {
         let latitude = self.required("a latitude")?;
         let lat_deg = degrees(self.place, latitude, LATITUDE)?;
-        let longitude = self.required("a longitude behind the latitude")?;
+        let longitude = self.required("a longitude after the latitude")?;
         Ok(LatLon { lat_deg, lon_deg: degrees(self.place, longitude, LONGITUDE)? })
     }
 }
@@ -111,9 +111,9 @@ pub(super) fn is_latitude(word: &str) -> bool {
 fn degrees(place: &dyn fmt::Display, word: Token, axis: CoordinateAxis) -> Result<f64, InputError> {
     let value = signed_degrees(word.text, axis).filter(|deg| deg.abs() <= axis.max_deg);
     let value = value.ok_or_else(|| {
-        let (positive, negative, max) = (axis.positive, axis.negative, axis.max_deg);
+        let CoordinateAxis { positive, negative, max_deg } = axis;
         let cause = format!("`{}` are no degrees {positive} or {negative}", word.text);
-        let remedy = format!("write up to {max}, as 12.5, -12.5, {negative}12.5 or 12'30'00");
+        let remedy = format!("write up to {max_deg}, as 12.5, -12.5, {negative}12.5 or 12'30'00");
         word.error(place, cause, &remedy)
     })?;
     // Longitudes are also counted from 0 to 360.
@@ -121,19 +121,28 @@ fn degrees(place: &dyn fmt::Display, word: Token, axis: CoordinateAxis) -> Resul
 }
 
 fn signed_degrees(text: &str, axis: CoordinateAxis) -> Option<f64> {
-    let of_letter = |letter: char, sign: f64| {
-        let both = [letter, letter.to_ascii_lowercase()];
-        let rest = text.strip_prefix(both).or_else(|| text.strip_suffix(both));
-        rest.map(|rest| (rest, sign))
-    };
-    let (text, hemisphere) = of_letter(axis.positive, 1.0)
-        .or_else(|| of_letter(axis.negative, -1.0))
-        .unwrap_or((text, 1.0));
-    let (text, sign) = match text.strip_prefix('-') {
-        Some(text) => (text, -1.0),
-        None => (text.strip_prefix('+').unwrap_or(text), 1.0),
-    };
-    Some(hemisphere * sign * unsigned_degrees(text)?)
+    let mut hemisphere = 1.0;
+    let mut rest = text;
+    if let Some(number) = strip_letter(text, axis.positive) {
+        rest = number;
+    } else if let Some(number) = strip_letter(text, axis.negative) {
+        rest = number;
+        hemisphere = -1.0;
+    }
+    let mut sign = 1.0;
+    if let Some(number) = rest.strip_prefix('-') {
+        rest = number;
+        sign = -1.0;
+    } else if let Some(number) = rest.strip_prefix('+') {
+        rest = number;
+    }
+    Some(hemisphere * sign * unsigned_degrees(rest)?)
+}
+
+/// Removes a letter of a hemisphere, capital or small, at the start or the end.
+fn strip_letter(text: &str, letter: char) -> Option<&str> {
+    let both = [letter, letter.to_ascii_lowercase()];
+    text.strip_prefix(both).or_else(|| text.strip_suffix(both))
 }
 
 fn unsigned_degrees(text: &str) -> Option<f64> {
@@ -158,9 +167,9 @@ pub(super) fn heading_deg(place: &dyn fmt::Display, word: Token) -> Result<f64, 
         let cause = format!("`{}` is no true heading", word.text);
         word.error(place, cause, "write degrees from true north such as 326.8 or 326.8T")
     })?;
-    let turned = value.rem_euclid(360.0);
+    let wrapped = value.rem_euclid(360.0);
     // rem_euclid may round up to the modulus itself, which is outside the range.
-    Ok(if turned >= 360.0 { 0.0 } else { turned })
+    Ok(if wrapped >= 360.0 { 0.0 } else { wrapped })
 }
 
 /// Reads an altitude in ft: a number, or a flight level such as `FL200`.
@@ -180,23 +189,26 @@ pub(super) fn altitude_ft(place: &dyn fmt::Display, word: Token) -> Result<f64, 
 
 /// Reads a speed: knots, or a Mach number as `.8`, `M0.8`, `M.8` or `M80`.
 pub(super) fn speed(place: &dyn fmt::Display, word: Token) -> Result<Airspeed, InputError> {
-    let wrong = || {
+    parse_speed(word.text).ok_or_else(|| {
         let cause = format!("`{}` is no speed", word.text);
         word.error(place, cause, "write knots such as 250, or a Mach number such as M0.8")
-    };
-    let up_to = |max: f64, text: &str| {
-        let value = Token { text, ..word }.number(place);
-        value.ok().filter(|value| (0.0..=max).contains(value)).ok_or_else(wrong)
-    };
-    let Some(mach) = word.text.strip_prefix(['M', 'm']) else {
-        let value = up_to(MAX_SPEED_KT, word.text)?;
-        // No aircraft flies at less than a knot, so a number below 1 is meant as a Mach number.
-        let is_mach = 0.1 < value && value < 1.0;
-        return Ok(if is_mach { Airspeed::Mach(value) } else { Airspeed::CasKt(value) });
-    };
-    // Without a point the digits are decimals.
-    let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
-    Ok(Airspeed::Mach(up_to(MAX_MACH, &digits)?))
+    })
+}
+
+fn parse_speed(text: &str) -> Option<Airspeed> {
+    if let Some(mach) = text.strip_prefix(['M', 'm']) {
+        // Without a point the digits are decimals.
+        let digits = if mach.contains('.') { mach.to_owned() } else { format!(".{mach}") };
+        let mach: f64 = digits.parse().ok()?;
+        return (0.0..=MAX_MACH).contains(&mach).then_some(Airspeed::Mach(mach));
+    }
+    let value: f64 = text.parse().ok()?;
+    if !(0.0..=MAX_SPEED_KT).contains(&value) {
+        return None;
+    }
+    // No aircraft flies at less than a knot, so a number below 1 is meant as a Mach number.
+    let is_mach = 0.1 < value && value < 1.0;
+    Some(if is_mach { Airspeed::Mach(value) } else { Airspeed::CasKt(value) })
 }
 
 /// Reads a number that must be greater than 0.
@@ -214,9 +226,10 @@ pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Token) -> Resul
     if value == 0.0 || VERTICAL_SPEEDS_FPM.contains(&value.abs()) {
         return Ok(value);
     }
-    let (least, most) = (VERTICAL_SPEEDS_FPM.start(), VERTICAL_SPEEDS_FPM.end());
+    let low = VERTICAL_SPEEDS_FPM.start();
+    let high = VERTICAL_SPEEDS_FPM.end();
     let cause = format!("a vertical speed of {value:?} ft/min");
-    Err(word.error(place, cause, &format!("write {least} to {most} ft/min, up or down, or 0")))
+    Err(word.error(place, cause, &format!("write {low} to {high} ft/min, up or down, or 0")))
 }
 
 /// Reads a size of the protected zone.

@@ -8,7 +8,7 @@
 //! The models that are read are obstacles and robots: a model with a `bitmap` is a floor plan, one
 //! that descends from `position` a robot, every other one that descends from `model` a box of its
 //! `size` (its `block` shapes are not used), unless neither a robot can hit it
-//! (`obstacle_return 0`) nor a ranger see it (`ranger_return` below 0). Models within models are
+//! (`obstacle_return 0`) nor a ranger detect it (`ranger_return` below 0). Models within models are
 //! placed in the frame of their parents; those of a robot belong to it. A bitmap is stretched to
 //! the model's size; pixels of brightness 127 and less are solid, as in Stage. Everything else is
 //! counted in [`World::not_used`].
@@ -89,7 +89,7 @@ pub struct Robot {
     pub name: String,
     /// The name of its model.
     pub kind: String,
-    /// The initial pose of the point about which it turns.
+    /// The initial pose of the point about which it rotates.
     pub pose: Pose2,
     /// Extent of its body in meters, lengthwise and sideways.
     pub size_m: [f64; 2],
@@ -98,12 +98,12 @@ pub struct Robot {
 }
 
 /// Reads a world, with all included files and its bitmaps; their paths are relative to the file
-/// that names them.
+/// that refers to them.
 ///
 /// # Errors
-/// A name that ends neither in `.world` nor in `.inc`; included files may end otherwise. Files that
-/// cannot be read, wrong syntax, wrong values: with file, line and column. Files that include
-/// themselves; more than 1000 files, 100,000 models, or 64 levels of models within models.
+/// When the extension is neither `.world` nor `.inc` (included files may have another), a file
+/// cannot be read, includes itself, or has invalid syntax or values, with file, line and column;
+/// when there are more than 1000 files, 100,000 models, or 64 levels of models within models.
 pub fn load(path: &Path) -> Result<World, InputError> {
     extension::check(path, "a world of Stage", &["world", "inc"])?;
     read::world(path)

@@ -61,11 +61,11 @@ pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, I
             _ => None,
         });
         let expected = expected.unwrap_or_else(|| "a property or a model".into());
-        let found = match text[error.offset()..].chars().next() {
+        let actual = match text[error.offset()..].chars().next() {
             Some(c) => format!("`{}`", c.escape_debug()),
             None => "the end of the file".into(),
         };
-        let cause = format!("{found} where {expected} is expected");
+        let cause = format!("{actual} where {expected} is expected");
         InputError::new(place, cause, format!("write {expected} there"))
             .with_offset(text, error.offset())
     })
@@ -74,8 +74,10 @@ pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, I
 /// Checks the depth of models, because the parser calls itself for each model in a model and must
 /// not overflow the stack.
 fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
-    let (mut depth, mut in_comment, mut in_text) = (0usize, false, false);
-    for (at, c) in text.char_indices() {
+    let mut depth = 0usize;
+    let mut in_comment = false;
+    let mut in_text = false;
+    for (offset, c) in text.char_indices() {
         match c {
             '\n' => in_comment = false,
             _ if in_comment => {}
@@ -88,7 +90,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
         }
         if depth > MAX_NESTING {
             let cause = format!("more than {MAX_NESTING} models in each other");
-            return Err(InputError::new(place, cause, "use fewer").with_offset(text, at));
+            return Err(InputError::new(place, cause, "use fewer").with_offset(text, offset));
         }
     }
     Ok(())
@@ -98,6 +100,7 @@ fn expected(what: &'static str) -> StrContext {
     StrContext::Expected(StrContextValue::Description(what))
 }
 
+/// Blanks, line breaks and comments.
 fn blank(input: &mut Input) -> ModalResult<()> {
     let comment = ('#', till_line_ending).void();
     repeat(0.., alt((multispace1.void(), comment))).parse_next(input)

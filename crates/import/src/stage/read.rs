@@ -77,21 +77,19 @@ impl WorldReader {
 
     fn include(&mut self, name: &Value) -> Result<(), InputError> {
         let path = self.path(name)?;
-        let is_open = path.canonicalize().is_ok_and(|path| self.open.contains(&path));
-        if is_open || self.sources.len() >= MAX_FILES {
-            let cause = match is_open {
-                true => format!("{} includes itself", path.display()),
-                false => format!("more than {MAX_FILES} files are included"),
-            };
+        if path.canonicalize().is_ok_and(|path| self.open.contains(&path)) {
+            let cause = format!("{} includes itself", path.display());
             return Err(self.error(name.at, cause, "leave this `include` out"));
         }
-        match path.is_file() {
-            true => self.file(&path),
-            false => {
-                let cause = format!("there is no file {}", path.display());
-                Err(self.error(name.at, cause, "put it there, or leave the line out"))
-            }
+        if self.sources.len() >= MAX_FILES {
+            let cause = format!("more than {MAX_FILES} files are included");
+            return Err(self.error(name.at, cause, "leave this `include` out"));
         }
+        if !path.is_file() {
+            let cause = format!("there is no file {}", path.display());
+            return Err(self.error(name.at, cause, "put it there, or leave the line out"));
+        }
+        self.file(&path)
     }
 
     /// Resolves a path in a file, relative to that file.
@@ -99,8 +97,8 @@ impl WorldReader {
         let [file] = &name.words[..] else {
             return Err(self.error(name.at, "a list where a file's name is expected", "give one"));
         };
-        let beside = self.sources[name.at.file].path.parent();
-        Ok(beside.unwrap_or(Path::new("")).join(file))
+        let folder = self.sources[name.at.file].path.parent();
+        Ok(folder.unwrap_or(Path::new("")).join(file))
     }
 
     fn error(&self, at: SourcePosition, cause: impl Into<String>, remedy: &str) -> InputError {
@@ -143,10 +141,10 @@ impl WorldReader {
         let definition = self.resolve(model);
         match definition.root.as_str() {
             "position" => self.add_robot(model, &definition, parent),
-            "model" => self.add_thing(model, &definition, parent, depth),
+            "model" => self.add_obstacle(model, &definition, parent, depth),
             _ if definition.properties.contains_key("bitmap") => {
-                // A floor plan with its definition in a file that is missing.
-                self.add_thing(model, &definition, parent, depth)
+                // A floor plan whose definition is in a file that is missing.
+                self.add_obstacle(model, &definition, parent, depth)
             }
             root => {
                 self.count_ignored(root);
@@ -161,25 +159,21 @@ impl WorldReader {
         def: &Definition,
         parent: Pose2,
     ) -> Result<(), InputError> {
-        let (size_m, origin) = (self.size_m(def)?, self.pose(def, "origin")?);
-        let far = |offset_m: f64, size_m: f64| offset_m.abs() + 0.5 * size_m;
+        let size_m = self.size_m(def)?;
+        let origin = self.pose(def, "origin")?;
         let robot = Robot {
             name: self.text(def, "name"),
             kind: model.kind.clone(),
             pose: self.pose(def, "pose")?.transformed_by(parent),
             size_m,
-            radius_m: match origin.yaw_rad == 0.0 {
-                true => hypot(far(origin.x_m, size_m[0]), far(origin.y_m, size_m[1])),
-                // An upper bound, because the corners of a turned body are not computed.
-                false => hypot(origin.x_m, origin.y_m) + 0.5 * hypot(size_m[0], size_m[1]),
-            },
+            radius_m: radius_m(size_m, origin),
         };
         self.world.robots.push(robot);
         self.count_unused(def);
         Ok(())
     }
 
-    fn add_thing(
+    fn add_obstacle(
         &mut self,
         model: &ModelBlock,
         def: &Definition,
@@ -187,16 +181,16 @@ impl WorldReader {
         depth: usize,
     ) -> Result<(), InputError> {
         let pose = self.pose(def, "pose")?.transformed_by(parent);
-        let middle = self.pose(def, "origin")?.transformed_by(pose);
+        let center = self.pose(def, "origin")?.transformed_by(pose);
         let size_m = self.size_m(def)?;
         let name = self.text(def, "name");
         if let Some(bitmap) = def.properties.get("bitmap") {
             let has_boundary = self.number(def, "boundary", 0.0)? != 0.0;
             let plan = self.floor_plan(bitmap)?;
-            let plan = FloorPlan { name, size_m, pose: middle, has_boundary, ..plan };
+            let plan = FloorPlan { name, size_m, pose: center, has_boundary, ..plan };
             self.world.floor_plans.push(plan);
         } else if self.is_obstacle(def)? {
-            self.world.boxes.push(BoxObstacle { name, pose: middle, size_m });
+            self.world.boxes.push(BoxObstacle { name, pose: center, size_m });
         } else {
             self.count_ignored(&model.kind);
         }
@@ -227,9 +221,10 @@ impl WorldReader {
     }
 
     fn count_unused(&mut self, def: &Definition) {
-        let is_used = |key: &&String| !KNOWN_PROPERTIES.contains(&key.as_str());
-        for key in def.properties.keys().filter(is_used) {
-            self.count_ignored(key);
+        for key in def.properties.keys() {
+            if !KNOWN_PROPERTIES.contains(&key.as_str()) {
+                self.count_ignored(key);
+            }
         }
     }
 
@@ -246,13 +241,17 @@ impl WorldReader {
     }
 
     fn numbers(&self, value: &Value) -> Result<Vec<f64>, InputError> {
-        let number = |word: &String| {
-            let number = word.parse().ok().filter(|x: &f64| x.is_finite());
-            number.ok_or_else(|| {
-                self.error(value.at, format!("`{word}` is no number"), "give finite numbers")
-            })
-        };
-        value.words.iter().map(number).collect()
+        let mut numbers = Vec::with_capacity(value.words.len());
+        for word in &value.words {
+            match word.parse::<f64>() {
+                Ok(number) if number.is_finite() => numbers.push(number),
+                _ => {
+                    let cause = format!("`{word}` is no number");
+                    return Err(self.error(value.at, cause, "give finite numbers"));
+                }
+            }
+        }
+        Ok(numbers)
     }
 
     fn size_m(&self, def: &Definition) -> Result<[f64; 2], InputError> {
@@ -285,10 +284,22 @@ impl WorldReader {
 const KNOWN_PROPERTIES: [&str; 8] =
     ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
 
+/// Returns the radius of the smallest disc about a robot's reference point that contains its body, or an upper bound.
+fn radius_m(size_m: [f64; 2], origin: Pose2) -> f64 {
+    if origin.yaw_rad == 0.0 {
+        let reach_m = |offset_m: f64, size_m: f64| offset_m.abs() + 0.5 * size_m;
+        hypot(reach_m(origin.x_m, size_m[0]), reach_m(origin.y_m, size_m[1]))
+    } else {
+        // A bound, because the corners of a rotated body are not computed.
+        hypot(origin.x_m, origin.y_m) + 0.5 * hypot(size_m[0], size_m[1])
+    }
+}
+
 impl Pose2 {
-    /// Returns a pose that is given in the frame of another in the frame of that one's parent.
+    /// Transforms a pose from the frame of `parent` into the frame of that one's parent.
     fn transformed_by(self, parent: Self) -> Self {
-        let (s, c) = (sin(parent.yaw_rad), cos(parent.yaw_rad));
+        let s = sin(parent.yaw_rad);
+        let c = cos(parent.yaw_rad);
         Self {
             x_m: parent.x_m + c * self.x_m - s * self.y_m,
             y_m: parent.y_m + s * self.x_m + c * self.y_m,

@@ -5,7 +5,7 @@
 //! [`Model::solids`], so a missing mesh is not an error. Lengths are meters, angles radians.
 //! Formats: <https://wiki.ros.org/urdf/XML>, <https://wiki.ros.org/srdf>.
 //!
-//! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter name no
+//! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter have no
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
 mod read;
@@ -24,7 +24,7 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 use sidestep_scenario::suggestion;
 
-/// The maximum size of a model in bytes after unpacking: some 400 times the longest known.
+/// The maximum size of a model in bytes after decompression: some 400 times the longest known.
 pub const MAX_URDF_BYTES: u64 = 1 << 24;
 
 /// A tree of links connected by joints.
@@ -128,7 +128,7 @@ impl JointKind {
 }
 
 impl Model {
-    /// Reads the URDF file at `path`, plain or packed with gzip.
+    /// Reads the URDF file at `path`, plain or compressed with gzip.
     ///
     /// # Errors
     /// When the file cannot be read, is xacro, is not URDF, or does not describe a tree of links;
@@ -141,7 +141,7 @@ impl Model {
         Self::parse(&place, &read_text(path, MAX_URDF_BYTES)?)
     }
 
-    /// Reads the text of a URDF file, which errors call `place`.
+    /// Reads the text of a URDF file; `place` is its name in errors.
     ///
     /// # Errors
     /// Those of [`Model::load`], except for reading.

@@ -9,7 +9,7 @@ use sidestep_scenario::suggestion;
 pub(super) const XACRO_CAUSE: &str = "is xacro, macros that have to become URDF first";
 pub(super) const XACRO_REMEDY: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
 
-/// The names of joint types in files.
+/// The joint types by their names in files.
 const JOINT_KINDS: [(&str, JointKind); 6] = [
     ("fixed", JointKind::Fixed),
     ("revolute", JointKind::Revolute),
@@ -31,8 +31,8 @@ const MIN_AXIS: f64 = 1e-6;
 
 pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let file = XmlFile::parse(place, text).map_err(|error| {
-        let is_xacro = error.cause().contains("`xacro:`");
-        if is_xacro {
+        // A prefix that is declared nowhere: the file was meant to be read by xacro first.
+        if error.cause().contains("`xacro:`") {
             at_position_of(&error, InputError::new(place, XACRO_CAUSE, XACRO_REMEDY))
         } else {
             error
@@ -73,10 +73,10 @@ fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
         if element.namespace().is_some_and(|address| address.contains("xacro")) {
             return Err(element.error(XACRO_CAUSE, XACRO_REMEDY));
         }
-        let is_macro =
-            |value: &XmlAttribute| value.text().contains("${") || value.text().contains("$(");
-        if let Some(value) = element.attributes().find(is_macro) {
-            return Err(value.error(XACRO_CAUSE, XACRO_REMEDY));
+        for value in element.attributes() {
+            if value.text().contains("${") || value.text().contains("$(") {
+                return Err(value.error(XACRO_CAUSE, XACRO_REMEDY));
+            }
         }
     }
     Ok(())
@@ -89,8 +89,8 @@ struct Links {
 }
 
 impl Links {
-    /// Returns the link that an element's attribute `link` names.
-    fn named_in(&self, element: Element) -> Result<usize, InputError> {
+    /// Returns the link in an element's attribute `link`.
+    fn link_in_attribute(&self, element: Element) -> Result<usize, InputError> {
         let value = element.required("link")?;
         self.names.get(value.text()).ok_or_else(|| {
             let known: Vec<&str> = self.in_order.iter().map(String::as_str).collect();
@@ -121,24 +121,29 @@ fn links(robot: Element) -> Result<Links, InputError> {
 
 /// Reads the shapes of a link that count for collisions.
 fn collisions(link: Element) -> Result<Vec<Collision>, InputError> {
-    let read = |element: Element| {
+    let mut collisions = Vec::new();
+    for element in link.children("collision") {
         // Empty elements, and those of other programs, are no shapes.
-        let Some(kind) = element.child("geometry")?.and_then(Element::first_child) else {
-            return Ok(None);
-        };
-        Ok(Some(Collision { origin: origin(element)?, shape: shape(kind)? }))
-    };
-    link.children("collision").filter_map(|element| read(element).transpose()).collect()
+        if let Some(kind) = element.child("geometry")?.and_then(Element::first_child) {
+            collisions.push(Collision { origin: origin(element)?, shape: shape(kind)? });
+        }
+    }
+    Ok(collisions)
 }
 
 fn shape(element: Element) -> Result<Shape, InputError> {
-    let length = |name| size(element.required(name)?, |value| Ok([value.number()?; 3]));
     Ok(match element.name() {
-        "sphere" => Shape::Sphere { radius_m: length("radius")?[0] },
-        "cylinder" => {
-            Shape::Cylinder { radius_m: length("radius")?[0], length_m: length("length")?[0] }
+        "sphere" => Shape::Sphere { radius_m: length_m(element.required("radius")?)? },
+        "cylinder" => Shape::Cylinder {
+            radius_m: length_m(element.required("radius")?)?,
+            length_m: length_m(element.required("length")?)?,
+        },
+        "box" => {
+            let value = element.required("size")?;
+            let size_m = value.triple()?;
+            size_m.into_iter().try_for_each(|x| check_length(&value, x))?;
+            Shape::Box { size_m }
         }
-        "box" => Shape::Box { size_m: size(element.required("size")?, |value| value.triple())? },
         "mesh" => Shape::Mesh {
             file: element.required("filename")?.text().to_owned(),
             scale: element.attribute("scale").map_or(Ok([1.0; 3]), bounded)?,
@@ -147,19 +152,19 @@ fn shape(element: Element) -> Result<Shape, InputError> {
     })
 }
 
-/// Reads lengths that are not negative.
-fn size<'a>(
-    value: XmlAttribute<'a>,
-    read: impl Fn(&XmlAttribute<'a>) -> Result<[f64; 3], InputError>,
-) -> Result<[f64; 3], InputError> {
-    let lengths = read(&value)?;
-    match lengths.into_iter().find(|x| !(0.0..=MAX_COORDINATE).contains(x)) {
-        None => Ok(lengths),
-        Some(x) => {
-            let cause = format!("{x} m is no length");
-            Err(value.error(cause, format!("give meters from 0 to {MAX_COORDINATE:e}")))
-        }
+/// Reads a length, which is not negative.
+fn length_m(value: XmlAttribute) -> Result<f64, InputError> {
+    let length_m = value.number()?;
+    check_length(&value, length_m)?;
+    Ok(length_m)
+}
+
+fn check_length(value: &XmlAttribute, length_m: f64) -> Result<(), InputError> {
+    if (0.0..=MAX_COORDINATE).contains(&length_m) {
+        return Ok(());
     }
+    let cause = format!("{length_m} m is no length");
+    Err(value.error(cause, format!("give meters from 0 to {MAX_COORDINATE:e}")))
 }
 
 fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
@@ -168,8 +173,8 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
     Ok(Joint {
         name,
         kind,
-        parent: links.named_in(element.required_child("parent")?)?,
-        child: links.named_in(element.required_child("child")?)?,
+        parent: links.link_in_attribute(element.required_child("parent")?)?,
+        child: links.link_in_attribute(element.required_child("child")?)?,
         origin: origin(element)?,
         axis: axis(element, kind)?,
         limits: limits(element, kind)?,
@@ -179,8 +184,8 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
 }
 
 fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
-    let found = JOINT_KINDS.iter().find(|(name, _)| *name == value.text());
-    found.map(|(_, kind)| *kind).ok_or_else(|| {
+    let entry = JOINT_KINDS.iter().find(|(name, _)| *name == value.text());
+    entry.map(|(_, kind)| *kind).ok_or_else(|| {
         let cause = format!("there are no `{}` joints", value.text());
         value.error(cause, suggestion(value.text(), &JOINT_KINDS.map(|(name, _)| name)))
     })
@@ -194,19 +199,19 @@ fn origin(joint: Element) -> Result<Origin, InputError> {
 
 fn bounded(value: XmlAttribute) -> Result<[f64; 3], InputError> {
     let triple = value.triple()?;
-    triple.into_iter().try_for_each(|x| is_bounded(&value, x))?;
+    triple.into_iter().try_for_each(|x| check_bounded(&value, x))?;
     Ok(triple)
 }
 
 /// Reads one number of a robot's size.
 fn bounded_number(value: XmlAttribute) -> Result<f64, InputError> {
     let number = value.number()?;
-    is_bounded(&value, number)?;
+    check_bounded(&value, number)?;
     Ok(number)
 }
 
 /// Refuses a number that no robot has, at which lengths would be lost to rounding.
-fn is_bounded(value: &XmlAttribute, x: f64) -> Result<(), InputError> {
+fn check_bounded(value: &XmlAttribute, x: f64) -> Result<(), InputError> {
     if x.abs() <= MAX_COORDINATE {
         return Ok(());
     }
@@ -276,7 +281,7 @@ fn read_mimics(
         })?;
         if !joints[i].kind.has_one_value() || !joints[driver].kind.has_one_value() {
             let cause = "a joint that cannot move takes part in a mimicry";
-            return Err(value.error(cause, "name joints with one value each"));
+            return Err(value.error(cause, "give joints with one value each"));
         }
         let number = |name, default| element.attribute(name).map_or(Ok(default), bounded_number);
         joints[i].mimic = Some(Mimic {
@@ -285,9 +290,11 @@ fn read_mimics(
             offset: number("offset", 0.0)?,
         });
     }
-    let endless = (0..joints.len()).find(|&i| tree::has_mimic_cycle(joints, i));
-    endless.map_or(Ok(()), |i| {
-        let cause = format!("`{}` mimics itself in a circle", joints[i].name);
-        Err(elements[i].error(cause, "remove one <mimic> of the circle"))
-    })
+    for i in 0..joints.len() {
+        if tree::has_mimic_cycle(joints, i) {
+            let cause = format!("`{}` mimics itself in a circle", joints[i].name);
+            return Err(elements[i].error(cause, "remove one <mimic> of the circle"));
+        }
+    }
+    Ok(())
 }

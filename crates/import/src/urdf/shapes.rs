@@ -35,7 +35,7 @@ pub enum Shape {
     },
     /// A mesh in a file.
     Mesh {
-        /// The file as the model names it: a path, or `package://` or `file://`.
+        /// The file as the model refers to it: by a path, or by `package://` or `file://`.
         file: String,
         /// Factors of its coordinates, which are then in m.
         scale: [f64; 3],
@@ -52,9 +52,9 @@ pub enum Shape {
 pub struct Solid {
     /// Index of its link in [`Model::links`].
     pub link: usize,
-    /// The frame of the shape that the model gives, in the link's.
+    /// The frame of the model's shape, in the link's.
     pub origin: Origin,
-    /// Its center in that frame: zero but for the boxes of meshes.
+    /// Its center in that frame: zero except for the boxes of meshes.
     pub center_m: [f64; 3],
     /// The shape; never a mesh.
     pub shape: Shape,
@@ -71,45 +71,56 @@ pub struct Solids {
 
 impl Model {
     /// Returns the solids of all links. Meshes are replaced by their bounding boxes: STL files,
-    /// which are looked for beside `urdf`, the model's own file, and for `package://NAME/REST` in the
+    /// which are searched for next to `urdf`, the model's own file, and for `package://NAME/REST` in the
     /// folders above it. A mesh that cannot be read is left out with a remark.
     pub fn solids(&self, urdf: &Path) -> Solids {
-        let mut found = Solids::default();
-        let (mut boxes, mut lost) = (0, Vec::new());
+        let mut solids = Vec::new();
+        let mut mesh_boxes = 0;
+        let mut left_out = Vec::new();
         for (link, shapes) in self.collisions.iter().enumerate() {
             for Collision { origin, shape } in shapes {
-                let (shape, center_m) = match shape {
+                let mut center_m = [0.0; 3];
+                let mut shape = shape.clone();
+                match &shape {
                     Shape::Mesh { file, scale } => match mesh_box(urdf, file, *scale) {
-                        Ok(found) => {
-                            boxes += 1;
-                            found
+                        Ok(mesh_box) => {
+                            mesh_boxes += 1;
+                            center_m = mesh_box.center_m;
+                            shape = Shape::Box { size_m: mesh_box.size_m };
                         }
-                        Err(why) => {
-                            lost.push(format!("`{}` ({file}: {why})", self.links[link]));
+                        Err(reason) => {
+                            left_out.push(format!("`{}` ({file}: {reason})", self.links[link]));
                             continue;
                         }
                     },
                     Shape::Other { kind } => {
-                        lost.push(format!("`{}` (a {kind} is not read)", self.links[link]));
+                        left_out.push(format!("`{}` (a {kind} is not read)", self.links[link]));
                         continue;
                     }
-                    solid => (solid.clone(), [0.0; 3]),
-                };
-                found.solids.push(Solid { link, origin: *origin, center_m, shape });
+                    Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Box { .. } => {}
+                }
+                solids.push(Solid { link, origin: *origin, center_m, shape });
             }
         }
-        if boxes > 0 {
-            found.remarks.push(format!("meshes stand as their bounding boxes: {boxes}"));
+        let mut remarks = Vec::new();
+        if mesh_boxes > 0 {
+            remarks.push(format!("meshes stand as their bounding boxes: {mesh_boxes}"));
         }
-        if !lost.is_empty() {
-            found.remarks.push(format!("shapes that are left out: {}", lost.join(", ")));
+        if !left_out.is_empty() {
+            remarks.push(format!("shapes that are left out: {}", left_out.join(", ")));
         }
-        found
+        Solids { solids, remarks }
     }
 }
 
-/// Returns the bounding box of a mesh and its center, or the reason why there is none.
-fn mesh_box(urdf: &Path, file: &str, scale: [f64; 3]) -> Result<(Shape, [f64; 3]), String> {
+/// The bounding box of a mesh.
+struct MeshBox {
+    size_m: [f64; 3],
+    center_m: [f64; 3],
+}
+
+/// Returns the bounding box of a mesh, or the reason why there is none.
+fn mesh_box(urdf: &Path, file: &str, scale: [f64; 3]) -> Result<MeshBox, String> {
     let is_stl = Path::new(file.trim_end_matches(".gz"))
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("stl"));
@@ -119,22 +130,26 @@ fn mesh_box(urdf: &Path, file: &str, scale: [f64; 3]) -> Result<(Shape, [f64; 3]
     let path = find_mesh(urdf, file).ok_or("the file is absent")?;
     let [low, high] = stl::read_bounds(&path).map_err(|error| error.cause().to_owned())?;
     let ends = [0, 1, 2].map(|i| [low[i] * scale[i], high[i] * scale[i]]);
+    // A negative factor mirrors the mesh, and so swaps the ends.
     let size_m = ends.map(|[a, b]| (b - a).abs());
-    Ok((Shape::Box { size_m }, ends.map(|[a, b]| 0.5 * (a + b))))
+    let center_m = ends.map(|[a, b]| 0.5 * (a + b));
+    Ok(MeshBox { size_m, center_m })
 }
 
-/// Returns the path of a mesh that a model names, if it exists.
+/// Returns the path of a mesh of a model, if it exists.
 fn find_mesh(urdf: &Path, file: &str) -> Option<PathBuf> {
     let folder = urdf.parent().unwrap_or(Path::new(""));
-    let is_there = |path: &PathBuf| path.is_file();
     if let Some(path) = file.strip_prefix("file://") {
-        return Some(PathBuf::from(path)).filter(is_there);
+        return Some(PathBuf::from(path)).filter(|path| path.is_file());
     }
-    let Some(named) = file.strip_prefix("package://") else {
-        return Some(folder.join(file)).filter(is_there);
+    let Some(package_path) = file.strip_prefix("package://") else {
+        return Some(folder.join(file)).filter(|path| path.is_file());
     };
-    // The package is a folder above the model, or stands beside one.
-    let rest = named.split_once('/').map_or("", |(_, rest)| rest);
+    // There is no index of packages without ROS: the package is a folder above the model, or a neighbor of one.
+    let path_in_package = package_path.split_once('/').map_or("", |(_, rest)| rest);
     let folder = std::path::absolute(folder).ok()?;
-    folder.ancestors().flat_map(|above| [above.join(named), above.join(rest)]).find(is_there)
+    folder
+        .ancestors()
+        .flat_map(|above| [above.join(package_path), above.join(path_in_package)])
+        .find(|path| path.is_file())
 }

@@ -69,16 +69,16 @@ pub struct DisabledCollision {
 }
 
 impl Semantics {
-    /// Reads the SRDF file at `path` for `model`, plain or packed with gzip.
+    /// Reads the SRDF file at `path` for `model`, plain or compressed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, is not SRDF, or names a link, joint or group that does not
+    /// When the file cannot be read, is not SRDF, or refers to a link, joint or group that does not
     /// exist; with file, line, column and the nearest name.
     pub fn load(path: &Path, model: &Model) -> Result<Self, InputError> {
         Self::parse(&path.display().to_string(), &read_text(path, MAX_URDF_BYTES)?, model)
     }
 
-    /// Reads the text of an SRDF file, which errors call `place`.
+    /// Reads the text of an SRDF file; `place` is its name in errors.
     ///
     /// # Errors
     /// Those of [`Semantics::load`], except for reading.
@@ -87,29 +87,29 @@ impl Semantics {
         let reader = SrdfReader { robot: file.root("robot")?, model };
         let groups = reader.groups()?;
         Ok(Self {
-            postures: reader.each("group_state", |e| reader.posture(e, &groups))?,
-            end_effectors: reader.each("end_effector", |e| reader.end_effector(e))?,
-            disabled_collisions: reader.each("disable_collisions", |e| reader.disabled(e))?,
+            postures: reader.read_all("group_state", |e| reader.posture(e, &groups))?,
+            end_effectors: reader.read_all("end_effector", |e| reader.end_effector(e))?,
+            disabled_collisions: reader.read_all("disable_collisions", |e| reader.disabled(e))?,
             groups,
         })
     }
 
     /// Returns the values of all postures called `name`; later ones replace earlier ones. `place`
-    /// is the option that names it.
+    /// is the option with the name.
     ///
     /// # Errors
     /// When there is none; the error lists the existing names.
     pub fn posture(&self, place: &str, name: &str) -> Result<Vec<(usize, f64)>, InputError> {
-        let named: Vec<_> = self.postures.iter().filter(|p| p.name == name).collect();
-        if named.is_empty() {
+        let postures: Vec<_> = self.postures.iter().filter(|p| p.name == name).collect();
+        if postures.is_empty() {
             let known: Vec<&str> = self.postures.iter().map(|p| p.name.as_str()).collect();
             let cause = format!("there is no posture `{name}`");
             return Err(InputError::new(place, cause, suggestion(name, &known)));
         }
-        Ok(named.iter().flat_map(|posture| posture.values.iter().copied()).collect())
+        Ok(postures.iter().flat_map(|posture| posture.values.iter().copied()).collect())
     }
 
-    /// Returns the group called `name`. `place` is the option that names it.
+    /// Returns the group called `name`. `place` is the option with the name.
     ///
     /// # Errors
     /// When there is none; the error suggests the nearest name.
@@ -121,8 +121,8 @@ impl Semantics {
     }
 
     /// Returns the first and the last link of the group `name`: those of its chain, or the ends of
-    /// the path on which its joints and those of its subgroups lie. `place` is the option that
-    /// names it.
+    /// the path on which its joints and those of its subgroups lie. `place` is the option with the
+    /// name.
     ///
     /// # Errors
     /// When there is no such group, or it is not a single path.
@@ -137,7 +137,7 @@ impl Semantics {
         }
         let mut names = vec![name];
         let mut joints = Vec::new();
-        // Groups that name each other in a circle are each visited once.
+        // Breadth first, with the list as the queue; groups that contain each other are each visited once.
         let mut next = 0;
         while let Some(name) = names.get(next) {
             let group = self.group(place, name)?;
@@ -152,21 +152,24 @@ impl Semantics {
             next += 1;
         }
         path_ends(&joints, model).ok_or_else(|| {
-            let cause = format!("the joints of group `{name}` do not lie on one way");
-            InputError::new(place, cause, "name base and tip with --base and --tip")
+            let cause = format!("the joints of group `{name}` are not on one path");
+            InputError::new(place, cause, "give base and tip with --base and --tip")
         })
     }
 }
 
 /// Returns the ends of the path that holds all of these joints.
 fn path_ends(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
-    let depth =
-        |&joint: &usize| model.joint_path(model.root, model.joints[joint].child).map(|w| w.len());
-    let first = *joints.iter().min_by_key(|j| depth(j))?;
-    let last = *joints.iter().max_by_key(|j| depth(j))?;
-    let (base, tip) = (model.joints[first].parent, model.joints[last].child);
-    let way = model.joint_path(base, tip)?;
-    joints.iter().all(|joint| way.contains(joint)).then_some((base, tip))
+    let depth = |joint: usize| {
+        let path = model.joint_path(model.root, model.joints[joint].child);
+        path.map(|path| path.len())
+    };
+    let first = *joints.iter().min_by_key(|joint| depth(**joint))?;
+    let last = *joints.iter().max_by_key(|joint| depth(**joint))?;
+    let base = model.joints[first].parent;
+    let tip = model.joints[last].child;
+    let path = model.joint_path(base, tip)?;
+    joints.iter().all(|joint| path.contains(joint)).then_some((base, tip))
 }
 
 struct SrdfReader<'a> {
@@ -176,7 +179,7 @@ struct SrdfReader<'a> {
 
 impl<'a> SrdfReader<'a> {
     /// Returns the result of `read` for each element called `name`.
-    fn each<T>(
+    fn read_all<T>(
         &self,
         name: &'a str,
         read: impl Fn(Element<'a>) -> Result<T, InputError>,
@@ -185,7 +188,7 @@ impl<'a> SrdfReader<'a> {
     }
 
     fn groups(&self) -> Result<Vec<Group>, InputError> {
-        let groups = self.each("group", |element| self.group(element))?;
+        let groups = self.read_all("group", |element| self.group(element))?;
         for (i, element) in self.robot.children("group").enumerate() {
             if groups[..i].iter().any(|earlier| earlier.name == groups[i].name) {
                 let cause = format!("a second group `{}`", groups[i].name);
@@ -199,18 +202,26 @@ impl<'a> SrdfReader<'a> {
     }
 
     fn group(&self, element: Element<'a>) -> Result<Group, InputError> {
-        let of_model = |name, found: fn(&Self, XmlAttribute) -> Result<usize, InputError>| {
-            let named = element.children(name).map(|e| found(self, e.required("name")?));
-            named.collect::<Result<Vec<usize>, InputError>>()
-        };
-        let names = element.children("group").map(|e| Ok(e.required("name")?.text().to_owned()));
-        Ok(Group {
+        let mut group = Group {
             name: element.required("name")?.text().to_owned(),
-            joints: of_model("joint", Self::joint)?,
-            links: of_model("link", Self::link)?,
-            chains: element.children("chain").map(|e| self.chain(e)).collect::<Result<_, _>>()?,
-            groups: names.collect::<Result<_, InputError>>()?,
-        })
+            joints: Vec::new(),
+            links: Vec::new(),
+            chains: Vec::new(),
+            groups: Vec::new(),
+        };
+        for joint in element.children("joint") {
+            group.joints.push(self.joint(joint.required("name")?)?);
+        }
+        for link in element.children("link") {
+            group.links.push(self.link(link.required("name")?)?);
+        }
+        for chain in element.children("chain") {
+            group.chains.push(self.chain(chain)?);
+        }
+        for part in element.children("group") {
+            group.groups.push(part.required("name")?.text().to_owned());
+        }
+        Ok(group)
     }
 
     fn chain(&self, element: Element<'a>) -> Result<(usize, usize), InputError> {
@@ -228,22 +239,24 @@ impl<'a> SrdfReader<'a> {
     fn posture(&self, element: Element<'a>, groups: &[Group]) -> Result<NamedPosture, InputError> {
         let group = element.required("group")?;
         known_group(group, groups)?;
-        // The model has no virtual joints, so their values are left out.
-        let values = element.children("joint").filter(|joint| !self.is_virtual(*joint));
-        let value = |joint: Element<'a>| {
-            Ok((self.joint(joint.required("name")?)?, joint.required("value")?.number()?))
-        };
-        Ok(NamedPosture {
-            name: element.required("name")?.text().to_owned(),
-            group: group.text().to_owned(),
-            values: values.map(value).collect::<Result<_, InputError>>()?,
-        })
+        let name = element.required("name")?.text().to_owned();
+        let mut values = Vec::new();
+        for joint in element.children("joint") {
+            // The model has no virtual joints, so their values are left out.
+            if !self.is_virtual(joint) {
+                let index = self.joint(joint.required("name")?)?;
+                values.push((index, joint.required("value")?.number()?));
+            }
+        }
+        Ok(NamedPosture { name, group: group.text().to_owned(), values })
     }
 
     /// Returns whether a joint exists in the SRDF only, and places the robot in the world.
     fn is_virtual(&self, joint: Element<'a>) -> bool {
-        let name = |e: Element<'a>| e.attribute("name").map(|value| value.text());
-        self.robot.children("virtual_joint").any(|v| name(v).is_some() && name(v) == name(joint))
+        let Some(name) = joint.attribute("name") else { return false };
+        self.robot.children("virtual_joint").any(|virtual_joint| {
+            virtual_joint.attribute("name").is_some_and(|other| other.text() == name.text())
+        })
     }
 
     fn end_effector(&self, element: Element<'a>) -> Result<EndEffector, InputError> {
@@ -255,21 +268,22 @@ impl<'a> SrdfReader<'a> {
     }
 
     fn disabled(&self, element: Element<'a>) -> Result<DisabledCollision, InputError> {
-        let link = |name| self.link(element.required(name)?);
+        let first = self.link(element.required("link1")?)?;
+        let second = self.link(element.required("link2")?)?;
         Ok(DisabledCollision {
-            links: (link("link1")?, link("link2")?),
+            links: (first, second),
             reason: element.attribute("reason").map_or("", |v| v.text()).to_owned(),
         })
     }
 
     fn link(&self, value: XmlAttribute) -> Result<usize, InputError> {
-        let found = self.model.link("", value.text());
-        found.map_err(|error| value.error(error.cause(), error.remedy()))
+        let link = self.model.link("", value.text());
+        link.map_err(|error| value.error(error.cause(), error.remedy()))
     }
 
     fn joint(&self, value: XmlAttribute) -> Result<usize, InputError> {
-        let found = self.model.joint("", value.text());
-        found.map_err(|error| value.error(error.cause(), error.remedy()))
+        let joint = self.model.joint("", value.text());
+        joint.map_err(|error| value.error(error.cause(), error.remedy()))
     }
 }
 

@@ -1,27 +1,29 @@
-//! The tip of an arm with a file that does not say which link it is.
+//! The tip of an arm whose file does not give it.
 
 use super::Model;
 
 impl Model {
-    /// Returns the link that is the tip unless one is named: the leaf with the most moving joints on its
-    /// path from the root, of several the first in the file. Where that leaf is a finger, it is the hand
-    /// that carries the fingers, or the one frame that is fixed to the hand and carries nothing.
+    /// Returns the link that is the tip unless another is given: the leaf with the most movable joints on its
+    /// path from the root, of several the first in the file. If that leaf is a finger, it is the hand
+    /// that carries the fingers, or the only frame that is fixed to the hand and carries nothing.
     pub fn default_tip(&self) -> usize {
         let leaf = self.farthest_leaf();
-        let way = self.path_to(leaf);
-        let hand = (0..way.len()).find_map(|k| self.hand(&way, k));
+        let path = self.path_to(leaf);
+        let hand = (0..path.len()).find_map(|k| self.hand(&path, k));
         hand.map_or(leaf, |hand| self.tool_frame(hand))
     }
 
     fn farthest_leaf(&self) -> usize {
-        let mut best = (self.root, 0);
+        let mut best = self.root;
+        let mut best_count = 0;
         for leaf in self.leaves() {
             let count = self.movable_joints(&self.path_to(leaf));
-            if count > best.1 || best.0 == self.root {
-                best = (leaf, count);
+            if count > best_count || best == self.root {
+                best = leaf;
+                best_count = count;
             }
         }
-        best.0
+        best
     }
 
     fn path_to(&self, link: usize) -> Vec<usize> {
@@ -32,26 +34,27 @@ impl Model {
         self.joints[joint].kind.has_one_value()
     }
 
-    fn movable_joints(&self, way: &[usize]) -> usize {
-        way.iter().filter(|&&joint| self.is_movable(joint)).count()
+    fn movable_joints(&self, path: &[usize]) -> usize {
+        path.iter().filter(|&&joint| self.is_movable(joint)).count()
     }
 
-    /// Returns the link from which joint `way[k]` goes out, if that is a finger's: it moves, other joints
-    /// move on the same body, and none of these branches has as many joints as there are before.
-    fn hand(&self, way: &[usize], k: usize) -> Option<usize> {
-        let before = self.movable_joints(&way[..k]);
-        let hand = self.joints[way[k]].parent;
+    /// Returns the parent link of joint `path[k]`, if that joint is a finger's: it moves, other joints
+    /// move on the same rigid body, and none of these branches has as many movable joints as there are before. A torso
+    /// with two arms branches too, but its arms are longer than what carries them.
+    fn hand(&self, path: &[usize], k: usize) -> Option<usize> {
+        let joints_before = self.movable_joints(&path[..k]);
+        let hand = self.joints[path[k]].parent;
         let body = self.rigid_links(hand);
-        let goes_out = |joint: &usize| self.is_movable(*joint) && body[self.joints[*joint].parent];
-        let fingers = (0..self.joints.len()).filter(goes_out).count();
-        let beyond = |leaf: usize| {
-            let way = self.path_to(leaf);
-            way.iter()
-                .position(|&joint| goes_out(&joint))
-                .map_or(0, |at| self.movable_joints(&way[at..]))
-        };
-        let longest = self.leaves().into_iter().map(beyond).max().unwrap_or(0);
-        (goes_out(&way[k]) && fingers > 1 && longest < before).then_some(hand)
+        let is_branch = |joint: usize| self.is_movable(joint) && body[self.joints[joint].parent];
+        let branches = (0..self.joints.len()).filter(|joint| is_branch(*joint)).count();
+        let mut longest = 0;
+        for leaf in self.leaves() {
+            let path = self.path_to(leaf);
+            if let Some(start) = path.iter().position(|joint| is_branch(*joint)) {
+                longest = longest.max(self.movable_joints(&path[start..]));
+            }
+        }
+        (is_branch(path[k]) && branches > 1 && longest < joints_before).then_some(hand)
     }
 
     /// Returns for each link whether it is rigid to `link`.

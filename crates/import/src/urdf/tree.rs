@@ -27,9 +27,10 @@ impl Names {
     }
 }
 
-/// Returns whether following the mimicry from `joint` never ends.
+/// Returns whether the mimicry of `joint` is a cycle.
 pub(super) fn has_mimic_cycle(joints: &[Joint], joint: usize) -> bool {
     let mut next = joint;
+    // A chain without a cycle has each joint at most once.
     for _ in 0..=joints.len() {
         match &joints[next].mimic {
             None => return false,
@@ -121,15 +122,15 @@ impl Model {
         for (i, joint) in self.joints.iter().enumerate() {
             above[joint.child] = Some(i);
         }
-        let mut way = Vec::new();
+        let mut path = Vec::new();
         let mut link = tip;
         while link != base {
             let joint = above[link]?;
-            way.push(joint);
+            path.push(joint);
             link = self.joints[joint].parent;
         }
-        way.reverse();
-        Some(way)
+        path.reverse();
+        Some(path)
     }
 
     /// Returns the links that carry no other, in the order of the file.

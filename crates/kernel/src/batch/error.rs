@@ -16,7 +16,7 @@ pub enum BatchError {
     Count {
         /// Number of worlds.
         worlds: usize,
-        /// The noun for the values.
+        /// The plural noun for the values, e.g. `seeds`.
         what: &'static str,
         /// Number of values.
         found: usize,
@@ -45,10 +45,10 @@ pub enum BatchError {
         /// The reason.
         error: OrderError,
     },
-    /// A missing team, or room of another shape.
+    /// A missing team, or buffers of another shape.
     #[error(transparent)]
     Observe(#[from] OrderError),
-    /// A world that broke off: it has no state until it is restarted.
+    /// A world that panicked: it has no state until it is restarted.
     #[error(
         "world {world} (seed {seed}) broke off after cycle {cycle}, which is a bug: {cause}; the other worlds \
          are whole, restart this one"

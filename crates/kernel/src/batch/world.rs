@@ -9,23 +9,25 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// One of the worlds.
 pub(super) struct BatchWorld {
     pub(super) seed: u64,
-    /// `None` for one that broke off, or never started.
+    /// `None` if it panicked, or never started.
     pub(super) run: Option<Box<dyn Simulation>>,
     /// Its error, until it is returned to the caller.
     pub(super) error: Option<BatchError>,
-    /// Observations of its agents, for the caller to take.
-    room: Vec<ObservationBuffer>,
-    has_observed: bool,
+    /// Observations of its agents, filled on a thread that cannot borrow the caller's buffers. Kept between calls,
+    /// because a batch is observed after every step.
+    buffers: Vec<ObservationBuffer>,
+    /// Whether the buffers hold observations that were not copied to the caller yet.
+    has_observations: bool,
 }
 
-/// The values of one space: what they are, and how many.
+/// Type and number of one world's values in one space.
 #[derive(Clone, Copy)]
 pub(super) struct BufferLayout {
     pub(super) is_integer: bool,
     pub(super) length: usize,
 }
 
-/// Values of one space.
+/// One world's values in one space.
 enum ObservationBuffer {
     Integer(Vec<i64>),
     Real(Vec<f64>),
@@ -34,7 +36,12 @@ enum ObservationBuffer {
 impl BatchWorld {
     /// Returns a world that has not started.
     pub(super) fn new(seed: u64) -> Self {
-        Self { seed, run: None, error: None, room: Vec::new(), has_observed: false }
+        Self { seed, run: None, error: None, buffers: Vec::new(), has_observations: false }
+    }
+
+    /// Returns the teams of its agents; none without a run.
+    pub(super) fn teams(&self) -> &[Team] {
+        self.run.as_ref().map_or(&[], |run| run.teams())
     }
 
     /// Returns the error of a world without a run.
@@ -60,63 +67,74 @@ impl BatchWorld {
             Ok(Err(error)) => self.error = Some(BatchError::Order { world: index, error }),
             Err(payload) => {
                 self.run = None;
-                let (seed, cause) = (self.seed, panic_message(&*payload));
-                self.error = Some(BatchError::Broken { world: index, seed, cycle, cause });
+                self.error = Some(BatchError::Broken {
+                    world: index,
+                    seed: self.seed,
+                    cycle,
+                    cause: panic_message(&*payload),
+                });
             }
         }
     }
 
-    /// Starts the world again; it stays the same if that fails.
+    /// Starts the world again; it stays the same if that fails. `teams`, if given, are those that it must have.
     pub(super) fn restart(
         &mut self,
         index: usize,
         seed: u64,
-        start: &SimulationFactory,
+        factory: &SimulationFactory,
         teams: Option<&[Team]>,
     ) {
-        let started = catch_unwind(AssertUnwindSafe(|| start(seed)));
-        let refused = match started {
+        let started = catch_unwind(AssertUnwindSafe(|| factory(seed)));
+        let error = match started {
             Ok(Ok(run)) if teams.is_some_and(|teams| *run.teams() != *teams) => {
                 BatchError::Shape { world: index }
             }
             Ok(Ok(run)) => {
-                (self.run, self.seed, self.error) = (Some(run), seed, None);
+                self.run = Some(run);
+                self.seed = seed;
+                self.error = None;
                 return;
             }
             Ok(Err(error)) => BatchError::Start { world: index, seed, error },
             Err(payload) => {
-                let (cycle, cause) = (0, panic_message(&*payload));
                 self.run = None;
-                BatchError::Broken { world: index, seed, cycle, cause }
+                let cause = panic_message(&*payload);
+                BatchError::Broken { world: index, seed, cycle: 0, cause }
             }
         };
         // For a broken world this replaces the older reason, which the restart did not fix.
-        self.error = Some(refused);
+        self.error = Some(error);
     }
 
-    /// Observes into its own room.
-    pub(super) fn observe(&mut self, index: usize, team: usize, spaces: &[BufferLayout]) {
-        let mut room = std::mem::take(&mut self.room);
-        if room.len() != spaces.len() || !room.iter().zip(spaces).all(|(room, &s)| room.fits(s)) {
-            room = spaces.iter().map(|&space| ObservationBuffer::new(space)).collect();
+    /// Observes into its own buffers.
+    pub(super) fn observe(&mut self, index: usize, team: usize, layouts: &[BufferLayout]) {
+        let mut buffers = std::mem::take(&mut self.buffers);
+        let fits = buffers.len() == layouts.len()
+            && buffers.iter().zip(layouts).all(|(buffer, &layout)| buffer.fits(layout));
+        // Another team than in the call before.
+        if !fits {
+            buffers = layouts.iter().map(|&layout| ObservationBuffer::new(layout)).collect();
         }
-        let mut cells: Vec<BufferMut<'_>> =
-            room.iter_mut().map(ObservationBuffer::as_mut).collect();
-        self.with_run(index, |run| run.observe(team, &mut cells));
-        (self.room, self.has_observed) = (room, true);
+        let mut borrowed: Vec<BufferMut<'_>> =
+            buffers.iter_mut().map(ObservationBuffer::as_mut).collect();
+        self.with_run(index, |run| run.observe(team, &mut borrowed));
+        self.buffers = buffers;
+        self.has_observations = true;
     }
 
-    /// Copies its observations into its part of the caller's room.
-    pub(super) fn copy_observations(&mut self, parts: &mut [BufferMut<'_>]) {
-        if !std::mem::take(&mut self.has_observed) {
+    /// Copies its observations into its part of the caller's buffers, if it was observed into its own.
+    pub(super) fn copy_observations(&mut self, slices: &mut [BufferMut<'_>]) {
+        if !std::mem::take(&mut self.has_observations) {
             return;
         }
-        for (from, to) in self.room.iter().zip(parts) {
+        for (from, to) in self.buffers.iter().zip(slices) {
             match (from, to) {
                 (ObservationBuffer::Integer(from), BufferMut::Integer(to)) => {
                     to.copy_from_slice(from)
                 }
                 (ObservationBuffer::Real(from), BufferMut::Real(to)) => to.copy_from_slice(from),
+                // `Batch::check_buffers` has compared the types.
                 _ => {}
             }
         }
@@ -124,31 +142,36 @@ impl BatchWorld {
 }
 
 impl ObservationBuffer {
-    fn new(space: BufferLayout) -> Self {
-        match space.is_integer {
-            true => Self::Integer(vec![0; space.length]),
-            false => Self::Real(vec![0.0; space.length]),
+    fn new(layout: BufferLayout) -> Self {
+        if layout.is_integer {
+            Self::Integer(vec![0; layout.length])
+        } else {
+            Self::Real(vec![0.0; layout.length])
         }
     }
 
-    fn fits(&self, space: BufferLayout) -> bool {
+    fn fits(&self, layout: BufferLayout) -> bool {
         match self {
-            Self::Integer(cells) => space.is_integer && cells.len() == space.length,
-            Self::Real(cells) => !space.is_integer && cells.len() == space.length,
+            Self::Integer(values) => layout.is_integer && values.len() == layout.length,
+            Self::Real(values) => !layout.is_integer && values.len() == layout.length,
         }
     }
 
     fn as_mut(&mut self) -> BufferMut<'_> {
         match self {
-            Self::Integer(cells) => BufferMut::Integer(cells),
-            Self::Real(cells) => BufferMut::Real(cells),
+            Self::Integer(values) => BufferMut::Integer(values),
+            Self::Real(values) => BufferMut::Real(values),
         }
     }
 }
 
-/// Returns the message of a panic.
+/// Returns the message of a panic: `panic!` carries a `&str` or, with arguments, a `String`.
 fn panic_message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_string());
-    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "without a message".into())
+    if let Some(text) = payload.downcast_ref::<&str>() {
+        (*text).to_string()
+    } else if let Some(text) = payload.downcast_ref::<String>() {
+        text.clone()
+    } else {
+        "without a message".into()
+    }
 }

@@ -1,4 +1,4 @@
-//! Controls that were handed over, as rows of a table, and controls to be handed over again.
+//! Controls of agents that decide outside of the run: recorded as rows of a table, and read back to be replayed.
 
 use crate::ports::{MemoryRecorder, Table, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 
 /// Name of the table of controls.
 const CONTROLS: &str = "controls";
-/// Number of bytes in a row.
+/// Number of bytes in a row: tables have no type for bytes, and 64-bit integers are their widest.
 const ROW_BYTES: usize = 8;
 
-/// A part of a control, as recorded. A cycle that was decided outside begins with a row of no agent, so that one
-/// without any control is distinguished from one that was not decided outside.
+/// A part of a control, as recorded. A cycle that was decided externally begins with a row of no agent, so that one
+/// without any control is distinguished from one in which the agents decided within the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ControlRow {
     cycle: Cycle,
@@ -35,17 +35,24 @@ pub(crate) fn control_rows(
     cycle: Cycle,
     controls: &[(EntityId, Vec<u8>)],
 ) -> impl Iterator<Item = ControlRow> + '_ {
-    let begins = ControlRow { cycle, agent: None, part: 0, bytes: 0, value: 0 };
+    let first = ControlRow { cycle, agent: None, part: 0, bytes: 0, value: 0 };
     let rows = controls.iter().flat_map(move |(agent, bytes)| {
-        let part = move |(part, bytes): (u32, &[u8])| {
-            let mut value = [0; ROW_BYTES];
-            value[..bytes.len()].copy_from_slice(bytes);
-            let (agent, value) = (Some(*agent), u64::from_le_bytes(value));
-            ControlRow { cycle, agent, part, bytes: bytes.len() as u32, value }
-        };
-        (0..).zip(bytes.chunks(ROW_BYTES)).map(part)
+        (0..).zip(bytes.chunks(ROW_BYTES)).map(move |(part, bytes)| ControlRow {
+            cycle,
+            agent: Some(*agent),
+            part,
+            bytes: bytes.len() as u32,
+            value: pack_bytes(bytes),
+        })
     });
-    std::iter::once(begins).chain(rows)
+    std::iter::once(first).chain(rows)
+}
+
+/// Returns up to [`ROW_BYTES`] bytes as one number, the first byte lowest.
+fn pack_bytes(bytes: &[u8]) -> u64 {
+    let mut value = [0; ROW_BYTES];
+    value[..bytes.len()].copy_from_slice(bytes);
+    u64::from_le_bytes(value)
 }
 
 /// Controls by the cycle for which they were handed over.
@@ -55,22 +62,22 @@ pub struct ControlLog {
 }
 
 impl ControlLog {
-    /// Notes the controls of agents in a cycle, after those already noted for it.
+    /// Adds the controls of agents in a cycle, after those that it has already.
     pub fn add(&mut self, cycle: Cycle, controls: impl IntoIterator<Item = (EntityId, Vec<u8>)>) {
         self.cycles.entry(cycle).or_default().extend(controls);
     }
 
-    /// Returns whether the book has no cycle that was decided outside.
+    /// Returns whether no cycle was decided externally.
     pub fn is_empty(&self) -> bool {
         self.cycles.is_empty()
     }
 
-    /// Returns the controls of agents in a cycle, if it was decided outside.
+    /// Returns the controls of agents in a cycle, if it was decided externally.
     pub fn get(&self, cycle: Cycle) -> Option<&[(EntityId, Vec<u8>)]> {
         self.cycles.get(&cycle).map(Vec::as_slice)
     }
 
-    /// Returns the first cycle after `cycle` that was decided outside.
+    /// Returns the first cycle after `cycle` that was decided externally.
     pub(crate) fn next_after(&self, cycle: Cycle) -> Option<Cycle> {
         self.cycles.range(cycle.saturating_add(1)..).next().map(|(cycle, _)| *cycle)
     }
@@ -108,14 +115,15 @@ impl ControlReader {
         let Values::U64(values) = column("value")? else { return None };
         for row in 0..cycles.len() {
             let controls = self.log.cycles.entry(*cycles.get(row)?).or_default();
+            // The row that only begins an externally decided cycle.
             let Some(&agent) = agents.get(row) else { continue };
             let value = values.get(row)?.to_le_bytes();
             let bytes = value.get(..*bytes.get(row)? as usize)?;
             if *parts.get(row)? == 0 {
                 controls.push((agent, Vec::new()));
             }
-            let (of, control) = controls.last_mut()?;
-            if *of != agent {
+            let (last_agent, control) = controls.last_mut()?;
+            if *last_agent != agent {
                 return None;
             }
             control.extend_from_slice(bytes);

@@ -1,22 +1,22 @@
-//! Decisions from outside: the observations of agents, and the orders that a caller gives them.
+//! External control: the observations of agents, and the orders that a caller gives them.
 //!
 //! ```text
 //! teams() ──> Space, Space, ...           inputs and outputs of all agents that are alike
 //! observe(team) ──> one array per space   of the frozen state, before a cycle
-//! order(agents, values)                   checked, noted in the state, recorded in the table `orders`
-//! follow(OrderBook)                       the same orders again, each before its cycle
+//! order(agents, values)                   checked, written to the state, recorded in the table `orders`
+//! replay_orders(OrderLog)                 the same orders again, each before its cycle
 //! ```
 //!
-//! Alternatively, agents decide elsewhere altogether, each with a program of its own; their action in a cycle is then
-//! a message that only their world understands:
+//! Alternatively, agents decide in processes of their own; their action in a cycle is then a message that only their
+//! world understands:
 //!
 //! ```text
-//! hand_over(agents, bytes)                checked, noted in the state, recorded in the table `controls`
-//! retrace(ControlBook)                    the same controls again, each before its cycle
+//! submit_controls(agents, bytes)          checked, written to the state, recorded in the table `controls`
+//! replay_controls(ControlLog)             the same controls again, each before its cycle
 //! ```
 //!
-//! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. A run
-//! that was decided from outside is therefore a function of its scenario, its seed and its tables `orders` and `controls`.
+//! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. An externally
+//! controlled run is therefore a function of its scenario, its seed and its tables `orders` and `controls`.
 
 mod controls;
 mod error;

@@ -1,4 +1,4 @@
-//! Orders that were given, as rows of a table, and orders to be given again.
+//! Orders to agents: recorded as rows of a table, and kept in order to be replayed.
 
 use super::team::Orders;
 use crate::ports::Table;
@@ -32,8 +32,12 @@ pub(crate) fn orders_table(names: Vec<String>) -> Table<OrderRow> {
 }
 
 /// Orders by the cycle before which each is given; those of one cycle stay in their order.
+///
+/// The agents and values of all entries lie in two long vectors, because a policy orders every agent before every
+/// cycle: an entry of its own vectors each would be two allocations for a few numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OrderLog {
+    /// In the order of their cycles.
     entries: Vec<OrderEntry>,
     agents: Vec<EntityId>,
     values: Vec<f64>,
@@ -49,24 +53,26 @@ struct OrderEntry {
 }
 
 impl OrderLog {
-    /// Notes orders that are given before a cycle, after those of the same cycle.
+    /// Adds orders that are given before a cycle, after those of the same cycle.
     pub fn add(&mut self, cycle: Cycle, orders: &Orders<'_>) {
-        let (agents, values) = (self.agents.len(), self.values.len());
-        self.agents.extend_from_slice(orders.agents);
-        self.values.extend_from_slice(orders.values);
-        let (agents, values) = (agents..self.agents.len(), values..self.values.len());
+        let agents = append(&mut self.agents, orders.agents);
+        let values = append(&mut self.values, orders.values);
+        // Recorded orders come back agent by agent: joining them restores the one order to all of them, which is
+        // checked and given at once.
         if let Some(last) = self.entries.last_mut()
             && last.agents.end == agents.start
             && last.can_extend_with(cycle, orders)
         {
-            (last.agents.end, last.values.end) = (agents.end, values.end);
+            last.agents.end = agents.end;
+            last.values.end = values.end;
             return;
         }
-        let at = self.entries.partition_point(|entry| entry.cycle <= cycle);
-        self.entries.insert(at, OrderEntry { cycle, order: orders.order.into(), agents, values });
+        let index = self.entries.partition_point(|entry| entry.cycle <= cycle);
+        let entry = OrderEntry { cycle, order: orders.order.into(), agents, values };
+        self.entries.insert(index, entry);
     }
 
-    /// Returns whether the book has no orders.
+    /// Returns whether there are no orders.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -77,9 +83,11 @@ impl OrderLog {
     }
 
     fn orders<'a>(&'a self, entry: &'a OrderEntry) -> Orders<'a> {
-        let OrderEntry { order, agents, values, .. } = entry;
-        let (agents, values) = (&self.agents[agents.clone()], &self.values[values.clone()]);
-        Orders { order, agents, values }
+        Orders {
+            order: &entry.order,
+            agents: &self.agents[entry.agents.clone()],
+            values: &self.values[entry.values.clone()],
+        }
     }
 
     /// Iterates over the orders that are given before `cycle`.
@@ -100,14 +108,19 @@ impl OrderLog {
     }
 }
 
+/// Appends a slice, and returns its range in the vector.
+fn append<T: Copy>(all: &mut Vec<T>, more: &[T]) -> Range<usize> {
+    let start = all.len();
+    all.extend_from_slice(more);
+    start..all.len()
+}
+
 impl OrderEntry {
     /// Returns whether further orders can be joined to the entry: the same order, with as many values per agent.
     fn can_extend_with(&self, cycle: Cycle, orders: &Orders<'_>) -> bool {
-        let width = |agents: usize, values: usize| values.checked_div(agents);
-        let (agents, values) = (self.agents.len(), self.values.len());
-        self.cycle == cycle
-            && self.order == orders.order
-            && width(agents, values) == width(orders.agents.len(), orders.values.len())
+        let own_width = self.values.len().checked_div(self.agents.len());
+        let other_width = orders.values.len().checked_div(orders.agents.len());
+        self.cycle == cycle && self.order == orders.order && own_width == other_width
     }
 }
 

@@ -27,8 +27,8 @@ impl OrderReader {
 
     /// Reads the next rows. `None` if the columns are not those of orders.
     pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
-        let at = |name: &str| schema.columns.iter().position(|column| column.name == name);
-        let column = |name: &str| columns.get(at(name)?);
+        let index = |name: &str| schema.columns.iter().position(|column| column.name == name);
+        let column = |name: &str| columns.get(index(name)?);
         let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
         else {
             return None;
@@ -37,13 +37,17 @@ impl OrderReader {
         let (Values::U32(parts), Values::F64(values)) = (column("part")?, column("value")?) else {
             return None;
         };
-        let names = &schema.columns[at("order")?];
+        let order_column = &schema.columns[index("order")?];
         for row in 0..orders.len() {
+            // A block may end within an order, so an order is complete only when the next one begins.
             if *parts.get(row)? == 0 {
                 self.finish_order();
-                let (cycle, agent) = (*cycles.get(row)?, *agents.get(row)?);
-                let order = names.text(orders, row);
-                self.pending = Some(IncompleteOrder { cycle, agent, order, values: Vec::new() });
+                self.pending = Some(IncompleteOrder {
+                    cycle: *cycles.get(row)?,
+                    agent: *agents.get(row)?,
+                    order: order_column.text(orders, row),
+                    values: Vec::new(),
+                });
             }
             if let Some(pending) = &mut self.pending {
                 pending.values.push(*values.get(row)?);
@@ -58,7 +62,7 @@ impl OrderReader {
         self.log
     }
 
-    /// Notes the order that has all of its values.
+    /// Adds the order that has all of its values to the log.
     fn finish_order(&mut self) {
         if let Some(IncompleteOrder { cycle, agent, order, values }) = self.pending.take() {
             self.log.add(cycle, &Orders { order: &order, agents: &[agent], values: &values });

@@ -12,7 +12,7 @@ pub struct Space {
     pub shape: Vec<usize>,
     /// The allowed values.
     pub kind: SpaceKind,
-    /// One sentence for the reader.
+    /// Its meaning, in one sentence.
     pub meaning: String,
 }
 
@@ -21,29 +21,30 @@ pub struct Space {
 pub enum SpaceKind {
     /// One of these, by number from 0.
     Discrete(Vec<String>),
-    /// Whole numbers from `least` to `most`, both included.
+    /// Whole numbers from `low` to `high`, both included.
     Integer {
-        /// The least value.
+        /// The lowest value.
         low: i64,
-        /// The greatest value.
+        /// The highest value.
         high: i64,
     },
-    /// Numbers from `least` to `most`, both included; infinite where there is no bound.
+    /// Numbers from `low` to `high`, both included; infinite where there is no bound.
     Real {
-        /// The least value.
+        /// The lowest value.
         low: f64,
-        /// The greatest value.
+        /// The highest value.
         high: f64,
     },
 }
 
 impl Space {
-    /// The greatest whole number in an order: up to it, no two of them become the same float.
+    /// The greatest whole number in an order: orders are floats, and up to it no two whole numbers become the same
+    /// float.
     pub const MAX_INTEGER: i64 = (1 << 53) - 1;
 
     /// Creates a space of single numbers.
-    pub fn new(name: impl Into<String>, bounds: SpaceKind, meaning: impl Into<String>) -> Self {
-        Self { name: name.into(), shape: Vec::new(), kind: bounds, meaning: meaning.into() }
+    pub fn new(name: impl Into<String>, kind: SpaceKind, meaning: impl Into<String>) -> Self {
+        Self { name: name.into(), shape: Vec::new(), kind, meaning: meaning.into() }
     }
 
     /// Returns the same space with another shape.
@@ -69,17 +70,14 @@ impl Space {
 
     /// Returns whether a value is allowed in it.
     pub fn contains(&self, value: f64) -> bool {
-        let between = |least: f64, most: f64| least <= value && value <= most;
-        // By a conversion, because taking the fraction is a library call in builds for processors of any age.
-        let is_whole = || value as i64 as f64 == value;
         match &self.kind {
-            SpaceKind::Discrete(names) => between(0.0, names.len() as f64 - 1.0) && is_whole(),
-            &SpaceKind::Integer { low: least, high: most } => {
-                between(least as f64, most as f64) && is_whole()
+            SpaceKind::Discrete(names) => {
+                (0.0..=names.len() as f64 - 1.0).contains(&value) && is_whole(value)
             }
-            &SpaceKind::Real { low: least, high: most } => {
-                value.is_finite() && between(least, most)
+            &SpaceKind::Integer { low, high } => {
+                (low as f64..=high as f64).contains(&value) && is_whole(value)
             }
+            &SpaceKind::Real { low, high } => value.is_finite() && (low..=high).contains(&value),
         }
     }
 
@@ -87,64 +85,64 @@ impl Space {
     pub fn describe(&self) -> String {
         match &self.kind {
             SpaceKind::Discrete(names) => {
-                let named: Vec<_> =
+                let choices: Vec<_> =
                     names.iter().enumerate().map(|(k, name)| format!("{k} {name}")).collect();
-                format!("one of {}", named.join(", "))
+                format!("one of {}", choices.join(", "))
             }
-            SpaceKind::Integer { low: least, high: most } => {
-                format!("a whole number from {least} to {most}")
-            }
-            SpaceKind::Real { low: least, high: most }
-                if least.is_infinite() && most.is_infinite() =>
-            {
+            SpaceKind::Integer { low, high } => format!("a whole number from {low} to {high}"),
+            SpaceKind::Real { low, high } if low.is_infinite() && high.is_infinite() => {
                 "a finite number".into()
             }
-            SpaceKind::Real { low: least, high: most } if most.is_infinite() => {
-                format!("a finite number of at least {least}")
+            SpaceKind::Real { low, high } if high.is_infinite() => {
+                format!("a finite number of at least {low}")
             }
-            SpaceKind::Real { low: least, high: most } => {
-                format!("a number from {least} to {most}")
-            }
+            SpaceKind::Real { low, high } => format!("a number from {low} to {high}"),
         }
     }
 }
 
-/// Room for the values of all agents of a team in one space, one agent after the other.
+/// Returns whether a value has no fraction. By a conversion, because taking the fraction is a library call in builds
+/// for processors of any age.
+fn is_whole(value: f64) -> bool {
+    value as i64 as f64 == value
+}
+
+/// A caller's buffer for the values of all agents of a team in one space, one agent after the other.
 #[derive(Debug)]
 pub enum BufferMut<'a> {
-    /// Room for [`SpaceKind::Discrete`] and [`SpaceKind::Integer`].
+    /// For [`SpaceKind::Discrete`] and [`SpaceKind::Integer`].
     Integer(&'a mut [i64]),
-    /// Room for [`SpaceKind::Real`].
+    /// For [`SpaceKind::Real`].
     Real(&'a mut [f64]),
 }
 
 impl BufferMut<'_> {
-    /// Number of values for which there is room.
+    /// Number of values that it holds.
     pub fn len(&self) -> usize {
         match self {
-            Self::Integer(room) => room.len(),
-            Self::Real(room) => room.len(),
+            Self::Integer(values) => values.len(),
+            Self::Real(values) => values.len(),
         }
     }
 
-    /// Returns whether there is no room at all.
+    /// Returns whether it holds no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Writes a whole number; does nothing with room for real ones, because a space has one kind of values.
+    /// Writes a whole number; does nothing with a buffer of real ones, because a space has one kind of values.
     #[inline]
-    pub fn set_integer(&mut self, at: usize, value: i64) {
-        if let Self::Integer(room) = self {
-            room[at] = value;
+    pub fn set_integer(&mut self, index: usize, value: i64) {
+        if let Self::Integer(values) = self {
+            values[index] = value;
         }
     }
 
-    /// Writes a real number; does nothing with room for whole ones, because a space has one kind of values.
+    /// Writes a real number; does nothing with a buffer of whole ones, because a space has one kind of values.
     #[inline]
-    pub fn set_real(&mut self, at: usize, value: f64) {
-        if let Self::Real(room) = self {
-            room[at] = value;
+    pub fn set_real(&mut self, index: usize, value: f64) {
+        if let Self::Real(values) = self {
+            values[index] = value;
         }
     }
 }

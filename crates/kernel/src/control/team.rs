@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Agents with the same observations and orders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
-    /// Name, by which a caller knows it: the kind of its agents, and a number where there are several.
+    /// Name, by which a caller selects it: the kind of its agents, and a number where several teams have the same.
     pub name: String,
     /// Its agents, rising; rows of arrays are in this order.
     pub agents: Vec<EntityId>,
@@ -62,8 +62,8 @@ impl Teams {
     /// gets a number: `robot`, `robot 2`.
     pub fn new(mut all: Vec<Team>, noun: &'static str) -> Self {
         number_duplicates(&mut all);
-        let last = all.iter().flat_map(|team| &team.agents).max();
-        let mut team_of = vec![NONE; last.map_or(0, |&last| last as usize + 1)];
+        let last_id = all.iter().flat_map(|team| &team.agents).max();
+        let mut team_of = vec![NONE; last_id.map_or(0, |&id| id as usize + 1)];
         for (k, team) in (0..).zip(&all) {
             team.agents.iter().for_each(|&agent| team_of[agent as usize] = k);
         }
@@ -81,11 +81,6 @@ impl Teams {
         &self.all
     }
 
-    /// The noun for an agent.
-    pub(crate) fn noun(&self) -> &'static str {
-        self.noun
-    }
-
     /// Returns whether any agent takes orders.
     pub(crate) fn accept_orders(&self) -> bool {
         self.all.iter().any(|team| !team.action_spaces.is_empty())
@@ -101,108 +96,128 @@ impl Teams {
         self.for_each_order(orders, |_| Ok(()))
     }
 
-    /// Hands over the orders to single agents, one after the other, as far as they have the shape and the bounds
-    /// of their spaces; orders checked this way do not have to be kept.
+    /// Checks the orders against the shape and the bounds of their spaces, and passes each to `give`, agent by agent,
+    /// up to the first that is wrong.
     ///
     /// # Errors
-    /// The first one that is wrong, or that `take` returns.
+    /// The first one that is wrong, or the error of `give`.
     pub(crate) fn for_each_order<'a>(
         &self,
         orders: &Orders<'a>,
-        mut take: impl FnMut(&Order<'a>) -> Result<(), OrderError>,
+        mut give: impl FnMut(&Order<'a>) -> Result<(), OrderError>,
     ) -> Result<(), OrderError> {
         let &Orders { order, agents, values } = orders;
         let Some(&first) = agents.first() else { return check_empty(orders) };
-        // Usually all are of one team, so its space is looked up once.
-        let mut of_team = self.space(order, first)?;
-        let width = of_team.2.width();
+        // Usually all agents are of one team, so its space is looked up once.
+        let mut action = self.action_space(order, first)?;
+        let width = action.space.width();
         if values.len() != agents.len() * width {
             let expected = format!("{} x {width}", agents.len());
             return Err(OrderError::Shape { order: order.into(), expected, found: values.len() });
         }
         for (k, &agent) in agents.iter().enumerate() {
-            if self.team_of.get(agent as usize).is_none_or(|&team| team as usize != of_team.0) {
-                of_team = self.space(order, agent)?;
+            if self.team_of.get(agent as usize).is_none_or(|&team| team as usize != action.team) {
+                action = self.action_space(order, agent)?;
             }
-            let (team, number, space) = of_team;
+            let ActionSpace { team, index, space } = action;
             if space.width() != width {
                 let expected = format!("{} values for {} {agent}", space.width(), self.noun);
                 return Err(OrderError::Shape { order: order.into(), expected, found: width });
             }
             let values = &values[k * width..(k + 1) * width];
             if let Some(&value) = values.iter().find(|&&value| !space.contains(value)) {
-                let who = format!("{} {agent}", self.noun);
-                let (order, expected) = (order.into(), space.describe());
-                return Err(OrderError::Value { order, who, value, expected });
+                return Err(OrderError::Value {
+                    order: order.into(),
+                    agent: self.agent_name(agent),
+                    value,
+                    expected: space.describe(),
+                });
             }
-            take(&Order { team, space: number, agent, values })?;
+            give(&Order { team, space: index, agent, values })?;
         }
         Ok(())
     }
 
-    /// Returns an agent's team, and the number of the space of this order in it, and the space.
-    fn space(&self, order: &str, agent: EntityId) -> Result<(usize, usize, &Space), OrderError> {
-        let who = || format!("{} {agent}", self.noun);
+    /// Returns an agent's name in errors: `robot 3`.
+    pub(crate) fn agent_name(&self, agent: EntityId) -> String {
+        format!("{} {agent}", self.noun)
+    }
+
+    /// Finds the space in which an agent's team takes an order.
+    fn action_space(&self, order: &str, agent: EntityId) -> Result<ActionSpace<'_>, OrderError> {
         let team = self.team_of.get(agent as usize).filter(|&&team| team != NONE);
         let Some(team) = team.map(|&team| team as usize) else {
             let last = self.team_of.len().checked_sub(1).map(|last| last as EntityId);
-            return Err(OrderError::NoAgent { who: who(), noun: self.noun, last });
+            let agent = self.agent_name(agent);
+            return Err(OrderError::NoAgent { agent, noun: self.noun, last });
         };
-        let ordered = &self.all[team].action_spaces;
-        if ordered.is_empty() {
-            return Err(OrderError::NotExternal { who: who() });
+        let spaces = &self.all[team].action_spaces;
+        if spaces.is_empty() {
+            return Err(OrderError::NotExternal { agent: self.agent_name(agent) });
         }
-        let number = ordered.iter().position(|space| space.name == order).ok_or_else(|| {
-            let known = ordered.iter().map(|space| space.name.clone()).collect();
-            OrderError::Unknown { order: order.into(), who: who(), known }
+        let index = spaces.iter().position(|space| space.name == order).ok_or_else(|| {
+            let known = spaces.iter().map(|space| space.name.clone()).collect();
+            OrderError::Unknown { order: order.into(), agent: self.agent_name(agent), known }
         })?;
-        Ok((team, number, &ordered[number]))
+        Ok(ActionSpace { team, index, space: &spaces[index] })
     }
 
-    /// Checks that there is exactly the room that a team's observations need.
+    /// Checks that the buffers have exactly the size that a team's observations need.
     pub(crate) fn check_buffers(
         &self,
         team: usize,
-        room: &[BufferMut<'_>],
+        buffers: &[BufferMut<'_>],
     ) -> Result<(), OrderError> {
-        let Some(Team { agents, observation_spaces: observed, .. }) = self.all.get(team) else {
+        let Some(Team { agents, observation_spaces: spaces, .. }) = self.all.get(team) else {
             return Err(OrderError::NoTeam { team, teams: self.all.len() });
         };
-        let fits = |(space, room): (&Space, &BufferMut<'_>)| {
-            room.len() == agents.len() * space.width()
-                && space.is_integer() == matches!(room, BufferMut::Integer(_))
-        };
-        if observed.len() == room.len() && observed.iter().zip(room).all(fits) {
+        let fits = spaces.len() == buffers.len()
+            && spaces.iter().zip(buffers).all(|(space, buffer)| {
+                buffer.len() == agents.len() * space.width()
+                    && space.is_integer() == matches!(buffer, BufferMut::Integer(_))
+            });
+        if fits {
             return Ok(());
         }
-        let expected = observed.iter().map(|space| {
-            let sort = if space.is_integer() { "whole" } else { "real" };
-            format!("{} of {} x {} {sort} values", space.name, agents.len(), space.width())
+        let expected = spaces.iter().map(|space| {
+            let number_type = if space.is_integer() { "whole" } else { "real" };
+            format!("{} of {} x {} {number_type} values", space.name, agents.len(), space.width())
         });
         Err(OrderError::BufferShape { expected: expected.collect::<Vec<_>>().join(", ") })
     }
 }
 
+/// The space in which a team takes an order.
+#[derive(Clone, Copy)]
+struct ActionSpace<'a> {
+    /// Number of the team.
+    team: usize,
+    /// Number of the space among the team's action spaces.
+    index: usize,
+    space: &'a Space,
+}
+
 /// Checks an order to no agents: it is right if it has no values.
 fn check_empty(orders: &Orders<'_>) -> Result<(), OrderError> {
-    match orders.values {
-        [] => Ok(()),
-        values => {
-            let (order, expected) = (orders.order.into(), "0".into());
-            Err(OrderError::Shape { order, expected, found: values.len() })
-        }
+    if orders.values.is_empty() {
+        return Ok(());
     }
+    Err(OrderError::Shape {
+        order: orders.order.into(),
+        expected: "0".into(),
+        found: orders.values.len(),
+    })
 }
 
 /// Gives a number to each repeated name.
 fn number_duplicates(teams: &mut [Team]) {
-    let mut taken = BTreeSet::new();
+    let mut used = BTreeSet::new();
     // The next number to try for each name, because thousands of teams may share one.
     let mut next: BTreeMap<String, u32> = BTreeMap::new();
     for team in teams {
         let plain = team.name.clone();
         let number = next.entry(plain.clone()).or_insert(2);
-        while !taken.insert(team.name.clone()) {
+        while !used.insert(team.name.clone()) {
             team.name = format!("{plain} {number}");
             *number += 1;
         }

@@ -1,4 +1,4 @@
-//! The faults of the packets of one agent, where each agent is a process of its own.
+//! Faults of the packets of one agent, where each agent is a process of its own.
 //!
 //! They are drawn like those of a network in memory, so that a packet of the same number in the same tick
 //! of the same cycle meets the same faults, wherever its sender runs.
@@ -12,38 +12,41 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub struct FaultInjector {
     network: Network,
-    draws: FaultStreams,
-    talks: Vec<(u64, f64)>,
-    /// Tick from which on each way of a link is free.
+    streams: FaultStreams,
+    conversations: Vec<(u64, f64)>,
+    /// Tick from which on each direction of a link is free.
     free_at: BTreeMap<[EntityId; 2], f64>,
 }
 
 impl FaultInjector {
     /// Returns a network with these faults.
-    pub fn new(network: Network, draws: FaultStreams) -> Self {
-        Self { network, draws, talks: vec![(0, 0.0)], free_at: BTreeMap::new() }
+    pub fn new(network: Network, streams: FaultStreams) -> Self {
+        Self { network, streams, conversations: vec![(0, 0.0)], free_at: BTreeMap::new() }
     }
 
-    /// Begins a cycle: all links are free. Its talks, at least one, are given by their first ticks and the times of
-    /// those in seconds after the start of the run, rising.
-    pub fn start_cycle(&mut self, talks: Vec<(u64, f64)>) {
-        (self.talks, self.free_at) = (talks, BTreeMap::new());
+    /// Starts a cycle, in which all links are free. Its conversations, at least one, are given by their first ticks
+    /// and the times of those in seconds after the start of the run, rising.
+    pub fn start_cycle(&mut self, conversations: Vec<(u64, f64)>) {
+        self.conversations = conversations;
+        self.free_at = BTreeMap::new();
     }
 
-    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is doubled. An arrival is the
-    /// tick in which all of the packet is on its way, and the tick in which it arrives. Its `cycle` is the tick in
-    /// which it is sent. Distances do not matter here.
+    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is duplicated. An arrival is
+    /// the tick by which all of the packet is sent, and the tick in which it arrives. The packet's `cycle` is the
+    /// tick in which sending starts. The range is not checked, because no process has the places of all agents.
     pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
         let network = Some(&self.network);
-        let mut carrier = FaultyTransport::in_memory(network, self.draws, None, &self.talks);
-        carrier.free_at = std::mem::take(&mut self.free_at);
+        let mut transport =
+            FaultyTransport::in_memory(network, self.streams, None, &self.conversations);
+        transport.free_at = std::mem::take(&mut self.free_at);
         let receiver = packet.receiver;
-        carrier.send(packet);
+        transport.send(packet);
         let mut arrivals = Vec::new();
-        while let Some(at) = carrier.next_arrival() {
-            arrivals.extend(carrier.receive(receiver, at).iter().map(|copy| (copy.cycle, at)));
+        while let Some(tick) = transport.next_arrival() {
+            let copies = transport.receive(receiver, tick);
+            arrivals.extend(copies.iter().map(|copy| (copy.cycle, tick)));
         }
-        self.free_at = std::mem::take(&mut carrier.free_at);
+        self.free_at = std::mem::take(&mut transport.free_at);
         arrivals
     }
 

@@ -1,7 +1,7 @@
 //! A network with faults: it can lose and delay messages, cut links, and have a limited range.
 //!
 //! A message takes one tick, or more when it is large or delayed. Every draw depends on sender, receiver,
-//! tick and number, never on the order in which agents are visited.
+//! tick and sequence number, never on the order in which agents are visited.
 
 use super::Network;
 use super::links::FaultStreams;
@@ -10,67 +10,70 @@ use crate::ports::{Envelope, MemoryTransport, Transport};
 use crate::units::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
-/// Distances between agents, at the start of a cycle.
+/// Distances between agents at the start of a cycle, for the range of radios.
 pub trait Distances {
     /// Returns the distance between two agents in meters.
     fn distance_m(&self, link: [EntityId; 2]) -> f64;
 }
 
-/// A transport for the talks of one cycle, on which some links may be cut.
+/// A transport for the conversations of one cycle, on which some links may be cut. A cycle of the world has many ticks
+/// of the network: a tick is the [`Envelope::cycle`] of the transport inside.
 pub struct FaultyTransport<'a, T> {
     inner: T,
     network: Option<&'a Network>,
-    draws: FaultStreams,
-    /// Places of the agents; without them, every agent reaches every other.
-    places: Option<&'a dyn Distances>,
-    /// First tick of each talk, and its time in seconds after the start of the run, both rising.
-    talks: &'a [(u64, f64)],
-    /// Tick from which on each way of a link is free, where messages take time by their size.
+    streams: FaultStreams,
+    /// Without them, every agent reaches every other.
+    distances: Option<&'a dyn Distances>,
+    /// First tick of each conversation, and its time in seconds after the start of the run, both rising.
+    conversations: &'a [(u64, f64)],
+    /// Tick from which on each direction of a link is free, where messages take time by their size.
     pub(super) free_at: BTreeMap<[EntityId; 2], f64>,
 }
 
 impl<'a> FaultyTransport<'a, MemoryTransport> {
-    /// Returns a network in memory with some faults; without any it loses nothing. The talks of the cycle, at least
+    /// Returns a network in memory with some faults; without any it loses nothing. The conversations of the cycle, at least
     /// one, are given by their first ticks and the times of those in seconds after the start of the run.
     pub fn in_memory(
         network: Option<&'a Network>,
-        draws: FaultStreams,
-        places: Option<&'a dyn Distances>,
-        talks: &'a [(u64, f64)],
+        streams: FaultStreams,
+        distances: Option<&'a dyn Distances>,
+        conversations: &'a [(u64, f64)],
     ) -> Self {
         let faults = network.map(Network::faults).unwrap_or_default();
-        let inner = MemoryTransport::new(draws.streams, draws.network, faults);
-        Self { inner, network, draws, places, talks, free_at: BTreeMap::new() }
+        let inner = MemoryTransport::new(streams.streams, streams.network, faults);
+        Self { inner, network, streams, distances, conversations, free_at: BTreeMap::new() }
     }
 }
 
 impl<T: Transport> FaultyTransport<'_, T> {
     /// Returns the time of a tick, in seconds after the start of the run.
     fn time_s(&self, network: &Network, tick: u64) -> f64 {
-        let begun = self.talks.partition_point(|(first, _)| *first <= tick);
-        let (first, starts_s) = self.talks[begun.saturating_sub(1)];
-        starts_s + network.seconds(tick.saturating_sub(first))
+        let started = self.conversations.partition_point(|(first, _)| *first <= tick);
+        let (first_tick, start_s) = self.conversations[started.saturating_sub(1)];
+        start_s + network.seconds(tick.saturating_sub(first_tick))
     }
 
     /// Returns whether the link of a message lets it through: it is not cut, within range, and not
-    /// in a burst that takes the message.
+    /// in a burst that destroys the message.
     fn passes(&self, envelope: &Envelope) -> bool {
         let Some(network) = self.network else { return true };
         let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
-        let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
-        let apart_m = self.places.map_or(0.0, |places| places.distance_m(link));
-        if !network.carries(link, at_s) || apart_m > network.range_m {
+        let link = [sender, receiver];
+        let at_s = self.time_s(network, tick);
+        let distance_m = self.distances.map_or(0.0, |distances| distances.distance_m(link));
+        if !network.carries(link, at_s) || distance_m > network.range_m {
             return false;
         }
         let Some(bursts) = &network.bursts else { return true };
-        let words =
-            self.draws.streams.pair(sender, receiver, tick, self.draws.burst_loss, sequence);
-        !(Bernoulli::new(bursts.loss).sample(words[0])
-            && bursts.is_in_burst(&self.draws, link, at_s))
+        let FaultStreams { streams, burst_loss, .. } = self.streams;
+        let words = streams.pair(sender, receiver, tick, burst_loss, sequence);
+        // The message's own draw comes first: it is one block, and the state of the link may take several.
+        let is_lost = Bernoulli::new(bursts.loss).sample(words[0])
+            && bursts.is_in_burst(&self.streams, link, at_s);
+        !is_lost
     }
 
-    /// Returns the tick in which all of a message is on its way: its link carries one message after
-    /// the other.
+    /// Returns the tick by which all of a message is sent: its link carries one message after the other.
     fn departure_tick(&mut self, envelope: &Envelope) -> u64 {
         let bits_per_tick = self.network.map_or(f64::INFINITY, Network::bits_per_tick);
         if bits_per_tick == f64::INFINITY {
@@ -86,7 +89,7 @@ impl<T: Transport> FaultyTransport<'_, T> {
 impl<T: Transport> Transport for FaultyTransport<'_, T> {
     fn send(&mut self, mut envelope: Envelope) {
         let is_carried = self.passes(&envelope);
-        // A message lost on the way occupies the link all the same.
+        // A message that is lost occupies the link all the same.
         envelope.cycle = self.departure_tick(&envelope);
         if is_carried {
             self.inner.send(envelope);

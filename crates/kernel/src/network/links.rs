@@ -5,10 +5,11 @@ use crate::distr::Bernoulli;
 use crate::stream::{Purpose, Streams};
 use crate::units::EntityId;
 
-/// Steps of the chain of bursts in the shorter of its two mean times: a burst lasts whole steps.
+/// Steps of the chain of bursts in the shorter of its two mean times. A burst lasts whole steps: with ten of them its
+/// length is near enough to exponential, and the state at a time takes about ten draws.
 const STEPS_PER_MEAN: f64 = 10.0;
 
-/// A while, in seconds after the start of the run.
+/// A period, in seconds after the start of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeWindow {
     /// Its start.
@@ -17,33 +18,33 @@ pub struct TimeWindow {
     pub until_s: f64,
 }
 
-/// A while in which an agent's radio is dead: it sends nothing, hears nothing, and knows it.
+/// A period in which an agent's radio is off: it neither sends nor receives, and is aware of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadioOutage {
     /// Id of the agent.
     pub agent: EntityId,
-    /// The while.
+    /// The period.
     pub window: TimeWindow,
 }
 
-/// A while in which no message gets from one side to another. Agents on no side hear all, and are heard
+/// A period in which no message gets from one side to another. Agents on no side reach all others, and are reached
 /// by all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Partition {
     /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
-    /// The while.
+    /// The period.
     pub window: TimeWindow,
 }
 
-/// A while in which a link works one way only.
+/// A period in which a link works in one direction only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnidirectionalLink {
-    /// Id of the agent that is heard by the other.
+    /// Id of the agent whose messages arrive.
     pub sender: EntityId,
-    /// Id of the agent that does not reach the other with its messages.
+    /// Id of the agent whose messages to the other are lost.
     pub receiver: EntityId,
-    /// The while.
+    /// The period.
     pub window: TimeWindow,
 }
 
@@ -76,7 +77,7 @@ impl TimeWindow {
     /// The time from the start of the run on.
     pub const ALWAYS: Self = Self { from_s: 0.0, until_s: f64::INFINITY };
 
-    /// Returns whether a time is within the while.
+    /// Returns whether a time is within the period.
     pub fn contains(&self, at_s: f64) -> bool {
         self.from_s <= at_s && at_s < self.until_s
     }
@@ -85,8 +86,17 @@ impl TimeWindow {
 impl Partition {
     /// Returns whether the partition separates two agents at a time.
     pub(super) fn separates(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
-        let side = |id: EntityId| self.sides.iter().position(|side| side.contains(&id));
-        self.window.contains(at_s) && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
+        if !self.window.contains(at_s) {
+            return false;
+        }
+        match (self.side(a), self.side(b)) {
+            (Some(side_a), Some(side_b)) => side_a != side_b,
+            _ => false,
+        }
+    }
+
+    fn side(&self, agent: EntityId) -> Option<usize> {
+        self.sides.iter().position(|side| side.contains(&agent))
     }
 }
 
@@ -102,16 +112,24 @@ impl GilbertElliott {
     ///
     /// In each step of the chain its state is drawn anew with a certain probability, and otherwise
     /// stays the same. That is the chain with the given mean times, and its state at any time
-    /// follows from the draws of a few steps before it.
-    pub(super) fn is_in_burst(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
+    /// follows from the draws of a few steps before it, so no link needs a stored state.
+    pub(super) fn is_in_burst(
+        &self,
+        streams: &FaultStreams,
+        link: [EntityId; 2],
+        at_s: f64,
+    ) -> bool {
         let step_s = self.mean_burst_s.min(self.mean_gap_s) / STEPS_PER_MEAN;
-        let renewed = Bernoulli::new(step_s / self.mean_burst_s + step_s / self.mean_gap_s);
-        let in_burst = Bernoulli::new(self.mean_burst_s / (self.mean_burst_s + self.mean_gap_s));
+        // The sum of the rates of leaving a burst and of leaving a gap: drawing anew with it, from the stationary
+        // distribution, leaves each state at its own rate.
+        let is_renewed = Bernoulli::new(step_s / self.mean_burst_s + step_s / self.mean_gap_s);
+        let is_burst = Bernoulli::new(self.mean_burst_s / (self.mean_burst_s + self.mean_gap_s));
         let mut step = (at_s / step_s) as u64;
+        // Back to the step in which the present state was drawn.
         loop {
-            let words = draws.streams.pair(link[0], link[1], step, draws.burst, 0);
-            if step == 0 || renewed.sample(words[0]) {
-                return in_burst.sample(words[1]);
+            let words = streams.streams.pair(link[0], link[1], step, streams.burst, 0);
+            if step == 0 || is_renewed.sample(words[0]) {
+                return is_burst.sample(words[1]);
             }
             step -= 1;
         }

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Bytes from a network may be anything. [`parse_packet`] lets through only those that another agent of the same
-//! scenario and build has sent in this form, for a talk; the message itself is checked by the agent that
-//! takes it. The checksum detects damage on the way, not forgery: the network below has to control access.
+//! scenario and build has sent in this form; the receiver checks the message itself. The checksum detects damage in
+//! transit, not forgery: the network below has to control access.
 
 use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
@@ -16,12 +16,12 @@ const MAGIC: [u8; 2] = *b"Ss";
 const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
-/// Place of the checksum among them.
+/// Position of the checksum among them.
 const CHECKSUM_OFFSET: usize = HEADER_BYTES - 8;
-/// Number of bytes for which there is room in a new packet.
+/// Initial capacity of a packet in bytes: most messages then need no second allocation.
 const TYPICAL_BYTES: usize = 512;
 
-/// The subject of a talk, as a world names it.
+/// The topics of conversations in a world, rising in the order in which a cycle has them.
 pub trait Protocol: Copy + Ord {
     /// Returns its number on the wire.
     fn number(self) -> u8;
@@ -30,20 +30,19 @@ pub trait Protocol: Copy + Ord {
     fn from_number(number: u8) -> Option<Self>;
 }
 
-/// The identity of a talk: messages of one are not meant for any other.
+/// The identity of a conversation: a message of one is never accepted in another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ConversationId<T> {
     /// The cycle that is decided.
     pub cycle: Cycle,
-    /// The subject.
+    /// The topic.
     pub topic: T,
-    /// A digest of the ids of all members: an agent that assumes a different group is in another
-    /// talk.
+    /// A digest of the ids of all members: agents that assume different groups are in different conversations.
     pub members: u64,
 }
 
 impl<T: Protocol> ConversationId<T> {
-    /// Returns the identity of the talk of these agents, by rising id.
+    /// Returns the identity of the conversation of these agents, by rising id.
     pub fn new(cycle: Cycle, topic: T, members: &[EntityId]) -> Self {
         let bytes: Vec<u8> = members.iter().flat_map(|id| id.to_le_bytes()).collect();
         Self { cycle, topic, members: digest([&bytes, &[]]) }
@@ -62,9 +61,9 @@ pub struct PacketBuffer(Vec<u8>);
 impl PacketBuffer {
     /// Returns a message in the form in which it travels.
     pub fn from_message<M: Serialize + ?Sized>(message: &M) -> Self {
-        let mut room = Vec::with_capacity(TYPICAL_BYTES);
-        room.resize(HEADER_BYTES, 0);
-        Self(postcard::to_extend(message, room).expect("messages are plain data"))
+        let mut bytes = Vec::with_capacity(TYPICAL_BYTES);
+        bytes.resize(HEADER_BYTES, 0);
+        Self(postcard::to_extend(message, bytes).expect("messages are plain data"))
     }
 
     /// Returns an already serialized message.
@@ -74,9 +73,9 @@ impl PacketBuffer {
 
     /// Returns a message that is followed by bytes in a form of their own.
     pub fn from_parts<M: Serialize + ?Sized>(message: &M, bytes: &[u8]) -> Self {
-        let Self(mut draft) = Self::from_message(message);
-        draft.extend_from_slice(bytes);
-        Self(draft)
+        let Self(mut packet) = Self::from_message(message);
+        packet.extend_from_slice(bytes);
+        Self(packet)
     }
 
     /// The message.
@@ -91,8 +90,8 @@ impl PacketBuffer {
     }
 
     /// Returns the bytes of the packet.
-    pub fn into_packet<T: Protocol>(mut self, seal: &PacketHeader<T>) -> Vec<u8> {
-        seal.write(&mut self.0[..CHECKSUM_OFFSET]);
+    pub fn into_packet<T: Protocol>(mut self, header: &PacketHeader<T>) -> Vec<u8> {
+        header.write(&mut self.0[..CHECKSUM_OFFSET]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
         let checksum = digest([&head[..CHECKSUM_OFFSET], message]).to_le_bytes();
         self.0[CHECKSUM_OFFSET..HEADER_BYTES].copy_from_slice(&checksum);
@@ -100,41 +99,35 @@ impl PacketBuffer {
     }
 }
 
-/// The statements of a packet about its message.
+/// The header of a packet, without its checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PacketHeader<T> {
-    /// Digest of scenario and build: agents with any other are not understood.
+    /// Digest of scenario and build: packets with any other are dropped.
     pub fingerprint: u64,
-    /// The talk.
+    /// The conversation.
     pub conversation: ConversationId<T>,
     /// The sender.
     pub sender: EntityId,
-    /// Number among the sender's packets of the talk.
+    /// Number among the sender's packets of the conversation.
     pub sequence: u32,
 }
 
 impl<T: Protocol> PacketHeader<T> {
     /// Writes the bytes before the checksum.
-    fn write(&self, room: &mut [u8]) {
-        let Self {
-            fingerprint,
-            conversation: ConversationId { cycle, topic, members },
-            sender,
-            sequence,
-        } = *self;
-        let [m, a] = MAGIC;
-        room[..4].copy_from_slice(&[m, a, VERSION, topic.number()]);
-        room[4..12].copy_from_slice(&fingerprint.to_le_bytes());
-        room[12..20].copy_from_slice(&cycle.to_le_bytes());
-        room[20..28].copy_from_slice(&members.to_le_bytes());
-        room[28..32].copy_from_slice(&sender.to_le_bytes());
-        room[32..36].copy_from_slice(&sequence.to_le_bytes());
+    fn write(&self, bytes: &mut [u8]) {
+        let ConversationId { cycle, topic, members } = self.conversation;
+        bytes[..2].copy_from_slice(&MAGIC);
+        bytes[2] = VERSION;
+        bytes[3] = topic.number();
+        bytes[4..12].copy_from_slice(&self.fingerprint.to_le_bytes());
+        bytes[12..20].copy_from_slice(&cycle.to_le_bytes());
+        bytes[20..28].copy_from_slice(&members.to_le_bytes());
+        bytes[28..32].copy_from_slice(&self.sender.to_le_bytes());
+        bytes[32..36].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
     /// Reads the bytes before the checksum.
     fn read(bytes: &[u8]) -> Result<Self, DropReason> {
-        let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
-        let half = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         if bytes[..2] != MAGIC {
             return Err(DropReason::NoPacket);
         }
@@ -142,12 +135,28 @@ impl<T: Protocol> PacketHeader<T> {
             return Err(DropReason::Version);
         }
         let topic = T::from_number(bytes[3]).ok_or(DropReason::Damaged)?;
-        let talk = ConversationId { cycle: word(12), topic, members: word(20) };
-        Ok(Self { fingerprint: word(4), conversation: talk, sender: half(28), sequence: half(32) })
+        Ok(Self {
+            fingerprint: read_u64(bytes, 4),
+            conversation: ConversationId {
+                cycle: read_u64(bytes, 12),
+                topic,
+                members: read_u64(bytes, 20),
+            },
+            sender: read_u32(bytes, 28),
+            sequence: read_u32(bytes, 32),
+        })
     }
 }
 
-/// Returns the seal of a packet, and its message.
+fn read_u64(bytes: &[u8], offset: usize) -> u64 {
+    u64::from_le_bytes(std::array::from_fn(|k| bytes[offset + k]))
+}
+
+fn read_u32(bytes: &[u8], offset: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|k| bytes[offset + k]))
+}
+
+/// Returns the header of a packet, and its message.
 ///
 /// # Errors
 /// When the bytes are no packet of `fingerprint`, or were damaged.
@@ -158,37 +167,38 @@ pub fn parse_packet<T: Protocol>(
     let Some((head, message)) = bytes.split_at_checked(HEADER_BYTES) else {
         return Err(DropReason::NoPacket);
     };
-    let (said, checksum) = head.split_at(CHECKSUM_OFFSET);
-    let seal = PacketHeader::read(said)?;
-    if digest([said, message]).to_le_bytes() != *checksum {
+    let (fields, checksum) = head.split_at(CHECKSUM_OFFSET);
+    // Before the checksum, which another version may compute differently.
+    let header = PacketHeader::read(fields)?;
+    if digest([fields, message]).to_le_bytes() != *checksum {
         return Err(DropReason::Damaged);
     }
-    if seal.fingerprint != fingerprint {
+    if header.fingerprint != fingerprint {
         return Err(DropReason::Fingerprint);
     }
-    Ok((seal, message))
+    Ok((header, message))
 }
 
-/// A reason why a packet was dropped.
+/// A reason reason a packet was dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum DropReason {
     /// Too short, or without the first bytes of a packet.
     NoPacket,
-    /// The packet is of another version of this form.
+    /// The packet has another version of this format.
     Version,
     /// Its checksum is wrong.
     Damaged,
     /// The packet is of another scenario or build.
     Fingerprint,
-    /// Larger than any message of its talk.
+    /// Larger than any message of its conversation.
     TooLarge,
-    /// The sender is not in the group, or gives the name of another agent.
+    /// The sender is not in the group, or uses the id of another agent.
     Sender,
-    /// The talk is over for all.
+    /// The conversation is over for all members.
     Stale,
-    /// The talk has other members.
+    /// The conversation has other members.
     OtherGroup,
-    /// The talk comes later, and nothing more of it can be kept.
+    /// The conversation comes later, and the buffer for its messages is full.
     NoRoom,
     /// Its message cannot be read.
     Unreadable,
@@ -236,13 +246,13 @@ pub struct DropCounts([u64; DropReason::ALL.len()]);
 
 impl DropCounts {
     /// Counts a packet that was dropped.
-    pub fn record(&mut self, why: DropReason) {
-        self.0[why as usize] += 1;
+    pub fn record(&mut self, reason: DropReason) {
+        self.0[reason as usize] += 1;
     }
 
     /// Returns the number of packets that were dropped for a reason.
-    pub fn get(&self, why: DropReason) -> u64 {
-        self.0[why as usize]
+    pub fn get(&self, reason: DropReason) -> u64 {
+        self.0[reason as usize]
     }
 
     /// Returns the number of all packets that were dropped.
@@ -253,38 +263,46 @@ impl DropCounts {
 
 /// Returns a digest of two pieces of bytes, one after the other: fast, but no defense against forgery.
 pub fn digest(pieces: [&[u8]; 2]) -> u64 {
-    let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_bytes(piece), FACTOR ^ piece.len() as u64);
-    pieces.into_iter().fold(FACTOR, add)
+    let mut sum = FACTOR;
+    for piece in pieces {
+        // With the length, so that a byte that moves from one piece to the other changes the digest.
+        sum = mix(sum ^ digest_bytes(piece), FACTOR ^ piece.len() as u64);
+    }
+    sum
 }
 
+/// 2^64 divided by the golden ratio, an odd number with bits in no pattern.
 const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
+/// The second prime of xxHash64.
 const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
 
-/// Returns both halves of a product as one.
+/// Folds a 128-bit product to 64 bits, as wyhash does: every input bit reaches every output bit.
 fn mix(a: u64, b: u64) -> u64 {
     let product = u128::from(a) * u128::from(b);
     product as u64 ^ (product >> 64) as u64
 }
 
-/// Returns a digest of some bytes. Four sums go side by side, because each product has to wait for the one before
-/// it.
+/// Returns a digest of some bytes. Four sums are computed side by side, because each product has to wait for the one
+/// before it.
 fn digest_bytes(bytes: &[u8]) -> u64 {
     const LANES: usize = 4;
-    let both = |sum: u64, bytes: &[u8; 16]| {
-        let (words, _) = bytes.as_chunks::<8>();
-        let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);
-        mix(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
-    };
     let (pairs, rest) = bytes.as_chunks::<16>();
     let (blocks, pairs) = pairs.as_chunks::<LANES>();
     let mut sums: [u64; LANES] = [1, 2, 3, 4];
     for block in blocks {
-        sums = std::array::from_fn(|lane| both(sums[lane], &block[lane]));
+        sums = std::array::from_fn(|lane| mix_pair(sums[lane], &block[lane]));
     }
     let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
     let mut last = [0; 16];
     last[..rest.len()].copy_from_slice(rest);
-    both(pairs.iter().fold(sum, both), &last)
+    mix_pair(pairs.iter().fold(sum, mix_pair), &last)
+}
+
+/// Adds two words to a digest.
+fn mix_pair(sum: u64, bytes: &[u8; 16]) -> u64 {
+    let (words, _) = bytes.as_chunks::<8>();
+    let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);
+    mix(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
 }
 
 /// Returns the digest of a scenario's text and seed.
@@ -312,22 +330,22 @@ mod tests {
     /// Any flipped bit of a packet, and any cut: the checksum finds it.
     #[test]
     fn a_packet_of_which_a_bit_was_turned_is_damaged() {
-        let talk = ConversationId::new(7, Weather, &[1, 4, 9]);
-        let seal = PacketHeader {
+        let conversation = ConversationId::new(7, Weather, &[1, 4, 9]);
+        let header = PacketHeader {
             fingerprint: 0x0123_4567_89AB_CDEF,
-            conversation: talk,
+            conversation,
             sender: 4,
             sequence: 3,
         };
         for length in [0, 1, 7, 16, 63, 64, 65, 200] {
             let message: Vec<u8> = (0..length).map(|k| (k * k) as u8).collect();
-            let packet = PacketBuffer::from_bytes(&message).into_packet(&seal);
-            assert_eq!(parse_packet(&packet, seal.fingerprint), Ok((seal, &message[..])));
+            let packet = PacketBuffer::from_bytes(&message).into_packet(&header);
+            assert_eq!(parse_packet(&packet, header.fingerprint), Ok((header, &message[..])));
             for bit in 0..8 * packet.len() {
                 let mut turned = packet.clone();
                 turned[bit / 8] ^= 1 << (bit % 8);
                 assert!(
-                    parse_packet::<Weather>(&turned, seal.fingerprint).is_err(),
+                    parse_packet::<Weather>(&turned, header.fingerprint).is_err(),
                     "bit {bit} of {length} bytes"
                 );
             }

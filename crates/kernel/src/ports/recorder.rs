@@ -67,8 +67,10 @@ pub struct MemoryRecorder {
 impl MemoryRecorder {
     /// Creates empty tables of these schemas.
     pub fn new(schemas: &[TableSchema]) -> Self {
-        let empty = |s: &TableSchema| s.columns.iter().map(|c| Values::empty(c.ty)).collect();
-        let tables = schemas.iter().map(empty).collect();
+        let tables = schemas
+            .iter()
+            .map(|schema| schema.columns.iter().map(|column| Values::empty(column.ty)).collect())
+            .collect();
         Self { schemas: schemas.to_vec(), tables, finished: false }
     }
 
@@ -95,7 +97,7 @@ impl MemoryRecorder {
         t.map_or(0, |t| self.tables[t].first().map_or(0, Values::len))
     }
 
-    /// Takes all rows out, by table, without a copy; the tables are empty then.
+    /// Moves all rows out, by table, without a copy; the tables are empty then.
     pub fn take(&mut self) -> Vec<(TableSchema, Vec<Values>)> {
         let empty = Self::new(&self.schemas);
         let tables = std::mem::replace(&mut self.tables, empty.tables);
@@ -105,8 +107,8 @@ impl MemoryRecorder {
     /// Drops rows: `keep` returns for every row of a table whether it stays, or `None` where all do.
     pub fn retain_rows(&mut self, keep: impl Fn(&TableSchema, &[Values]) -> Option<Vec<bool>>) {
         for (schema, columns) in self.schemas.iter().zip(&mut self.tables) {
-            if let Some(kept) = keep(schema, columns).filter(|kept| kept.contains(&false)) {
-                columns.iter_mut().for_each(|column| column.retain_rows(&kept));
+            if let Some(mask) = keep(schema, columns).filter(|mask| mask.contains(&false)) {
+                columns.iter_mut().for_each(|column| column.retain_rows(&mask));
             }
         }
     }
@@ -122,33 +124,40 @@ impl MemoryRecorder {
 /// # Errors
 /// When a column does not fit; the error names the first one.
 pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordError> {
-    let wrong = |cause: String| Err(RecordError::new(&schema.name, cause));
-    if block.len() != schema.columns.len() {
-        return wrong(format!("{} columns given, {} expected", block.len(), schema.columns.len()));
+    let given = block.len();
+    let expected = schema.columns.len();
+    if given != expected {
+        let cause = format!("{given} columns given, {expected} expected");
+        return Err(RecordError::new(&schema.name, cause));
     }
-    for (spec, values) in schema.columns.iter().zip(block) {
-        if values.ty() != spec.ty {
-            return wrong(format!(
-                "column `{}` is {:?}, not {:?}",
-                spec.name,
-                spec.ty,
-                values.ty()
-            ));
-        }
-        if values.len() != block[0].len() {
-            return wrong(format!("column `{}` differs in length from the first", spec.name));
-        }
-        if !spec.is_nullable && values.valid().is_some() {
-            return wrong(format!("column `{}` has missing values", spec.name));
-        }
-        // The maximum, not the first wrong one, because this runs for every row of a recorded run.
-        if let Values::Label(indices) = values
-            && let Some(bad) = largest(indices).filter(|&&i| i as usize >= spec.labels.len())
-        {
-            return wrong(format!("column `{}` has no label {bad}", spec.name));
+    for (column, values) in schema.columns.iter().zip(block) {
+        if let Some(fault) = column_fault(column, values, block[0].len()) {
+            let cause = format!("column `{}` {fault}", column.name);
+            return Err(RecordError::new(&schema.name, cause));
         }
     }
     Ok(())
+}
+
+/// Returns the reason why values do not fit a column of a block with this number of rows.
+fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<String> {
+    if values.ty() != column.ty {
+        return Some(format!("is {:?}, not {:?}", column.ty, values.ty()));
+    }
+    if values.len() != rows {
+        return Some("differs in length from the first".into());
+    }
+    if !column.is_nullable && values.valid().is_some() {
+        return Some("has missing values".into());
+    }
+    // The maximum, not the first wrong one: a loop without an exit is vectorized, and this one runs over every row
+    // of a recorded run.
+    if let Values::Label(indices) = values
+        && let Some(index) = largest(indices).filter(|&&i| i as usize >= column.labels.len())
+    {
+        return Some(format!("has no label {index}"));
+    }
+    None
 }
 
 /// Returns the largest of the values that are not missing.
@@ -179,6 +188,7 @@ impl Recorder for MemoryRecorder {
 /// Returns the schemas that [`conformance`] writes to: create the recorder under test with them.
 pub fn conformance_schemas() -> Vec<TableSchema> {
     let column = |name: &str, ty| ColumnSpec::new(name, ty, &format!("test column {name}"));
+    // One table of plain numbers, and one with a label and a missing text: every way in which columns are encoded.
     let event = ColumnSpec::label("event", "test column event", ["contact", "trip"]);
     let note = ColumnSpec { is_nullable: true, ..column("note", ColumnType::Text) };
     vec![

@@ -34,7 +34,7 @@ pub trait Transport {
     /// before, sorted.
     fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope>;
 
-    /// Returns the first cycle in which a message that is on its way arrives; `None` if none is, or
+    /// Returns the first cycle in which a message in transit arrives; `None` if there is none, or
     /// if the transport cannot know, as one between processes cannot.
     fn next_arrival(&self) -> Option<Cycle>;
 }
@@ -78,9 +78,10 @@ impl MemoryTransport {
 
     fn deliver(&mut self, envelope: Envelope, delay_word: u32) {
         let choices = u64::from(self.faults.max_delay_cycles) + 1;
-        let extra = (u64::from(delay_word) * choices) >> 32;
-        let at = (envelope.receiver, envelope.cycle + 1 + extra);
-        self.waiting.entry(at).or_default().push(envelope);
+        // The high half of the product is uniform in `0..choices`, without a division.
+        let delay_cycles = (u64::from(delay_word) * choices) >> 32;
+        let arrival = (envelope.receiver, envelope.cycle + 1 + delay_cycles);
+        self.waiting.entry(arrival).or_default().push(envelope);
     }
 }
 
@@ -102,15 +103,15 @@ impl Transport for MemoryTransport {
 
     fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
         let due: Vec<_> =
-            self.waiting.range((receiver, 0)..=(receiver, now)).map(|(&at, _)| at).collect();
+            self.waiting.range((receiver, 0)..=(receiver, now)).map(|(&key, _)| key).collect();
         let mut arrived: Vec<_> =
-            due.iter().flat_map(|at| self.waiting.remove(at).unwrap_or_default()).collect();
+            due.iter().flat_map(|key| self.waiting.remove(key).unwrap_or_default()).collect();
         arrived.sort_unstable();
         arrived
     }
 
     fn next_arrival(&self) -> Option<Cycle> {
-        self.waiting.keys().map(|&(_, at)| at).min()
+        self.waiting.keys().map(|&(_, arrival)| arrival).min()
     }
 }
 

@@ -22,7 +22,8 @@ impl AtomicBitSet {
     /// time; of several that mark the same box, exactly one gets `true`.
     #[inline]
     pub fn insert(&self, index: usize) -> bool {
-        let (word, bit) = (&self.0[index / 64], 1 << (index % 64));
+        let word = &self.0[index / 64];
+        let bit = 1 << (index % 64);
         // Read first, because the box is almost always marked already and a load is far cheaper
         // than an atomic exchange.
         word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0
@@ -42,6 +43,7 @@ mod tests {
     fn each_box_is_new_once_even_to_two_threads() {
         let marks = AtomicBitSet::empty(1000);
         let new = |from: usize| (from..1000).filter(|&i| marks.insert(i)).count();
+        #[expect(clippy::disallowed_methods, reason = "tested from several threads")]
         let total: usize = std::thread::scope(|scope| {
             let workers = [scope.spawn(|| new(0)), scope.spawn(|| new(500))];
             workers.into_iter().map(|w| w.join().expect("no panic")).sum()

@@ -89,7 +89,7 @@ impl Floor {
         fn column<T: BoxWord>(walls: impl Iterator<Item = bool>) -> Column<T> {
             walls.map(|wall| if wall { T::WALL } else { T::FREE }).collect()
         }
-        // Half the memory where the slots fit.
+        // Half the memory where the slots fit: the boxes around a body then lie in fewer cache lines.
         if bodies <= u16::MAX_BODIES {
             Self::Narrow(column(walls))
         } else {
@@ -99,7 +99,7 @@ impl Floor {
 
     /// Returns the occupant of the box with this index.
     pub fn occupant(&self, index: usize) -> Occupant {
-        fn of<T: BoxWord>(word: T) -> Occupant {
+        fn occupant<T: BoxWord>(word: T) -> Occupant {
             match word {
                 _ if word.is_free() => Occupant::Empty,
                 _ if word == T::WALL => Occupant::Wall,
@@ -107,8 +107,8 @@ impl Floor {
             }
         }
         match self {
-            Self::Narrow(boxes) => of(boxes.get(index)),
-            Self::Wide(boxes) => of(boxes.get(index)),
+            Self::Narrow(boxes) => occupant(boxes.get(index)),
+            Self::Wide(boxes) => occupant(boxes.get(index)),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Places on a grid: positions, the occupants and claimants of boxes, marked boxes.
+//! Grids: positions, the occupants and claimants of boxes, sets of boxes.
 
 pub mod bit_set;
 pub mod floor;

@@ -1,11 +1,12 @@
-//! The look of each kind of body: one table for pictures, films and recordings for viewers.
+//! The appearance of each kind of body: one table for pictures, animations and recordings for viewers.
 
 use super::body::{Body, BodyKind, Condition};
 
 /// Red, green and blue, 0 to 255 each.
 pub type Color = [u8; 3];
 
-/// Colors that distinguish numbered bodies: Okabe and Ito's, without yellow and black.
+/// Colors that distinguish numbered bodies: Okabe and Ito's palette for all kinds of color vision, without yellow,
+/// which is faint on white, and black, which is the color of text.
 pub const BODY_COLORS: [Color; 6] = [
     [0x00, 0x72, 0xB2],
     [0xD5, 0x5E, 0x00],
@@ -25,7 +26,7 @@ pub const DOOR_COLOR: Color = [0x8B, 0x5A, 0x2B];
 /// Color of conditions that should not occur.
 pub const ALERT_COLOR: Color = [0xD0, 0x10, 0x10];
 
-/// The look of a body, apart from its shape.
+/// The appearance of a body, apart from its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
     /// Its color.
@@ -44,7 +45,7 @@ pub fn body_color(number: u32) -> Color {
 }
 
 impl Body {
-    /// Returns its look in a world with this number of dimensions.
+    /// Returns its appearance in a world with this number of dimensions.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
         let layer = match self.kind {

@@ -4,7 +4,7 @@ use super::pose::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The name of a body, which it keeps during the run; shown as `robot/3` or `connector/0/7`.
+/// The identity of a body, which it keeps during the run; displayed as `robot/3` or `connector/0/7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "Parts", into = "Parts")]
 pub struct BodyId {
@@ -12,15 +12,15 @@ pub struct BodyId {
     pub kind: BodyKind,
     /// Its number among the bodies of its kind.
     pub number: u32,
-    /// Its part, of things that have parts.
+    /// Its part, of bodies that have parts.
     pub part: Option<u32>,
 }
 
-/// A name as it is written: kind, number and part.
+/// An identity as files and the page have it: kind, number and part.
 type Parts = (BodyKind, u32, Option<u32>);
 
 impl BodyId {
-    /// Returns the name of a body.
+    /// Returns the identity of a body.
     pub fn new(kind: BodyKind, number: u32, part: Option<u32>) -> Self {
         Self { kind, number, part }
     }
@@ -45,7 +45,7 @@ impl fmt::Display for BodyId {
     }
 }
 
-/// Something that can be seen.
+/// Something visible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Body {
     /// Its kind.
@@ -60,12 +60,12 @@ pub struct Body {
     pub shape: Shape,
     /// Its condition.
     pub state: Condition,
-    /// The velocity of a thing that is moved without acting; zero for all that stand still.
+    /// The velocity of a moving obstacle, which does not act; zero for all other bodies.
     pub velocity_m_s: Vec3,
 }
 
 impl Body {
-    /// Creates a body without parts, in plain condition.
+    /// Creates a body without parts, in plain condition, at rest.
     pub fn new(kind: BodyKind, number: u32, pose: Pose, shape: Shape) -> Self {
         Self {
             kind,
@@ -78,7 +78,7 @@ impl Body {
         }
     }
 
-    /// Returns the same body as a part of a larger thing.
+    /// Returns the same body as a part of a larger one.
     #[must_use]
     pub fn with_part(self, part: u32) -> Self {
         Self { part: Some(part), ..self }
@@ -174,7 +174,7 @@ impl BodyKind {
         }
     }
 
-    /// Returns whether it is an agent: the subject of a table of trajectories.
+    /// Returns whether it is an agent, whose trajectory is recorded.
     pub fn is_agent(self) -> bool {
         matches!(self, Self::Robot | Self::Connector | Self::Airplane)
     }

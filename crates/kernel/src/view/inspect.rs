@@ -5,14 +5,14 @@ use super::pose::Vec3;
 use crate::units::Cycle;
 use serde::Serialize;
 
-/// Percepts and decisions of a body in a cycle, and their outcome. It names no world.
+/// Percepts and decisions of a body in a cycle, and their outcome, in a form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The body.
     pub who: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
-    /// The body's name among people.
+    /// The body's name for people.
     pub title: String,
     /// Facts about it, by topic.
     pub sections: Vec<FactSection>,
@@ -27,7 +27,7 @@ pub struct FactSection {
     pub title: String,
     /// Single facts.
     pub facts: Vec<Fact>,
-    /// Facts of the same kind about several things.
+    /// A table of facts of one kind.
     pub table: Option<FactTable>,
 }
 
@@ -57,20 +57,20 @@ pub enum FactValue {
     Text(String),
     /// A body.
     Who(BodyId),
-    /// A place in meters.
+    /// A position in meters.
     Place(Vec3),
-    /// Whether it is so.
+    /// Yes or no.
     Yes(bool),
     /// Nothing, or not known.
     None,
 }
 
-/// Facts of the same kind about several things.
+/// A table of facts of one kind, e.g. one row per neighbor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactTable {
-    /// Heads of the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
-    /// A value for each column, by row.
+    /// Rows of a value per column.
     pub rows: Vec<Vec<FactValue>>,
 }
 
@@ -91,25 +91,25 @@ pub struct Mark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MarkRole {
-    /// The truth to be perceived.
+    /// The ground truth.
     True,
-    /// The percept.
+    /// The sensor's report of it.
     Reported,
-    /// The body's wish.
+    /// The action that the body has chosen.
     Wish,
-    /// The resulting deed.
+    /// The action that results.
     Done,
-    /// An obstacle to it, or a deed that is not done.
+    /// An action that is not carried out, or the obstacle to it.
     Refused,
-    /// Room that it claims for its action.
+    /// The space that it claims for its action.
     Claim,
-    /// The others with which it is in conflict.
+    /// The other bodies of its conflict group.
     Group,
-    /// A possible future.
+    /// A predicted path.
     Predicted,
-    /// The future that was chosen.
+    /// The predicted path that was chosen.
     Chosen,
-    /// Its knowledge of others.
+    /// Its knowledge of other bodies.
     Known,
     /// The orbit that it can always fall back to.
     Orbit,
@@ -133,10 +133,10 @@ pub enum MarkShape {
     },
     /// A point.
     Point {
-        /// Its place.
+        /// Its position.
         at_m: Vec3,
     },
-    /// A level circle.
+    /// A horizontal circle.
     Circle {
         /// Its center.
         at_m: Vec3,
@@ -147,8 +147,8 @@ pub enum MarkShape {
 
 impl Inspection {
     /// Creates an empty inspection.
-    pub fn new(who: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
-        Self { who, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
+    pub fn new(body: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
+        Self { who: body, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
 
     /// Adds a section, unless it is empty.
@@ -232,9 +232,9 @@ impl FactTable {
         self.rows.push(values.into());
     }
 
-    /// Returns the values of a column, by its head.
-    pub fn column(&self, head: &str) -> Option<impl Iterator<Item = &FactValue>> {
-        let k = self.columns.iter().position(|column| column == head)?;
+    /// Returns the values of a column, by its heading.
+    pub fn column(&self, heading: &str) -> Option<impl Iterator<Item = &FactValue>> {
+        let k = self.columns.iter().position(|column| column == heading)?;
         Some(self.rows.iter().map(move |row| &row[k]))
     }
 }
@@ -255,7 +255,7 @@ impl FactValue {
         Self::number(value_rad.to_degrees(), "°")
     }
 
-    /// Creates a number of things.
+    /// Creates a number without a unit.
     pub fn count(value: impl TryInto<u32>) -> Self {
         Self::number(f64::from(value.try_into().unwrap_or(u32::MAX)), "")
     }
@@ -279,8 +279,8 @@ impl From<String> for FactValue {
 }
 
 impl From<BodyId> for FactValue {
-    fn from(who: BodyId) -> Self {
-        Self::Who(who)
+    fn from(body: BodyId) -> Self {
+        Self::Who(body)
     }
 }
 
@@ -291,8 +291,8 @@ impl From<Vec3> for FactValue {
 }
 
 impl From<bool> for FactValue {
-    fn from(is_so: bool) -> Self {
-        Self::Yes(is_so)
+    fn from(value: bool) -> Self {
+        Self::Yes(value)
     }
 }
 

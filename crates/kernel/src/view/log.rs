@@ -17,13 +17,13 @@ pub struct LogEvent {
     pub kind: LogEventKind,
     /// The body that it happened to.
     pub who: BodyId,
-    /// The other body concerned, if there is one and the world knows it.
+    /// The other body involved, if there is one and the world knows it.
     pub with: Option<BodyId>,
-    /// The place, in meters.
+    /// The position, in meters.
     pub at_m: Option<Vec3>,
-    /// The measure of it, where it has one.
+    /// The number that its kind defines, e.g. a distance.
     pub value: Option<Quantity>,
-    /// The event in words.
+    /// A sentence about the event, for people.
     pub words: String,
 }
 
@@ -44,14 +44,14 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Creates an amount.
+    /// Creates a number with its unit.
     pub fn new(value: f64, unit: &'static str) -> Self {
         Self { value, unit: Cow::Borrowed(unit) }
     }
 }
 
 /// Declares the kinds of events with their names in files.
-macro_rules! happenings {
+macro_rules! log_event_kinds {
     ($($(#[$doc:meta])* $kind:ident = $name:literal,)*) => {
         /// The kinds of events of all worlds.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -74,7 +74,7 @@ macro_rules! happenings {
     };
 }
 
-happenings! {
+log_event_kinds! {
     /// Two bodies, or a body and a wall, touch.
     Contact = "contact",
     /// A door has opened.
@@ -85,43 +85,43 @@ happenings! {
     LossOfSeparation = "loss-of-separation",
     /// A body has finished its route; the value is its delay.
     Arrival = "arrival",
-    /// The shield has changed a wish; the value is the number of the wish that is followed instead.
+    /// The shield has overridden an action; the value is the number of the action that is taken instead.
     Override = "override",
     /// The shield keeps a body on its stored orbit.
     Orbit = "orbit",
-    /// A body has not heard another one in spite of asking.
+    /// An agent does not answer another one's requests.
     Unheard = "unheard",
-    /// A body that was not heard is heard again.
+    /// An agent that did not answer is heard again.
     Heard = "heard",
-    /// Time was up before a body had decided.
+    /// The deadline passed before an agent had decided.
     Deadline = "deadline",
-    /// A body keeps its course because not all others have agreed to its wish.
+    /// A body keeps its course because not all others have agreed to another.
     HeldBack = "held-back",
     /// A group is too large to decide together; the value is the number of its bodies.
     GroupTooLarge = "group-too-large",
-    /// The errors of a body exceed the bounds that were allowed for; the value is the ratio of the two.
+    /// The errors of a body exceed their assumed bounds; the value is the ratio of the two.
     BeyondBound = "beyond-bound",
-    /// A body can be reached by one that avoids no other; the value is their distance.
+    /// A non-cooperative body can reach a body; the value is their distance.
     Intruder = "intruder",
     /// A body keeps to its safe plan, because no decision for it arrived in time.
     Absent = "absent",
-    /// A part has objected to a motion; the value is the distance that it could have gone.
+    /// A part has vetoed a motion; the value is the distance that it could have moved.
     Veto = "veto",
-    /// A part is inside something; the value is the depth.
+    /// A part penetrates another body; the value is the depth.
     Penetration = "penetration",
-    /// A body is clear of everything again.
+    /// A body is clear of all others again.
     Clear = "clear",
-    /// A part got out of the way of something; the value is the number of motions that it took.
+    /// A part has evaded an obstacle; the value is the number of motions that it took.
     Escape = "escape",
-    /// A bumper touches something; the value is the distance between the robot and its place.
+    /// A bumper touches an obstacle; the value is the distance between the robot and the contact.
     Bumper = "bumper",
-    /// A leader goes on in another direction after a veto; the value is the turn.
+    /// A leader continues in another direction after a veto; the value is the turn.
     Sideways = "sideways",
     /// The other end has taken over, to pull a chain back.
     PulledBack = "pulled-back",
-    /// Nothing helps: the leader cannot go on.
+    /// The leader cannot move in any direction.
     Stuck = "stuck",
-    /// A part has broken down, or has got other abilities.
+    /// A part has failed, or its abilities have changed.
     Changed = "changed",
     /// Parts were scattered; the value is their number.
     Broken = "broken",
@@ -129,9 +129,9 @@ happenings! {
     Reforming = "reforming",
     /// Scattered parts are joined again.
     Reformed = "reformed",
-    /// A gap is longer than the parts that shall close it; the value is the missing length.
+    /// A gap is longer than the parts that could close it; the value is the missing length.
     GapTooLong = "gap-too-long",
-    /// No places were found where scattered parts are joined; the value is the error that is left.
+    /// No positions were found that join the scattered parts; the value is the remaining error.
     NotReformed = "not-reformed",
     /// A target has been reached; the value is its number.
     Target = "target",
@@ -139,9 +139,9 @@ happenings! {
     Done = "done",
     /// A task was given up; the value is its number.
     GivenUp = "given-up",
-    /// A way to a target was found; the value is the number of its pieces.
+    /// A path to a target was found; the value is the number of its segments.
     Planned = "planned",
-    /// No way to a target was found; the value is its number.
+    /// No path to a target was found; the value is its number.
     NotPlanned = "not-planned",
 }
 
@@ -151,7 +151,7 @@ happenings! {
 pub enum Severity {
     /// Normal.
     Info,
-    /// Worth a look.
+    /// Unusual, but allowed.
     Warning,
     /// An event that the run is meant to avoid.
     Error,
@@ -162,11 +162,12 @@ pub enum Severity {
 pub struct Log<E> {
     events: Vec<E>,
     dropped: u64,
-    /// Whether events are kept, because there is a watcher.
+    /// Whether events are kept, because somebody reads frames.
     pub is_enabled: bool,
 }
 
-/// The maximum number of events between two frames; further ones are only counted.
+/// The maximum number of events between two frames: more than a viewer can list, and a bound for the memory of a run
+/// whose viewer reads no frames for hours.
 const MAX_EVENTS: usize = 10_000;
 
 impl<E> Default for Log<E> {
@@ -176,18 +177,19 @@ impl<E> Default for Log<E> {
 }
 
 impl<E> Log<E> {
-    /// Keeps an event, if there is a watcher.
+    /// Keeps an event, if events are kept.
     pub fn push(&mut self, event: E) {
         if !self.is_enabled {
             return;
         }
-        match self.events.len() < MAX_EVENTS {
-            true => self.events.push(event),
-            false => self.dropped += 1,
+        if self.events.len() < MAX_EVENTS {
+            self.events.push(event);
+        } else {
+            self.dropped += 1;
         }
     }
 
-    /// Takes all events since the last call, and the number of those that were left out.
+    /// Moves out all events since the last call, and the number of those that were dropped.
     pub fn take(&mut self) -> (Vec<E>, u64) {
         (std::mem::take(&mut self.events), std::mem::take(&mut self.dropped))
     }

@@ -1,7 +1,7 @@
 //! The visible part of a run of any world: constant scenery, and frames of single moments.
 //!
-//! Recordings for viewers, films and live pages draw from this alone. A frame is
-//! computed from the state on request; looking never changes a run. Lengths are meters, x runs
+//! Recordings for viewers, animations and live pages are made from this alone. A frame is
+//! computed from the state on request, which never changes a run. Lengths are meters, x points
 //! east, y north and z up; angles are radians, counterclockwise.
 
 mod appearance;
@@ -44,13 +44,13 @@ pub struct Scenery {
 /// A floor of square boxes, along the axes of its own plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OccupancyGrid {
-    /// Boxes along the first axis: from west to east, where the floor is not turned.
+    /// Boxes along the first axis: from west to east, where the floor is not rotated.
     pub width: u32,
-    /// Boxes along the second axis: from south to north, where the floor is not turned.
+    /// Boxes along the second axis: from south to north, where the floor is not rotated.
     pub height: u32,
     /// Side of a box, in meters.
     pub box_m: f64,
-    /// The corner of the first box, and the turn about it.
+    /// The corner of the first box, and the rotation about it.
     pub plane: Isometry2,
     /// The content of each box, row by row from the first.
     pub boxes: Vec<Occupancy>,
@@ -87,20 +87,21 @@ pub struct Frame {
     pub bodies: Vec<Body>,
     /// The present readings of sensors.
     pub scans: Vec<Scan>,
-    /// The poses that bodies' wheels claim, each in the frame in which the body was when watching began; none in
-    /// worlds without wheels that err.
+    /// The poses of bodies by wheel odometry, each relative to the body's pose when odometry was enabled; none in
+    /// worlds without odometry.
     #[serde(default)]
     pub odometry: Vec<(BodyId, Pose)>,
-    /// The events since the frame before, by time.
+    /// The events since the previous frame, by time.
     pub log: Vec<LogEvent>,
-    /// Entries that were left out because there were too many.
+    /// Number of events that were dropped because there were too many.
     pub log_left_out: u64,
 }
 
 /// The options of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FrameOptions {
-    /// The bodies of which scans are wanted; reading sensors costs as much as simulating them.
+    /// The bodies whose scans the frame has. All would be slow: reading a sensor for a frame costs as much as simulating
+    /// it.
     pub scans: ScanSelection,
 }
 
@@ -119,7 +120,7 @@ impl FrameOptions {
     }
 }
 
-/// The bodies of which a frame holds scans.
+/// The bodies whose scans a frame has.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScanSelection {
@@ -129,9 +130,9 @@ pub enum ScanSelection {
     Of(Vec<BodyId>),
 }
 
-/// Largest difference in rad between steps of beams that count as evenly spaced.
+/// Largest deviation in rad of a beam's bearing from equal steps: rounding errors of bearings from degrees are smaller.
 const EVEN_TOLERANCE_RAD: f64 = 1e-6;
-/// Step in rad of the raster for beams that are not evenly spaced.
+/// Step in rad of the raster for beams that are not evenly spaced: one degree, as many range finders have.
 const RASTER_STEP_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Ranges of one sensor, all around or in a sector.
@@ -160,9 +161,9 @@ impl Scan {
         format!("{}/{}", self.of, self.sensor)
     }
 
-    /// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
-    /// evenly spaced are put into a raster of degrees, in which directions without a beam have the
-    /// range `no_beam`.
+    /// Returns the first and last bearing, and ranges at equal steps between them, as laser scans of ROS and Foxglove
+    /// require. Beams that are not evenly spaced are put into a raster of degrees, in which directions without a beam
+    /// have the range `no_beam`.
     pub fn evenly_spaced(&self, no_beam: f64) -> (f64, f64, Vec<f64>) {
         let Self { bearings_rad, ranges_m, .. } = self;
         let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
@@ -177,13 +178,18 @@ impl Scan {
         }
         let low = bearings_rad.iter().copied().fold(f64::INFINITY, f64::min);
         let high = bearings_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let place = |bearing_rad: f64| ((bearing_rad - low) / RASTER_STEP_RAD).round() as usize;
-        let mut raster = vec![f64::NAN; place(high) + 1];
+        let index = |bearing_rad: f64| ((bearing_rad - low) / RASTER_STEP_RAD).round() as usize;
+        let mut raster = vec![f64::NAN; index(high) + 1];
         for (&bearing_rad, &range_m) in bearings_rad.iter().zip(ranges_m) {
-            let seen_m = &mut raster[place(bearing_rad)];
-            *seen_m = seen_m.min(range_m);
+            // Of beams in one degree the nearest echo counts; the minimum with NaN is the other number.
+            let nearest_m = &mut raster[index(bearing_rad)];
+            *nearest_m = nearest_m.min(range_m);
         }
-        raster.iter_mut().filter(|range_m| range_m.is_nan()).for_each(|range_m| *range_m = no_beam);
+        for range_m in &mut raster {
+            if range_m.is_nan() {
+                *range_m = no_beam;
+            }
+        }
         (low, low + (raster.len() - 1) as f64 * RASTER_STEP_RAD, raster)
     }
 }

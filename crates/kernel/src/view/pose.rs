@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A place in space, in meters; worlds of the plane have height 0.
+/// A position in space, in meters; planar worlds have height 0.
 pub type Vec3 = [f64; 3];
 
-/// A plane that lies in that of the world, such as the image of a map: the place of its origin, and
-/// the turn of its axes.
+/// A rigid transform of the plane, such as from the image of a map to the world: a rotation and a translation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Isometry2 {
     /// Its origin in the world, in meters.
@@ -16,26 +15,30 @@ pub struct Isometry2 {
 }
 
 impl Isometry2 {
-    /// Returns the place in the world of a point of the plane, in meters.
+    /// Returns the point of the world of a point of the plane, in meters.
     pub fn transform_point(&self, point: [f64; 2]) -> [f64; 2] {
         self.cached().transform_point(point)
     }
 
-    /// Returns the plane with its sine and cosine, for many points.
+    /// Returns the transform with its sine and cosine, for many points.
     pub fn cached(&self) -> CachedIsometry2 {
-        let (sine, cosine) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
-        CachedIsometry2 { origin_m: self.origin_m, sine, cosine }
+        CachedIsometry2 {
+            origin_m: self.origin_m,
+            sine: crate::math::sin(self.yaw_rad),
+            cosine: crate::math::cos(self.yaw_rad),
+        }
     }
 
-    /// Returns the point of the plane that is at a place in the world, in meters.
+    /// Returns the point of the plane of a point of the world, in meters.
     pub fn inverse_transform_point(&self, at_m: [f64; 2]) -> [f64; 2] {
-        let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
+        let s = crate::math::sin(self.yaw_rad);
+        let c = crate::math::cos(self.yaw_rad);
         let [x, y] = [at_m[0] - self.origin_m[0], at_m[1] - self.origin_m[1]];
         [c * x + s * y, c * y - s * x]
     }
 }
 
-/// A [`Isometry2`] with the sine and cosine of its turn.
+/// An [`Isometry2`] with the sine and cosine of its angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CachedIsometry2 {
     origin_m: [f64; 2],
@@ -44,10 +47,10 @@ pub struct CachedIsometry2 {
 }
 
 impl CachedIsometry2 {
-    /// Returns the place in the world of a point of the plane, in meters.
+    /// Returns the point of the world of a point of the plane, in meters.
     #[inline]
     pub fn transform_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (s, c) = (self.sine, self.cosine);
+        let Self { sine: s, cosine: c, .. } = self;
         [self.origin_m[0] + (c * x - s * y), self.origin_m[1] + (s * x + c * y)]
     }
 }
@@ -62,31 +65,37 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Creates a pose at a place, facing along x.
+    /// Creates a pose at a position, facing along x.
     pub fn from_position(at_m: Vec3) -> Self {
         Self { at_m, turn: [0.0, 0.0, 0.0, 1.0] }
     }
 
-    /// Creates a pose at a place, turned about the vertical axis.
+    /// Creates a pose at a position, rotated about the vertical axis.
     pub fn from_heading(at_m: Vec3, heading_rad: f64) -> Self {
         let half = 0.5 * heading_rad;
         Self { at_m, turn: [0.0, 0.0, crate::math::sin(half), crate::math::cos(half)] }
     }
 
-    /// Creates a pose at a place with these unit vectors as its axes; they must be perpendicular to
+    /// Creates a pose at a position with these unit vectors as its axes; they must be perpendicular to
     /// each other and right-handed.
     pub fn from_axes(at_m: Vec3, axes: [Vec3; 3]) -> Self {
-        // Entry [row][column] of the rotation is axes[column][row].
+        // Entry [row][column] of the rotation matrix is axes[column][row].
         let m = |row: usize, column: usize| axes[column][row];
         let trace = m(0, 0) + m(1, 1) + m(2, 2);
-        // The largest of the four components is computed first, because the others divide by it.
+        // Shepperd's method: the largest of the four components is computed first, because the others divide by it.
         let largest = (0..3).max_by(|&a, &b| m(a, a).total_cmp(&m(b, b))).unwrap_or(0);
         let turn = if trace > m(largest, largest) {
             let w4 = 2.0 * (1.0 + trace).max(0.0).sqrt();
-            let part = |i: usize, j: usize| (m(i, j) - m(j, i)) / w4;
-            [part(2, 1), part(0, 2), part(1, 0), 0.25 * w4]
+            [
+                (m(2, 1) - m(1, 2)) / w4,
+                (m(0, 2) - m(2, 0)) / w4,
+                (m(1, 0) - m(0, 1)) / w4,
+                0.25 * w4,
+            ]
         } else {
-            let (i, j, k) = (largest, (largest + 1) % 3, (largest + 2) % 3);
+            let i = largest;
+            let j = (largest + 1) % 3;
+            let k = (largest + 2) % 3;
             let r4 = 2.0 * (1.0 + m(i, i) - m(j, j) - m(k, k)).max(0.0).sqrt();
             let mut turn = [0.0; 4];
             turn[i] = 0.25 * r4;
@@ -101,7 +110,7 @@ impl Pose {
     /// Rotates a vector from the frame of the body into that of the world.
     pub fn rotate(&self, [x, y, z]: Vec3) -> Vec3 {
         let [qx, qy, qz, w] = self.turn;
-        // v + 2 q x (q x v + w v)
+        // v + 2 q x (q x v + w v), which takes fewer operations than q v q*, with t = 2 q x v.
         let t = [2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)];
         [
             x + w * t[0] + qy * t[2] - qz * t[1],
@@ -111,9 +120,9 @@ impl Pose {
     }
 
     /// Transforms a point from the frame of the body into that of the world.
-    pub fn transform_point(&self, of_body: Vec3) -> Vec3 {
-        let turned = self.rotate(of_body);
-        std::array::from_fn(|i| self.at_m[i] + turned[i])
+    pub fn transform_point(&self, point: Vec3) -> Vec3 {
+        let rotated = self.rotate(point);
+        std::array::from_fn(|i| self.at_m[i] + rotated[i])
     }
 }
 

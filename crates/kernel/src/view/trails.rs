@@ -7,16 +7,16 @@ use crate::ports::Values;
 use crate::units::Cycle;
 use std::collections::BTreeMap;
 
-/// The way that a body has gone.
+/// The past path of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     /// The body.
     pub of: BodyId,
-    /// The places of its center at the start of cycles, the earliest first.
+    /// The positions of its center at the start of cycles, the earliest first.
     pub points: Vec<(Cycle, Vec3)>,
 }
 
-/// Rows of a recorded table as places of bodies.
+/// The table and the columns with the recorded positions of bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionColumns {
     /// Name of the table; its column `cycle` has the cycle of each row.
@@ -31,15 +31,15 @@ pub struct PositionColumns {
     pub axes: Vec<Axis>,
     /// The plane of the coordinates x and y, that of the world unless given.
     pub plane: Option<Isometry2>,
-    /// Whether the places are those of a body's corner with the lowest coordinates, not those of
+    /// Whether the positions are those of a body's corner with the lowest coordinates, not those of
     /// its center.
     pub is_corner: bool,
-    /// The column with headings in quarter turns from east, of bodies that go straight ahead before
+    /// The column with headings in quarter turns from east, of bodies that move straight ahead before
     /// they slip to a side.
     pub heading: Option<&'static str>,
     /// Cycles between two rows of a body.
     pub interval: Cycle,
-    /// Number of cycles before the present that are worth showing.
+    /// Length of a readable trail, in cycles before the present.
     pub history: Cycle,
 }
 
@@ -54,8 +54,14 @@ pub struct Axis {
     pub offset_m: f64,
 }
 
-/// A row: the cycle, the place, and the heading in quarter turns.
-type Row = (Cycle, Vec3, Option<u32>);
+/// A row of the table.
+#[derive(Debug, PartialEq)]
+struct Row {
+    cycle: Cycle,
+    at_m: Vec3,
+    /// Heading in quarter turns from east.
+    heading: Option<u32>,
+}
 
 impl PositionColumns {
     /// Returns the trails of some bodies up to the moment of a frame, from the columns of the
@@ -65,101 +71,129 @@ impl PositionColumns {
         &self,
         scenery: &Scenery,
         frame: &Frame,
-        whose: &[BodyId],
+        bodies: &[BodyId],
         column: impl Fn(&str) -> Option<&'a Values>,
     ) -> Option<Vec<Trail>> {
-        let rows = self.rows(frame.cycle, whose, column)?;
-        let trail = |(of, rows): (BodyId, Vec<Row>)| {
-            let here = frame.bodies.iter().find(|body| body.id() == of);
-            let way = self.points(rows, scenery, here.map(|body| (frame.cycle, body)), of.number);
-            way.map(|way| Trail { of, points: way })
-        };
-        Some(rows.into_iter().filter_map(trail).collect())
+        let rows = self.rows(frame.cycle, bodies, column)?;
+        let mut trails = Vec::new();
+        for (id, rows) in rows {
+            let body = frame.bodies.iter().find(|body| body.id() == id);
+            let is_current = |last: &Row| last.cycle + self.interval >= frame.cycle;
+            if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
+                // A body that is gone has no shape in the frame, so that of its start is used.
+                let start = || scenery.bodies.iter().find(|body| is_start(body, id.number));
+                let like = body.or_else(start);
+                let present = body.map(|body| (frame.cycle, body.pose.at_m));
+                trails.push(Trail { of: id, points: self.points(rows, like, present) });
+            }
+        }
+        Some(trails)
     }
 
     /// Returns the rows of some bodies before a cycle.
     fn rows<'a>(
         &self,
         before: Cycle,
-        whose: &[BodyId],
+        bodies: &[BodyId],
         column: impl Fn(&str) -> Option<&'a Values>,
     ) -> Option<BTreeMap<BodyId, Vec<Row>>> {
         let Values::U64(cycles) = column("cycle")? else { return None };
-        let words = |name| match column(name)? {
+        let integers = |name| match column(name)? {
             Values::U32(values) | Values::Label(values) => Some(values),
             _ => None,
         };
-        let numbers = words(self.number)?;
+        let numbers = integers(self.number)?;
         // A table without one of the named columns is another table.
-        let parts = self.part.map(|name| words(name).ok_or(())).transpose().ok()?;
-        let ahead = self.heading.map(|name| words(name).ok_or(())).transpose().ok()?;
+        let parts = self.part.map(|name| integers(name).ok_or(())).transpose().ok()?;
+        let headings = self.heading.map(|name| integers(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
         let axes: Vec<(&Axis, &Values)> = axes.collect::<Option<_>>()?;
         let mut rows: BTreeMap<BodyId, Vec<Row>> =
-            whose.iter().map(|&of| (of, Vec::new())).collect();
+            bodies.iter().map(|&id| (id, Vec::new())).collect();
         for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
-            let of = BodyId::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
-            let Some(own) = rows.get_mut(&of) else { continue };
+            let id = BodyId::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
+            let Some(own) = rows.get_mut(&id) else { continue };
             let mut at_m = [0.0; 3];
             for (x, (axis, values)) in at_m.iter_mut().zip(&axes) {
                 *x = axis.offset_m + axis.scale_m * number(values, k)?;
             }
-            own.push((cycle, at_m, ahead.map(|ahead| ahead[k])));
+            own.push(Row { cycle, at_m, heading: headings.map(|headings| headings[k]) });
         }
-        rows.values_mut().for_each(|rows| rows.sort_by_key(|(cycle, ..)| *cycle));
+        rows.values_mut().for_each(|rows| rows.sort_by_key(|row| row.cycle));
         Some(rows)
     }
 
+    /// Returns the points of a trail: the center at each row, the corner of each move that has one, and the present
+    /// position. `like` is a body of the same shape.
     fn points(
         &self,
         rows: Vec<Row>,
-        scenery: &Scenery,
-        here: Option<(Cycle, &Body)>,
-        number: u32,
-    ) -> Option<Vec<(Cycle, Vec3)>> {
-        let &(last, ..) = rows.last()?;
-        if here.is_some_and(|(now, _)| last + self.interval < now) {
-            return None;
-        }
-        // A body that is gone has no shape in the frame, so the shape of its start is taken.
-        let is_start = |body: &&Body| (body.kind, body.number) == (BodyKind::Start, number);
-        let like = here.map(|(_, body)| body).or_else(|| scenery.bodies.iter().find(is_start));
-        // The way from the corner to the center.
+        like: Option<&Body>,
+        present: Option<(Cycle, Vec3)>,
+    ) -> Vec<(Cycle, Vec3)> {
         let half_m = match like.map(|body| &body.shape) {
             Some(Shape::Cuboid { size_m }) if self.is_corner => size_m.map(|m| 0.5 * m),
             _ => [0.0; 3],
         };
-        let middle = |at: Vec3| -> Vec3 {
-            std::array::from_fn(|k| match k < self.axes.len() {
-                true => at[k] + half_m[k],
-                // The table has no heights, so the body's own is taken.
-                false => like.map_or(0.0, |body| body.pose.at_m[k]),
-            })
-        };
-        let turned = |turn: &dyn Fn(&Isometry2, [f64; 2]) -> [f64; 2], [x, y, z]: Vec3| {
-            let [x, y] = self.plane.as_ref().map_or([x, y], |plane| turn(plane, [x, y]));
-            [x, y, z]
-        };
-        // Trails have their corners along the axes of the columns.
-        let now = here.map(|(now, body)| {
-            (now, turned(&Isometry2::inverse_transform_point, body.pose.at_m), None)
-        });
-        let rows = rows.into_iter().map(|(cycle, at, ahead)| (cycle, middle(at), ahead)).chain(now);
-        let mut way: Vec<(Cycle, Vec3)> = Vec::new();
-        let mut left: Option<(Vec3, u32)> = None;
-        for (cycle, at, ahead) in rows {
-            if let Some((from, quarters)) = left {
-                let between = corner(from, quarters, at);
-                way.extend((between != from && between != at).then_some((cycle, between)));
-            }
-            way.push((cycle, at));
-            left = ahead.map(|ahead| (at, ahead));
+        let mut points: Vec<(Cycle, Vec3)> = Vec::new();
+        let mut previous: Option<(Vec3, u32)> = None;
+        for Row { cycle, at_m, heading } in rows {
+            let center_m = std::array::from_fn(|k| {
+                if k < self.axes.len() {
+                    at_m[k] + half_m[k]
+                } else {
+                    // The table has no heights, so the body's own is used.
+                    like.map_or(0.0, |body| body.pose.at_m[k])
+                }
+            });
+            push_with_corner(&mut points, previous, (cycle, center_m));
+            previous = heading.map(|heading| (center_m, heading));
         }
-        way.iter_mut().for_each(|(_, at)| *at = turned(&Isometry2::transform_point, *at));
-        Some(way)
+        if let Some((cycle, at_m)) = present {
+            // Corners lie along the axes of the columns, so they are found in the plane of these.
+            let at_m = self.map_xy(at_m, Isometry2::inverse_transform_point);
+            push_with_corner(&mut points, previous, (cycle, at_m));
+        }
+        for (_, at_m) in &mut points {
+            *at_m = self.map_xy(*at_m, Isometry2::transform_point);
+        }
+        points
+    }
+
+    /// Transforms the horizontal coordinates of a point between the world and the plane of the columns.
+    fn map_xy(
+        &self,
+        [x, y, z]: Vec3,
+        transform: impl Fn(&Isometry2, [f64; 2]) -> [f64; 2],
+    ) -> Vec3 {
+        let [x, y] = match &self.plane {
+            Some(plane) => transform(plane, [x, y]),
+            None => [x, y],
+        };
+        [x, y, z]
     }
 }
 
+fn is_start(body: &Body, number: u32) -> bool {
+    body.kind == BodyKind::Start && body.number == number
+}
+
+/// Appends a point, and before it the corner of the move from the previous one, whose position and heading are given.
+fn push_with_corner(
+    points: &mut Vec<(Cycle, Vec3)>,
+    previous: Option<(Vec3, u32)>,
+    (cycle, at_m): (Cycle, Vec3),
+) {
+    if let Some((from_m, heading)) = previous {
+        let between_m = corner(from_m, heading, at_m);
+        if between_m != from_m && between_m != at_m {
+            points.push((cycle, between_m));
+        }
+    }
+    points.push((cycle, at_m));
+}
+
+/// Returns a value of a numeric column as a number; a label or a truth value is no coordinate.
 fn number(values: &Values, row: usize) -> Option<f64> {
     values.number(row).filter(|_| values.is_numeric())
 }
@@ -171,10 +205,10 @@ impl Axis {
     }
 }
 
-/// Returns the place between two others where a body was if it went ahead before it slipped to a
-/// side: `quarters` is the heading, in quarter turns from east, in which it left the first one.
-pub fn corner(from: Vec3, quarters: u32, to: Vec3) -> Vec3 {
-    if quarters.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
+/// Returns the position between two others where a body was if it moved ahead before it slipped to a
+/// side: `heading` is the direction in which it left the first one, in quarter turns from east.
+pub fn corner(from: Vec3, heading: u32, to: Vec3) -> Vec3 {
+    if heading.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
 }
 
 #[cfg(test)]

@@ -5,18 +5,20 @@ use crate::interrupt::unwind_worker_lost;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Numbers in the largest chunk that a worker takes at once.
+/// Numbers in the largest chunk that a worker takes at once: each is a whole world, with many cycles of work.
 const MAX_CHUNK: usize = 8;
-/// Number of times that a worker looks for a call before it sleeps: some 50 us. Falling asleep and being woken takes
-/// as long as a small call, and callers come with the next one at once; each look yields the processor to any other
+/// Chunks of each worker's share at least, so that the others find some work to take over.
+const MIN_CHUNKS_PER_SHARE: usize = 8;
+/// Number of times that a worker polls for a call before it sleeps: some 50 us. Falling asleep and being woken takes
+/// as long as a small call, and callers make the next one at once; each poll yields the processor to any other
 /// thread.
 const POLLS_BEFORE_SLEEP: usize = 100;
 
 /// A task that any worker does for some numbers.
 pub type Job = Arc<dyn Fn(usize) + Send + Sync>;
 
-/// A caller and W - 1 threads, which are started at the first call and wait between calls, asleep after a short
-/// while.
+/// A caller and W - 1 threads, which are started at the first call and wait between calls, asleep after some
+/// microseconds.
 #[derive(Debug)]
 pub struct ThreadPool {
     workers: usize,
@@ -36,9 +38,9 @@ struct PoolState {
     call: Mutex<Call>,
     called: Condvar,
     done: Condvar,
-    /// The number of the present call, beside the lock.
+    /// The number of the present call, outside of the lock for polling.
     number: AtomicU64,
-    /// Threads that have begun and not ended their part.
+    /// Threads that have started and not finished their part.
     working: AtomicUsize,
     /// The next number of each worker's share.
     cursors: Vec<CachePadded>,
@@ -50,7 +52,7 @@ struct PoolState {
 struct Call {
     number: u64,
     n: usize,
-    /// `None` when it is over; a thread that comes later goes back to sleep.
+    /// `None` when it is over; a thread that wakes later goes back to sleep.
     task: Option<Job>,
     is_last: bool,
 }
@@ -73,22 +75,22 @@ impl ThreadPool {
         self.workers
     }
 
-    /// Does every number of `0..n` once, and returns when all are done: `own` those that fall to the calling
-    /// thread, `task` the others. Each worker begins with a share of its own, the same in each call, and
-    /// then helps with the others' shares.
+    /// Does every number of `0..n` once, and returns when all are done: the calling thread by `own_task`, the others by
+    /// `task`. Each worker starts with a share of its own, the same in each call, because its caches may still hold
+    /// that data, and then helps with the others' shares.
     ///
     /// # Panics
-    /// When `own` or `task` panicked (a bug), or the system cannot start a thread.
-    pub fn run(&mut self, n: usize, mut own: impl FnMut(usize), task: Job) {
+    /// When `own_task` or `task` panicked (a bug), or the system cannot start a thread.
+    pub fn run(&mut self, n: usize, mut own_task: impl FnMut(usize), task: Job) {
         if self.workers == 1 || n <= 1 {
-            return (0..n).for_each(own);
+            return (0..n).for_each(own_task);
         }
         let shared = Arc::clone(&self.threads().shared);
         shared.start(n, task);
-        // Also awaited where `own` unwinds, because the threads work with data that the caller has lent them.
-        let awaited = JoinGuard(&shared);
-        shared.work(0, n, &mut own);
-        drop(awaited);
+        // A guard, because the threads must be done with the caller's data also when `own_task` unwinds.
+        let guard = JoinGuard(&shared);
+        shared.work(0, n, &mut own_task);
+        drop(guard);
         if shared.is_broken.load(Ordering::Relaxed) {
             self.threads = None;
             unwind_worker_lost();
@@ -97,15 +99,15 @@ impl ThreadPool {
 
     fn threads(&mut self) -> &Threads {
         let process = std::process::id();
-        let is_here = self.threads.as_ref().is_some_and(|crew| crew.process == process);
-        let is_broken = |crew: &Threads| crew.shared.is_broken.load(Ordering::Relaxed);
-        if is_here && self.threads.as_ref().is_some_and(is_broken) {
-            // The last call unwound, and some of its threads are gone.
-            self.threads = None;
-        }
-        if !is_here && let Some(lost) = self.threads.take() {
-            // The threads belong to the parent: its locks may be held in this copy forever.
-            std::mem::forget(lost);
+        if let Some(threads) = self.threads.take() {
+            if threads.process != process {
+                // This is a forked child, and the threads are the parent's: its locks may be held in this copy
+                // forever, so dropping could hang.
+                std::mem::forget(threads);
+            } else if !threads.shared.is_broken.load(Ordering::Relaxed) {
+                self.threads = Some(threads);
+            }
+            // Otherwise the last call unwound, and some of its threads are gone.
         }
         let workers = self.workers;
         self.threads.get_or_insert_with(|| Threads::new(workers, process))
@@ -151,39 +153,50 @@ impl PoolState {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.call();
         call.number += 1;
-        (call.n, call.task) = (n, Some(task));
+        call.n = n;
+        call.task = Some(task);
         self.number.store(call.number, Ordering::Release);
         drop(call);
         self.called.notify_all();
     }
 
-    /// A thread's life: call after call.
+    /// Runs call after call on a thread, until the pool is dropped.
     fn run_jobs(&self, index: usize) {
-        let mut seen = 0;
+        let mut last_number = 0;
         loop {
-            poll_until(|| self.number.load(Ordering::Acquire) != seen);
+            poll_until(|| self.number.load(Ordering::Acquire) != last_number);
             let mut call = self.call();
-            while (call.number == seen || call.task.is_none()) && !call.is_last {
+            while (call.number == last_number || call.task.is_none()) && !call.is_last {
                 call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
             }
-            let (n, Some(task), false) = (call.n, call.task.clone(), call.is_last) else { return };
+            if call.is_last {
+                return;
+            }
+            let n = call.n;
+            let Some(task) = call.task.clone() else { return };
             self.working.fetch_add(1, Ordering::Relaxed);
-            seen = call.number;
+            last_number = call.number;
             drop(call);
-            let _ended = CompletionGuard(self);
+            let _guard = CompletionGuard(self);
             self.work(index, n, &mut |k| task(k));
-            // Before the end is reported: after it no thread holds a caller's data.
+            // Before the guard reports completion: after it no thread holds a caller's data.
             drop(task);
         }
+    }
+
+    /// Returns whether no thread works on a call.
+    fn is_idle(&self) -> bool {
+        self.working.load(Ordering::Acquire) == 0
     }
 
     /// Does one worker's share, and then the remaining parts of the others'.
     fn work(&self, index: usize, n: usize, task: &mut dyn FnMut(usize)) {
         let size = self.cursors.len();
-        let chunk = (n / (size * 8)).clamp(1, MAX_CHUNK);
+        let chunk = (n / (size * MIN_CHUNKS_PER_SHARE)).clamp(1, MAX_CHUNK);
         for k in 0..size {
             let owner = (index + k) % size;
-            let (start, end) = (n * owner / size, n * (owner + 1) / size);
+            let start = n * owner / size;
+            let end = n * (owner + 1) / size;
             let cursor: &AtomicUsize = &self.cursors[owner].0;
             loop {
                 let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
@@ -197,16 +210,16 @@ impl PoolState {
 }
 
 /// Checks a condition a number of times.
-fn poll_until(mut is_so: impl FnMut() -> bool) {
+fn poll_until(mut condition: impl FnMut() -> bool) {
     for _ in 0..POLLS_BEFORE_SLEEP {
-        if is_so() {
+        if condition() {
             return;
         }
         std::thread::yield_now();
     }
 }
 
-/// A guard that reports the end of a thread's part, also after a panic.
+/// A guard that reports that a thread has finished its part, also after a panic.
 struct CompletionGuard<'a>(&'a PoolState);
 
 impl Drop for CompletionGuard<'_> {
@@ -222,18 +235,17 @@ impl Drop for CompletionGuard<'_> {
     }
 }
 
-/// A guard that waits until all threads that have begun have ended their part.
+/// A guard that waits until all threads that have started have finished their part.
 struct JoinGuard<'a>(&'a PoolState);
 
 impl Drop for JoinGuard<'_> {
     fn drop(&mut self) {
-        // Nothing is left to do: a thread that has not begun, because its processor has other work, is not waited
-        // for.
+        // All numbers are taken: a thread that has not started, because its processor has other work, would find
+        // nothing to do, and is not waited for.
         self.0.call().task = None;
-        let is_done = || self.0.working.load(Ordering::Acquire) == 0;
-        poll_until(is_done);
+        poll_until(|| self.0.is_idle());
         let mut call = self.0.call();
-        while !is_done() {
+        while !self.0.is_idle() {
             call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);
         }
     }

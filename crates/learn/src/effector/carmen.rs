@@ -43,7 +43,7 @@ pub(super) struct EventRule {
 }
 
 const CARMEN_RULE: EventRule =
-    EventRule { words: RULE, path_m: 0.3, remedy: "name a corrected log with ODOM messages" };
+    EventRule { words: RULE, path_m: 0.3, remedy: "give a corrected log with ODOM messages" };
 
 pub(super) fn learn(
     source: &str,

@@ -83,12 +83,12 @@ pub fn from_bag(
     options: &SensorOptions,
 ) -> Result<LearnedSensor, InputError> {
     let map = sidestep_import::load_pixel_map(scanner.map, None)?.ok_or_else(|| {
-        let remedy = "name the .yaml file of a ROS map";
+        let remedy = "give the .yaml file of a ROS map";
         InputError::new(scanner.map.display(), "this is no map of pixels", remedy)
     })?;
     let (source, log) = (path.display().to_string(), sidestep_import::bag::read(path, wanted)?);
     let Some(scan) = log.scans.first() else {
-        return Err(InputError::new(source, "no scans were read", "name the topic of the scans"));
+        return Err(InputError::new(source, "no scans were read", "give the topic of the scans"));
     };
     let options = bag::scan_options(options, scan, scanner.range_m, scanner.bearings_deg);
     let classes = options.check()?;

@@ -90,7 +90,7 @@ impl DistanceClasses {
             || reserved
         {
             let cause = format!("{} edges and the classes {:?}", self.edges_m.len(), self.names);
-            let remedy = "name one class more than there are edges, all different, none `beyond`";
+            let remedy = "give one class more than there are edges, all different, none `beyond`";
             return Err(InputError::new("distance classes", cause, remedy));
         }
         Ok(self)

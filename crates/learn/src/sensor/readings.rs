@@ -118,7 +118,7 @@ fn observations(
     let mut names = BTreeSet::new();
     for word in words {
         if word.text.is_empty() {
-            let remedy = "name an observation; `nothing` where there is none";
+            let remedy = "give an observation; `nothing` where there is none";
             return Err(word.error(&place, "the observation is empty".to_string(), remedy));
         }
         names.insert(word.text);

@@ -274,7 +274,7 @@ impl AgentCycle {
             TimeMode::Untimed | TimeMode::Ticks => (self.tick, packet.sequence),
         };
         self.sequence += 1;
-        for to in packet.to {
+        for &to in &*packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
             let transmission = Transmission { to, tick: draw_tick, sequence, bytes };

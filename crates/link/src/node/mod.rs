@@ -254,12 +254,12 @@ impl Node {
         match &mut self.cycle {
             Some(cycle) if current == Some(packet.cycle) => cycle.on_packet(from, packet),
             // Another node may have heard of the cycle before this one.
-            _ if current.is_none_or(|current| packet.cycle > current) => {
-                if self.early_packets.len() < MAX_EARLY_PACKETS {
-                    self.early_packets.push((from, packet));
-                }
+            _ if current.is_none_or(|current| packet.cycle > current)
+                && self.early_packets.len() < MAX_EARLY_PACKETS =>
+            {
+                self.early_packets.push((from, packet));
             }
-            // Of a conversation that is over.
+            // Of a conversation that is over, or more than can be kept.
             _ => {}
         }
     }

@@ -59,7 +59,7 @@ fn check_endpoints<'a>(
 
 fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
     std::fs::read(file)
-        .map_err(|e| InputError::new(place, e.to_string(), "name a file that can be read"))
+        .map_err(|e| InputError::new(place, e.to_string(), "give a file that can be read"))
 }
 
 fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {

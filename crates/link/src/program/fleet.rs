@@ -161,7 +161,7 @@ fn finish(
         Err(lost @ FleetError::NodeLost { .. }) => {
             let remedy = match folder {
                 Some(folder) => {
-                    format!("go on without nodes: sidestep resume {}", folder.display())
+                    format!("continue without nodes: sidestep resume {}", folder.display())
                 }
                 None => "start the fleet again; with --out DIR it could be resumed".into(),
             };

@@ -22,7 +22,7 @@ impl MetricsExporter {
         let Some(address) = address else { return Ok(Self::default()) };
         let text = Arc::new(Mutex::new(String::new()));
         serve(address, text.clone()).map_err(|e| {
-            let remedy = "give --metrics HOST:PORT of this machine that nobody else has";
+            let remedy = "give --metrics HOST:PORT with a free port of this machine";
             InputError::new(format!("--metrics {address}"), e.to_string(), remedy)
         })?;
         Ok(Self(Some(text)))

@@ -58,7 +58,7 @@ impl Server<'_> {
         let is_former = node.member.as_ref().is_some_and(|known| known.incarnation == incarnation);
         if node.is_lost && is_former {
             let error = JoinError {
-                cause: "the server has not heard this node for too long, and has given it up"
+                cause: "the server has not heard this node for too long, and considers it lost"
                     .into(),
                 remedy: "start it again".into(),
             };

@@ -175,7 +175,7 @@ mod tests {
             assert!(tick < 10_000, "they never come to an end");
             for from in 0..programs.len() {
                 for packet in programs[from].take_packets() {
-                    for to in packet.to {
+                    for &to in &*packet.to {
                         programs[to as usize].on_packet(from as EntityId, &packet.payload, tick);
                     }
                 }

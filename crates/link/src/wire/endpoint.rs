@@ -17,7 +17,7 @@ pub enum WireError {
     #[error("`{0}` is no endpoint")]
     NoEndpoint(String),
     /// There is no answer.
-    #[error("nobody answers at {endpoint}: {reason}")]
+    #[error("no answer from {endpoint}: {reason}")]
     NoAnswer {
         /// The address.
         endpoint: String,

@@ -15,7 +15,7 @@ impl Distances {
     pub(super) const UNREACHABLE: u32 = u32::MAX;
 
     /// Computes the distances to the nearest of `goals` (column, row) for a body of `size` x `size`
-    /// boxes that has to fit into `free` on its way; boxes and goals mean its lower-left box. Goals
+    /// boxes that has to fit into `free` along its path; boxes and goals mean its lower-left box. Goals
     /// where the body does not fit do not count.
     ///
     /// # Panics
@@ -31,11 +31,12 @@ impl Distances {
             height: anchors.height(),
             steps: vec![Self::UNREACHABLE; anchors.len()],
         };
+        // The vector only grows, with the head of the queue as an index into it.
         let mut queue = distances.insert_goals(anchors, goals);
         let mut head = 0;
-        while let Some(&at) = queue.get(head) {
+        while let Some(&position) = queue.get(head) {
             head += 1;
-            distances.spread(anchors, at, &mut queue);
+            distances.expand(anchors, position, &mut queue);
         }
         distances
     }
@@ -83,15 +84,17 @@ impl Distances {
     }
 
     /// Sets the distance of the unreached neighbors of a box and adds them to the queue.
-    fn spread(&mut self, anchors: &FreeSpace, (col, row): (u32, u32), queue: &mut Vec<(u32, u32)>) {
+    fn expand(&mut self, anchors: &FreeSpace, (col, row): (u32, u32), queue: &mut Vec<(u32, u32)>) {
         let steps = self.steps[anchors.index(col, row)] + 1;
         for (east, north) in STEPS {
-            let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
-            if next.0 < self.width && next.1 < self.height {
-                let index = anchors.index(next.0, next.1);
+            // A step off the west or south edge wraps to a large number, which is off the grid too.
+            let col = col.wrapping_add_signed(east);
+            let row = row.wrapping_add_signed(north);
+            if col < self.width && row < self.height {
+                let index = anchors.index(col, row);
                 if self.steps[index] == Self::UNREACHABLE && anchors.contains(index) {
                     self.steps[index] = steps;
-                    queue.push(next);
+                    queue.push((col, row));
                 }
             }
         }

@@ -5,10 +5,10 @@ use super::{Distances, FreeSpace, STEPS};
 /// The first step of a shortest 4-connected path to the nearest goal, and the difference in distance
 /// to each neighbor, for every box of a grid.
 ///
-/// Neighbors differ by at most one step, so the distance modulo 3 is enough to tell which of them is
-/// nearer to the goal.
+/// Neighbors differ by at most one step, so the distance modulo 3 shows which of them is
+/// nearer to the goal, and a box takes four bits.
 ///
-/// Of several shortest paths it takes the one with the lowest direction of its step (0 east, 1
+/// Of several shortest paths it follows the one with the lowest direction of its step (0 east, 1
 /// north, 2 west, 3 south), so it depends neither on the order of the goals nor on that of the
 /// search.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,8 +25,8 @@ const GOAL: u8 = 12;
 const UNREACHABLE: u8 = 13;
 
 impl FlowField {
-    /// Computes the field for a body of `size` x `size` boxes that has to fit into `free` on its
-    /// way to the nearest of `goals` (column, row); boxes and goals mean its lower-left box. Goals
+    /// Computes the field for a body of `size` x `size` boxes that has to fit into `free` along its
+    /// path to the nearest of `goals` (column, row); boxes and goals mean its lower-left box. Goals
     /// where the body does not fit do not count.
     ///
     /// # Panics
@@ -37,7 +37,8 @@ impl FlowField {
 
     /// Computes the field that descends along `distances`.
     pub fn from_distances(distances: &Distances) -> Self {
-        let (width, height) = (distances.width(), distances.height());
+        let width = distances.width();
+        let height = distances.height();
         let boxes = distances.as_slice().len();
         let mut field = Self { width, height, codes: vec![0; boxes.div_ceil(2)] };
         for row in 0..height {
@@ -58,11 +59,9 @@ impl FlowField {
     /// or 1. `None` where no path leads from one of the two boxes to a goal.
     pub fn rise(&self, col: u32, row: u32, direction: u8) -> Option<i8> {
         let (east, north) = STEPS[usize::from(direction % 4)];
-        let rest =
-            |code: u8| (code != UNREACHABLE).then_some(if code == GOAL { 0 } else { code / 4 });
-        let here = rest(self.code(col, row)?)?;
-        let next = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
-        let there = rest(self.code(next.0, next.1)?)?;
+        let here = distance_mod_3(self.code(col, row)?)?;
+        let neighbor = self.code(col.wrapping_add_signed(east), row.wrapping_add_signed(north))?;
+        let there = distance_mod_3(neighbor)?;
         Some([0, 1, -1][usize::from((3 + there - here) % 3)])
     }
 
@@ -105,6 +104,15 @@ impl FlowField {
     }
 }
 
+/// Returns the distance to the goal modulo 3; `None` without a path.
+fn distance_mod_3(code: u8) -> Option<u8> {
+    match code {
+        UNREACHABLE => None,
+        GOAL => Some(0),
+        _ => Some(code / 4),
+    }
+}
+
 fn code(distances: &Distances, col: u32, row: u32) -> u8 {
     match distances.steps(col, row) {
         None => UNREACHABLE,
@@ -113,13 +121,13 @@ fn code(distances: &Distances, col: u32, row: u32) -> u8 {
     }
 }
 
-/// Returns the lowest direction to a neighbor that is `steps` away.
+/// Returns the lowest direction to a neighbor that is `steps` away from the goal.
 fn downhill(distances: &Distances, (col, row): (u32, u32), steps: u32) -> u8 {
-    let leads_down = |&(east, north): &(i32, i32)| {
-        let (col, row) = (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
-        distances.steps(col, row) == Some(steps)
-    };
-    let direction = STEPS.iter().position(leads_down);
+    let direction = STEPS.iter().position(|&(east, north)| {
+        let neighbor =
+            distances.steps(col.wrapping_add_signed(east), row.wrapping_add_signed(north));
+        neighbor == Some(steps)
+    });
     direction.expect("a box that is n > 0 steps away has a neighbor that is n - 1 away") as u8
 }
 

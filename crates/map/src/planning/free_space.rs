@@ -60,18 +60,20 @@ impl FreeSpace {
             return self.clone();
         }
         let mut anchors = Self::empty(self.width, self.height);
-        // Side of the largest free square with its lower-left box at a column, in the row above;
-        // one column more, for the east edge.
-        let mut above = vec![0; self.width as usize + 1];
+        // Dynamic programming: the largest free square with its lower-left box here is one box larger than the
+        // smallest of those above, to the east, and above to the east. The sides of one row are kept, from the
+        // east edge on those of the present row, and beyond it those of the row above; with one column more, for
+        // the east edge.
+        let mut sides = vec![0; self.width as usize + 1];
         for row in (0..self.height).rev() {
-            // The value above and to the east, which the pass to the west has already overwritten.
+            // The side above to the east, which the pass to the west has already overwritten.
             let mut above_east = 0;
             for col in (0..self.width).rev() {
-                let at = col as usize;
-                let smallest = above[at].min(above[at + 1]).min(above_east);
-                above_east = above[at];
-                above[at] = if self.is_free(col, row) { smallest + 1 } else { 0 };
-                if above[at] >= size {
+                let index = col as usize;
+                let smallest = sides[index].min(sides[index + 1]).min(above_east);
+                above_east = sides[index];
+                sides[index] = if self.is_free(col, row) { smallest + 1 } else { 0 };
+                if sides[index] >= size {
                     anchors.insert(col, row);
                 }
             }

@@ -20,18 +20,18 @@ pub fn octile_distance(free: &FreeSpace, start: (u32, u32), goal: (u32, u32)) ->
     best[free.index(start.0, start.1)] = 0.0;
     let mut open =
         BinaryHeap::from([Reverse(FrontierNode::new(start, PathLength::default(), goal))]);
-    while let Some(Reverse(visit)) = open.pop() {
-        if visit.at == goal {
-            return Some(visit.length.in_boxes());
+    while let Some(Reverse(node)) = open.pop() {
+        if node.position == goal {
+            return Some(node.length.in_boxes());
         }
         // A shorter path was found after this one was queued.
-        if visit.length.in_boxes() > best[free.index(visit.at.0, visit.at.1)] {
+        if node.length.in_boxes() > best[free.index(node.position.0, node.position.1)] {
             continue;
         }
-        for (next, length) in neighbors(free, visit.at, visit.length) {
-            let known = &mut best[free.index(next.0, next.1)];
-            if length.in_boxes() < *known {
-                *known = length.in_boxes();
+        for (next, length) in neighbors(free, node.position, node.length) {
+            let best_length = &mut best[free.index(next.0, next.1)];
+            if length.in_boxes() < *best_length {
+                *best_length = length.in_boxes();
                 open.push(Reverse(FrontierNode::new(next, length, goal)));
             }
         }
@@ -53,31 +53,35 @@ impl PathLength {
 
     /// Returns the octile distance on a grid without walls.
     fn between(a: (u32, u32), b: (u32, u32)) -> Self {
-        let (x, y) = (a.0.abs_diff(b.0), a.1.abs_diff(b.1));
+        let x = a.0.abs_diff(b.0);
+        let y = a.1.abs_diff(b.1);
         Self { straight: x.abs_diff(y), diagonal: x.min(y) }
     }
 }
 
-/// A box on the search's frontier; the least is expanded next.
+/// A box on the search's frontier; the smallest is expanded next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct FrontierNode {
-    /// Bits of the least length of a path through this box: lengths are not negative, so their bits
+    /// Bits of a lower bound of the length of paths through this box: lengths are not negative, so their bits
     /// have the same order as the lengths.
     estimate_bits: u64,
-    at: (u32, u32),
+    position: (u32, u32),
     length: PathLength,
 }
 
 impl FrontierNode {
-    fn new(at: (u32, u32), length: PathLength, goal: (u32, u32)) -> Self {
-        let rest = PathLength::between(at, goal);
-        let whole = PathLength {
-            straight: length.straight + rest.straight,
-            diagonal: length.diagonal + rest.diagonal,
+    fn new(position: (u32, u32), length: PathLength, goal: (u32, u32)) -> Self {
+        let heuristic = PathLength::between(position, goal);
+        let estimate = PathLength {
+            straight: length.straight + heuristic.straight,
+            diagonal: length.diagonal + heuristic.diagonal,
         };
-        Self { estimate_bits: whole.in_boxes().to_bits(), at, length }
+        Self { estimate_bits: estimate.in_boxes().to_bits(), position, length }
     }
 }
+
+/// The four diagonal steps as (columns, rows).
+const DIAGONAL_STEPS: [(i32, i32); 4] = [(1, 1), (-1, 1), (-1, -1), (1, -1)];
 
 /// Returns the boxes one step away and the length of the path to them.
 fn neighbors(
@@ -85,20 +89,18 @@ fn neighbors(
     (col, row): (u32, u32),
     length: PathLength,
 ) -> impl Iterator<Item = ((u32, u32), PathLength)> {
-    let shifted =
+    let neighbor =
         move |east, north| (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
     let is_free = move |(col, row): (u32, u32)| free.is_free(col, row);
-    let straight = PathLength { straight: length.straight + 1, ..length };
-    let diagonal = PathLength { diagonal: length.diagonal + 1, ..length };
-    let along = STEPS.into_iter().map(move |(east, north)| shifted(east, north));
-    let across = [(1, 1), (-1, 1), (-1, -1), (1, -1)].into_iter();
-    let across = across
-        .filter(move |&(east, north)| is_free(shifted(east, 0)) && is_free(shifted(0, north)))
-        .map(move |(east, north)| shifted(east, north));
-    along
-        .map(move |at| (at, straight))
-        .chain(across.map(move |at| (at, diagonal)))
-        .filter(move |&(at, _)| is_free(at))
+    let after_straight = PathLength { straight: length.straight + 1, ..length };
+    let after_diagonal = PathLength { diagonal: length.diagonal + 1, ..length };
+    let straight =
+        STEPS.into_iter().map(move |(east, north)| (neighbor(east, north), after_straight));
+    let diagonal = DIAGONAL_STEPS
+        .into_iter()
+        .filter(move |&(east, north)| is_free(neighbor(east, 0)) && is_free(neighbor(0, north)))
+        .map(move |(east, north)| (neighbor(east, north), after_diagonal));
+    straight.chain(diagonal).filter(move |&(position, _)| is_free(position))
 }
 
 #[cfg(test)]

@@ -183,12 +183,12 @@ impl<V: Integer> DeltaEncoder<V> {
         }
     }
 
-    /// Appends the differences inside `values`, as many at a time as the block has room for.
+    /// Appends the differences inside `values`, as many at a time as fit the block.
     fn extend_differences(&mut self, mut values: &[V]) {
         while values.len() > 1 {
             let n = (BLOCK - self.pending).min(values.len() - 1);
-            let room = &mut self.deltas[self.pending..self.pending + n];
-            for ((delta, v), previous) in room.iter_mut().zip(&values[1..]).zip(values) {
+            let deltas = &mut self.deltas[self.pending..self.pending + n];
+            for ((delta, v), previous) in deltas.iter_mut().zip(&values[1..]).zip(values) {
                 *delta = v.minus(*previous);
             }
             self.pending += n;

@@ -108,7 +108,8 @@ impl BagWriter {
     /// # Errors
     /// An I/O error.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        let (path, metadata) = (self.folder.join(FILE), self.metadata());
+        let path = self.folder.join(FILE);
+        let metadata = self.metadata();
         self.writer.finish().map_err(|e| RecordError::new(path.display(), error_text(e)))?;
         let file = self.writer.into_inner().into_inner().map_err(|e| e.into_error());
         file.and_then(|file| file.sync_all()).map_err(|e| RecordError::new(path.display(), e))?;

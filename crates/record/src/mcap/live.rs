@@ -23,11 +23,11 @@ use super::messages::to_ns;
 
 /// Bytes that wait for a viewer before the oldest ones are dropped, about.
 const MAX_BACKLOG_BYTES: usize = 64 << 20;
-/// Messages that wait at least: as many as there can be topics at once.
+/// Fewest messages that may wait: as many as there can be topics, so that each has its newest.
 const MIN_BACKLOG_MESSAGES: usize = 128;
 const MAX_BACKLOG_MESSAGES: usize = 1024;
 
-/// The wish of a viewer.
+/// The request of a viewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaybackRequest {
     /// Whether the run is to go on.
@@ -75,34 +75,48 @@ pub struct LiveFrameWriter {
     output: LiveOutput,
 }
 
-/// Starts a server for a run at `host` and `port` (0 for any free one), with a first frame, and up to `end_s` of
-/// simulated time. Viewers' wishes are handed to `steer`, in threads of the server, which must not wait there.
+/// A run that a server shows to viewers.
+#[derive(Debug, Clone, Copy)]
+pub struct ServedRun<'a> {
+    /// Everything that stays the same.
+    pub scenery: &'a Scenery,
+    /// The first frame.
+    pub first: &'a Frame,
+    /// The end of the run, in simulated seconds.
+    pub end_s: f64,
+}
+
+/// Starts a server for `run` at `host` and `port` (0 for any free one). Viewers' requests are
+/// handed to `steer` in threads of the server, where it must not wait: all viewers would.
 ///
 /// # Errors
-/// When the address cannot be had.
+/// When the address cannot be used.
 pub fn start_live_server(
     host: &str,
     port: u16,
-    scenery: &Scenery,
-    first: &Frame,
-    end_s: f64,
+    run: &ServedRun<'_>,
     steer: impl Fn(PlaybackRequest) -> Playback + Send + Sync + 'static,
 ) -> io::Result<(LiveServer, LiveFrameWriter)> {
     let context = Context::new();
-    let desk = Arc::new(RequestHandler { latest: Mutex::default(), steer: Box::new(steer) });
-    let output =
-        LiveOutput { context: context.clone(), desk: desk.clone(), channels: BTreeMap::new() };
+    let handler = Arc::new(RequestHandler { latest: Mutex::default(), steer: Box::new(steer) });
+    let output = LiveOutput {
+        context: context.clone(),
+        handler: handler.clone(),
+        channels: BTreeMap::new(),
+    };
+    let ServedRun { scenery, first, end_s } = *run;
     let mut frames = LiveFrameWriter { topics: FrameEncoder::new(scenery), output };
-    let told = frames.topics.write_scenery(scenery, &mut frames.output);
-    told.and_then(|()| frames.write_frame(first)).map_err(io::Error::other)?;
+    // Before the server starts: the size of these messages determines how many may wait.
+    frames.topics.write_scenery(scenery, &mut frames.output).map_err(io::Error::other)?;
+    frames.write_frame(first).map_err(io::Error::other)?;
     let server = WebSocketServer::new()
         .context(&context)
         .name(format!("sidestep: {}", scenery.name))
         .bind(host, port)
         .capabilities([Capability::PlaybackControl, Capability::Time])
         .playback_time_range(0, to_ns(end_s))
-        .message_backlog_size(desk.max_backlog_messages())
-        .listener(desk)
+        .message_backlog_size(handler.max_backlog_messages())
+        .listener(handler)
         .start_blocking();
     let handle = server.map_err(|error| match error {
         FoxgloveError::Bind(error) => error,
@@ -152,7 +166,7 @@ impl LiveFrameWriter {
 
 struct LiveOutput {
     context: Arc<Context>,
-    desk: Arc<RequestHandler>,
+    handler: Arc<RequestHandler>,
     /// Channels by topic.
     channels: BTreeMap<String, Arc<RawChannel>>,
 }
@@ -184,7 +198,7 @@ impl MessageSink for LiveOutput {
         // An event is sent once, not whenever a viewer comes.
         if topic != "/log" {
             let id = u64::from(channel.id());
-            self.desk.lock().insert(id, LatestMessage { channel, log_time, bytes });
+            self.handler.lock().insert(id, LatestMessage { channel, log_time, bytes });
         }
         Ok(())
     }
@@ -232,12 +246,12 @@ impl ServerListener for RequestHandler {
         &self,
         request: PlaybackControlRequest,
     ) -> Option<PlaybackState> {
-        let steering = PlaybackRequest {
+        let request = PlaybackRequest {
             play: request.playback_command == PlaybackCommand::Play,
             speed: f64::from(request.playback_speed),
             seek_s: request.seek_time.map(|ns| ns as f64 * 1e-9),
         };
-        Some(playback_state((self.steer)(steering)))
+        Some(playback_state((self.steer)(request)))
     }
 }
 

@@ -65,8 +65,8 @@ fn color([r, g, b]: [u8; 3], a: f64) -> Option<Color> {
 }
 
 fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
-    let look = body.appearance(dimensions);
-    color(look.color, look.opacity)
+    let appearance = body.appearance(dimensions);
+    color(appearance.color, appearance.opacity)
 }
 
 /// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
@@ -153,7 +153,8 @@ fn entity(id: &str, now_ns: u64) -> SceneEntity {
 }
 
 fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
-    let (color, at) = (color_of(body, dimensions), pose(&body.pose));
+    let color = color_of(body, dimensions);
+    let at = pose(&body.pose);
     match &body.shape {
         Shape::Cuboid { size_m } => {
             entity.cubes.push(CubePrimitive { pose: at, size: vector(*size_m), color });
@@ -276,15 +277,15 @@ pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
         name,
         ..Log::default()
     };
-    let told = frame.log.iter().map(|e| {
-        let (name, words) = (e.name(), format!("{} {}", e.name(), e.words));
-        entry(e.cycle as f64 * cycle_s, e.level, name, words)
+    let events = frame.log.iter().map(|event| {
+        let words = format!("{} {}", event.name(), event.words);
+        entry(event.cycle as f64 * cycle_s, event.level, event.name(), words)
     });
-    let more = (frame.log_left_out > 0).then(|| {
+    let left_out = (frame.log_left_out > 0).then(|| {
         let words = format!("{} more events are not told", frame.log_left_out);
         entry(frame.time_s, Severity::Warning, "log".into(), words)
     });
-    told.chain(more).collect()
+    events.chain(left_out).collect()
 }
 
 #[cfg(test)]
@@ -304,12 +305,12 @@ mod tests {
         ] {
             for dimensions in [2, 3] {
                 let body = Body::new(kind, 4, ViewPose::from_position([0.0; 3]), ball.clone());
-                let look = body.appearance(dimensions);
+                let appearance = body.appearance(dimensions);
                 let frame = Frame { bodies: vec![body], ..Frame::default() };
                 let update = scene(&frame, dimensions, &mut BTreeSet::new());
                 let shown = update.entities[0].spheres[0].color.expect("a color");
                 let bytes = [shown.r, shown.g, shown.b].map(|part| (255.0 * part).round() as u8);
-                assert_eq!((bytes, shown.a), (look.color, look.opacity), "{kind}");
+                assert_eq!((bytes, shown.a), (appearance.color, appearance.opacity), "{kind}");
             }
         }
     }

@@ -31,7 +31,8 @@ mod writer;
 
 pub use bag::{BagSchema, BagWriter};
 pub use live::{
-    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, start_live_server,
+    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, ServedRun,
+    start_live_server,
 };
 pub use reader::{McapRunInfo, is_mcap};
 pub use scene_reader::McapSceneReader;

@@ -127,7 +127,7 @@ impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, InputError> {
         let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|e| {
-            InputError::new(path.display(), e.to_string(), "name a recording that can be read")
+            InputError::new(path.display(), e.to_string(), "give a recording that can be read")
         })?;
         Ok(Self { path: path.to_path_buf(), file, length })
     }
@@ -198,7 +198,7 @@ impl McapFile {
 }
 
 fn not_a_recording(path: &Path) -> InputError {
-    let remedy = "name a recording that `sidestep run --mcap` or `sidestep export --to mcap` made";
+    let remedy = "give a recording that `sidestep run --mcap` or `sidestep export --to mcap` made";
     InputError::new(path.display(), "the file says nothing of a run of sidestep", remedy)
 }
 

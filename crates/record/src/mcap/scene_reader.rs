@@ -38,8 +38,8 @@ impl McapSceneReader {
     pub fn open(path: &Path) -> Result<Self, InputError> {
         let mut source = McapFile::open(path)?;
         let summary = source.summary()?;
-        let said = describe_run(&mut source, &summary)?;
-        let cycle_s = said.get("cycle_s").and_then(|text| text.parse().ok());
+        let description = describe_run(&mut source, &summary)?;
+        let cycle_s = description.get("cycle_s").and_then(|text| text.parse().ok());
         let cycle_s = cycle_s.filter(|s: &f64| s.is_finite() && *s > 0.0);
         let cycle_s =
             cycle_s.ok_or_else(|| damaged(path, "it does not say how long a cycle takes"))?;
@@ -67,9 +67,10 @@ impl McapSceneReader {
     /// # Errors
     /// When the file is damaged.
     pub fn events(&mut self) -> Result<Vec<LogEvent>, InputError> {
-        let (mut events, cycle_s) = (Vec::new(), self.cycle_s);
-        self.for_each::<Log>("/log", IndexedReaderOptions::new(), |told| {
-            events.extend(parse_event(&told, cycle_s));
+        let mut events = Vec::new();
+        let cycle_s = self.cycle_s;
+        self.for_each::<Log>("/log", IndexedReaderOptions::new(), |entry| {
+            events.extend(parse_event(&entry, cycle_s));
             if events.len() < MAX_EVENTS {
                 ControlFlow::Continue(())
             } else {
@@ -79,7 +80,7 @@ impl McapSceneReader {
         Ok(events)
     }
 
-    /// Passes on the messages of a topic, until it is told to stop.
+    /// Passes on the messages of a topic, until `take` breaks.
     fn for_each<T: Decode>(
         &mut self,
         topic: &str,
@@ -87,7 +88,7 @@ impl McapSceneReader {
         mut take: impl FnMut(T) -> ControlFlow<()>,
     ) -> Result<(), InputError> {
         if !self.summary.channels.values().any(|channel| channel.topic == topic) {
-            // The reader would take no such topic for all topics.
+            // A filter on a topic that the file does not have would pass all topics.
             return Ok(());
         }
         // Unpacked data may be larger, but a damaged length must not ask for all memory.
@@ -153,7 +154,8 @@ fn shapes(entity: &SceneEntity) -> Vec<(Pose, Shape)> {
         return solids;
     }
     let darts = entity.arrows.iter().map(|arrow| {
-        let (tail, length_m) = (at(arrow.pose.as_ref()), arrow.shaft_length + arrow.head_length);
+        let tail = at(arrow.pose.as_ref());
+        let length_m = arrow.shaft_length + arrow.head_length;
         let pose = Pose { at_m: tail.transform_point([0.5 * length_m, 0.0, 0.0]), ..tail };
         (pose, Shape::Dart { length_m, width_m: arrow.head_diameter })
     });
@@ -170,19 +172,19 @@ fn parse_body_id(name: &str) -> Option<BodyId> {
 }
 
 /// Returns the event of a body that a message reports. Its words are all that is known of it.
-fn parse_event(told: &Log, cycle_s: f64) -> Option<LogEvent> {
-    let words = told.message.strip_prefix(&told.name).unwrap_or(&told.message).trim();
-    let level = match log::Level::try_from(told.level) {
+fn parse_event(entry: &Log, cycle_s: f64) -> Option<LogEvent> {
+    let words = entry.message.strip_prefix(&entry.name).unwrap_or(&entry.message).trim();
+    let level = match log::Level::try_from(entry.level) {
         Ok(log::Level::Warning) => Severity::Warning,
         Ok(log::Level::Error | log::Level::Fatal) => Severity::Error,
         _ => Severity::Info,
     };
-    let time_s = messages::log_time_ns(told) as f64 / 1e9;
+    let time_s = messages::log_time_ns(entry) as f64 / 1e9;
     Some(LogEvent {
         cycle: (time_s / cycle_s).round() as Cycle,
         level,
         kind: LogEventKind::Changed,
-        who: parse_body_id(&told.name)?,
+        who: parse_body_id(&entry.name)?,
         with: None,
         at_m: None,
         value: None,

@@ -77,11 +77,11 @@ impl McapRecorder {
     pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
         let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
         match fs::metadata(path) {
-            Ok(found) if !found.is_file() => refuse("this is no file", "name a new file"),
+            Ok(found) if !found.is_file() => refuse("this is no file", "give a new file"),
             Ok(_) if existing == IfExists::Refuse => {
-                refuse("the file exists already", "name another file, or replace it (--replace)")
+                refuse("the file exists already", "give another file, or replace it (--replace)")
             }
-            _ if path.file_name().is_none() => refuse("this is no file name", "name a new file"),
+            _ if path.file_name().is_none() => refuse("this is no file name", "give a new file"),
             _ => Ok(()),
         }
     }
@@ -96,13 +96,13 @@ impl McapRecorder {
         origin: McapProvenance,
         scenery: &Scenery,
     ) -> Result<Self, RecordError> {
-        let growing = disk::partial_path(path);
+        let partial = disk::partial_path(path);
         let failed = |cause: String| RecordError::new(path.display(), cause);
-        let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&growing));
+        let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&partial));
         let file = file.map_err(|e| failed(e.to_string()))?;
         let options = write_options(&origin.origin.program_version);
         let writer = options.create(BufWriter::new(file)).map_err(|e| failed(error_text(e)));
-        let writer = writer.inspect_err(|_| drop(fs::remove_file(&growing)))?;
+        let writer = writer.inspect_err(|_| drop(fs::remove_file(&partial)))?;
         let output = FileOutput {
             path: path.to_path_buf(),
             writer: Some(writer),
@@ -170,14 +170,14 @@ impl McapRecorder {
         let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
         self.output.with_writer(|writer| writer.write_metadata(&metadata))?;
         self.output.with_writer(|writer| writer.finish().map(drop))?;
-        let growing = disk::partial_path(self.path());
-        let Some(writer) = self.output.writer.take() else { return Ok(growing) };
+        let partial = disk::partial_path(self.path());
+        let Some(writer) = self.output.writer.take() else { return Ok(partial) };
         let ended = writer.into_inner().into_inner().map_err(|e| e.into_error());
         ended.and_then(|file| file.sync_all()).map_err(|e| {
-            let _ = fs::remove_file(&growing);
+            let _ = fs::remove_file(&partial);
             RecordError::new(self.path().display(), e)
         })?;
-        Ok(growing)
+        Ok(partial)
     }
 
     fn metadata(&self, end: &McapFooter) -> BTreeMap<String, String> {
@@ -261,7 +261,7 @@ impl Drop for McapRecorder {
     }
 }
 
-/// Returns the way in which files are written by a version of the program.
+/// Returns the compression, chunk size and origin of files that this version of the program writes.
 pub(super) fn write_options(version: &str) -> WriteOptions {
     // Several threads would compress to bytes that differ from those of one.
     WriteOptions::new()

@@ -78,7 +78,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<RoleColumn<R>>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
-            let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
+            let remedy =
+                "give another folder, or continue the sweep in this one: sidestep resume DIR";
             let cause = "the folder holds a sweep already";
             return Err(InputError::new(path.display(), cause, remedy).into());
         }
@@ -135,7 +136,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     pub fn open(path: &Path) -> Result<Self, InputError> {
         if !Self::is_at(path) {
             let cause = format!("this is no sweep: it holds no `{MANIFEST}`");
-            let remedy = "name the folder that a sweep was written to";
+            let remedy = "give the folder that a sweep was written to";
             return Err(InputError::new(path.display(), cause, remedy));
         }
         let manifest = manifest::read_json(&path.join(MANIFEST))?;
@@ -236,9 +237,10 @@ fn read_files(
         let path = entry.map_err(failed(folder))?.path();
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
         let name = format!("{under}{}", name.unwrap_or_default());
-        match path.is_dir() {
-            true => read_files(&path, &format!("{name}/"), files)?,
-            false => files.push((name, fs::read(&path).map_err(failed(&path))?)),
+        if path.is_dir() {
+            read_files(&path, &format!("{name}/"), files)?;
+        } else {
+            files.push((name, fs::read(&path).map_err(failed(&path))?));
         }
     }
     Ok(())

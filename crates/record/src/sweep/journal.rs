@@ -78,13 +78,15 @@ impl Journal {
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
         journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
         if length == 0 {
-            let (program_version, fingerprint) = (of.program_version.into(), of.fingerprint.into());
-            let fingerprint = Some(fingerprint);
-            let head = JournalHeader { format: format::CURRENT, program_version, fingerprint };
+            let header = JournalHeader {
+                format: format::CURRENT,
+                program_version: of.program_version.into(),
+                fingerprint: Some(of.fingerprint.into()),
+            };
             journal
-                .append(&head)
+                .append(&header)
                 .and_then(|()| journal.sync())
-                .map_err(|e| InputError::new(e.place, e.cause, "make room on the disk"))?;
+                .map_err(|e| InputError::new(e.place, e.cause, "make space on the disk"))?;
         }
         Ok(journal)
     }
@@ -128,7 +130,8 @@ pub(super) fn is_locked(path: &Path) -> Option<bool> {
     }
 }
 
-/// Locks a file, against other writers. Checking for a lock takes one briefly, so a few further tries are made.
+/// Locks a file against other writers. [`is_locked`] in another process holds a shared lock for a
+/// moment, so a lock that fails is tried again a few times.
 fn try_lock(file: &File) -> Result<(), TryLockError> {
     for _ in 0..MAX_LOCK_RETRIES {
         match file.try_lock() {
@@ -156,8 +159,8 @@ fn line(entry: &impl Serialize) -> serde_json::Result<String> {
     Ok(format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes())))
 }
 
-/// Passes on the entries of the journal at `path`, which may be growing: up to the last complete
-/// line.
+/// Passes on the entries of the journal at `path` up to the last complete line: a process may be
+/// appending to it.
 ///
 /// # Errors
 /// A journal that cannot be read, is damaged, or was written by another version of the program.
@@ -181,7 +184,8 @@ fn read_complete_lines<T: DeserializeOwned>(
     };
     let file = File::open(path).map_err(|e| damaged(1, e.to_string()))?;
     let mut reader = BufReader::new(file);
-    let (mut bytes, mut length) = (Vec::new(), 0);
+    let mut bytes = Vec::new();
+    let mut length = 0;
     for number in 1.. {
         bytes.clear();
         let n = reader.read_until(b'\n', &mut bytes).map_err(|e| damaged(number, e.to_string()))?;
@@ -212,23 +216,23 @@ fn json(line: &[u8]) -> Option<&[u8]> {
 }
 
 fn check_header(path: &Path, json: &[u8], of: SweepIdentity<'_>) -> Result<(), InputError> {
-    let head: JournalHeader = serde_json::from_slice(json).map_err(|e| {
+    let header: JournalHeader = serde_json::from_slice(json).map_err(|e| {
         InputError::new(path.display(), format!("this is no journal: {e}"), "delete it")
     })?;
-    head.format.check_readable(path.display())?;
-    if head.fingerprint.is_some_and(|fingerprint| fingerprint != of.fingerprint) {
+    header.format.check_readable(path.display())?;
+    if header.fingerprint.is_some_and(|fingerprint| fingerprint != of.fingerprint) {
         let remedy = "delete it, and its runs are made";
         return Err(InputError::new(path.display(), "its runs are of another sweep", remedy));
     }
-    if head.program_version == of.program_version {
+    if header.program_version == of.program_version {
         return Ok(());
     }
     let cause = format!(
         "its runs are of sidestep {}, this is {}",
-        head.program_version, of.program_version
+        header.program_version, of.program_version
     );
     let remedy =
-        format!("go on with sidestep {}, or sweep into a new folder", head.program_version);
+        format!("continue with sidestep {}, or sweep into a new folder", header.program_version);
     Err(InputError::new(path.display(), cause, remedy))
 }
 

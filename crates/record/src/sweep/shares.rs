@@ -90,7 +90,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         but: Option<Share>,
         mut each: impl FnMut(T),
     ) -> Result<(), InputError> {
-        let (done, fingerprint) = (self.shares_with("parquet")?, self.fingerprint());
+        let done = self.shares_with("parquet")?;
+        let fingerprint = self.fingerprint();
         for share in self.shares_with("journal")? {
             if !done.contains(&share) && Some(share) != but {
                 let path = self.share_file(share, "journal");
@@ -100,12 +101,12 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
-    /// Returns the shares that were begun, in order, and whether each is done.
+    /// Returns the shares that were started, in order, and whether each is done.
     ///
     /// # Errors
     /// A folder that cannot be read.
     pub fn shares(&self) -> Result<Vec<(Share, bool)>, InputError> {
-        // Journals first: a share that ends between both looks is seen as one that is done.
+        // Journals first: a share that ends between both listings counts as done, not as missing.
         let mut shares = self.shares_with("journal")?;
         let done = self.shares_with("parquet")?;
         shares.extend(&done);
@@ -139,7 +140,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Checks that the scenarios of a part are those of this sweep.
     fn check_part(&self, path: &Path) -> Result<(), InputError> {
         let [fingerprint] = run_table::read_key_values(path, [FINGERPRINT])?;
-        // Parts that are older than this check do not say it.
+        // Parts that are older than this check have no fingerprint.
         if fingerprint.is_none_or(|fingerprint| fingerprint == self.fingerprint()) {
             return Ok(());
         }
@@ -148,11 +149,13 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     }
 
     fn check_version<R>(&self, path: &Path, table: &LoadedTable<R>) -> Result<(), InputError> {
-        let (wrote, ours) = (&table.program_version, &self.manifest().program_version);
-        if wrote == ours {
+        let part_version = &table.program_version;
+        let sweep_version = &self.manifest().program_version;
+        if part_version == sweep_version {
             return Ok(());
         }
-        let cause = format!("its runs are of sidestep {wrote}, the sweep is of {ours}");
+        let cause =
+            format!("its runs are of sidestep {part_version}, the sweep is of {sweep_version}");
         Err(InputError::new(path.display(), cause, "delete it, and run this share again"))
     }
 

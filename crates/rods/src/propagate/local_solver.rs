@@ -1,5 +1,6 @@
-//! One connector by itself: its reaction to its master, and its part as an initiator, by the code that
-//! judges whole chains. It knows its neighbors' messages and its own surroundings, and nothing else.
+//! One connector by itself: its reaction to its master, and its checks as an initiator, by the code that
+//! propagates motions through whole chains. Its inputs are messages from its neighbors and its own
+//! surroundings, and nothing else (slide E4), so that it can run as an agent aboard a robot.
 
 use super::{DrivenConnectors, check, count_sub_steps, project};
 use crate::candidates::{CandidateScratch, guide};
@@ -14,29 +15,31 @@ use crate::rules::{Rotation, Rules};
 use crate::veto::{Motion, VetoEffect};
 use sidestep_kernel::InputError;
 
-/// Index of the connector in a chain of its own, and the one that its master would have.
+/// Index of the connector in a chain of its own.
 const SELF_INDEX: usize = 0;
+/// Index that its master would have in that chain. Nothing is looked up there.
 const MASTER_INDEX: usize = 1;
 
 /// A connector by itself.
 #[derive(Debug, Clone)]
 pub struct LocalSolver<const D: usize> {
-    /// A chain of this connector only, with the measures of the whole one.
+    /// A chain of this connector only. It has the least move and the step length of the whole one,
+    /// so that the connector decides as it would inside it.
     chain: Chain<D>,
     rules: Rules,
-    work: CandidateScratch<D>,
-    overlay: TentativePositions<D>,
-    own: RodBvh<D>,
+    scratch: CandidateScratch<D>,
+    tentative: TentativePositions<D>,
+    own_rods: RodBvh<D>,
 }
 
-/// A master's motion, as its slave hears of it.
+/// A master's motion, as its message to the slave describes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MasterMotion<const D: usize> {
-    /// The master before,
+    /// Position of the master before the motion.
     pub mo: Point<D>,
-    /// and after.
+    /// Position of the master after it.
     pub mn: Point<D>,
-    /// The connector on the master's other side, if its place is settled.
+    /// The connector on the master's other side, if its new position is settled.
     pub prev: Option<Point<D>>,
     /// Bend limit of the master, rad.
     pub max_bend_rad: f64,
@@ -49,26 +52,30 @@ pub struct MasterMotion<const D: usize> {
 /// A slave's reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reaction<const D: usize> {
-    /// Its new place; the old one, bit for bit, if it stays.
+    /// Its new position; the old one, bit for bit, if it stays.
     pub at: Point<D>,
-    /// Whether the motion ends here, because the slave stays and everything beyond it is good as it is.
+    /// Whether the motion ends here, because the slave stays and everything beyond it meets its constraints.
     pub ends: bool,
     /// Whether its rod turned from the guide line.
     pub rotated: bool,
     /// Whether it could have gone elsewhere.
     pub has_others: bool,
-    /// Whether its rod found a way by turning.
+    /// Whether its rod found a free direction by turning.
     pub has_turned: bool,
 }
 
 impl<const D: usize> LocalSolver<D> {
-    /// Returns a connector of a chain, which reacts by the chain's rules. Parts of its own chain are not
-    /// in its way.
+    /// Returns connector `k` of a chain, which reacts by the chain's rules, except that it does not
+    /// check for collisions of the chain with itself: it does not know where the other parts are.
     pub fn new(chain: &Chain<D>, k: usize, rules: &Rules) -> Self {
         let rules = Rules { self_collision: false, ..*rules };
-        let (work, overlay, own) =
-            (CandidateScratch::default(), TentativePositions::default(), RodBvh::default());
-        Self { chain: chain.single_connector(k), rules, work, overlay, own }
+        Self {
+            chain: chain.single_connector(k),
+            rules,
+            scratch: CandidateScratch::default(),
+            tentative: TentativePositions::default(),
+            own_rods: RodBvh::default(),
+        }
     }
 
     /// Returns its bend limit, rad.
@@ -76,7 +83,7 @@ impl<const D: usize> LocalSolver<D> {
         self.chain.connectors()[SELF_INDEX].max_bend_rad
     }
 
-    /// Gives it another bend limit.
+    /// Sets its bend limit, rad.
     ///
     /// # Errors
     /// When the limit is out of range.
@@ -111,9 +118,10 @@ impl<const D: usize> LocalSolver<D> {
             return Ok(self.free_reaction(so, rod, next, pull));
         }
         self.chain.points_mut()[SELF_INDEX] = so;
-        let Self { chain, rules, work, overlay, own } = self;
-        (work.all_lengths, work.has_turned) = (pull.all_lengths, false);
-        let scene = MotionContext { chain, obstacles, rules, overlay, own };
+        let Self { chain, rules, scratch, tentative, own_rods } = self;
+        scratch.all_lengths = pull.all_lengths;
+        scratch.has_turned = false;
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
         let connector = &chain.connectors()[SELF_INDEX];
         let step = SlaveStep {
             master: MASTER_INDEX,
@@ -126,20 +134,28 @@ impl<const D: usize> LocalSolver<D> {
             tip_radius_m: connector.radius_m,
             max_bend_rad: pull.max_bend_rad,
         };
-        scene.candidates(&step, work)?;
-        let chosen = work.found[0];
+        context.candidates(&step, scratch)?;
+        let chosen = scratch.found[0];
         let stays = distance(chosen.at, so) <= chain.min_move_m();
-        let is_good = |(at, rod): (Point<D>, Rod)| {
-            let (prev, max_bend_rad) = (Some(pull.mn), connector.max_bend_rad);
-            let beyond = SlaveStep { mo: so, mn: so, so: at, prev, rod, max_bend_rad, ..step };
-            is_length_allowed(rod, distance(at, so)) && beyond.exceeds_bend_at(at)
+        let is_next_good = |(next_at, next_rod): (Point<D>, Rod)| {
+            let next_step = SlaveStep {
+                mo: so,
+                mn: so,
+                so: next_at,
+                prev: Some(pull.mn),
+                rod: next_rod,
+                max_bend_rad: connector.max_bend_rad,
+                ..step
+            };
+            is_length_allowed(next_rod, distance(next_at, so))
+                && next_step.is_bend_allowed_at(next_at)
         };
         Ok(Reaction {
             at: if stays { so } else { chosen.at },
-            ends: stays && next.is_none_or(is_good),
+            ends: stays && next.is_none_or(is_next_good),
             rotated: chosen.rotated,
-            has_others: work.found.len() > 1 || work.has_other_side,
-            has_turned: work.has_turned,
+            has_others: scratch.found.len() > 1 || scratch.has_other_side,
+            has_turned: scratch.has_turned,
         })
     }
 
@@ -157,7 +173,7 @@ impl<const D: usize> LocalSolver<D> {
         Reaction { at, ends, rotated: false, has_others: false, has_turned: false }
     }
 
-    /// Returns the number of sub-steps in which it goes from its place to a target as an initiator.
+    /// Returns the number of sub-steps in which it moves to a target as an initiator.
     /// `is_empty` says that there is no obstacle anywhere.
     ///
     /// # Errors
@@ -175,14 +191,14 @@ impl<const D: usize> LocalSolver<D> {
         count_sub_steps(&self.rules, self.chain.step_m(), is_empty, distance(from, to))
     }
 
-    /// Returns whether its own constraint allows it to go from its place to a target as an initiator.
+    /// Checks whether its own constraint allows it to move to a target as an initiator.
     ///
     /// # Errors
     /// The constraint because of which it objects.
     pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
-        let mut heads = DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to });
-        project(&self.chain, &mut heads, VetoEffect::Exact).map_err(|(_, refusal)| refusal)
+        let mut driven = DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to });
+        project(&self.chain, &mut driven, VetoEffect::Exact).map_err(|(_, objection)| objection)
     }
 
     /// Returns whether a sub-step is too short to count.
@@ -190,7 +206,7 @@ impl<const D: usize> LocalSolver<D> {
         distance(to, from) <= self.chain.min_move_m()
     }
 
-    /// Checks whether its way as an initiator is free of obstacles.
+    /// Checks whether its path as an initiator is free of obstacles.
     ///
     /// # Errors
     /// The constraint because of which it objects.
@@ -201,7 +217,8 @@ impl<const D: usize> LocalSolver<D> {
         obstacles: &Obstacles<D>,
     ) -> Result<(), PendingVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
-        let Self { chain, rules, overlay, own, .. } = &*self;
-        MotionContext { chain, obstacles, rules, overlay, own }.check_initiator(SELF_INDEX, to)
+        let Self { chain, rules, tentative, own_rods, .. } = &*self;
+        MotionContext { chain, obstacles, rules, tentative, own_rods }
+            .check_initiator(SELF_INDEX, to)
     }
 }

@@ -1,4 +1,8 @@
-//! Motions of a chain in its own way in which no part comes near another.
+//! Motions with self-collision in which no part of the chain comes near another.
+//!
+//! Most motions are like that. They are made without a test of each pair of parts, and
+//! [`MotionBounds`] proves afterwards that no test could have objected; where the proof fails, the
+//! motion is taken back and made with all tests. The result is the same bits either way.
 
 use super::{DrivenConnectors, MotionTally, Propagator, is_open};
 use crate::chain::Chain;
@@ -8,19 +12,19 @@ use crate::obstacle::Obstacles;
 use crate::open::{self, StayRule};
 use std::ops::Range;
 
-/// Motions among obstacles until a proof is tried again. Where one fails, its effort is lost, so every
-/// failure doubles the time to the next. No result depends on it.
+/// The schedule of proofs: exponential backoff. The effort of a proof that fails is lost, so every
+/// failure doubles the number of motions until the next attempt. No result depends on it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ProofSchedule {
     until_next: u32,
     pause: u32,
 }
 
-/// Most motions from one proof to the next.
+/// Most motions from one proof to the next, so that a chain that has opened up again soon moves fast.
 const MAX_PAUSE: u32 = 256;
 
 impl ProofSchedule {
-    /// Returns whether a proof is to be tried now.
+    /// Returns whether a proof is due for this motion, and counts the motion.
     #[inline]
     fn is_due(&mut self) -> bool {
         let is_due = self.until_next == 0;
@@ -28,6 +32,7 @@ impl ProofSchedule {
         is_due
     }
 
+    /// Records the result of a proof.
     #[inline]
     fn record(&mut self, holds: bool) {
         self.pause = if holds { 0 } else { (2 * self.pause).clamp(1, MAX_PAUSE) };
@@ -42,102 +47,106 @@ impl ProofSchedule {
 }
 
 impl<const D: usize> Propagator<D> {
-    /// Makes a motion if no part comes near another in it; then nothing can object, and the chain moves
-    /// as if it were not in its own way.
+    /// Makes a sub-step without obstacles if no part comes near another in it: then nothing can object,
+    /// and the chain moves as it does without self-collision. Returns whether it was made.
     pub(super) fn pull_if_separated(
         &mut self,
         chain: &mut Chain<D>,
-        heads: &DrivenConnectors<D>,
-        goes_on: bool,
+        driven: &DrivenConnectors<D>,
+        is_last: bool,
     ) -> bool {
         if !MotionBounds::is_worthwhile(chain) {
             return false;
         }
-        self.leeway.record(chain);
-        let mut tally = MotionTally::start(heads.first);
-        let head_m = distance(chain.points()[heads.first], heads.to[0]);
-        open::pull(chain, heads.first, heads.to[0], StayRule::Nearly, &mut tally);
-        let way_m = head_m.max(tally.max_slave_step_m);
-        let may = self.is_proven(chain, &tally, way_m);
-        if may {
-            if goes_on {
-                self.save_positions(heads.first, tally.from..tally.to);
+        self.motion_bounds.record(chain);
+        let mut tally = MotionTally::start(driven.first);
+        let head_m = distance(chain.points()[driven.first], driven.to[0]);
+        open::pull(chain, driven.first, driven.to[0], StayRule::Nearly, &mut tally);
+        let travel_m = head_m.max(tally.max_slave_step_m);
+        let holds = self.is_proven(chain, &tally, travel_m);
+        if holds {
+            // A later sub-step may end in a veto, which takes back the whole request.
+            if !is_last {
+                self.save_positions(driven.first, tally.from..tally.to);
             }
             self.tally.add(&tally);
-            self.leeway.accept(chain);
+            self.motion_bounds.accept(chain);
         }
-        may
+        holds
     }
 
-    /// Makes all sub-steps of a request alone at once, if no part comes near another in any of them. Every part is then
-    /// where it would be after one sub-step after the other, each with a proof of its own or none.
+    /// Makes all sub-steps of a request in one batch, if no part comes near another in any of them.
+    /// Every part is then where the sub-steps one after the other would have brought it. Returns
+    /// whether they were made.
     pub(super) fn pull_all_if_separated(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &DrivenConnectors<D>,
+        driven: &DrivenConnectors<D>,
         n: usize,
     ) -> bool {
-        let may = self.rules.self_collision
+        let is_eligible = self.rules.self_collision
             && (2..=open::MAX_BATCH).contains(&n)
-            && is_open(chain, obstacles, heads)
+            && is_open(chain, obstacles, driven)
             && MotionBounds::is_worthwhile(chain);
-        let k = heads.first;
-        let from = heads.positions(chain);
-        // A sub-step too short to count is none.
-        let is_long = distance(from[0], heads.to[0]) > 2.0 * n as f64 * chain.min_move_m();
-        if !may || !is_long || !self.whole_proofs.is_due() {
+        let k = driven.first;
+        let from = driven.positions(chain);
+        // Sub-steps below the least move are skipped one by one, and must not be in a batch.
+        let is_long = distance(from[0], driven.to[0]) > 2.0 * n as f64 * chain.min_move_m();
+        if !is_eligible || !is_long || !self.request_proofs.is_due() {
             return false;
         }
-        self.leeway.record(chain);
+        self.motion_bounds.record(chain);
         let mut tally = MotionTally::start(k);
-        let mut to = [heads.to[0]; open::MAX_BATCH];
+        let mut to = [driven.to[0]; open::MAX_BATCH];
         for (j, to) in to[..n].iter_mut().enumerate() {
-            *to = heads.positions_at(from, [j + 1, n])[0];
+            *to = driven.positions_at(from, [j + 1, n])[0];
         }
-        let way_m = open::pull_batch(chain, k, &to[..n], &mut tally);
-        let holds = self.is_proven(chain, &tally, way_m);
+        let travel_m = open::pull_batch(chain, k, &to[..n], &mut tally);
+        let holds = self.is_proven(chain, &tally, travel_m);
         if holds {
             self.tally.add(&tally);
-            self.leeway.accept(chain);
+            self.motion_bounds.accept(chain);
         }
-        self.whole_proofs.record(holds);
+        self.request_proofs.record(holds);
         holds
     }
 
-    /// Returns whether a motion from the noted places, in which connectors went `way_m` at most, is allowed;
-    /// otherwise it is taken back.
-    fn is_proven(&mut self, chain: &mut Chain<D>, tally: &MotionTally, way_m: f64) -> bool {
-        let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
-            && self.leeway.allows(chain, way_m);
-        if !may {
+    /// Returns whether a motion from the recorded places, in which connectors moved by at most
+    /// `travel_m`, is proven to be allowed; otherwise it is taken back.
+    fn is_proven(&mut self, chain: &mut Chain<D>, tally: &MotionTally, travel_m: f64) -> bool {
+        let holds = tally.max_slave_step_m <= self.rules.slave_step_max_m
+            && self.motion_bounds.allows(chain, travel_m);
+        if !holds {
             let run = tally.from..tally.to;
-            chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.recorded_points()[run]);
-            self.leeway.revert(way_m);
+            chain.points_mut()[run.clone()]
+                .copy_from_slice(&self.motion_bounds.recorded_points()[run]);
+            self.motion_bounds.revert(travel_m);
         }
-        may
+        holds
     }
 
-    /// Makes a motion among obstacles if no rod turns and no part comes near another in it: every part is then where
-    /// it would be if each had been looked at.
+    /// Makes a sub-step among obstacles without tests of the chain against itself, if no rod turns and
+    /// no part comes near another in it: then those tests would have changed nothing. Returns whether
+    /// it was made.
     pub(super) fn sweep_if_separated(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        heads: &DrivenConnectors<D>,
+        driven: &DrivenConnectors<D>,
     ) -> bool {
         if !MotionBounds::is_worthwhile(chain) || !self.proofs.is_due() {
             return false;
         }
         let rotated = self.tally.rotated;
         self.rules.self_collision = false;
-        let followed = self.sweep_from(chain, obstacles, heads);
+        let followed = self.sweep_from(chain, obstacles, driven);
         self.rules.self_collision = true;
         // A rod that turns past an obstacle may have to turn past a part as well.
         let holds = followed.is_ok() && self.tally.rotated == rotated && self.are_separated(chain);
         if holds {
-            self.commit(chain, heads);
-            self.leeway.accept(chain);
+            self.commit(chain, driven);
+            self.motion_bounds.accept(chain);
         }
         self.tally.rotated = rotated;
         self.proofs.record(holds);
@@ -146,24 +155,26 @@ impl<const D: usize> Propagator<D> {
 
     /// Returns whether the new places bring no part near another.
     fn are_separated(&mut self, chain: &mut Chain<D>) -> bool {
-        self.leeway.record(chain);
-        let run = self.overlay.from..self.overlay.to;
-        let ways = self.overlay.positions().iter().zip(&chain.points()[run.clone()]);
-        let way_m = ways.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
-        chain.points_mut()[run.clone()].copy_from_slice(self.overlay.positions());
-        let are_apart = self.leeway.allows(chain, way_m);
-        chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.recorded_points()[run]);
-        if !are_apart {
-            self.leeway.revert(way_m);
+        self.motion_bounds.record(chain);
+        let run = self.tentative.run();
+        let moves = self.tentative.positions().iter().zip(&chain.points()[run.clone()]);
+        let travel_m = moves.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
+        // The bounds measure a chain, so it is moved for them and put back.
+        chain.points_mut()[run.clone()].copy_from_slice(self.tentative.positions());
+        let are_separated = self.motion_bounds.allows(chain, travel_m);
+        chain.points_mut()[run.clone()].copy_from_slice(&self.motion_bounds.recorded_points()[run]);
+        if !are_separated {
+            self.motion_bounds.revert(travel_m);
         }
-        are_apart
+        are_separated
     }
 
-    /// Keeps the positions before a motion that the request may have to take back.
+    /// Saves the positions before a motion that the request may have to take back.
     fn save_positions(&mut self, head: usize, run: Range<usize>) {
+        // Outward from the initiator, so that the run of original positions has no gap.
         for i in (head..run.end).chain((run.start..head).rev()) {
-            if self.before.get(i).is_none() {
-                self.before.set(i, self.leeway.recorded_points()[i]);
+            if self.original.get(i).is_none() {
+                self.original.set(i, self.motion_bounds.recorded_points()[i]);
             }
         }
     }

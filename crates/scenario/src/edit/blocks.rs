@@ -17,17 +17,15 @@ fn removable_lines(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
     let text = layout.text;
     let mut lines = layout.lines(run);
     let is_section = layout.statements[run.start].is_header;
-    let follows = blank_after(text, lines.end);
-    let is_alone = follows.is_some() || lines.end == text.len();
-    if !is_section {
-        lines.start = match is_alone {
-            true => above_comments(text, lines.start),
-            // The comment may be about the keys after it, too.
-            false => lines.start,
-        };
+    let blank_after = blank_after(text, lines.end);
+    let ends_block = blank_after.is_some() || lines.end == text.len();
+    // Before further keys the comment stays, because it may be about these too.
+    if !is_section && ends_block {
+        lines.start = above_comments(text, lines.start);
     }
-    match (blank_before(text, lines.start), follows) {
-        (Some(blank), _) if is_section || is_alone => blank..lines.end,
+    match (blank_before(text, lines.start), blank_after) {
+        // One of the two blank lines around it goes.
+        (Some(blank), _) if is_section || ends_block => blank..lines.end,
         (None, Some(blank)) if is_section && lines.start == 0 => lines.start..blank,
         _ => lines,
     }
@@ -35,15 +33,15 @@ fn removable_lines(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
 
 /// Returns the start of the empty line before a line.
 fn blank_before(text: &str, start: usize) -> Option<usize> {
-    let before = line_start(text, start.checked_sub(1)?);
-    matches!(&text[before..start], "\n" | "\r\n").then_some(before)
+    let previous = line_start(text, start.checked_sub(1)?);
+    matches!(&text[previous..start], "\n" | "\r\n").then_some(previous)
 }
 
 /// Returns the end of the empty line after a line.
 fn blank_after(text: &str, end: usize) -> Option<usize> {
     let rest = &text[end..];
-    let ends = ["\n", "\r\n"].into_iter().find(|new_line| rest.starts_with(new_line));
-    ends.map(|new_line| end + new_line.len())
+    let new_line = ["\n", "\r\n"].into_iter().find(|new_line| rest.starts_with(new_line))?;
+    Some(end + new_line.len())
 }
 
 /// Inserts a section into a list at a number, which is at most the number of sections.
@@ -57,16 +55,21 @@ pub(super) fn insert_section(
         return Err(edit_error("a section of a list is a table", "give a table"));
     };
     let block = section_text(layout, list, members, true)?;
-    let element = |number| [list, &[Step::Index(number)]].concat();
-    if let Some(run) = layout.statement_runs(&element(at)).first() {
+    if let Some(run) = layout.statement_runs(&element_path(list, at)).first() {
         return Ok(vec![insert_section_before(layout, layout.lines(run).start, &block)]);
     }
-    let last = layout.statement_runs(list);
-    let end = last.last().map_or(layout.text.len(), |run| layout.lines(run).end);
+    let runs = layout.statement_runs(list);
+    let end = runs.last().map_or(layout.text.len(), |run| layout.lines(run).end);
     Ok(vec![insert(end, format!("{}{block}", layout.new_line()))])
 }
 
-/// Inserts a section before the lines of another: with an empty line between them if there is one before.
+/// Returns the path of an element of a list.
+fn element_path(list: &[Step], number: usize) -> Vec<Step> {
+    [list, &[Step::Index(number)]].concat()
+}
+
+/// Inserts a section before the lines of another: with an empty line between them if the text separates its sections
+/// so.
 pub(super) fn insert_section_before(layout: &Layout<'_>, start: usize, block: &str) -> Splice {
     let is_spaced = start == 0 || blank_before(layout.text, start).is_some();
     insert(start, format!("{block}{}", if is_spaced { layout.new_line() } else { "" }))
@@ -74,18 +77,22 @@ pub(super) fn insert_section_before(layout: &Layout<'_>, start: usize, block: &s
 
 /// Moves the sections of a list into another order.
 pub(super) fn reorder_sections(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
-    let runs_of = |number| layout.statement_runs(&[list, &[Step::Index(number)]].concat());
-    let text_of = |number: usize| {
-        let runs = runs_of(number);
-        let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();
-        texts.join(layout.new_line())
-    };
     let mut splices = Vec::new();
     for (slot, &number) in order.iter().enumerate().filter(|(slot, number)| slot != *number) {
-        let runs = runs_of(slot);
-        let mut places = runs.iter().map(|run| layout.lines(run));
-        splices.extend(places.next().map(|place| replace(place, text_of(number))));
-        splices.extend(places.map(delete));
+        let runs = layout.statement_runs(&element_path(list, slot));
+        let mut ranges = runs.iter().map(|run| layout.lines(run));
+        // The first lines of the old section get all of the new one; a section may be spread over the text.
+        if let Some(first) = ranges.next() {
+            splices.push(replace(first, element_text(layout, &element_path(list, number))));
+        }
+        splices.extend(ranges.map(delete));
     }
     splices
+}
+
+/// Returns all lines of a section of a list.
+fn element_text(layout: &Layout<'_>, path: &[Step]) -> String {
+    let runs = layout.statement_runs(path);
+    let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();
+    texts.join(layout.new_line())
 }

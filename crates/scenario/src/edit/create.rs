@@ -11,7 +11,7 @@ use super::{EditError, edit_error};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Table, Value};
 
-/// Makes a key with a value in the item at a path, and the tables on the way to it.
+/// Creates a key with a value in the item at a path, and its parent tables.
 pub(super) fn create(
     layout: &Layout<'_>,
     path: &[Step],
@@ -29,13 +29,13 @@ pub(super) fn create(
         Item::Table(table) if table.is_dotted() => add_dotted(layout, path, names, new),
         Item::Table(table) => add_to_table(layout, path, table, names, new),
         _ => Err(edit_error(
-            format!("`{}` does not stand in a table", dotted(names)),
-            "name a table",
+            format!("`{}` is not in a table", dotted(names)),
+            "give the key of a table",
         )),
     }
 }
 
-/// Makes a line after those of a table of dotted keys.
+/// Adds a line after those of a table of dotted keys, with the same prefix.
 fn add_dotted(
     layout: &Layout<'_>,
     path: &[Step],
@@ -43,19 +43,21 @@ fn add_dotted(
     new: NewValue<'_>,
 ) -> Result<Vec<Splice>, EditError> {
     let runs = layout.statement_runs(path);
-    let below = |s: &Statement| names_of(&s.path[path.len()..]).len();
-    let mut own = runs.iter().flat_map(|run| &layout.statements[run.clone()]);
+    // Number of names in a statement's path that follow the table's.
+    let names_below = |s: &Statement| names_of(&s.path[path.len()..]).len();
+    let mut statements = runs.iter().flat_map(|run| &layout.statements[run.clone()]);
     // Keys below a header of their own are no pattern for the new line.
-    let Some(last) = own.rfind(|s| !s.is_header && s.keys.len() > below(s)) else {
+    let Some(last) = statements.rfind(|s| !s.is_header && s.keys.len() > names_below(s)) else {
         return Ok(Vec::new());
     };
-    let shown = last.keys.len() - below(last);
-    let (Some(first), Some(end)) = (last.keys.first(), last.keys.get(shown.saturating_sub(1)))
+    let prefix_parts = last.keys.len() - names_below(last);
+    let (Some(first), Some(prefix_end)) =
+        (last.keys.first(), last.keys.get(prefix_parts.saturating_sub(1)))
     else {
         return Ok(Vec::new());
     };
-    let head = &layout.text[line_start(layout.text, first.start)..end.end];
-    let line = format!("{head}.{} = {}{}", dotted(names), new.to_toml(None)?, layout.new_line());
+    let prefix = &layout.text[line_start(layout.text, first.start)..prefix_end.end];
+    let line = format!("{prefix}.{} = {}{}", dotted(names), new.to_toml(None)?, layout.new_line());
     Ok(vec![insert(last.lines.end, line)])
 }
 
@@ -66,45 +68,47 @@ fn add_to_table(
     names: &[String],
     new: NewValue<'_>,
 ) -> Result<Vec<Splice>, EditError> {
-    let Some((last, on_the_way)) = names.split_last() else { return Ok(Vec::new()) };
-    let step = |name: &String| Step::Name(name.clone());
-    let way = |names: &[String]| [path, &names.iter().map(step).collect::<Vec<_>>()].concat();
+    let Some((last, parents)) = names.split_last() else { return Ok(Vec::new()) };
     match new {
-        NewValue::Json(Json::Object(members)) if is_section(path, table, on_the_way, members) => {
-            let block = section_text(layout, &way(names), members, false)?;
+        NewValue::Json(Json::Object(members)) if is_section(path, table, parents, members) => {
+            let block = section_text(layout, &path_below(path, names), members, false)?;
             Ok(vec![insert_block_after(layout, path, &block)])
         }
         NewValue::Json(Json::Array(items)) if are_sections(items) => {
-            let list = way(names);
-            let blocks = items.iter().filter_map(Json::as_object);
-            let blocks: Result<Vec<String>, EditError> =
-                blocks.map(|members| section_text(layout, &list, members, true)).collect();
-            Ok(vec![insert_block_after(layout, path, &blocks?.join(layout.new_line()))])
+            let list = path_below(path, names);
+            let mut blocks: Vec<String> = Vec::with_capacity(items.len());
+            for members in items.iter().filter_map(Json::as_object) {
+                blocks.push(section_text(layout, &list, members, true)?);
+            }
+            Ok(vec![insert_block_after(layout, path, &blocks.join(layout.new_line()))])
         }
         _ => {
             let line =
                 format!("{} = {}{}", quoted_name(last), new.to_toml(None)?, layout.new_line());
-            Ok(vec![match on_the_way.is_empty() {
-                true => insert_line(layout, path, &line),
-                false => {
-                    let head = header(layout, &way(on_the_way), false);
-                    insert_block_after(layout, path, &format!("{head}{line}"))
-                }
-            }])
+            if parents.is_empty() {
+                return Ok(vec![insert_line(layout, path, &line)]);
+            }
+            let header = header(layout, &path_below(path, parents), false);
+            Ok(vec![insert_block_after(layout, path, &format!("{header}{line}"))])
         }
     }
 }
 
-/// Returns whether a new table becomes a section rather than one in braces: at the top, among other sections, and if
+fn path_below(path: &[Step], names: &[String]) -> Vec<Step> {
+    path.iter().cloned().chain(names.iter().cloned().map(Step::Name)).collect()
+}
+
+/// Returns whether a new table becomes a section rather than an inline table: at the top, among other sections, and if
 /// it is large.
 fn is_section(
     path: &[Step],
     table: &Table,
-    on_the_way: &[String],
+    parents: &[String],
     members: &Map<String, Json>,
 ) -> bool {
-    let is_among = table.iter().any(|(_, item)| item.as_table().is_some_and(|t| !t.is_dotted()));
-    path.is_empty() || !on_the_way.is_empty() || is_among || is_large(members)
+    let has_sections =
+        table.iter().any(|(_, item)| item.as_table().is_some_and(|t| !t.is_dotted()));
+    path.is_empty() || !parents.is_empty() || has_sections || is_large(members)
 }
 
 /// Inserts a section after everything at a path.
@@ -124,7 +128,7 @@ fn insert_line(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let first = match header {
         Some(header) => header + 1,
         None if path.is_empty() => 0,
-        // The only headers are those of sections in it.
+        // The table exists only by the headers of sections in it, so it gets a header of its own.
         None => return insert_header_before(layout, path, line),
     };
     let lines = layout.statements[first..].iter().take_while(|s| !s.is_header);
@@ -144,15 +148,14 @@ pub(super) fn insert_header_before(layout: &Layout<'_>, path: &[Step], line: &st
     }
 }
 
-/// Returns the place after a comment that heads the text, and the empty lines after it.
+/// Returns the offset after a comment at the start of the text, and the empty lines after it; 0 if no empty line
+/// follows, because the comment is then about the first key or section.
 fn end_of_head_comment(layout: &Layout<'_>) -> usize {
-    let mut at = 0;
     let lines = layout.text.split_inclusive('\n');
-    let comments = lines.clone().take_while(|line| line.trim_start().starts_with('#'));
-    at += comments.map(str::len).sum::<usize>();
-    let empty = layout.text[at..].split_inclusive('\n').take_while(|line| line.trim().is_empty());
-    match empty.map(str::len).sum::<usize>() {
-        0 => 0,
-        empty => at + empty,
-    }
+    let comments = lines.take_while(|line| line.trim_start().starts_with('#'));
+    let comment_bytes: usize = comments.map(str::len).sum();
+    let rest = layout.text[comment_bytes..].split_inclusive('\n');
+    let blanks = rest.take_while(|line| line.trim().is_empty());
+    let blank_bytes: usize = blanks.map(str::len).sum();
+    if blank_bytes == 0 { 0 } else { comment_bytes + blank_bytes }
 }

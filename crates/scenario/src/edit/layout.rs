@@ -1,4 +1,4 @@
-//! Places of all keys and sections in a text.
+//! Positions of all keys and sections in a text.
 
 use super::path::{KeyPart, keys_at};
 use super::{EditError, edit_error};
@@ -19,7 +19,7 @@ pub(super) struct Statement {
     pub(super) lines: Range<usize>,
 }
 
-/// A text, and the places of all items in it.
+/// A text, and the positions of all items in it.
 pub(super) struct Layout<'t> {
     pub(super) text: &'t str,
     document: Document<&'t str>,
@@ -27,7 +27,7 @@ pub(super) struct Layout<'t> {
     pub(super) statements: Vec<Statement>,
 }
 
-/// The end of a key's path in a text.
+/// The result of looking a key up in a text: the part of its path that exists, and the rest.
 pub(super) struct KeyLookup<'l> {
     /// The path to the last existing item, with every number.
     pub(super) path: Vec<Step>,
@@ -47,23 +47,23 @@ impl<'t> Layout<'t> {
         Ok(Self { text, document, statements })
     }
 
-    /// Follows a key as far as it leads.
+    /// Follows a key as far as it exists.
     pub(super) fn look_up(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
-        let mut reach =
+        let mut lookup =
             KeyLookup { path: Vec::new(), item: self.document.as_item(), rest: Vec::new() };
         for part in key {
-            follow_part(&mut reach, part)?;
+            follow_part(&mut lookup, part)?;
         }
-        Ok(reach)
+        Ok(lookup)
     }
 
     /// Follows a key to its end.
     pub(super) fn find(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
-        let reach = self.look_up(key)?;
-        match reach.rest.first() {
-            None => Ok(reach),
+        let lookup = self.look_up(key)?;
+        match lookup.rest.first() {
+            None => Ok(lookup),
             Some(name) => {
-                let known = names_of(reach.item);
+                let known = names_of(lookup.item);
                 let known: Vec<&str> = known.iter().map(String::as_str).collect();
                 let remedy = crate::suggestion(name, &known);
                 Err(edit_error(format!("there is no key `{name}`"), remedy))
@@ -74,22 +74,24 @@ impl<'t> Layout<'t> {
     /// Returns the item at the end of a path.
     pub(super) fn item(&self, path: &[Step]) -> &Item {
         path.iter().fold(self.document.as_item(), |item, step| {
-            let found = match step {
+            let child = match step {
                 Step::Name(name) => item.get(name.as_str()),
                 Step::Index(number) => item.get(*number),
             };
-            found.unwrap_or(item)
+            child.unwrap_or(item)
         })
     }
 
     /// Returns the numbers of the statements at a path or below, in runs without others between them.
     pub(super) fn statement_runs(&self, path: &[Step]) -> Vec<Range<usize>> {
         let mut runs: Vec<Range<usize>> = Vec::new();
-        let below = |s: &Statement| s.path.starts_with(path);
-        for (at, _) in self.statements.iter().enumerate().filter(|(_, s)| below(s)) {
+        for (k, statement) in self.statements.iter().enumerate() {
+            if !statement.path.starts_with(path) {
+                continue;
+            }
             match runs.last_mut() {
-                Some(run) if run.end == at => run.end += 1,
-                _ => runs.push(at..at + 1),
+                Some(run) if run.end == k => run.end += 1,
+                _ => runs.push(k..k + 1),
             }
         }
         runs
@@ -97,9 +99,12 @@ impl<'t> Layout<'t> {
 
     /// Returns the lines of statements, with the comment directly above them if they begin with a header.
     pub(super) fn lines(&self, run: &Range<usize>) -> Range<usize> {
-        let (first, last) = (&self.statements[run.start], &self.statements[run.end - 1]);
-        let start = first.lines.start;
-        let start = if first.is_header { above_comments(self.text, start) } else { start };
+        let first = &self.statements[run.start];
+        let last = &self.statements[run.end - 1];
+        let mut start = first.lines.start;
+        if first.is_header {
+            start = above_comments(self.text, start);
+        }
         start..last.lines.end
     }
 
@@ -116,45 +121,45 @@ fn names_of(item: &Item) -> Vec<String> {
     table.map(|t| t.iter().map(|(key, _)| key.to_string()).collect()).unwrap_or_default()
 }
 
-/// Takes one part of a key.
-fn follow_part(reach: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
-    if !reach.rest.is_empty() {
-        return push_missing(reach, part);
+/// Follows one part of a key.
+fn follow_part(lookup: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
+    if !lookup.rest.is_empty() {
+        return push_missing(lookup, part);
     }
-    if let Some(count) = count(reach.item) {
+    if let Some(count) = count(lookup.item) {
         let number = match part.number() {
             Some(number) => number,
             None if count == 1 => 0,
             None => return Err(not_a_table(&part.name)),
         };
-        let element = reach.item.get(number).ok_or_else(|| {
+        let element = lookup.item.get(number).ok_or_else(|| {
             let cause = format!("there is no element {number}, as there are {count}");
             edit_error(cause, "count from 0")
         })?;
-        reach.path.push(Step::Index(number));
-        reach.item = element;
+        lookup.path.push(Step::Index(number));
+        lookup.item = element;
         if part.number().is_some() {
             return Ok(());
         }
     }
-    let table = reach.item.as_table_like().ok_or_else(|| not_a_table(&part.name))?;
+    let table = lookup.item.as_table_like().ok_or_else(|| not_a_table(&part.name))?;
     match table.get(&part.name) {
         Some(item) => {
-            reach.path.push(Step::Name(part.name.clone()));
-            reach.item = item;
+            lookup.path.push(Step::Name(part.name.clone()));
+            lookup.item = item;
         }
-        // A section that stands alone.
+        // A single section may have the number 0, as in a list of one.
         None if part.number() == Some(0) => {}
-        None => push_missing(reach, part)?,
+        None => push_missing(lookup, part)?,
     }
     Ok(())
 }
 
-fn push_missing(reach: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
+fn push_missing(lookup: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
     match part.number() {
-        None => reach.rest.push(part.name.clone()),
-        // The new section will stand alone.
-        Some(0) if !reach.rest.is_empty() => {}
+        None => lookup.rest.push(part.name.clone()),
+        // The new section will be a single one, which may have the number 0.
+        Some(0) if !lookup.rest.is_empty() => {}
         Some(number) => {
             return Err(edit_error(format!("there is no element {number}"), "count from 0"));
         }
@@ -170,13 +175,18 @@ pub(super) fn count(item: &Item) -> Option<usize> {
 
 fn not_a_table(name: &str) -> EditError {
     edit_error(
-        format!("`{name}` does not stand in a table"),
-        "name the element of an array by its number, e.g. robots.0.count",
+        format!("`{name}` is not in a table"),
+        "give the number of an element of an array, e.g. robots.0.count",
     )
 }
 
 /// Collects the statements of a table and of the tables in it.
-fn collect_statements(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
+fn collect_statements(
+    text: &str,
+    table: &Table,
+    path: &mut Vec<Step>,
+    statements: &mut Vec<Statement>,
+) {
     for (name, item) in table.iter() {
         path.push(Step::Name(name.to_string()));
         match item {
@@ -184,14 +194,14 @@ fn collect_statements(text: &str, table: &Table, path: &mut Vec<Step>, found: &m
             Item::Value(value) => {
                 let key = table.key(name).and_then(toml_edit::Key::span);
                 if let (Some(key), Some(value)) = (key, value.span()) {
-                    found.push(pair(text, path, key.start, value.end));
+                    statements.push(key_value(text, path, key.start, value.end));
                 }
             }
-            Item::Table(inner) => push_section(text, inner, path, found),
+            Item::Table(inner) => push_section(text, inner, path, statements),
             Item::ArrayOfTables(many) => {
                 for (number, inner) in many.iter().enumerate() {
                     path.push(Step::Index(number));
-                    push_section(text, inner, path, found);
+                    push_section(text, inner, path, statements);
                     path.pop();
                 }
             }
@@ -200,21 +210,22 @@ fn collect_statements(text: &str, table: &Table, path: &mut Vec<Step>, found: &m
     }
 }
 
-fn push_section(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
+fn push_section(text: &str, table: &Table, path: &mut Vec<Step>, statements: &mut Vec<Statement>) {
     if let (Some(_), Some(span)) = (table.position(), table.span()) {
         let brackets = text[span.start..].bytes().take_while(|b| *b == b'[').count();
-        found.push(Statement {
+        statements.push(Statement {
             path: path.clone(),
             is_header: true,
             keys: keys_at(text, span.start + brackets),
             lines: line_start(text, span.start)..line_end(text, span.end),
         });
     }
-    collect_statements(text, table, path, found);
+    collect_statements(text, table, path, statements);
 }
 
-fn pair(text: &str, path: &[Step], key: usize, end: usize) -> Statement {
-    let start = line_start(text, key);
+/// Returns the statement of a key that starts, and whose value ends, at these offsets.
+fn key_value(text: &str, path: &[Step], start: usize, end: usize) -> Statement {
+    let start = line_start(text, start);
     Statement {
         path: path.to_vec(),
         is_header: false,
@@ -223,24 +234,24 @@ fn pair(text: &str, path: &[Step], key: usize, end: usize) -> Statement {
     }
 }
 
-/// Returns the start of the line of a place.
-pub(super) fn line_start(text: &str, at: usize) -> usize {
-    text[..at].rfind('\n').map_or(0, |end| end + 1)
+/// Returns the start of the line at an offset.
+pub(super) fn line_start(text: &str, offset: usize) -> usize {
+    text[..offset].rfind('\n').map_or(0, |end| end + 1)
 }
 
-/// Returns the end of the line of a place, after its line break.
-pub(super) fn line_end(text: &str, at: usize) -> usize {
-    text[at..].find('\n').map_or(text.len(), |end| at + end + 1)
+/// Returns the end of the line at an offset, after its line break.
+pub(super) fn line_end(text: &str, offset: usize) -> usize {
+    text[offset..].find('\n').map_or(text.len(), |end| offset + end + 1)
 }
 
 /// Returns the start of the comment that ends where a line begins, or the start of that line.
 pub(super) fn above_comments(text: &str, mut start: usize) -> usize {
     while start > 0 {
-        let before = line_start(text, start - 1);
-        if !text[before..start].trim_start().starts_with('#') {
+        let previous = line_start(text, start - 1);
+        if !text[previous..start].trim_start().starts_with('#') {
             break;
         }
-        start = before;
+        start = previous;
     }
     start
 }

@@ -1,4 +1,4 @@
-//! Keys of tables in braces.
+//! Keys of inline tables.
 
 use super::layout::{Layout, Step};
 use super::lists::{comma_after, skip_space};
@@ -7,9 +7,9 @@ use super::splice::{Splice, delete, insert, replace};
 use std::ops::Range;
 use toml_edit::{InlineTable, Item, Value};
 
-/// A key with its value, in braces.
+/// A key with its value in an inline table.
 pub(super) struct Member {
-    /// The path to it from the table in braces.
+    /// The path to it from the inline table.
     path: Vec<String>,
     /// The parts of its key.
     pub(super) keys: Vec<Range<usize>>,
@@ -24,27 +24,33 @@ impl Member {
 
     /// Returns whether it is at a path or below.
     pub(super) fn is_below(&self, path: &[Step]) -> bool {
-        let name = |(step, own): (&Step, &String)| *step == Step::Name(own.clone());
-        path.len() <= self.path.len() && path.iter().zip(&self.path).all(name)
+        path.len() <= self.path.len()
+            && path
+                .iter()
+                .zip(&self.path)
+                .all(|(step, own)| matches!(step, Step::Name(name) if name == own))
     }
 }
 
-/// Returns the table in braces that a path leads into, and the number of steps to it.
+/// Returns the inline table with braces that contains a path, and the number of steps to it: dotted keys within it
+/// are tables without braces.
 pub(super) fn enclosing_table<'l>(
     layout: &'l Layout<'_>,
     path: &[Step],
 ) -> Option<(&'l InlineTable, usize)> {
-    let at = |depth: usize| match layout.item(&path[..depth]) {
-        Item::Value(Value::InlineTable(table)) => Some(table),
-        _ => None,
-    };
-    let depth = (0..=path.len()).rev().find(|depth| at(*depth).is_none_or(|t| !t.is_dotted()))?;
-    at(depth).map(|table| (table, depth))
+    for depth in (0..=path.len()).rev() {
+        match layout.item(&path[..depth]) {
+            Item::Value(Value::InlineTable(table)) if table.is_dotted() => {}
+            Item::Value(Value::InlineTable(table)) => return Some((table, depth)),
+            _ => return None,
+        }
+    }
+    None
 }
 
-/// Returns the members of a table in braces, in the order of the text.
+/// Returns the members of an inline table, in the order of the text.
 pub(super) fn members(text: &str, table: &InlineTable) -> Vec<Member> {
-    let mut found: Vec<Member> = table
+    let mut members: Vec<Member> = table
         .get_values()
         .into_iter()
         .filter_map(|(keys, value)| {
@@ -52,13 +58,14 @@ pub(super) fn members(text: &str, table: &InlineTable) -> Vec<Member> {
             Some(Member { path, keys: Vec::new(), end: value.span()?.end })
         })
         .collect();
-    found.sort_by_key(|member| member.end);
-    let mut at = table.span().map_or(0, |span| span.start + 1);
-    for member in &mut found {
-        member.keys = keys_at(text, skip_space(text, at));
-        at = comma_after(text, member.end).map_or(member.end, |comma| comma + 1);
+    members.sort_by_key(|member| member.end);
+    // Keys follow the opening brace, and each comma.
+    let mut offset = table.span().map_or(0, |span| span.start + 1);
+    for member in &mut members {
+        member.keys = keys_at(text, skip_space(text, offset));
+        offset = comma_after(text, member.end).map_or(member.end, |comma| comma + 1);
     }
-    found
+    members
 }
 
 /// Inserts a member after the others.
@@ -76,13 +83,14 @@ pub(super) fn remove_members(text: &str, table: &InlineTable, path: &[Step]) -> 
     let all = members(text, table);
     let open = table.span().map_or(0, |span| span.start + 1);
     let mut splices = Vec::new();
-    for (at, member) in all.iter().enumerate().filter(|(_, member)| member.is_below(path)) {
-        let stay_before = all[..at].iter().rfind(|other| !other.is_below(path));
-        let stays_behind = all[at + 1..].iter().any(|other| !other.is_below(path));
-        splices.push(delete(match (stay_before, stays_behind) {
-            (_, true) => member.start()..all[at + 1].start(),
-            (Some(before), false) => before.end..member.end,
-            (None, false) => open..member.end,
+    for (k, member) in all.iter().enumerate().filter(|(_, member)| member.is_below(path)) {
+        let kept_before = all[..k].iter().rfind(|other| !other.is_below(path));
+        let is_any_kept_after = all[k + 1..].iter().any(|other| !other.is_below(path));
+        // With the comma after it, or at the end with the one before.
+        splices.push(delete(match kept_before {
+            _ if is_any_kept_after => member.start()..all[k + 1].start(),
+            Some(before) => before.end..member.end,
+            None => open..member.end,
         }));
     }
     splices
@@ -97,11 +105,15 @@ pub(super) fn replace_members(
 ) -> Vec<Splice> {
     let all = members(text, table);
     let mut splices = Vec::new();
-    for (at, member) in all.iter().enumerate().filter(|(_, member)| member.is_below(path)) {
+    for (k, member) in all.iter().enumerate().filter(|(_, member)| member.is_below(path)) {
+        // The first member gets the value, and all others go.
         let key = member.keys.get(path.len() - 1).filter(|_| splices.is_empty());
-        splices.push(match (key, at.checked_sub(1).map(|before| all[before].end)) {
-            (Some(key), _) => replace(key.end..member.end, format!(" = {value}")),
-            (None, before) => delete(before.unwrap_or(member.start())..member.end),
+        splices.push(match key {
+            Some(key) => replace(key.end..member.end, format!(" = {value}")),
+            None => {
+                let start = k.checked_sub(1).map_or(member.start(), |previous| all[previous].end);
+                delete(start..member.end)
+            }
         });
     }
     splices

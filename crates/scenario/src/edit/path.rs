@@ -1,9 +1,9 @@
-//! Keys as overrides name them: `robots.1.at`, `kinds."a.b".observation`.
+//! Keys in the notation of overrides: `robots.1.at`, `kinds."a.b".observation`.
 
 use super::{EditError, edit_error};
 use toml_edit::Key;
 
-/// The largest number of parts of a key.
+/// The maximum number of parts of a key: several times as many as any scenario has.
 const MAX_PARTS: usize = 64;
 
 /// A part of a key.
@@ -11,6 +11,7 @@ const MAX_PARTS: usize = 64;
 pub(crate) struct KeyPart {
     /// The name, without quotes.
     pub(crate) name: String,
+    /// Whether it is quoted, and so is a name even if it consists of digits.
     is_quoted: bool,
 }
 
@@ -18,45 +19,38 @@ impl KeyPart {
     /// Returns the number of an element, if it is one.
     pub(crate) fn number(&self) -> Option<usize> {
         let is_number = !self.is_quoted && self.name.bytes().all(|b| b.is_ascii_digit());
-        is_number.then(|| self.name.parse().ok()).flatten()
+        if is_number { self.name.parse().ok() } else { None }
     }
 }
 
-/// Splits a key into its parts; never returns none.
+/// Splits a key into its parts, at least one.
 pub(crate) fn parse_key(key: &str) -> Result<Vec<KeyPart>, EditError> {
-    let mut found = Vec::new();
+    let mut parts = Vec::new();
     let mut rest = key.trim();
     loop {
         let end = end_of_part(rest);
-        found.push(parse_part(&rest[..end])?);
+        parts.push(parse_part(&rest[..end])?);
         match rest[end..].strip_prefix('.') {
-            Some(behind) => rest = behind,
-            None if end == rest.len() => return Ok(found),
-            None => return Err(edit_error("a dot is missing behind a quote", "write a.\"b.c\".d")),
+            Some(next) => rest = next,
+            None if end == rest.len() => return Ok(parts),
+            None => return Err(edit_error("a dot is missing after a quote", "write a.\"b.c\".d")),
         }
-        if found.len() > MAX_PARTS {
-            return Err(edit_error("the key has too many parts", "name what is in the text"));
+        if parts.len() > MAX_PARTS {
+            return Err(edit_error("the key has too many parts", "give a key of the text"));
         }
     }
 }
 
 fn parse_part(text: &str) -> Result<KeyPart, EditError> {
-    let is_quoted = text.starts_with(['"', '\'']);
-    let name = match is_quoted {
-        false => text.to_string(),
-        true => match Key::parse(text).as_deref() {
-            Ok([key]) => key.get().to_string(),
-            _ => {
-                return Err(edit_error(
-                    "a quoted part of the key is not TOML",
-                    "write a.\"b.c\".d",
-                ));
-            }
-        },
-    };
-    match name.is_empty() && !is_quoted {
-        true => Err(edit_error("a part of the key is empty", "write a.b.c")),
-        false => Ok(KeyPart { name, is_quoted }),
+    if text.is_empty() {
+        return Err(edit_error("a part of the key is empty", "write a.b.c"));
+    }
+    if !text.starts_with(['"', '\'']) {
+        return Ok(KeyPart { name: text.to_string(), is_quoted: false });
+    }
+    match Key::parse(text).as_deref() {
+        Ok([key]) => Ok(KeyPart { name: key.get().to_string(), is_quoted: true }),
+        _ => Err(edit_error("a quoted part of the key is not TOML", "write a.\"b.c\".d")),
     }
 }
 
@@ -71,28 +65,29 @@ fn end_of_part(text: &str) -> usize {
 /// Returns the end of the quoted name that a text begins with.
 fn end_of_quoted(text: &str, quote: u8) -> usize {
     let mut bytes = text.bytes().enumerate().skip(1);
-    while let Some((at, byte)) = bytes.next() {
-        match byte {
-            b'\\' if quote == b'"' => drop(bytes.next()),
-            _ if byte == quote => return at + 1,
-            _ => {}
+    while let Some((k, byte)) = bytes.next() {
+        // Only strings in double quotes have escapes.
+        if byte == b'\\' && quote == b'"' {
+            bytes.next();
+        } else if byte == quote {
+            return k + 1;
         }
     }
     text.len()
 }
 
-/// Returns the places of the parts of the key at a place of a text, which must be TOML.
-pub(super) fn keys_at(text: &str, at: usize) -> Vec<std::ops::Range<usize>> {
-    let mut found = Vec::new();
-    let mut at = skip_blanks(text, at);
+/// Returns the positions of the parts of the key at an offset of a text, which must be TOML.
+pub(super) fn keys_at(text: &str, offset: usize) -> Vec<std::ops::Range<usize>> {
+    let mut parts = Vec::new();
+    let mut start = skip_blanks(text, offset);
     loop {
-        let end = at + end_of_key(&text[at..]);
-        found.push(at..end);
+        let end = start + end_of_key(&text[start..]);
+        parts.push(start..end);
         let dot = skip_blanks(text, end);
-        match text[dot..].starts_with('.') {
-            true => at = skip_blanks(text, dot + 1),
-            false => return found,
+        if !text[dot..].starts_with('.') {
+            return parts;
         }
+        start = skip_blanks(text, dot + 1);
     }
 }
 
@@ -103,8 +98,8 @@ fn end_of_key(text: &str) -> usize {
     }
 }
 
-fn skip_blanks(text: &str, at: usize) -> usize {
-    at + text[at..].bytes().take_while(|b| b" \t".contains(b)).count()
+fn skip_blanks(text: &str, offset: usize) -> usize {
+    offset + text[offset..].bytes().take_while(|b| b" \t".contains(b)).count()
 }
 
 /// Returns a name as TOML writes it.

@@ -6,10 +6,10 @@ use super::path::quoted_name;
 use super::value::text_of;
 use serde_json::{Map, Value as Json};
 
-/// The length of the longest table in braces; a longer one becomes a section.
+/// The length of the longest inline table, which fits a line; a longer one becomes a section.
 const MAX_INLINE_CHARS: usize = 80;
 
-/// Returns whether a table should be a section rather than in braces.
+/// Returns whether a table should be a section rather than an inline table.
 pub(super) fn is_large(members: &Map<String, Json>) -> bool {
     let text = text_of(&Json::Object(members.clone()), false);
     text.is_ok_and(|text| text.len() > MAX_INLINE_CHARS)
@@ -22,11 +22,12 @@ pub(super) fn are_sections(items: &[Json]) -> bool {
 
 /// Returns the names on a path.
 pub(super) fn names_of(path: &[Step]) -> Vec<String> {
-    let names = path.iter().filter_map(|step| match step {
-        Step::Name(name) => Some(name.clone()),
-        Step::Index(_) => None,
-    });
-    names.collect()
+    path.iter()
+        .filter_map(|step| match step {
+            Step::Name(name) => Some(name.clone()),
+            Step::Index(_) => None,
+        })
+        .collect()
 }
 
 /// Returns names as a key of several parts.
@@ -36,8 +37,9 @@ pub(super) fn dotted(names: &[String]) -> String {
 
 /// Returns the header of a section, or of one of a list.
 pub(super) fn header(layout: &Layout<'_>, path: &[Step], is_element: bool) -> String {
-    let (open, close) = if is_element { ("[[", "]]") } else { ("[", "]") };
-    format!("{open}{}{close}{}", dotted(&names_of(path)), layout.new_line())
+    let name = dotted(&names_of(path));
+    let new_line = layout.new_line();
+    if is_element { format!("[[{name}]]{new_line}") } else { format!("[{name}]{new_line}") }
 }
 
 /// Returns the text of a section, or of one of a list.
@@ -49,19 +51,20 @@ pub(super) fn section_text(
 ) -> Result<String, EditError> {
     let new_line = layout.new_line();
     let mut text = header(layout, path, is_element);
+    // After all keys, because a key after the header of a section would belong to that section.
     let mut sections = String::new();
     for (name, value) in members {
-        let way = [path, &[Step::Name(name.clone())]].concat();
+        let member_path = [path, &[Step::Name(name.clone())]].concat();
         match value {
             Json::Array(items) if are_sections(items) => {
                 for inner in items.iter().filter_map(Json::as_object) {
                     sections += new_line;
-                    sections += &section_text(layout, &way, inner, true)?;
+                    sections += &section_text(layout, &member_path, inner, true)?;
                 }
             }
             Json::Object(inner) if is_large(inner) => {
                 sections += new_line;
-                sections += &section_text(layout, &way, inner, false)?;
+                sections += &section_text(layout, &member_path, inner, false)?;
             }
             _ => {
                 let line = format!("{} = {}{new_line}", quoted_name(name), text_of(value, false)?);

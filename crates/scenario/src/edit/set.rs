@@ -12,7 +12,7 @@ use super::{EditError, edit_error};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Value};
 
-/// The size of the largest table that is set key by key.
+/// The size of the largest table that is set key by key: each key searches the whole text.
 const MAX_KEYS: usize = 1000;
 
 /// Sets a value.
@@ -22,9 +22,10 @@ pub(super) fn set(
     new: NewValue<'_>,
 ) -> Result<Vec<Splice>, EditError> {
     let KeyLookup { path, item, rest } = layout.look_up(key)?;
-    match rest.is_empty() {
-        true => set_item(layout, &path, item, new),
-        false => create(layout, &path, item, &rest, new),
+    if rest.is_empty() {
+        set_item(layout, &path, item, new)
+    } else {
+        create(layout, &path, item, &rest, new)
     }
 }
 
@@ -52,22 +53,22 @@ pub(super) fn add_header(
 ) -> Result<Vec<Splice>, EditError> {
     let KeyLookup { path, item, rest } = layout.look_up(key)?;
     let table = item.as_table().filter(|t| t.position().is_none() && !t.is_dotted());
-    let (Some(table), Json::Object(members), true) = (table, value, rest.is_empty()) else {
-        return Ok(Vec::new());
-    };
-    match path.is_empty() || members.keys().all(|name| table.contains_key(name)) {
-        true => Ok(Vec::new()),
-        false => Ok(vec![insert_header_before(layout, &path, "")]),
+    let (Some(table), Json::Object(members)) = (table, value) else { return Ok(Vec::new()) };
+    let has_new_keys = members.keys().any(|name| !table.contains_key(name));
+    if rest.is_empty() && !path.is_empty() && has_new_keys {
+        Ok(vec![insert_header_before(layout, &path, "")])
+    } else {
+        Ok(Vec::new())
     }
 }
 
 /// Removes a key, an element or a section.
 pub(super) fn remove(layout: &Layout<'_>, key: &[KeyPart]) -> Result<Vec<Splice>, EditError> {
     let path = layout.find(key)?.path;
-    match path.is_empty() {
-        true => Err(edit_error("this is the whole text", "name a key of it")),
-        false => Ok(removal_splices(layout, &path)),
+    if path.is_empty() {
+        return Err(edit_error("this is the whole text", "give a key of it"));
     }
+    Ok(removal_splices(layout, &path))
 }
 
 /// Returns the pieces that remove the item at a path.
@@ -110,21 +111,21 @@ fn is_dotted(value: &Value) -> bool {
     value.as_inline_table().is_some_and(toml_edit::InlineTable::is_dotted)
 }
 
-/// Sets a value in place of dotted keys in braces.
+/// Sets a value in place of dotted keys in an inline table.
 fn set_dotted(
     layout: &Layout<'_>,
     path: &[Step],
     old: &Value,
     new: NewValue<'_>,
 ) -> Result<Vec<Splice>, EditError> {
-    match (enclosing_table(layout, path), new) {
-        (_, NewValue::Json(json)) if is_same(old, json) => Ok(Vec::new()),
-        (Some((table, depth)), _) => {
-            let value = new.to_toml(None)?;
-            Ok(replace_members(layout.text, table, &path[depth..], &value))
-        }
-        (None, _) => Ok(Vec::new()),
+    if let NewValue::Json(json) = new
+        && is_same(old, json)
+    {
+        return Ok(Vec::new());
     }
+    let Some((table, depth)) = enclosing_table(layout, path) else { return Ok(Vec::new()) };
+    let value = new.to_toml(None)?;
+    Ok(replace_members(layout.text, table, &path[depth..], &value))
 }
 
 /// Replaces a value that is written as a value; parts that stay the same keep their text.
@@ -168,15 +169,17 @@ fn set_members(
     if members.len() + old.len() > MAX_KEYS {
         return Err(edit_error("the table has too many keys", "set them one by one"));
     }
-    let at = |name: &str| [path, &[Step::Name(name.into())]].concat();
-    let gone = old.iter().filter(|key| !members.contains_key(**key));
-    let mut splices: Vec<Splice> = gone.flat_map(|key| removal_splices(layout, &at(key))).collect();
-    // Lines stand before sections.
+    let member_path = |name: &str| [path, &[Step::Name(name.into())]].concat();
+    let mut splices: Vec<Splice> = Vec::new();
+    for key in old.iter().filter(|key| !members.contains_key(**key)) {
+        splices.extend(removal_splices(layout, &member_path(key)));
+    }
+    // Lines come before sections: after the header of one they would belong to it.
     let (sections, lines): (Vec<_>, Vec<_>) = members.iter().partition(|(_, v)| may_be_section(v));
     for (name, value) in lines.into_iter().chain(sections) {
         let new = NewValue::Json(value);
         splices.extend(match table.and_then(|table| table.get(name)) {
-            Some(member) => set_item(layout, &at(name), member, new)?,
+            Some(member) => set_item(layout, &member_path(name), member, new)?,
             None => create(layout, path, item, std::slice::from_ref(name), new)?,
         });
     }
@@ -202,15 +205,17 @@ fn set_sections(
     if elements.len() + count > MAX_KEYS {
         return Err(edit_error("the list has too many sections", "set them one by one"));
     }
-    let at = |number| [path, &[Step::Index(number)]].concat();
+    let element_path = |number| [path, &[Step::Index(number)]].concat();
     let mut splices = Vec::new();
     for (number, element) in elements.iter().enumerate() {
         splices.extend(match item.get(number) {
-            Some(old) => set_item(layout, &at(number), old, NewValue::Json(element))?,
+            Some(old) => set_item(layout, &element_path(number), old, NewValue::Json(element))?,
             None => super::blocks::insert_section(layout, path, count, element)?,
         });
     }
-    splices.extend((elements.len()..count).flat_map(|number| removal_splices(layout, &at(number))));
+    for number in elements.len()..count {
+        splices.extend(removal_splices(layout, &element_path(number)));
+    }
     Ok(splices)
 }
 
@@ -223,6 +228,6 @@ fn replace_sections(
     let Some((Step::Name(name), parent)) = path.split_last() else {
         return Err(edit_error("a section of a list is a table", "give a table"));
     };
-    let made = create(layout, parent, layout.item(parent), std::slice::from_ref(name), new)?;
-    Ok([removal_splices(layout, path), made].concat())
+    let created = create(layout, parent, layout.item(parent), std::slice::from_ref(name), new)?;
+    Ok([removal_splices(layout, path), created].concat())
 }

@@ -17,8 +17,8 @@ pub(super) fn replace(range: Range<usize>, text: impl Into<String>) -> Splice {
 }
 
 /// Inserts a piece.
-pub(super) fn insert(at: usize, text: impl Into<String>) -> Splice {
-    replace(at..at, text)
+pub(super) fn insert(offset: usize, text: impl Into<String>) -> Splice {
+    replace(offset..offset, text)
 }
 
 /// Removes a piece.
@@ -26,17 +26,18 @@ pub(super) fn delete(range: Range<usize>) -> Splice {
     replace(range, "")
 }
 
-/// Returns a text with pieces replaced; where two overlap, the second gets the remainder of the first.
+/// Returns a text with pieces replaced; where two overlap, the second covers only what the first has left.
 pub(super) fn apply_splices(text: &str, mut splices: Vec<Splice>) -> String {
+    // A stable sort: insertions at one offset stay in their order.
     splices.sort_by_key(|splice| splice.range.start);
     let mut new = String::with_capacity(text.len());
-    let mut done = 0;
+    let mut copied = 0;
     for Splice { range, text: piece } in splices {
-        new += &text[done..range.start.max(done)];
+        new += &text[copied..range.start.max(copied)];
         new += &piece;
-        done = done.max(range.end);
+        copied = copied.max(range.end);
     }
-    new + &text[done..]
+    new + &text[copied..]
 }
 
 #[cfg(test)]

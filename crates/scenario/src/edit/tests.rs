@@ -271,9 +271,9 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
     let source = Source::new("s.toml", TEXT, "");
     let infinite = serde_json::Number::from_f64(f64::NAN).map_or(Value::Null, Value::Number);
     for (edit, cause, remedy) in [
-        (set("robots.count", json!(1)), "does not stand in a table", "by its number"),
+        (set("robots.count", json!(1)), "is not in a table", "the number of an element"),
         (set("robots.7.count", json!(1)), "no element 7, as there are 2", "count from 0"),
-        (set("seed.x", json!(1)), "does not stand in a table", "number"),
+        (set("seed.x", json!(1)), "is not in a table", "number"),
         (set("at.2", json!(1)), "no element 2", "count from 0"),
         (set("seed", Value::Null), "null", "leave the key out"),
         (set("seed", infinite), "null", "NaN"),
@@ -284,15 +284,15 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
         (insert("seed", None, json!(1)), "neither an array", "array"),
         (insert("at", Some(3), json!(1)), "no place 3", "count from 0"),
         (insert("robots", None, json!(1)), "is a table", "give a table"),
-        (insert("robots.1", None, json!({})), "an element", "name the array"),
+        (insert("robots.1", None, json!({})), "an element", "give the key of the array"),
         (remove("sede"), "no key `sede`", "`seed`"),
         (remove("robots.2"), "no element 2", "count from 0"),
         (relocate("robots.0", 2), "no place 2", "count from 0"),
         (relocate("map", 0), "no element", "robots.1"),
         (rename("seed", "at"), "`at` already", "another name"),
         (rename("seed", ""), "empty", "give a name"),
-        (rename("robots.0", "x"), "no name", "name a key"),
-        (paint("seed", &[]), "no drawing", "map.ascii"),
+        (rename("robots.0", "x"), "no name", "give a key"),
+        (paint("seed", &[]), "no map drawn in text", "map.ascii"),
     ] {
         let edits = [set("seed", json!(5)), edit.clone()];
         let error = source.edited(&edits).expect_err("it does not fit");

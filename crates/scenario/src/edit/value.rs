@@ -53,16 +53,16 @@ pub(super) fn text_of(value: &Json, floats: bool) -> Result<String, EditError> {
 fn write_value(text: &mut String, value: &Json, floats: bool) -> Result<(), EditError> {
     match value {
         Json::Null => {
-            let remedy = "leave the key out; what is NaN or infinite becomes null in JSON";
+            let remedy = "leave the key out; NaN and infinite numbers become null in JSON";
             return Err(edit_error("null is no value of TOML", remedy));
         }
-        Json::Bool(is_so) => text.push_str(if *is_so { "true" } else { "false" }),
+        Json::Bool(value) => text.push_str(if *value { "true" } else { "false" }),
         Json::Number(number) => text.push_str(&number_text(number, floats)?),
-        Json::String(words) => text.push_str(&string_text(words)),
+        Json::String(string) => text.push_str(&string_text(string)),
         Json::Array(items) => {
             text.push('[');
-            for (at, item) in items.iter().enumerate() {
-                text.push_str(if at == 0 { "" } else { ", " });
+            for (k, item) in items.iter().enumerate() {
+                text.push_str(if k == 0 { "" } else { ", " });
                 write_value(text, item, floats)?;
             }
             text.push(']');
@@ -77,8 +77,8 @@ fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), E
         text.push_str("{}");
         return Ok(());
     }
-    for (at, (name, member)) in members.iter().enumerate() {
-        text.push_str(if at == 0 { "{ " } else { ", " });
+    for (k, (name, member)) in members.iter().enumerate() {
+        text.push_str(if k == 0 { "{ " } else { ", " });
         text.push_str(&quoted_name(name));
         text.push_str(" = ");
         write_value(text, member, false)?;
@@ -87,6 +87,8 @@ fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), E
     Ok(())
 }
 
+/// Returns the text of a number. JSON has one type of numbers, so a whole one becomes an integer of TOML unless floats
+/// are asked for.
 fn number_text(number: &Number, floats: bool) -> Result<String, EditError> {
     let float = number.as_f64().filter(|x| x.is_finite());
     match (number.as_i64(), float) {
@@ -104,17 +106,17 @@ fn number_text(number: &Number, floats: bool) -> Result<String, EditError> {
 }
 
 /// Returns a string in quotes: on several lines if it has several.
-fn string_text(words: &str) -> String {
-    if !words.contains('\n') {
-        return Value::from(words).to_string();
+fn string_text(string: &str) -> String {
+    if !string.contains('\n') {
+        return Value::from(string).to_string();
     }
-    // Quotes side by side, or at the end, could be taken for the end of the string.
-    let is_risky = words.contains("\"\"") || words.ends_with('"');
+    // Adjacent quotes, or one at the end, could be read as the end of the string.
+    let escapes_quotes = string.contains("\"\"") || string.ends_with('"');
     let mut text = String::from("\"\"\"\n");
-    for c in words.chars() {
+    for c in string.chars() {
         match c {
             '\\' => text.push_str("\\\\"),
-            '"' if is_risky => text.push_str("\\\""),
+            '"' if escapes_quotes => text.push_str("\\\""),
             '\n' | '\t' => text.push(c),
             _ if c.is_control() => drop(write!(text, "\\u{:04X}", u32::from(c))),
             _ => text.push(c),
@@ -140,8 +142,7 @@ pub(super) fn is_same(old: &Value, new: &Json) -> bool {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_same(a, b))
         }
         (Value::InlineTable(a), Json::Object(b)) => {
-            let same = |(key, a): (&str, &Value)| b.get(key).is_some_and(|b| is_same(a, b));
-            a.len() == b.len() && a.iter().all(same)
+            a.len() == b.len() && a.iter().all(|(key, a)| b.get(key).is_some_and(|b| is_same(a, b)))
         }
         _ => false,
     }

@@ -1,39 +1,44 @@
-//! Comments and values of a world's commented scenario, put into its schema.
+//! Comments and values of a world's commented scenario, added to its schema.
 
 use super::documented::{DocumentedKey, documented_keys};
 use super::pointers::pointers;
 use serde_json::{Map, Value};
 use sidestep_kernel::ports::table::split_unit;
 
-/// Adds to each key the statements of the commented scenario about it: words, examples, and its default; and those of
-/// its name: a title and a unit.
+/// Adds to each key its description, examples and default from the commented scenario, and a title and a unit from its
+/// name.
 pub(crate) fn describe(schema: &mut Value, scenario: &str) {
-    let mut told: Vec<String> = Vec::new();
-    for one in documented_keys(scenario) {
-        for place in pointers(schema, &one.way) {
-            let is_new = !told.contains(&place);
-            let Some(Value::Object(part)) = schema.pointer_mut(&place) else { continue };
-            add(part, &one, is_new);
-            // Tables of names get the statements about the first name that is shown.
-            let table = place.strip_suffix("/additionalProperties");
+    let mut described: Vec<String> = Vec::new();
+    for key in documented_keys(scenario) {
+        for pointer in pointers(schema, &key.path) {
+            let is_new = !described.contains(&pointer);
+            let Some(Value::Object(part)) = schema.pointer_mut(&pointer) else { continue };
+            add(part, &key, is_new);
+            // A table of names gets the description of the first name that the scenario shows.
+            let table = pointer.strip_suffix("/additionalProperties");
             if let Some(Value::Object(table)) = table.and_then(|table| schema.pointer_mut(table))
-                && !one.words.is_empty()
+                && !key.words.is_empty()
             {
-                table.entry("description").or_insert(one.words.clone().into());
+                table.entry("description").or_insert(key.words.clone().into());
             }
-            told.push(place);
+            described.push(pointer);
         }
     }
     add_titles(schema);
 }
 
-/// Adds the statements about a key. Of several alternatives the first has the words, and all are examples.
-fn add(part: &mut Map<String, Value>, one: &DocumentedKey, is_new: bool) {
-    if !one.words.is_empty() && (is_new || !part.contains_key("description")) {
-        part.insert("description".into(), one.words.clone().into());
+/// Adds the description, the default and the example of a key. Of several alternatives the first gives the
+/// description, and all are examples.
+fn add(part: &mut Map<String, Value>, key: &DocumentedKey, is_new: bool) {
+    if !key.words.is_empty() && (is_new || !part.contains_key("description")) {
+        part.insert("description".into(), key.words.clone().into());
     }
-    let Some(value) = &one.value else { return };
-    if is_new && let Some(default) = default_of(one, part).filter(|own| is_like(own, value)) {
+    let Some(value) = &key.value else { return };
+    // A default of another shape is that of an alternative notation.
+    if is_new
+        && let Some(default) = default_of(key, part)
+        && default.is_array() == value.is_array()
+    {
         part.insert("default".into(), default);
     }
     let examples = part.entry("examples").or_insert_with(|| Value::Array(Vec::new()));
@@ -42,32 +47,30 @@ fn add(part: &mut Map<String, Value>, one: &DocumentedKey, is_new: bool) {
     }
 }
 
+/// Words of comments that say that a value is one of several, and so not the default.
+const ALTERNATIVE_WORDS: [&str; 4] = ["e.g.", "instead", "or as ", "part of"];
+
 /// Returns the default of a key: `[value]` at the end of its words, `default value` in them, or the
-/// value of a key that is left out, if it can have no other meaning.
-fn default_of(one: &DocumentedKey, part: &Map<String, Value>) -> Option<Value> {
-    let bracket = one.words.strip_suffix(']').and_then(|words| words.rsplit_once('['));
-    if let Some((_, told)) = bracket {
-        return value_of(told);
+/// value of a key that is commented out, if it can have no other meaning.
+fn default_of(key: &DocumentedKey, part: &Map<String, Value>) -> Option<Value> {
+    let bracket = key.words.strip_suffix(']').and_then(|words| words.rsplit_once('['));
+    if let Some((_, text)) = bracket {
+        return parse_value(text);
     }
-    if let Some((_, told)) = one.words.rsplit_once("default ") {
-        let told = told.split([';', ',']).next().unwrap_or(told);
-        let told = if told.starts_with('[') { one.words.rsplit_once("default ")?.1 } else { told };
-        return value_of(told);
+    if let Some((_, text)) = key.words.rsplit_once("default ") {
+        // The value ends at a comma, except within an array.
+        let end = if text.starts_with('[') { None } else { text.find([';', ',']) };
+        return parse_value(&text[..end.unwrap_or(text.len())]);
     }
-    let is_alternative = ["e.g.", "instead", "or as ", "part of"].iter();
-    let is_alternative = is_alternative.clone().any(|word| one.words.contains(word));
-    let value = one.value.as_ref().filter(|_| one.is_left_out && !is_alternative)?;
-    let is_plain = value.is_boolean() || value.is_number() || part.contains_key("enum");
-    let is_plain = is_plain || part.contains_key("oneOf") || part.contains_key("$ref");
+    let is_alternative = ALTERNATIVE_WORDS.iter().any(|word| key.words.contains(word));
+    let value = key.value.as_ref().filter(|_| key.is_left_out && !is_alternative)?;
+    let is_plain = value.is_boolean()
+        || value.is_number()
+        || ["enum", "oneOf", "$ref"].iter().any(|word| part.contains_key(*word));
     is_plain.then(|| value.clone())
 }
 
-/// Returns whether both are arrays, or neither is.
-fn is_like(one: &Value, other: &Value) -> bool {
-    one.is_array() == other.is_array()
-}
-
-fn value_of(toml: &str) -> Option<Value> {
+fn parse_value(toml: &str) -> Option<Value> {
     let table: toml::Table = format!("x = {toml}").parse().ok()?;
     let value = serde_json::to_value(table.get("x")?).ok()?;
     (!value.is_null()).then_some(value)
@@ -76,20 +79,20 @@ fn value_of(toml: &str) -> Option<Value> {
 /// Adds the words of keys as their titles, and the units that they end in.
 fn add_titles(schema: &mut Value) {
     match schema {
-        Value::Array(many) => many.iter_mut().for_each(add_titles),
+        Value::Array(elements) => elements.iter_mut().for_each(add_titles),
         Value::Object(members) => {
-            let own = members.get("description").cloned();
+            let description = members.get("description").cloned();
             if let Some(Value::Object(keys)) = members.get_mut("properties") {
-                let is_alone = keys.len() == 1;
+                let is_only_key = keys.len() == 1;
                 for (key, part) in keys.iter_mut() {
                     let (quantity, unit) = split_unit(key);
                     let Some(part) = part.as_object_mut() else { continue };
                     part.insert("title".into(), quantity.replace('_', " ").into());
-                    // Names of alternatives mean the same as the alternatives.
-                    if let Some(own) =
-                        own.clone().filter(|_| is_alone || part.contains_key("const"))
+                    // The key that selects an alternative means the same as the alternative.
+                    if let Some(description) =
+                        description.clone().filter(|_| is_only_key || part.contains_key("const"))
                     {
-                        part.entry("description").or_insert(own);
+                        part.entry("description").or_insert(description);
                     }
                     if let Some(unit) = unit {
                         part.insert("x-unit".into(), unit.into());

@@ -1,13 +1,13 @@
 //! JSON Schemas of scenarios: for editors, and for forms.
 //!
 //! ```text
-//! the types that parse ──schemars──> sections      limits, names, which keys are needed
-//! the head of all worlds ────────────┐   │
-//! default.toml of the world ──shown──┴───┴──> schema of the world ──> schema of any scenario
-//!              words, examples, defaults
+//! the types that parse ──schemars──> sections      limits, names, required keys
+//! the head of all worlds ─────────────┐   │
+//! default.toml of the world ──────────┴───┴──> schema of the world ──> schema of any scenario
+//!              descriptions, examples, defaults
 //! ```
-//! Beside the words of the standard, a schema has `x-unit` (the unit of a number), `x-names` (the key
-//! of the table with the keys that can be named there) and `x-infinite` (whether `inf` is allowed, which JSON lacks).
+//! Beside the keywords of the standard, a schema has `x-unit` (the unit of a number), `x-names` (the key
+//! of the table whose keys are valid values) and `x-infinite` (whether `inf` is allowed, which JSON lacks).
 
 mod describe;
 mod documented;
@@ -39,33 +39,33 @@ pub fn for_type<T: JsonSchema>() -> Value {
 /// Removes the null of optional values from a schema.
 fn without_null(schema: &mut Value) {
     match schema {
-        Value::Array(many) => many.iter_mut().for_each(without_null),
+        Value::Array(elements) => elements.iter_mut().for_each(without_null),
         Value::Object(members) => {
             if members.get("default").is_some_and(Value::is_null) {
                 members.remove("default");
             }
             if let Some(Value::Array(types)) = members.get_mut("type") {
-                types.retain(|one| one != "null");
-                if let [one] = &types[..] {
-                    let one = one.clone();
-                    members.insert("type".into(), one);
+                types.retain(|name| name != "null");
+                if let [only] = &types[..] {
+                    let only = only.clone();
+                    members.insert("type".into(), only);
                 }
             }
             if let Some(Value::Array(values)) = members.get_mut("enum") {
-                values.retain(|one| !one.is_null());
+                values.retain(|value| !value.is_null());
             }
             members.values_mut().for_each(without_null);
-            only_alternative(members);
+            inline_only_alternative(members);
         }
         _ => {}
     }
 }
 
 /// Replaces "a value or null" by the value's own schema.
-fn only_alternative(members: &mut Map<String, Value>) {
-    let Some(Value::Array(many)) = members.get_mut("anyOf") else { return };
-    many.retain(|one| one.get("type") != Some(&json!("null")));
-    if let [Value::Object(only)] = &mut many[..] {
+fn inline_only_alternative(members: &mut Map<String, Value>) {
+    let Some(Value::Array(alternatives)) = members.get_mut("anyOf") else { return };
+    alternatives.retain(|schema| schema.get("type") != Some(&json!("null")));
+    if let [Value::Object(only)] = &mut alternatives[..] {
         let only = std::mem::take(only);
         members.remove("anyOf");
         for (key, value) in only {
@@ -75,47 +75,46 @@ fn only_alternative(members: &mut Map<String, Value>) {
 }
 
 /// Returns the schema of a world's scenarios.
-pub fn for_world(kind: &dyn WorldType) -> Value {
-    let mut sections = kind.sections();
+pub fn for_world(world: &dyn WorldType) -> Value {
     let mut schema = for_type::<Head>();
     schema["properties"]["format"]["const"] = FORMAT.into();
-    schema["properties"]["world"]["const"] = kind.name().into();
-    if let Some(own) = sections.as_object_mut() {
-        join(&mut schema, own);
+    schema["properties"]["world"]["const"] = world.name().into();
+    if let Value::Object(sections) = world.sections() {
+        merge(&mut schema, sections);
     }
-    describe::describe(&mut schema, kind.default_scenario());
-    let title = format!("A scenario of the world {}", kind.name());
-    let mut all = Map::new();
-    all.insert("$schema".into(), DRAFT.into());
-    all.insert("title".into(), title.into());
-    all.insert("description".into(), kind.about().into());
+    describe::describe(&mut schema, world.default_scenario());
+    let title = format!("A scenario of the world {}", world.name());
+    // Readers look for these first, so they come before the keywords of the type.
+    let mut members = Map::new();
+    members.insert("$schema".into(), DRAFT.into());
+    members.insert("title".into(), title.into());
+    members.insert("description".into(), world.about().into());
     for (key, value) in schema.as_object().cloned().unwrap_or_default() {
-        all.entry(key).or_insert(value);
+        members.entry(key).or_insert(value);
     }
-    Value::Object(all)
+    Value::Object(members)
 }
 
-/// Returns the schema of a file with the keys in `own`, a title, and the words of a commented scenario for the keys
-/// that both have.
-pub fn for_file(title: &str, mut own: Value, scenario: &str) -> Value {
-    describe::describe(&mut own, scenario);
-    let mut all = Map::new();
-    all.insert("$schema".into(), DRAFT.into());
-    all.insert("title".into(), title.into());
-    for (key, value) in own.as_object().cloned().unwrap_or_default() {
-        all.entry(key).or_insert(value);
+/// Returns the schema of a file with the keys of `schema`, a title, and the descriptions of a commented scenario for
+/// the keys that both have.
+pub fn for_file(title: &str, mut schema: Value, scenario: &str) -> Value {
+    describe::describe(&mut schema, scenario);
+    let mut members = Map::new();
+    members.insert("$schema".into(), DRAFT.into());
+    members.insert("title".into(), title.into());
+    for (key, value) in schema.as_object().cloned().unwrap_or_default() {
+        members.entry(key).or_insert(value);
     }
-    all.insert("title".into(), title.into());
-    Value::Object(all)
+    Value::Object(members)
 }
 
 /// Adds the sections of a world to the keys that all worlds share.
-fn join(schema: &mut Value, own: &mut Map<String, Value>) {
-    for (key, value) in std::mem::take(own) {
+fn merge(schema: &mut Value, sections: Map<String, Value>) {
+    for (key, value) in sections {
         match (schema.get_mut(&key), value) {
-            (Some(Value::Object(all)), Value::Object(more)) => all.extend(more),
-            (Some(Value::Array(all)), Value::Array(more)) => all.extend(more),
-            (Some(all), value) => *all = value,
+            (Some(Value::Object(members)), Value::Object(more)) => members.extend(more),
+            (Some(Value::Array(elements)), Value::Array(more)) => elements.extend(more),
+            (Some(old), value) => *old = value,
             (None, value) => schema[&key] = value,
         }
     }
@@ -132,37 +131,45 @@ impl Worlds {
 
     fn for_any_world(&self) -> Value {
         let mut definitions = Map::new();
-        for kind in self.iter() {
-            let mut schema = for_world(kind);
-            rename(&mut schema, kind.name());
+        for world in self.iter() {
+            let mut schema = for_world(world);
+            prefix_references(&mut schema, world.name());
             if let Some(members) = schema.as_object_mut() {
                 members.remove("$schema");
+                // Worlds may have definitions of the same name, so each gets its world's name as a prefix.
                 if let Some(Value::Object(own)) = members.remove("$defs") {
-                    let named = |(name, one)| (format!("{}.{name}", kind.name()), one);
-                    definitions.extend(own.into_iter().map(named));
+                    for (name, definition) in own {
+                        definitions.insert(format!("{}.{name}", world.name()), definition);
+                    }
                 }
             }
-            definitions.insert(kind.name().into(), schema);
+            definitions.insert(world.name().into(), schema);
         }
-        let named = |name| json!({ "$ref": format!("#/$defs/{name}") });
+        let references: Vec<Value> = self
+            .names()
+            .into_iter()
+            .map(|name| json!({ "$ref": format!("#/$defs/{name}") }))
+            .collect();
         json!({
             "$schema": DRAFT,
             "title": "A scenario of any world",
-            "oneOf": self.names().into_iter().map(named).collect::<Vec<_>>(),
+            "oneOf": references,
             "$defs": definitions,
         })
     }
 }
 
-/// Puts the name of a world before the names of definitions.
-fn rename(schema: &mut Value, world: &str) {
+/// Adds the name of a world to references to definitions.
+fn prefix_references(schema: &mut Value, world: &str) {
     match schema {
-        Value::Array(many) => many.iter_mut().for_each(|one| rename(one, world)),
+        Value::Array(elements) => {
+            elements.iter_mut().for_each(|element| prefix_references(element, world));
+        }
         Value::Object(members) => {
-            if let Some(Value::String(to)) = members.get_mut("$ref") {
-                *to = to.replace("#/$defs/", &format!("#/$defs/{world}."));
+            if let Some(Value::String(reference)) = members.get_mut("$ref") {
+                *reference = reference.replace("#/$defs/", &format!("#/$defs/{world}."));
             }
-            members.values_mut().for_each(|one| rename(one, world));
+            members.values_mut().for_each(|member| prefix_references(member, world));
         }
         _ => {}
     }
@@ -175,17 +182,17 @@ pub fn with_infinity(mut limits: Value) -> Value {
     limits
 }
 
-/// Marks a string of a schema, or the elements of an array of strings, as names of other things:
+/// Marks a string of a schema, or the elements of an array of strings, as names:
 /// keys of the table `table`, or one of `built_in`.
 ///
 /// # Panics
 /// When the schema has no such key.
 pub fn mark_as_names(schema: &mut Value, key: &str, table: &str, built_in: &[&str]) {
-    let way: Vec<String> = key.split('.').map(String::from).collect();
-    let found = pointers::pointers(schema, &way);
-    assert!(!found.is_empty(), "the sections have no key `{key}`");
-    for place in found {
-        let part = schema.pointer_mut(&place).expect("found just now");
+    let path: Vec<String> = key.split('.').map(String::from).collect();
+    let pointers = pointers::pointers(schema, &path);
+    assert!(!pointers.is_empty(), "the sections have no key `{key}`");
+    for pointer in pointers {
+        let part = schema.pointer_mut(&pointer).expect("found just now");
         let part = if part.get("items").is_some() { &mut part["items"] } else { part };
         part["x-names"] = table.into();
         if !built_in.is_empty() {
@@ -194,27 +201,36 @@ pub fn mark_as_names(schema: &mut Value, key: &str, table: &str, built_in: &[&st
     }
 }
 
-/// Returns the keys that the commented scenario of a world shows, also commented out, and that its
-/// schema does not know. There should be none.
-pub fn unknown_keys(kind: &dyn WorldType) -> Vec<String> {
-    let schema = for_world(kind);
-    let shown = documented::documented_keys(kind.default_scenario()).into_iter();
-    let unknown = shown.filter(|one| pointers::pointers(&schema, &one.way).is_empty());
-    unknown.map(|one| one.way.join(".")).collect()
+/// Returns the keys of the commented scenario of a world, also those that are commented out, that its
+/// schema does not have. There should be none.
+pub fn unknown_keys(world: &dyn WorldType) -> Vec<String> {
+    let schema = for_world(world);
+    let mut unknown = Vec::new();
+    for key in documented::documented_keys(world.default_scenario()) {
+        if pointers::pointers(&schema, &key.path).is_empty() {
+            unknown.push(key.path.join("."));
+        }
+    }
+    unknown
 }
 
-/// Returns the keys of a world's schema, as JSON pointers, that its commented scenario shows nowhere, neither as a
-/// key nor in the words beside one.
-pub fn undocumented_keys(kind: &dyn WorldType) -> Vec<String> {
-    let schema = for_world(kind);
-    let shown = documented::documented_keys(kind.default_scenario());
-    let ways = shown.iter().flat_map(|one| (1..=one.way.len()).map(|n| &one.way[..n]));
-    let told: BTreeSet<String> = ways.flat_map(|way| pointers::pointers(&schema, way)).collect();
-    let is_named = |key: &str| shown.iter().any(|one| has_word(&one.words, key));
-    let mut all = Vec::new();
-    pointers::collect_properties(&schema, "", &mut all);
-    all.retain(|(place, key)| !told.contains(place) && !is_named(key));
-    all.into_iter().map(|(place, _)| place).collect()
+/// Returns the keys of a world's schema, as JSON pointers, that are nowhere in its commented scenario, neither as a
+/// key nor in the comment of one.
+pub fn undocumented_keys(world: &dyn WorldType) -> Vec<String> {
+    let schema = for_world(world);
+    let documented_keys = documented::documented_keys(world.default_scenario());
+    let mut documented = BTreeSet::new();
+    for key in &documented_keys {
+        // A key documents its parents too.
+        for depth in 1..=key.path.len() {
+            documented.extend(pointers::pointers(&schema, &key.path[..depth]));
+        }
+    }
+    let is_mentioned = |name: &str| documented_keys.iter().any(|key| has_word(&key.words, name));
+    let mut properties = Vec::new();
+    pointers::collect_properties(&schema, "", &mut properties);
+    properties.retain(|(pointer, name)| !documented.contains(pointer) && !is_mentioned(name));
+    properties.into_iter().map(|(pointer, _)| pointer).collect()
 }
 
 /// Returns whether a text has a key as a word of its own.
@@ -223,10 +239,10 @@ fn has_word(text: &str, key: &str) -> bool {
 }
 
 /// Returns examples of a key's values, from the commented scenario of its world.
-pub fn examples(schema: &Value, way: &[String]) -> Vec<Value> {
-    let places = pointers::pointers(schema, way);
-    let known = places.iter().filter_map(|place| schema.pointer(place)?.get("examples"));
-    known.filter_map(Value::as_array).flatten().cloned().collect()
+pub fn examples(schema: &Value, path: &[String]) -> Vec<Value> {
+    let pointers = pointers::pointers(schema, path);
+    let examples = pointers.iter().filter_map(|pointer| schema.pointer(pointer)?.get("examples"));
+    examples.filter_map(Value::as_array).flatten().cloned().collect()
 }
 
 /// Returns a schema that was written by hand.
@@ -235,8 +251,8 @@ pub fn written(schema: Value) -> Schema {
     Schema::try_from(schema).unwrap_or_default()
 }
 
-/// Gives a handwritten schema to a type with handwritten reading: a `serde_json::Value`, which
-/// stands wherever the type does.
+/// Gives a handwritten schema, a `serde_json::Value`, to a type with a handwritten `Deserialize`. It
+/// is inlined wherever the type is used.
 #[macro_export]
 macro_rules! schema_by_hand {
     ($name:ident, $schema:expr) => {

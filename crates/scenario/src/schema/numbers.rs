@@ -14,7 +14,8 @@ fn numbers(conditions: Value) -> Schema {
     schema
 }
 
-/// Implements the common part of all: they have no definition of their own.
+/// Implements the common part of all: they are inlined, because a definition of a few words would only be a detour for
+/// the reader.
 macro_rules! inline {
     ($name:literal) => {
         fn inline_schema() -> bool {

@@ -1,63 +1,74 @@
-//! The places of a schema that are about a key.
+//! JSON pointers to the parts of a schema that are about a key.
 
 use serde_json::Value;
 
-/// Returns the places (JSON pointers) of the parts of a schema that are about a key. There may be
-/// several, where a section stands alone or in an array; none if the schema does not know the key.
-pub(crate) fn pointers(schema: &Value, way: &[String]) -> Vec<String> {
-    let mut found = vec![String::new()];
-    for name in way {
-        found = found.iter().flat_map(|place| pointers_below(schema, place, name)).collect();
-        found.sort();
-        found.dedup();
+/// Returns JSON pointers to the parts of a schema that are about a key. There may be
+/// several, where a section may be a table or an array of tables; none if the schema does not have the key.
+pub(crate) fn pointers(schema: &Value, path: &[String]) -> Vec<String> {
+    let mut pointers = vec![String::new()];
+    for name in path {
+        pointers =
+            pointers.iter().flat_map(|pointer| pointers_below(schema, pointer, name)).collect();
+        pointers.sort();
+        pointers.dedup();
     }
-    found
+    pointers
 }
 
-/// Returns the places of a key of the tables at a place, or in the arrays there.
-fn pointers_below(schema: &Value, place: &str, name: &str) -> Vec<String> {
-    let Some(part) = schema.pointer(place) else { return Vec::new() };
-    let mut found = Vec::new();
+/// Returns pointers to a key of the tables at a pointer, or in the arrays there.
+fn pointers_below(schema: &Value, pointer: &str, name: &str) -> Vec<String> {
+    let Some(part) = schema.pointer(pointer) else { return Vec::new() };
+    let mut pointers = Vec::new();
     if let Some(target) = part.get("$ref").and_then(Value::as_str) {
-        found.extend(pointers_below(schema, target.trim_start_matches('#'), name));
+        pointers.extend(pointers_below(schema, target.trim_start_matches('#'), name));
     }
     for word in ["oneOf", "anyOf", "allOf"] {
         let count = part.get(word).and_then(Value::as_array).map_or(0, Vec::len);
         let inner =
-            (0..count).flat_map(|i| pointers_below(schema, &format!("{place}/{word}/{i}"), name));
-        found.extend(inner);
+            (0..count).flat_map(|i| pointers_below(schema, &format!("{pointer}/{word}/{i}"), name));
+        pointers.extend(inner);
     }
     if part.get("items").is_some_and(Value::is_object) {
-        found.extend(pointers_below(schema, &format!("{place}/items"), name));
+        pointers.extend(pointers_below(schema, &format!("{pointer}/items"), name));
     }
     if part.get("properties").is_some_and(|own| own.get(name).is_some()) {
-        let name = name.replace('~', "~0").replace('/', "~1");
-        found.push(format!("{place}/properties/{name}"));
+        pointers.push(format!("{pointer}/properties/{}", escape(name)));
     } else if part.get("additionalProperties").is_some_and(Value::is_object) {
-        found.push(format!("{place}/additionalProperties"));
+        pointers.push(format!("{pointer}/additionalProperties"));
     }
-    found
+    pointers
 }
 
-/// Gathers the places of all keys of the tables within a part of a schema, each with its name.
-pub(crate) fn collect_properties(part: &Value, place: &str, found: &mut Vec<(String, String)>) {
+/// Escapes a name for a JSON pointer (RFC 6901).
+fn escape(name: &str) -> String {
+    name.replace('~', "~0").replace('/', "~1")
+}
+
+/// Collects pointers to all keys of the tables within a part of a schema, each with its name.
+pub(crate) fn collect_properties(
+    part: &Value,
+    pointer: &str,
+    properties: &mut Vec<(String, String)>,
+) {
     match part {
-        Value::Array(many) => {
-            for (i, one) in many.iter().enumerate() {
-                collect_properties(one, &format!("{place}/{i}"), found);
+        Value::Array(elements) => {
+            for (i, element) in elements.iter().enumerate() {
+                collect_properties(element, &format!("{pointer}/{i}"), properties);
             }
         }
         Value::Object(members) => {
-            for (word, inner) in members {
-                let place = format!("{place}/{word}");
-                let keys = inner.as_object().filter(|_| word == "properties");
+            for (keyword, inner) in members {
+                let pointer = format!("{pointer}/{keyword}");
+                let keys = inner.as_object().filter(|_| keyword == "properties");
                 for (name, inner) in keys.into_iter().flatten() {
-                    let place = format!("{place}/{}", name.replace('~', "~0").replace('/', "~1"));
-                    collect_properties(inner, &place, found);
-                    found.push((place, name.clone()));
+                    let pointer = format!("{pointer}/{}", escape(name));
+                    collect_properties(inner, &pointer, properties);
+                    properties.push((pointer, name.clone()));
                 }
-                if keys.is_none() && !matches!(&word[..], "default" | "examples" | "enum") {
-                    collect_properties(inner, &place, found);
+                // Values, not schemas, follow these keywords.
+                let has_values = matches!(&keyword[..], "default" | "examples" | "enum");
+                if keys.is_none() && !has_values {
+                    collect_properties(inner, &pointer, properties);
                 }
             }
         }
@@ -82,8 +93,8 @@ mod tests {
             },
             "$defs": { "Robot": { "properties": { "at": {} } } },
         });
-        let of = |way: &[&str]| {
-            pointers(&schema, &way.iter().map(ToString::to_string).collect::<Vec<_>>())
+        let of = |path: &[&str]| {
+            pointers(&schema, &path.iter().map(ToString::to_string).collect::<Vec<_>>())
         };
         assert_eq!(of(&["robots"]), ["/properties/robots"]);
         assert_eq!(of(&["robots", "at"]), ["/$defs/Robot/properties/at"]);
@@ -97,6 +108,6 @@ mod tests {
         collect_properties(&schema, "", &mut all);
         let names: Vec<&str> = all.iter().map(|(_, name)| &name[..]).collect();
         assert_eq!(names, ["robots", "a/b", "sensors", "at"]);
-        assert!(all.iter().all(|(place, _)| schema.pointer(place).is_some()), "{all:?}");
+        assert!(all.iter().all(|(pointer, _)| schema.pointer(pointer).is_some()), "{all:?}");
     }
 }

@@ -75,7 +75,8 @@ impl JobQueue {
         job: impl FnOnce(&CancelToken) -> Result<T, ResultError> + Send + 'static,
     ) -> Result<T, ResultError> {
         let bug = || {
-            let problem = Problem::new("result", "this is a bug in sidestep", "please report it");
+            let problem =
+                Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
             ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
         };
         // The semaphore is never closed.

@@ -15,8 +15,8 @@ pub(super) fn inspection(run: &dyn Simulation, of: &BodyId) -> Result<Inspection
     let told = body(of).and_then(|body| run.inspect(body)).ok_or_else(|| {
         let part = of.part.map(|part| format!("/{part}")).unwrap_or_default();
         let place = format!("{}/{}{part}", of.kind, of.number);
-        let remedy = format!("name a {} of this run", run.agent());
-        Problem::new(place, "nothing is to tell of this body", remedy)
+        let remedy = format!("choose a {} of this run", run.agent());
+        Problem::new(place, "no information about this body", remedy)
     })?;
     Ok(Inspection {
         body: body_id(&told.who),

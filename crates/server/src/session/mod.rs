@@ -225,8 +225,8 @@ fn panic_message(payload: &(dyn Any + Send)) -> String {
 }
 
 fn internal_error(message: &str) -> Problem {
-    let remedy = "please report it with the scenario; the other sessions go on";
-    Problem::new("session", format!("this is a bug in sidestep: {message}"), remedy)
+    let remedy = "please report it with the scenario; the other sessions continue";
+    Problem::new("session", format!("internal error (a bug in Sidestep): {message}"), remedy)
 }
 
 #[cfg(test)]

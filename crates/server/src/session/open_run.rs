@@ -94,7 +94,7 @@ impl OpenRun {
     ) -> Result<Self, Problem> {
         let world_type = deps.worlds.find(world).ok_or_else(|| {
             let names = deps.worlds.names().join(", ");
-            Problem::new(world, "no such world is known", format!("name one of {names}"))
+            Problem::new(world, "no such world", format!("give one of {names}"))
         })?;
         let folder = deps.files.first_root_folder();
         let source = Source::new(format!("{world}.toml"), world_type.default_scenario(), folder);

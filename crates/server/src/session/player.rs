@@ -175,7 +175,7 @@ impl Player {
                 return None;
             }
             RunMethod::Restart { seed, text } => {
-                self.cancel_seek("the run was started anew");
+                self.cancel_seek("the run was restarted");
                 let result = self.restart(seed, text);
                 if result.is_err() && self.state == SessionState::Seeking {
                     self.pause();

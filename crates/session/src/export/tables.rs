@@ -28,7 +28,7 @@ pub(super) fn export(
     only: Option<&str>,
 ) -> Result<ExportResult, Error> {
     let Some(folder) = &job.recorded.folder else {
-        let remedy = "name the run folder; one is made by `sidestep run SCENARIO --out DIR`";
+        let remedy = "give the run folder; one is made by `sidestep run SCENARIO --out DIR`";
         let cause = "a recording for viewers has no tables";
         return Err(InputError::new(job.recorded.path.display(), cause, remedy).into());
     };

@@ -25,7 +25,7 @@ impl Target {
         let target = Self { path };
         if resolve_path(recorded).starts_with(resolve_path(&target.path)) {
             let cause = "this is the recording that is exported, or holds it";
-            return Err(target.error(cause, "name another place with --out"));
+            return Err(target.error(cause, "give another place with --out"));
         }
         Ok(target)
     }
@@ -37,7 +37,7 @@ impl Target {
     pub(super) fn for_file(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
         let target = Self::resolve(job, ending)?;
         match std::fs::metadata(&target.path) {
-            Ok(found) if found.is_dir() => Err(target.error("this is a folder", "name a file")),
+            Ok(found) if found.is_dir() => Err(target.error("this is a folder", "give a file")),
             Ok(_) if !job.wanted.replace => Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY)),
             _ => Ok(target),
         }
@@ -55,7 +55,7 @@ impl Target {
         let target = Self::resolve(job, ending)?;
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
             return match target.path.exists() {
-                true => Err(target.error("this is no folder", "name a new folder")),
+                true => Err(target.error("this is no folder", "give a new folder")),
                 false => Ok(target),
             };
         };
@@ -71,7 +71,7 @@ impl Target {
         if !entries.all(is_ours) {
             let listed = holds.join(", .");
             let cause = format!("the folder holds something else than .{listed} files");
-            return Err(target.error(&cause, "name a new folder"));
+            return Err(target.error(&cause, "give a new folder"));
         }
         Ok(target)
     }
@@ -111,7 +111,7 @@ impl Target {
 }
 
 const EXISTS_CAUSE: &str = "is there already";
-const REPLACE_REMEDY: &str = "name another place with --out, or give --replace";
+const REPLACE_REMEDY: &str = "give another place with --out, or --replace";
 
 fn remove(folder: &Path) -> std::io::Result<()> {
     match std::fs::remove_dir_all(folder) {

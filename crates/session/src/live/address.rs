@@ -84,7 +84,7 @@ impl ViewerAddress {
         };
         let remedy = match next_free_port(ip, self.port) {
             Some(free) => format!("give --foxglove {}:{free}, which is free", self.host()),
-            None => format!("give --foxglove {}:0, and a free one is taken", self.host()),
+            None => format!("give --foxglove {}:0 to use a free one", self.host()),
         };
         InputError::new(place, "the port is in use", remedy)
     }

@@ -14,7 +14,8 @@ use crate::frame_sink::FRAME_OPTIONS;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::{Frame, FrameOptions, Scenery};
 use sidestep_record::{
-    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, start_live_server,
+    LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, ServedRun,
+    start_live_server,
 };
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -75,8 +76,8 @@ impl ViewerServer {
         let first = run.frame(FRAME_OPTIONS);
         let (host, port) = (at.host(), at.port());
         let steer = move |wish| heard.accept(wish);
-        let served =
-            retry_bind(|| start_live_server(&host, port, scenery, &first, end_s, steer.clone()));
+        let served_run = ServedRun { scenery, first: &first, end_s };
+        let served = retry_bind(|| start_live_server(&host, port, &served_run, steer.clone()));
         let (server, encoder) = served.map_err(|e| at.bind_error(&e))?;
         let (frames, taken) = sync_channel(1);
         let is_encoding = Arc::new(AtomicBool::new(false));

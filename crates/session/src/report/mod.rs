@@ -3,7 +3,8 @@
 //! ```text
 //! run.rs        a run folder -> a document       metrics.rs   numbers of a summary -> tables
 //! sweep.rs      the folder of a sweep -> a document
-//! recorded.rs   its tables and columns             events.rs    timeline of events
+//! tables.rs     its tables and columns           events.rs    timeline of events
+//! text.rs       numbers as text
 //! ```
 
 mod events;

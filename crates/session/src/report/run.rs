@@ -83,7 +83,7 @@ fn unfinished(view: &RunReader) -> Option<Text> {
     );
     let resume =
         Text::code(format!("sidestep resume {}", shell_quote(&view.path.display().to_string())));
-    Some(Text::from_markup(&text).append(resume).append(" goes on with it."))
+    Some(Text::from_markup(&text).append(resume).append(" continues it."))
 }
 
 fn facts(view: &RunReader, summary: Option<&Value>) -> Vec<(String, Text)> {

@@ -71,7 +71,7 @@ fn unfinished(folder: &Folder, table: &RunTable) -> Text {
     let (done, all) = (format_count(table.runs() as u64), format_count(folder.plan().runs()));
     let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
     let resume = format!("sidestep resume {}", shell_quote(&folder.path().display().to_string()));
-    Text::from_markup(&text).append(Text::code(resume)).append(" goes on with it.")
+    Text::from_markup(&text).append(Text::code(resume)).append(" continues it.")
 }
 
 fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
@@ -136,7 +136,7 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
 fn stop_reasons_table(plan: &Plan, table: &RunTable) -> Option<Table> {
     let stopped = variant_stops(plan, table);
     let names = plan.names();
-    let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
+    let mut rows = Table::new("Why this number of runs", "", &["variant", "runs", "why"]);
     for VariantStop { variant, runs, reason } in &stopped {
         let name = names.get(*variant as usize).cloned();
         rows.push_row([name.unwrap_or_default(), runs.to_string(), reason.describe().to_string()]);

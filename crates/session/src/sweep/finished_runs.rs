@@ -70,7 +70,7 @@ pub(crate) fn run_picture(
         made => made?.ok_or(Error::Interrupted)?,
     };
     if outcome.digest != digest {
-        return Ok(Err(format!("made again, it comes to the digest {}", outcome.digest)));
+        return Ok(Err(format!("run again, it gives the digest {}", outcome.digest)));
     }
     Ok(stored_picture(&again).ok_or_else(|| "it could not be drawn".to_string()))
 }

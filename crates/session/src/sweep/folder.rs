@@ -26,7 +26,7 @@ pub(super) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputE
     let maker =
         Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
     maker.check(worlds.build(), folder.path(), "sweep", |wrote| {
-        format!("go on with sidestep {wrote}, or sweep into a new folder")
+        format!("continue with sidestep {wrote}, or sweep into a new folder")
     })
 }
 

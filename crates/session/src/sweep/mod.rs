@@ -1,14 +1,14 @@
 //! Many runs: a sweep -> cells -> one table.
 //!
 //! ```text
-//! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
-//! journey.rs   from the plan to the table         effort.rs    the time of all runs
-//! gather.rs    the folder, and the finished runs in it
-//! crew.rs      runners outside                    task.rs      cells that another process sends
-//! piles.rs     finished runs -> the table, in blocks
-//! told.rs      the results, for programs
-//! look.rs      finished runs, for reports         stamped.rs   lines of a journal
-//! status.rs    a sweep in progress elsewhere
+//! prepare.rs        every variant compiled, a plan  cell_runner.rs  cells -> outcomes, many at once
+//! run.rs            from the plan to the table      timing.rs       the time of all runs
+//! folder.rs         the folder, and the finished runs in it
+//! executor.rs       runners in other processes      task.rs         cells that another process sends
+//! buckets.rs        finished runs -> the table, in blocks
+//! json.rs           the results, for programs
+//! finished_runs.rs  finished runs, for reports      journal.rs      lines of a journal
+//! status.rs         a sweep in progress elsewhere
 //! ```
 
 mod buckets;

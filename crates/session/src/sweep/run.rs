@@ -63,7 +63,7 @@ pub fn run_in_memory<'a>(
 ) -> Result<(Plan, SweepEnd), Error> {
     if sweep.record {
         let cause = "there is no folder to record runs to";
-        return Err(InputError::new("--record-runs", cause, "name one with --out").into());
+        return Err(InputError::new("--record-runs", cause, "give one with --out").into());
     }
     let engine = engine.into();
     let make: VariantFn<'_, Source> = &|_, source, _| Ok(source.clone());
@@ -143,7 +143,7 @@ fn open_same(
     }
     let there = out.display();
     let remedy =
-        format!("name another folder, or go on with what is there: sidestep resume {there}");
+        format!("give another folder, or continue the sweep in this one: sidestep resume {there}");
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
@@ -233,7 +233,8 @@ pub fn run_share(
     check_build(worlds, folder)?;
     let plan = folder.plan();
     if plan.until.is_some() {
-        let cause = "this sweep stops by its precision, which takes all runs to be seen";
+        let cause =
+            "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
         let remedy =
             "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
         return Err(InputError::new(folder.path().display(), cause, remedy).into());
@@ -347,7 +348,8 @@ fn with_cell_runner(
 fn with_resume_hint(error: Error, folder: &Path) -> Error {
     match error {
         Error::Record(error) => {
-            let remedy = "make room; the finished runs are saved, go on with: sidestep resume";
+            let remedy =
+                "free some space; the finished runs are saved, continue with: sidestep resume";
             Error::other(error.to_string(), format!("{remedy} {}", folder.display()))
         }
         other => other,

@@ -2,9 +2,10 @@
 //! of their controls are missing.
 
 use crate::support::SHIPPED_WORLDS;
-use sidestep_airspace::AirspaceRun;
-use sidestep_airspace::pilot::{Control, Fleet, Packet, Percept, Pilot};
+use sidestep_airspace::pilot::{Control, Percept, Pilot};
+use sidestep_airspace::{AirspaceRun, Fleet};
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep_scenario::Source;
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, replay_all, replay_to};
 use std::any::Any;
@@ -29,7 +30,7 @@ fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<Control> {
     }
     loop {
         for pilot in &mut *pilots {
-            for Packet { to, payload, .. } in pilot.take_packets() {
+            for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
                 due.extend(to.iter().map(|&other| (other, pilot.id(), payload.clone())));
             }
         }

@@ -59,7 +59,7 @@ fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
         .map(drop)
         .expect_err("nobody decides");
     let words = error.to_string();
-    assert!(words.contains("its agents were decided from outside up to cycle 120"), "{words}");
+    assert!(words.contains("its agents were controlled externally up to cycle 120"), "{words}");
     let again = RecordedRun::open(&SHIPPED_WORLDS, &folder).expect("a run");
     replay_to(&again, 119, 1, &NoWatcher).expect("what was recorded can be looked at");
 }

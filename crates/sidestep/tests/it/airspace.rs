@@ -188,7 +188,7 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         ("[airspace]\ndt_s = 1e-9\ndtau_s = 1e-9\n", "0.01 to 3600 s"),
         ("[airspace]\nhorizon = 60\ndtau_s = 5.0\n", "write horizon_s = 300.0"),
         ("[airspace]\nhorizon_s = 4.0\n", "at least dt_s = 5"),
-        ("[airspace]\nhorizon_s = 1e300\n", "nobody predicts more than a day"),
+        ("[airspace]\nhorizon_s = 1e300\n", "predictions are limited to one day"),
         ("[airspace]\nhorizon_s = 20000\n", "10000 steps"),
         ("[airspace]\ntolerance_m = 1e300\n", "0.001 to 1e6 m"),
         ("[airspace]\nalpha = 1e300\n", "1e-12 to 1e6"),

@@ -7,7 +7,7 @@ use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema, Values};
 use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::exact::MarkovModel;
+use sidestep::worlds::robots::exact::markov_model;
 use sidestep::worlds::robots::robots_run;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::path::Path;
@@ -130,7 +130,7 @@ fn an_effector_comes_back_from_the_log_of_its_run() {
                     ascii = \"\"\"\n.....\n\"\"\"\n[robots]\nat = [[1, 0, 0]]\neffector = \"wheels\"\n";
     let loaded = Source::new("loaded.toml", scenario, folder.path());
     let compiled = Compiled::new(&loaded, &Behaviours::new(), StorageOrder::ById);
-    let model = MarkovModel::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap();
+    let model = markov_model(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap();
     let forward = learned.profile.action("forward").expect("learned");
     let slip = forward.iter().find(|t| t.path == "FF").expect("two boxes ahead").p;
     let ahead = model.outcome_distribution(model.poses()[0], 0);

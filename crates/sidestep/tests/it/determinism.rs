@@ -51,7 +51,7 @@ fn a_recording_that_was_never_begun_is_an_error_and_not_empty() {
     run.advance(10);
     let mut recorder = MemoryRecorder::new(&run.schemas());
     let error = run.record(&mut recorder).expect_err("no rows were kept");
-    assert!(error.to_string().contains("begin_recording"), "{error}");
+    assert!(error.to_string().contains("start_recording"), "{error}");
 }
 
 #[test]

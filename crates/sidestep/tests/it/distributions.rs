@@ -2,11 +2,11 @@
 //! scenario, and impossible outcomes never happen.
 
 use super::tiles::{Tiles, assert_fits, law, repeating};
+use sidestep::error_models::effector::ObstacleRule;
+use sidestep::exact::{ActionOutcome, GridPose};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
 use sidestep::scenario::Source;
-use sidestep::worlds::robots::effector::ObstacleRule;
-use sidestep::worlds::robots::exact::{ActionOutcome, GridPose};
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 

@@ -2,14 +2,15 @@
 //! exported POMDP is that chain.
 
 use super::tiles::{Tiles, assert_fits, law};
+use sidestep::error_models::RandomPolicy;
+use sidestep::error_models::effector::{FORWARD, ObstacleRule, Side};
+use sidestep::exact::{
+    self, Comparison, GridPose, MarkovChain, MarkovModel, sampling_limit, total_variation,
+};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::RobotsRun;
-use sidestep::worlds::robots::decide::RandomPolicy;
-use sidestep::worlds::robots::effector::{FORWARD, ObstacleRule, Side};
-use sidestep::worlds::robots::exact::{
-    self, Comparison, GridPose, MarkovChain, MarkovModel, sampling_limit, total_variation,
-};
+use sidestep::worlds::robots::exact::{compare, markov_model};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
 
@@ -54,7 +55,7 @@ fn compile(source: &Source) -> Compiled {
 }
 
 fn model(tiles: &Tiles) -> MarkovModel {
-    MarkovModel::new(&compile(&tiles.single().source())).unwrap_or_else(|e| panic!("{e}"))
+    markov_model(&compile(&tiles.single().source())).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Last poses of all rooms, contacts left out.
@@ -142,7 +143,7 @@ fn long_run(tiles: &Tiles, apart: u64, times: u64) -> (BTreeMap<GridPose, u64>, 
 
 fn compared(simulated: ObstacleRule, name: &str, cycles: u64) -> Comparison {
     let source = rooms(ROOM, 1, "{ kind = \"external\" }", simulated).single().source();
-    exact::compare(&compile(&source), &source, &exact::policy(name).unwrap(), cycles, 1500).unwrap()
+    compare(&compile(&source), &source, &exact::policy(name).unwrap(), cycles, 1500).unwrap()
 }
 
 #[test]
@@ -203,7 +204,7 @@ fn a_robot_that_always_goes_ahead_ends_at_the_wall() {
 
 fn refused(text: &str) -> InputError {
     let source = Source::new("s.toml", format!("format = 1\nworld = \"robots\"\n{text}"), "");
-    MarkovModel::new(&compile(&source)).expect_err(text)
+    markov_model(&compile(&source)).expect_err(text)
 }
 
 #[test]
@@ -228,7 +229,7 @@ fn what_is_no_chain_over_one_robot_is_refused_with_what_to_change() {
 fn a_closed_door_is_a_wall_of_its_kind() {
     let text = "format = 1\nworld = \"robots\"\n[map]\nascii = \"\"\"\n.....\n\"\"\"\n[robots]\n\
                 at = [[0, 0, 0]]\n[doors]\nat = [[2, 0]]\nperiodic = { open = 0, closed = 1 }\n";
-    let model = MarkovModel::new(&compile(&Source::new("s.toml", text, ""))).unwrap();
+    let model = markov_model(&compile(&Source::new("s.toml", text, ""))).unwrap();
     assert_eq!(model.poses().len(), 8);
     let at_the_door = GridPose { col: 1, row: 0, heading: 0 };
     let door = 2;

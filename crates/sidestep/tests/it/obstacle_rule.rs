@@ -7,11 +7,12 @@
 
 use super::tiles::{PERSON, Tiles, WALL, assert_fits, law, repeating};
 use proptest::prelude::*;
+use sidestep::error_models::effector::ObstacleRule::{self, Cut, Renormalise, Stay};
+use sidestep::error_models::effector::Side::{self, Front, Left, Right};
+use sidestep::error_models::effector::Transition;
+use sidestep::exact::{ActionOutcome, GridPose, outcome_distribution};
 use sidestep::kernel::Simulation;
-use sidestep::worlds::robots::effector::ObstacleRule::{self, Cut, Renormalise, Stay};
-use sidestep::worlds::robots::effector::Side::{self, Front, Left, Right};
-use sidestep::worlds::robots::effector::Transition;
-use sidestep::worlds::robots::exact::{ActionOutcome, GridPose, MarkovModel, outcome_distribution};
+use sidestep::worlds::robots::exact::markov_model;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
 
@@ -381,7 +382,7 @@ proptest! {
         let tiles = tiles(&lines.join("\n"), 2, "nomad", action, rule).single();
         let tiles = tiles.keys(&format!("seed = {seed}"));
         let mut simulation = tiles.simulation();
-        let model = MarkovModel::new(&compile(&tiles)).expect("one robot");
+        let model = markov_model(&compile(&tiles)).expect("one robot");
         simulation.advance(1);
         let ended = tiles.outcomes(&simulation);
         let id = ["forward", "left", "right", "stay"].iter().position(|a| *a == action);

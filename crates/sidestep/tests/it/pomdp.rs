@@ -2,9 +2,10 @@
 //! 1 to the last printed digit, and it agrees with the simulator.
 
 use super::tiles::{Tiles, assert_fits};
+use sidestep::exact::{Beam, MarkovModel, PomdpOptions};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Values};
-use sidestep::worlds::robots::exact::{Beam, MarkovModel, PomdpOptions};
+use sidestep::worlds::robots::exact::markov_model;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
 
@@ -117,7 +118,7 @@ fn with_sensor(across: u32, sensor: &str) -> Tiles {
 
 fn model(tiles: &Tiles) -> MarkovModel {
     let compiled = Compiled::new(&tiles.source(), &Behaviours::new(), StorageOrder::ById);
-    MarkovModel::new(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"))
+    markov_model(&compiled.unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn file(options: &PomdpOptions) -> File {

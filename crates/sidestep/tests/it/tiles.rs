@@ -1,10 +1,10 @@
 //! Tiles of robots that cannot meet, poses, and the test of fit.
 
+use sidestep::error_models::effector::ObstacleRule;
+use sidestep::exact::{ActionOutcome, GridPose};
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
 use sidestep::statistics::chi_square_p_value;
-use sidestep::worlds::robots::effector::ObstacleRule;
-use sidestep::worlds::robots::exact::{ActionOutcome, GridPose};
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
 

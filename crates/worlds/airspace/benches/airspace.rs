@@ -75,7 +75,7 @@ impl Conflict {
     }
 }
 
-/// The same game, with every sample's ways predicted anew whenever they are looked at.
+/// The same game, with every sample's paths predicted anew whenever they are looked at.
 struct UncachedGame<'a> {
     conflict: &'a Conflict,
     strategies: Vec<usize>,
@@ -88,17 +88,17 @@ impl Game for UncachedGame<'_> {
 
     fn cost(&self, joint: &[usize]) -> f64 {
         let Conflict { objective, model, poses, actions, timing, .. } = self.conflict;
-        let ways: Vec<_> = joint
+        let predictions: Vec<_> = joint
             .iter()
             .enumerate()
             .map(|(i, &x)| self.conflict.pilot(i).predict(actions[x], poses[i], 0, timing))
             .collect();
         let r = [model.separation_m; 2];
         let mut sum = 0.0;
-        for (i, a) in ways.iter().enumerate() {
+        for (i, a) in predictions.iter().enumerate() {
             let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, timing);
             sum += objective.alpha * objective.deviation(a, &best);
-            for b in &ways[i + 1..] {
+            for b in &predictions[i + 1..] {
                 sum += objective.collision(a, b, r).iter().sum::<f64>();
             }
         }

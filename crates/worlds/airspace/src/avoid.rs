@@ -1,123 +1,134 @@
-//! Ways that keep clear of intruders, as far as there are any.
+//! Paths that keep clear of non-cooperative aircraft, as far as there are any.
 //!
-//! No airplane knows where an intruder wants to go, so no orbit is safe from it forever, and the
-//! invariant of the shield is about all others. The promise about intruders: **an airplane that
-//! loses separation from an intruder is named with it before.** Within `dt` the intruder stays in a
-//! circle that grows at its greatest speed `s`. A way is *clear* if at each moment `t` of `dt` the
-//! airplane is farther than `R + s t` from where the intruder is at its start, and farther by the
-//! bounds on errors. On a clear way there is no loss in this `dt`, however the intruder flies. If
-//! the way that is flown in the end is not clear, the pair is named until it is again.
+//! No airplane knows where a non-cooperative one is bound for, so no orbit is safe from it forever, and the
+//! invariant of the shield is about all others. The guarantee beside it: **an airplane that
+//! loses separation from a non-cooperative one is reported with it before.** Within `dt` that one stays in a
+//! circle that grows at its greatest speed `s`. A path is *clear* if at each moment `t` of `dt` the
+//! airplane is farther than `R + s t` from where the other is at its start, and farther by the
+//! bounds on errors. On a clear path there is no loss in this `dt`, however the other flies. If
+//! the path that is flown in the end is not clear, the pair is exempt until it is again.
 //!
-//! To avoid that as far as possible, an airplane prefers ways that would stay clear for as long as it takes to turn
-//! back, if it flew straight on after `dt`, and the intruder all the time.
+//! To avoid that as far as possible, an airplane prefers paths that would stay clear for as long as it takes to turn
+//! back, if it flew straight on after `dt`, and the other all the time.
 
 use crate::flight::{Point, Pose2, distance_m};
 use crate::non_cooperative::NonCooperative;
 use crate::shield::{ShieldedAircraft, TurnProfile, stays_apart_for};
 use std::f64::consts::PI;
 
-/// The clearance of a way from all intruders.
+/// The clearance of a path from all others. The derived order prefers clear paths, and then wide margins.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Clearance {
-    /// Whether no intruder can come too near within `dt`.
+    /// Whether no other can come too near within `dt`.
     is_clear: bool,
-    /// Meters beyond the distance wanted, at the closest; at most 0.
-    spare_m: f64,
+    /// Meters beyond the desired distance, at the closest; at most 0.
+    margin_m: f64,
 }
 
-/// An airplane among intruders.
+/// An airplane among non-cooperative ones.
 pub(crate) struct NonCooperativeAvoidance<'a> {
-    flyer: &'a ShieldedAircraft,
-    /// Intruders on its levels.
-    intruders: Vec<&'a NonCooperative>,
+    aircraft: &'a ShieldedAircraft,
+    /// Those on its levels.
+    others: Vec<&'a NonCooperative>,
     dtau_s: f64,
 }
 
 impl<'a> NonCooperativeAvoidance<'a> {
-    pub(crate) fn new(flyer: &'a ShieldedAircraft, all: &'a [NonCooperative], dtau_s: f64) -> Self {
-        let minds = |one: &&NonCooperative| one.levels.overlaps(&flyer.levels, flyer.vertical_m);
-        Self { flyer, intruders: all.iter().filter(minds).collect(), dtau_s }
+    pub(crate) fn new(
+        aircraft: &'a ShieldedAircraft,
+        non_cooperative: &'a [NonCooperative],
+        dtau_s: f64,
+    ) -> Self {
+        let others = non_cooperative
+            .iter()
+            .filter(|one| one.levels.overlaps(&aircraft.levels, aircraft.vertical_m))
+            .collect();
+        Self { aircraft, others, dtau_s }
     }
 
-    /// Returns the ways that an airplane may fly, by their places in `wishes`: those that are better
-    /// than its fallback. Ways without fault keep their order, the others follow by merit.
+    /// Returns the profiles that an airplane may fly, by their places in `candidates`: those that are better
+    /// than its fallback. Clear ones with a full margin keep their order, the others follow by clearance.
     pub(crate) fn allowed_profiles(
         &self,
-        wishes: &[TurnProfile],
+        candidates: &[TurnProfile],
         fallback: impl FnOnce() -> TurnProfile,
     ) -> Vec<usize> {
-        if self.intruders.is_empty() {
-            return (0..wishes.len()).collect();
+        if self.others.is_empty() {
+            return (0..candidates.len()).collect();
         }
-        let least = self.clearance(&fallback());
-        let faultless = Clearance { is_clear: true, spare_m: 0.0 };
-        let merits = wishes.iter().map(|way| self.clearance(way)).enumerate();
-        let mut better: Vec<(usize, Clearance)> =
-            merits.filter(|(_, merit)| *merit == faultless || *merit > least).collect();
-        // A stable sort by falling merit.
+        let required = self.clearance(&fallback());
+        let full = Clearance { is_clear: true, margin_m: 0.0 };
+        let clearances = candidates.iter().map(|profile| self.clearance(profile)).enumerate();
+        let mut better: Vec<(usize, Clearance)> = clearances
+            .filter(|(_, clearance)| *clearance == full || *clearance > required)
+            .collect();
+        // A stable sort by falling clearance.
         better.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
         better.into_iter().map(|(k, _)| k).collect()
     }
 
-    /// Returns the intruders that could come too near on a way within `dt`.
+    /// Returns the others that could come too near on a path within `dt`.
     pub(crate) fn threats<'b>(
         &'b self,
-        way: &'b TurnProfile,
+        profile: &'b TurnProfile,
     ) -> impl Iterator<Item = &'a NonCooperative> + 'b {
-        let poses = self.poses(way);
-        self.intruders.iter().copied().filter(move |one| !self.is_clear(&poses, way, one))
+        let poses = self.poses(profile);
+        self.others.iter().copied().filter(move |one| !self.is_clear(&poses, profile, one))
     }
 
-    fn clearance(&self, way: &TurnProfile) -> Clearance {
-        let poses = self.poses(way);
-        let spare_m = self.intruders.iter().map(|one| self.margin_m(&poses, one));
+    fn clearance(&self, profile: &TurnProfile) -> Clearance {
+        let poses = self.poses(profile);
+        let margins_m = self.others.iter().map(|one| self.margin_m(&poses, one));
         Clearance {
-            is_clear: self.intruders.iter().all(|one| self.is_clear(&poses, way, one)),
-            spare_m: spare_m.fold(0.0, f64::min),
+            is_clear: self.others.iter().all(|one| self.is_clear(&poses, profile, one)),
+            margin_m: margins_m.fold(0.0, f64::min),
         }
     }
 
-    /// Returns its poses at the start of each step of a way, and at the end.
-    fn poses(&self, way: &TurnProfile) -> Vec<Pose2> {
-        let mut poses = vec![self.flyer.pose];
-        for &omega in &way.omegas_rad_s {
-            poses.push(poses[poses.len() - 1].step(self.flyer.v_m_s, omega, self.dtau_s));
+    /// Returns its poses at the start of each step of a profile, and at the end.
+    fn poses(&self, profile: &TurnProfile) -> Vec<Pose2> {
+        let mut poses = vec![self.aircraft.pose];
+        for &omega in &profile.omegas_rad_s {
+            poses.push(poses[poses.len() - 1].step(self.aircraft.v_m_s, omega, self.dtau_s));
         }
         poses
     }
 
-    /// Returns the distance in meters that it has to keep from an intruder, as both are seen.
+    /// Returns the distance in meters that it has to keep from another one, as both are seen.
     fn gap_m(&self, one: &NonCooperative) -> f64 {
-        self.flyer.separation_m.max(one.separation_m) + self.flyer.error_m + one.error_m
+        self.aircraft.separation_m.max(one.separation_m) + self.aircraft.error_m + one.error_m
     }
 
-    fn is_clear(&self, poses: &[Pose2], way: &TurnProfile, one: &NonCooperative) -> bool {
-        let ShieldedAircraft { v_m_s, .. } = *self.flyer;
-        way.omegas_rad_s.iter().zip(poses).enumerate().all(|(k, (&omega, pose))| {
-            let from_s = k as f64 * self.dtau_s;
-            let left_m = |t_s: f64| {
-                distance_m(pose.step(v_m_s, omega, t_s).at, one.at) - one.top_m_s * (from_s + t_s)
+    fn is_clear(&self, poses: &[Pose2], profile: &TurnProfile, one: &NonCooperative) -> bool {
+        let v_m_s = self.aircraft.v_m_s;
+        profile.omegas_rad_s.iter().zip(poses).enumerate().all(|(k, (&omega, pose))| {
+            let step_s = k as f64 * self.dtau_s;
+            // The distance from the circle in which the other may be at that time.
+            let distance_left_m = |t_s: f64| {
+                distance_m(pose.step(v_m_s, omega, t_s).at, one.at) - one.top_m_s * (step_s + t_s)
             };
-            stays_apart_for(&left_m, self.dtau_s, v_m_s + one.top_m_s, self.gap_m(one))
+            stays_apart_for(&distance_left_m, self.dtau_s, v_m_s + one.top_m_s, self.gap_m(one))
         })
     }
 
-    /// Returns the meters to spare if it flew straight on after the way, and the intruder all the
+    /// Returns the meters beyond the desired distance if it flew straight on after a path, and the other all the
     /// time; at most 0.
     fn margin_m(&self, poses: &[Pose2], one: &NonCooperative) -> f64 {
         let steps = poses.len() - 1;
-        let wanted_m = self.gap_m(one) + one.top_m_s * one.dt_s;
-        let nearest_m =
-            |k: usize| distance_m(poses[k].at, one.position_after(k as f64 * self.dtau_s));
-        let during_m = (1..steps).map(nearest_m).fold(f64::INFINITY, f64::min);
+        let desired_m = self.gap_m(one) + one.top_m_s * one.dt_s;
+        let during_m = (1..steps)
+            .map(|k| distance_m(poses[k].at, one.position_after(k as f64 * self.dtau_s)))
+            .fold(f64::INFINITY, f64::min);
         let end = poses[steps];
-        let ahead = end.step(self.flyer.v_m_s, 0.0, 1.0).at;
+        let after_a_second = end.step(self.aircraft.v_m_s, 0.0, 1.0).at;
         let [vx, vy] = one.velocity_m_s;
-        let relative = [vx - (ahead[0] - end.at[0]), vy - (ahead[1] - end.at[1])];
+        let relative_velocity =
+            [vx - (after_a_second[0] - end.at[0]), vy - (after_a_second[1] - end.at[1])];
         let place = one.position_after(steps as f64 * self.dtau_s);
         let from = [place[0] - end.at[0], place[1] - end.at[1]];
-        let after_m = min_distance_m(from, relative, PI / self.flyer.orbit_rad_s);
-        (during_m.min(after_m) - wanted_m).min(0.0)
+        let half_turn_s = PI / self.aircraft.orbit_rad_s;
+        let after_m = min_distance_m(from, relative_velocity, half_turn_s);
+        (during_m.min(after_m) - desired_m).min(0.0)
     }
 }
 

@@ -1,27 +1,26 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
 mod external;
+mod group_memory;
 mod preferences;
 mod velocity;
 
-use super::PhaseContext;
 use super::agents::ActionChoice;
 use super::agents::network_traffic::NetworkTraffic;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
-use super::memory::max_group_bytes;
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, game};
-use super::perceive::known_aircraft;
-use super::pilot::Maneuver;
 use super::purpose;
-use super::shield::{ShieldDecision, TurnProfile};
-use super::world::{AirspaceWorld, Method};
+use super::settings::Method;
+use super::shield::TurnProfile;
+use super::world::AirspaceWorld;
+pub(super) use group_memory::max_group_bytes;
 use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId};
 
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,54 +64,46 @@ impl OptimizationStats {
     }
 }
 
-/// Everything that an airplane considers in a cycle.
+/// Everything that an airplane considers flying in a cycle.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ManeuverCandidates {
-    /// Its actions in the order in which it wants them; none by methods that give a heading.
+    /// Its actions by falling preference; none by methods that give a heading.
     pub(super) actions: Vec<Action>,
-    /// The different ways of the next `dt` that it may fly, the wanted one first.
-    pub(super) ways: Vec<TurnProfile>,
+    /// The different turn profiles of the next `dt` that it may fly, the preferred one first.
+    pub(super) profiles: Vec<TurnProfile>,
     /// The optimizer's decision.
     pub(super) decided: Option<ActionChoice>,
 }
 
 impl ManeuverCandidates {
     fn from_actions(world: &AirspaceWorld, known: KnownAircraft, actions: Vec<Action>) -> Self {
-        Self { ways: preferences::turn_profiles(world, known, &actions), actions, decided: None }
-    }
-
-    fn from_profiles(ways: Vec<TurnProfile>) -> Self {
-        Self { ways, ..Self::default() }
-    }
-
-    /// Returns the course that follows from the shield's decision about those of its ways that were `allowed`.
-    pub(super) fn maneuver(&self, decision: ShieldDecision, allowed: &[usize]) -> Maneuver {
-        match decision.candidate.map(|k| allowed[k]) {
-            Some(wish) => Maneuver::Way {
-                wish: wish as u32,
-                way: self.ways[wish].clone(),
-                side: decision.fallback,
-            },
-            None => Maneuver::Orbit,
+        Self {
+            profiles: preferences::turn_profiles(world, known, &actions),
+            actions,
+            decided: None,
         }
+    }
+
+    fn from_profiles(profiles: Vec<TurnProfile>) -> Self {
+        Self { profiles, ..Self::default() }
     }
 }
 
-/// The way in which airplanes of a group find their wishes.
+/// How airplanes of a group find their candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DecisionStrategy {
     /// Each alone.
     Independent,
     /// All, by optimizing together.
     Joint,
-    /// Each by the places and goals of all.
+    /// Each by the positions and goals of all.
     Reactive,
     /// Each alone, because the group takes too much memory to be optimized.
     GroupTooLarge,
 }
 
 impl DecisionStrategy {
-    /// Returns the manner of a group beside some others that do not decide with it.
+    /// Returns the strategy of a group beside some others that do not decide with it.
     pub(super) fn for_group(world: &AirspaceWorld, group: &[KnownAircraft], others: usize) -> Self {
         let is_alone = group.is_empty() || group.len() + others < 2;
         match world.method {
@@ -124,26 +115,26 @@ impl DecisionStrategy {
         }
     }
 
-    /// Returns whether the method gives headings by the places and goals of all.
+    /// Returns whether the method gives headings by the positions and goals of all.
     pub(super) fn is_reactive(world: &AirspaceWorld) -> bool {
         matches!(world.method, Method::Mvp | Method::Orca)
     }
 }
 
-/// Returns the wishes of an airplane that decides alone: its way-point, or its order.
+/// Returns the candidates of an airplane that decides alone: toward its way-point, or as ordered.
 pub(super) fn candidates_alone(
     world: &AirspaceWorld,
     known: KnownAircraft,
-    wish: Option<&ExternalAction>,
+    external_action: Option<&ExternalAction>,
 ) -> ManeuverCandidates {
     match world.method {
-        Method::External => external::candidates_by_action(world, known, wish),
+        Method::External => external::candidates_by_action(world, known, external_action),
         _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
 }
 
-/// Returns the wishes of an airplane by probability collectives: the chosen action first, then the others by the cost
-/// that the optimizer expects of them.
+/// Returns the candidates of an airplane by probability collectives: the chosen action first, then the others by the
+/// cost that the optimizer expects of them.
 pub(super) fn candidates_by_choice(
     world: &AirspaceWorld,
     known: KnownAircraft,
@@ -157,48 +148,51 @@ pub(super) fn candidates_by_choice(
     ManeuverCandidates { decided, ..ManeuverCandidates::from_actions(world, known, actions) }
 }
 
-/// Returns the wishes of the airplanes of a group by the world's method, if that gives them
+/// Returns the candidates of the airplanes of a group by the world's method, if that gives them
 /// headings. `memory` are the conflicts that they resolve.
 pub(super) fn candidates_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    intruders: &[NonCooperative],
+    non_cooperative: &[NonCooperative],
     memory: &mut [ActiveResolutions],
 ) -> Vec<ManeuverCandidates> {
-    let ways = velocity::profiles_by_velocity(world, group, intruders, memory);
-    ways.into_iter().map(ManeuverCandidates::from_profiles).collect()
+    let profiles = velocity::profiles_by_velocity(world, group, non_cooperative, memory);
+    profiles.into_iter().map(ManeuverCandidates::from_profiles).collect()
 }
 
-/// Returns all the different ways of the next `dt` that the actions of an airplane lead.
+/// Returns all the different turn profiles of the next `dt` that the actions of an airplane have.
 pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
     preferences::turn_profiles(world, known, world.actions(known.slot))
 }
 
-/// Returns the straight way to the next way-point of an airplane that minds no other.
-pub(super) fn straight_profile(turn: &PhaseContext<'_>, slot: Slot) -> TurnProfile {
-    let PhaseContext { world, state, now, .. } = *turn;
-    let known = known_aircraft(world, state, now, slot);
-    let wishes = rank_straight_first(world, known);
-    preferences::turn_profiles(world, known, &wishes[..1]).swap_remove(0)
+/// Returns the turn profile straight to the next way-point, for an airplane that avoids nobody.
+pub(super) fn straight_profile(world: &AirspaceWorld, known: KnownAircraft) -> TurnProfile {
+    let actions = rank_straight_first(world, known);
+    preferences::turn_profiles(world, known, &actions[..1]).swap_remove(0)
 }
 
-/// Lets one process decide for all.
+/// Decides for all airplanes of a group in one process.
 pub(super) fn decide_centrally(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    intruders: &[NonCooperative],
+    non_cooperative: &[NonCooperative],
     now: Cycle,
 ) -> Vec<Option<ActionChoice>> {
     let options: Vec<ActionPredictions> =
-        group.iter().map(|known| world.action_predictions(*known, intruders)).collect();
+        group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
     let game = game(&world.objective, &options);
-    let uniform =
-        |player: usize, k: u64| purpose::sample(&world.streams, group[player].slot, now, k);
-    let outcome = optimize(&game, &world.settings, uniform);
-    let (rounds, converged) = (outcome.rounds, outcome.converged);
+    let outcome = optimize(&game, &world.settings, |player: usize, k: u64| {
+        purpose::sample(&world.streams, group[player].slot, now, k)
+    });
     let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
-    let decided = |((chosen, expected), chances)| {
-        Some(ActionChoice { chosen, expected, rounds, converged, chances })
-    };
-    each.map(decided).collect()
+    each.map(|((chosen, expected), chances)| {
+        Some(ActionChoice {
+            chosen,
+            expected,
+            rounds: outcome.rounds,
+            converged: outcome.converged,
+            chances,
+        })
+    })
+    .collect()
 }

@@ -13,8 +13,8 @@ pub enum EventKind {
     LossOfSeparation,
     /// An airplane has finished with its last way-point; the value is its delay in seconds.
     Arrival,
-    /// The shield has changed an airplane's wish; the value is the number of the way it flies
-    /// instead, counted from the wanted one.
+    /// The shield has changed an airplane's action; the value is the number of the candidate that it flies instead,
+    /// counted from the preferred one.
     Override,
     /// The shield keeps an airplane on its stored orbit.
     Orbit,
@@ -22,7 +22,7 @@ pub enum EventKind {
     Unheard,
     /// Time was up before an airplane's agent was done.
     Deadline,
-    /// An airplane stays on its orbit because not all others have agreed to its wish.
+    /// An airplane stays on its orbit because not all others have accepted its plan.
     HeldBack,
     /// A group is too large for the memory allowed: its airplanes fly straight on, as far as the
     /// shield lets them; the value is the number of airplanes.
@@ -30,10 +30,10 @@ pub enum EventKind {
     /// An airplane's errors exceed the bounds for which the shield allows; the value is how many
     /// times.
     BeyondBound,
-    /// An airplane can be reached in this `dt`, on any way, by one that minds no other; the value
+    /// An airplane can be reached in this `dt`, on any path, by a non-cooperative one; the value
     /// is their distance in meters.
     Intruder,
-    /// An airplane that is decided outside of the run stays on its orbit, because no control of it came in time.
+    /// An airplane with an external pilot stays on its orbit, because no control of it came in time.
     Absent,
 }
 

@@ -1,5 +1,4 @@
-//! Airplanes as a caller sees them: their observations, and the orders for those that are decided
-//! from outside.
+//! Airplanes as a caller sees them: their observations, and the orders for those that decide by method `external`.
 
 mod observation;
 #[cfg(test)]
@@ -10,9 +9,11 @@ use super::flight::KnownAircraft;
 use super::join::ControlledGroup;
 use super::non_cooperative::NonCooperative;
 use super::perceive::{known_aircraft, non_cooperative_aircraft};
+use super::scratch::{PhaseContext, Scratch};
+use super::settings::Method;
 use super::state::AirspaceState;
-use super::world::{AirspaceWorld, Method};
-use super::{PhaseContext, Scratch, act, join};
+use super::world::AirspaceWorld;
+use super::{act, join};
 use observation::{Observation, VisibleAircraft};
 use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
 use sidestep_kernel::ports::ManualClock;
@@ -20,32 +21,34 @@ use sidestep_kernel::{Cycle, EntityId, Slot, World};
 use std::collections::BTreeMap;
 
 impl AirspaceWorld {
-    /// Returns the teams: airplanes that decide, and that turn alike. Those that mind no other are
-    /// in none.
+    /// Returns the teams: airplanes that decide, with the same actions, because all agents of a team have the same
+    /// spaces. Non-cooperative airplanes are in none.
     pub(super) fn find_teams(&self) -> Teams {
-        let mut places: BTreeMap<(usize, u64), usize> = BTreeMap::new();
-        let mut alike: Vec<Vec<EntityId>> = Vec::new();
+        let mut team_by_turns: BTreeMap<(usize, u64), usize> = BTreeMap::new();
+        let mut members: Vec<Vec<EntityId>> = Vec::new();
         for i in (0..self.airplanes.len()).filter(|&i| self.is_controlled(i)) {
             let model = &self.airplanes[i].model;
-            let place = places.entry((model.turns, model.omega_max_rad_s.to_bits()));
-            let place = *place.or_insert(alike.len());
-            if place == alike.len() {
-                alike.push(Vec::new());
+            let turns = (model.turns, model.omega_max_rad_s.to_bits());
+            let team = *team_by_turns.entry(turns).or_insert(members.len());
+            if team == members.len() {
+                members.push(Vec::new());
             }
-            alike[place].push(i as EntityId);
+            members[team].push(i as EntityId);
         }
-        let team = |(k, agents): (usize, Vec<EntityId>)| {
-            let name = match k {
-                0 => Self::AGENT.into(),
-                k => format!("{} {}", Self::AGENT, k + 1),
-            };
-            let first = agents[0] as usize;
-            let is_external = self.method == Method::External;
-            let ordered = if is_external { self.order_spaces(first) } else { Vec::new() };
-            let observed = observation::spaces(self, &agents);
-            Team { name, agents, observation_spaces: observed, action_spaces: ordered }
+        let teams = members.into_iter().enumerate().map(|(k, agents)| self.team(k, agents));
+        Teams::new(teams.collect(), Self::AGENT)
+    }
+
+    /// Returns team `k`, the first of which is named like an airplane, because most worlds have no other.
+    fn team(&self, k: usize, agents: Vec<EntityId>) -> Team {
+        let name = if k == 0 { Self::AGENT.into() } else { format!("{} {}", Self::AGENT, k + 1) };
+        let action_spaces = if self.method == Method::External {
+            self.order_spaces(agents[0] as usize)
+        } else {
+            Vec::new()
         };
-        Teams::new(alike.into_iter().enumerate().map(team).collect(), Self::AGENT)
+        let observation_spaces = observation::spaces(self, &agents);
+        Team { name, agents, observation_spaces, action_spaces }
     }
 
     /// Returns the spaces of the orders that an airplane may be given.
@@ -76,18 +79,18 @@ impl AirspaceWorld {
         ]
     }
 
-    /// Returns the wish that is ordered.
+    /// Returns the action that is ordered.
     pub(super) fn external_action(&self, order: &Order<'_>) -> Option<ExternalAction> {
         let space = &self.teams.all()[order.team].action_spaces[order.space];
         ExternalAction::from_order(&space.name, order.values)
     }
 
-    /// Notes an order until its airplane decides. After the end of its flight an airplane never does.
+    /// Records an order until its airplane decides. After the end of its flight an airplane never does.
     pub(super) fn store_order(&self, state: &AirspaceState, order: &Order<'_>) {
-        if let Some(wish) = self.external_action(order)
+        if let Some(action) = self.external_action(order)
             && state.airplanes[order.agent as usize].is_flying()
         {
-            state.set_external_action(order.agent, wish);
+            state.set_external_action(order.agent, action);
         }
     }
 
@@ -97,52 +100,57 @@ impl AirspaceWorld {
         state: &AirspaceState,
         now: Cycle,
         team: usize,
-        room: &mut [BufferMut<'_>],
+        buffers: &mut [BufferMut<'_>],
     ) {
         let agents = &self.teams.all()[team].agents;
-        let nothing = Observation::default();
-        (0..agents.len()).for_each(|row| nothing.write(self, row, room));
-        self.for_each_group(state, now, |turn, flown, intruders| {
-            if flown.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
+        // Airplanes that decide in no group of this cycle keep this padding.
+        let padding = Observation::default();
+        (0..agents.len()).for_each(|row| padding.write(self, row, buffers));
+        self.for_each_group(state, now, |context, group, non_cooperative| {
+            if group.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
                 return;
             }
-            let known = |&slot: &Slot| known_aircraft(self, turn.state, now, slot);
-            let flown: Vec<KnownAircraft> = flown.ids.iter().map(known).collect();
-            let all = VisibleAircraft::from_group(turn, &flown, intruders);
-            for own in &flown {
+            let members: Vec<KnownAircraft> = group
+                .ids
+                .iter()
+                .map(|&slot| known_aircraft(self, context.state, now, slot))
+                .collect();
+            let all = VisibleAircraft::from_group(context, &members, non_cooperative);
+            for own in &members {
                 if let Ok(row) = agents.binary_search(&own.slot) {
-                    Observation::new(turn, own, &all).write(self, row, room);
+                    Observation::new(context, own, &all).write(self, row, buffers);
                 }
             }
         });
     }
 
-    /// Calls `look` with the perceptions of each group in cycle `now`: its airplanes that decide, and those that mind
-    /// no other. The cycle is started on a copy of the state, because orders that are due and airplanes that come in
-    /// change the perceptions.
+    /// Calls `visit` with the percepts of each group in cycle `now`: its airplanes that decide, and the non-cooperative
+    /// ones. The cycle is started on a copy of the state, because orders that are due and airplanes that enter change
+    /// the percepts.
     pub(super) fn for_each_group(
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut look: impl FnMut(&PhaseContext<'_>, &ControlledGroup, &[NonCooperative]),
+        mut visit: impl FnMut(&PhaseContext<'_>, &ControlledGroup, &[NonCooperative]),
     ) {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
-        let (clock, mut scratch) = (ManualClock::default(), Scratch::default());
-        let turn = &mut PhaseContext {
+        let clock = ManualClock::default();
+        let mut scratch = Scratch::default();
+        let context = &mut PhaseContext {
             world: self,
             state: &copy,
             now,
             clock: &clock,
             scratch: &mut scratch,
         };
-        let groups = join::groups(turn);
+        let groups = join::groups(context);
         let mut group = Vec::new();
         for leader in (0..self.airplanes.len() as Slot).filter(|&slot| groups.is_leader(slot)) {
             groups.members(leader, &mut group);
             group.retain(|&slot| copy.is_active(self, slot, now));
             group.sort_unstable();
-            let flown = act::prepare(turn, &group);
-            look(turn, &flown, &non_cooperative_aircraft(turn, &group));
+            let controlled = act::prepare(context, &group);
+            visit(context, &controlled, &non_cooperative_aircraft(context, &group));
         }
     }
 }

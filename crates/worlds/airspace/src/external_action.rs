@@ -1,9 +1,9 @@
-//! Wishes that a caller orders, as an airplane keeps them until it decides.
+//! Actions that a caller orders, as an airplane keeps them until it decides.
 
 use super::flight::Point;
 use serde::{Deserialize, Serialize};
 
-/// An order from outside: the wish that an airplane is to have when it decides next.
+/// An external order: the action that an airplane is to propose in its next decision.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ExternalAction {
     /// Its actions by number, the best first.
@@ -22,7 +22,7 @@ impl ExternalAction {
     /// The order of a velocity.
     pub const VELOCITY: &'static str = "velocity_m_s";
 
-    /// Returns the wish of an order by its name; `None` where there is no such order.
+    /// Returns the action of an order by its name; `None` where there is no such order.
     pub(crate) fn from_order(order: &str, values: &[f64]) -> Option<Self> {
         match (order, values) {
             (Self::RANKING, actions) => {
@@ -50,18 +50,17 @@ impl ExternalAction {
 }
 
 fn check_ranking(actions: &[u16]) -> Result<(), String> {
-    let mut times = vec![0_usize; actions.len()];
-    actions.iter().for_each(|&action| times[usize::from(action)] += 1);
-    let with = |is: &dyn Fn(usize) -> bool| times.iter().position(|&times| is(times));
+    let mut counts = vec![0_usize; actions.len()];
+    for &action in actions {
+        counts[usize::from(action)] += 1;
+    }
     // Where no action occurs twice, none is missing.
-    let (Some(double), Some(missing)) = (with(&|times| times > 1), with(&|times| times == 0))
-    else {
-        return Ok(());
-    };
+    let Some(double) = counts.iter().position(|&count| count > 1) else { return Ok(()) };
+    let Some(missing) = counts.iter().position(|&count| count == 0) else { return Ok(()) };
     Err(format!(
         "action {double} stands in it {} times and action {missing} not at all; give each action from \
          0 to {} once, the best first",
-        times[double],
+        counts[double],
         actions.len() - 1
     ))
 }

@@ -1,8 +1,7 @@
-//! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its
-//! orders.
+//! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its orders.
 
 use super::flight::{FlightOrder, FlightTask, MAX_ORDERS, Track, TrackPoint};
-use super::scenario::{SeparationM, Speed, TurnRate, Turns};
+use super::settings::{SeparationM, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
@@ -112,17 +111,22 @@ impl AirplaneSection {
     /// Returns the recorded track, if there is one.
     pub(super) fn track(&self, source: &Source) -> Result<Option<Track>, InputError> {
         let Some(rows) = &self.track else { return Ok(None) };
-        let own = self.at_m.is_some() || self.heading_deg.is_some() || self.way_points_m.is_some();
-        if own || self.altitude_m.is_some() || self.appears_s.is_some() || !self.orders.is_empty() {
+        let has_own_start =
+            self.at_m.is_some() || self.altitude_m.is_some() || self.heading_deg.is_some();
+        let has_own_flight =
+            self.way_points_m.is_some() || self.appears_s.is_some() || !self.orders.is_empty();
+        if has_own_start || has_own_flight {
             let remedy =
                 "leave out at_m, heading_deg, way_points_m, altitude_m, appears_s and orders";
-            return Err(source.error(rows.span(), "a track beside what it tells itself", remedy));
+            return Err(source.error(rows.span(), "a track beside keys that it replaces", remedy));
         }
-        let point =
-            |&[t_s, x, y, altitude_m]: &[f64; 4]| TrackPoint { t_s, at: [x, y], altitude_m };
-        let points: Vec<TrackPoint> = rows.get_ref().iter().map(point).collect();
-        let begins_before = points.first().is_some_and(|p| p.t_s < 0.0);
-        match Track::new(points).filter(|_| !begins_before) {
+        let points: Vec<TrackPoint> = rows
+            .get_ref()
+            .iter()
+            .map(|&[t_s, x, y, altitude_m]| TrackPoint { t_s, at: [x, y], altitude_m })
+            .collect();
+        let begins_before_run = points.first().is_some_and(|p| p.t_s < 0.0);
+        match Track::new(points).filter(|_| !begins_before_run) {
             Some(track) => Ok(Some(track)),
             None => {
                 let remedy = "give two or more [t_s, x_m, y_m, altitude_m], times rising from 0";
@@ -133,7 +137,8 @@ impl AirplaneSection {
 
     /// Returns its orders, and the time at which it is removed.
     pub(super) fn orders(&self, source: &Source) -> Result<Orders, InputError> {
-        let (mut orders, mut leaves_s) = (Vec::new(), f64::INFINITY);
+        let mut orders = Vec::new();
+        let mut leaves_s = f64::INFINITY;
         let mut last_s = 0.0;
         for section in &self.orders {
             let order = section.get_ref();
@@ -164,15 +169,13 @@ impl OrderSection {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));
         }
         let climb_m_s = self.climb_m_s.map_or(CLIMB_M_S, f64::from);
-        let climbs = |to: Value| FlightTask::Altitude { altitude_m: to.get(), climb_m_s };
-        let turns = |to: Value| FlightTask::Heading(math::wrap_angle(to.get().to_radians()));
-        let route = points_m(self.way_points_m.as_ref());
+        let way_points_m = points_m(self.way_points_m.as_ref());
         let tasks = [
-            self.heading_deg.map(turns),
+            self.heading_deg.map(|to| FlightTask::Heading(math::wrap_angle(to.get().to_radians()))),
             self.speed_m_s.map(|speed| FlightTask::Speed(speed.get())),
-            self.altitude_m.map(climbs),
-            (!route.is_empty()).then_some(FlightTask::WayPoints(route)),
-            self.proceeds.filter(|yes| *yes).map(|_| FlightTask::Proceed),
+            self.altitude_m.map(|to| FlightTask::Altitude { altitude_m: to.get(), climb_m_s }),
+            (!way_points_m.is_empty()).then_some(FlightTask::WayPoints(way_points_m)),
+            (self.proceeds == Some(true)).then_some(FlightTask::Proceed),
         ];
         let mut tasks: Vec<FlightTask> = tasks.into_iter().flatten().collect();
         match (tasks.len(), self.leaves == Some(true)) {

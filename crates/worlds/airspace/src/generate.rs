@@ -9,7 +9,7 @@ use sidestep_kernel::{interrupt, math};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Largest number of draws, per airplane, for a place far enough from all others.
+/// Largest number of draws, per airplane, for a start far enough from all others.
 const MAX_TRIES: usize = 2_000;
 
 /// Kinds of generated traffic.
@@ -36,24 +36,24 @@ pub(super) struct GeneratorParams<'a> {
     pub(super) errors_m: f64,
 }
 
-/// Returns the airplanes, or, as an error, how many found a place before there was none left.
+/// Returns the airplanes, or, as an error, how many found a start before there was none left.
 pub(super) fn generate(
-    order: &GeneratorParams<'_>,
+    params: &GeneratorParams<'_>,
     streams: &Streams,
 ) -> Result<Vec<Airplane>, usize> {
-    match order.kind {
-        GeneratorKind::Superconflict => Ok(superconflict(order, streams)),
-        GeneratorKind::Random => random(order, streams),
-        GeneratorKind::Streams => Ok(converging(order, streams)),
+    match params.kind {
+        GeneratorKind::Superconflict => Ok(superconflict(params, streams)),
+        GeneratorKind::Random => random(params, streams),
+        GeneratorKind::Streams => Ok(converging(params, streams)),
     }
 }
 
-fn airplane(order: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airplane {
+fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
     let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
     Airplane {
         callsign: None,
-        model: order.model.clone(),
+        model: params.model.clone(),
         start: Pose2 { at: from, heading_rad },
         mission: to,
         altitude_m: 0.0,
@@ -61,7 +61,7 @@ fn airplane(order: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airplan
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: None,
-        is_intruder: false,
+        is_non_cooperative: false,
     }
 }
 
@@ -75,51 +75,72 @@ fn airplane_draws(streams: &Streams, id: usize) -> Draws {
 
 /// Returns airplanes evenly spread on a circle, each flying to the opposite point. The seed turns
 /// the circle, and moves each airplane along it by up to the jitter.
-fn superconflict(order: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
-    let turned = TAU * airplane_draws(streams, order.n).uniform();
-    let place = |k: usize| {
-        let jitter = order.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
-        turned + TAU * k as f64 / order.n as f64 + jitter / order.radius_m
-    };
-    (0..order.n)
-        .map(|k| {
-            let (from, to) = (place(k), place(k) + TAU / 2.0);
-            airplane(order, on_circle(order.radius_m, from), vec![on_circle(order.radius_m, to)])
-        })
-        .collect()
+fn superconflict(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
+    let rotation_rad = TAU * airplane_draws(streams, params.n).uniform();
+    let mut airplanes = Vec::with_capacity(params.n);
+    for k in 0..params.n {
+        let jitter_m = params.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
+        let angle_rad =
+            rotation_rad + TAU * k as f64 / params.n as f64 + jitter_m / params.radius_m;
+        let start = on_circle(params.radius_m, angle_rad);
+        let goal = on_circle(params.radius_m, angle_rad + TAU / 2.0);
+        airplanes.push(airplane(params, start, vec![goal]));
+    }
+    airplanes
 }
 
 /// Returns airplanes anywhere in a disc, each flying to a point of the disc at least half its
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
-fn random(order: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
-    let gap_m = 4.0 * order.model.turn_radius_m() + order.model.separation_m + order.errors_m + 1.0;
-    // Starts by squares as wide as the gap, so that only those around a place are compared with it.
-    let mut starts: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
-    let square = |at: Point| at.map(|v| (v / gap_m).floor() as i64);
-    let mut all = Vec::new();
-    for id in 0..order.n {
+fn random(params: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+    let gap_m =
+        4.0 * params.model.turn_radius_m() + params.model.separation_m + params.errors_m + 1.0;
+    let mut starts = SpacedPoints { gap_m, by_square: BTreeMap::new() };
+    let mut airplanes = Vec::new();
+    for id in 0..params.n {
         let mut draws = airplane_draws(streams, id);
-        let free = |at: &Point| {
-            let [x, y] = square(*at);
-            let rows = (x - 1..=x + 1).map(|x| starts.range([x, y - 1]..=[x, y + 1]));
-            let mut near = rows.flatten().flat_map(|(_, starts)| starts);
-            near.all(|other| {
-                interrupt::check();
-                distance_m(*at, *other) >= gap_m
-            })
-        };
-        let from = (0..MAX_TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(free);
-        let from = from.ok_or(id)?;
-        let far = |to: &Point| distance_m(from, *to) >= 0.5 * order.radius_m;
-        let to = (0..MAX_TRIES).map(|_| in_disc(order.radius_m, &mut draws)).find(far);
-        starts.entry(square(from)).or_default().push(from);
-        all.push(airplane(order, from, vec![to.unwrap_or([-from[0], -from[1]])]));
+        let start = (0..MAX_TRIES)
+            .map(|_| in_disc(params.radius_m, &mut draws))
+            .find(|at| starts.has_room_at(*at));
+        let start = start.ok_or(id)?;
+        let goal = (0..MAX_TRIES)
+            .map(|_| in_disc(params.radius_m, &mut draws))
+            .find(|goal| distance_m(start, *goal) >= 0.5 * params.radius_m);
+        starts.add(start);
+        airplanes.push(airplane(params, start, vec![goal.unwrap_or([-start[0], -start[1]])]));
     }
-    Ok(all)
+    Ok(airplanes)
+}
+
+/// Points that are apart from each other, by squares as wide as the gap, so that a point has to be compared only with
+/// those in the squares around it.
+struct SpacedPoints {
+    gap_m: f64,
+    by_square: BTreeMap<[i64; 2], Vec<Point>>,
+}
+
+impl SpacedPoints {
+    fn square(&self, at: Point) -> [i64; 2] {
+        at.map(|v| (v / self.gap_m).floor() as i64)
+    }
+
+    fn has_room_at(&self, at: Point) -> bool {
+        let [x, y] = self.square(at);
+        let rows = (x - 1..=x + 1).map(|x| self.by_square.range([x, y - 1]..=[x, y + 1]));
+        let mut near = rows.flatten().flat_map(|(_, points)| points);
+        near.all(|other| {
+            interrupt::check();
+            distance_m(at, *other) >= self.gap_m
+        })
+    }
+
+    fn add(&mut self, at: Point) {
+        self.by_square.entry(self.square(at)).or_default().push(at);
+    }
 }
 
 fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
+    // The root makes all places of the disc equally likely.
     let r = radius_m * draws.uniform().sqrt();
     on_circle(r, TAU * draws.uniform())
 }
@@ -127,16 +148,17 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
 /// Returns three streams that meet at the center and continue together. Airplanes of a stream
 /// follow each other at four separations; the first of each stream reach the center at the same
 /// time, and so do the second, and so on.
-fn converging(order: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
-    let spacing_m = 4.0 * order.model.separation_m;
-    (0..order.n)
-        .map(|k| {
-            let (stream, place) = (k % 3, (k / 3) as f64);
-            let jitter = order.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
-            let behind_m = place * spacing_m + jitter;
-            let angle = TAU / 2.0 + (stream as f64 - 1.0) * TAU / 12.0;
-            let from = on_circle(order.radius_m + behind_m, angle);
-            airplane(order, from, vec![[0.0, 0.0], [order.radius_m, 0.0]])
-        })
-        .collect()
+fn converging(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
+    let spacing_m = 4.0 * params.model.separation_m;
+    let mut airplanes = Vec::with_capacity(params.n);
+    for k in 0..params.n {
+        let stream = k % 3;
+        let place = (k / 3) as f64;
+        let jitter_m = params.jitter_m * (2.0 * airplane_draws(streams, k).uniform() - 1.0);
+        let behind_m = place * spacing_m + jitter_m;
+        let angle_rad = TAU / 2.0 + (stream as f64 - 1.0) * TAU / 12.0;
+        let start = on_circle(params.radius_m + behind_m, angle_rad);
+        airplanes.push(airplane(params, start, vec![[0.0, 0.0], [params.radius_m, 0.0]]));
+    }
+    airplanes
 }

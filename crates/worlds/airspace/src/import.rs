@@ -20,10 +20,12 @@ enum FileFormat {
 fn file_format(file: &Path) -> FileFormat {
     let name = file.to_string_lossy().to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
-    match name {
-        _ if name.ends_with(".scn") => FileFormat::Bluesky,
-        _ if name.ends_with(".csv") => FileFormat::Tracks,
-        _ => FileFormat::Other,
+    if name.ends_with(".scn") {
+        FileFormat::Bluesky
+    } else if name.ends_with(".csv") {
+        FileFormat::Tracks
+    } else {
+        FileFormat::Other
     }
 }
 
@@ -56,10 +58,10 @@ pub(super) fn translate(file: &Path) -> Result<Option<ImportedScenario>, InputEr
     Ok(Some(ImportedScenario { scenario, json, lines }))
 }
 
-/// Returns the report on a file; `beside` are commands that could be read but not flown.
-fn bluesky_report(scn: &ScnFile, beside: &[InputError]) -> (Value, KeyValues) {
+/// Returns the report on a file; `not_flown` are commands that could be read but not flown.
+fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues) {
     let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
-    let refused = [&scn.refused[..], beside].concat();
+    let refused = [&scn.refused[..], not_flown].concat();
     let json = json!({
         "command_lines": scn.command_lines,
         "unparsed_lines": scn.unparsed.len(),
@@ -94,10 +96,13 @@ fn aircraft_without_place(scn: &ScnFile) -> Vec<String> {
 
 /// Returns the places to fly to that the file does not define, by name, each with its uses.
 fn unresolved_places(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPosition>> {
-    let creates = |command: &str| matches!(command, "CRE" | "CREATE");
-    let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
     let mut by_name: BTreeMap<&str, Vec<&UnresolvedPosition>> = BTreeMap::new();
-    uses.for_each(|used| by_name.entry(&used.name).or_default().push(used));
+    for used in &scn.unresolved_places {
+        // Aircraft that are created at unknown places have a list of their own.
+        if !matches!(used.command.as_str(), "CRE" | "CREATE") {
+            by_name.entry(&used.name).or_default().push(used);
+        }
+    }
     by_name
 }
 
@@ -112,20 +117,22 @@ fn use_as_json(used: &UnresolvedPosition) -> Value {
 
 /// Returns each unknown place in words, with the command, the airplane and the line of its first use.
 fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
-    let in_words = |(name, uses): (&str, Vec<&UnresolvedPosition>)| {
+    let mut texts = Vec::new();
+    for (name, uses) in unresolved_places(scn) {
         let UnresolvedPosition { command, aircraft, line, .. } = uses[0];
-        let whose = aircraft.as_ref().map_or(String::new(), |id| format!(" of {id}"));
+        let owner = aircraft.as_ref().map_or(String::new(), |id| format!(" of {id}"));
         let more = match uses.len() - 1 {
             0 => String::new(),
             more => format!(", and {} more", group_thousands(more as u64)),
         };
-        format!("{name} ({command}{whose}, line {line}{more})")
-    };
-    unresolved_places(scn).into_iter().map(in_words).collect()
+        texts.push(format!("{name} ({command}{owner}, line {line}{more})"));
+    }
+    texts
 }
 
 fn track_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
-    let (rows, repeated) = (recorded.rows as u64, recorded.repeated_rows as u64);
+    let rows = recorded.rows as u64;
+    let repeated = recorded.repeated_rows as u64;
     let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
     let json = json!({
         "rows": rows,
@@ -164,7 +171,9 @@ fn first_names_line(name: &str, all: &[String]) -> Option<(String, String)> {
 
 /// Returns a line per error, which says where in the file it is.
 fn error_lines(name: &str, errors: &[InputError]) -> impl Iterator<Item = (String, String)> {
-    // The remedy is on a line of its own, which would look like a line of the report.
-    let in_one_line = |error: &InputError| error.to_string().replace("\n  help: ", "; ");
-    errors.iter().map(move |error| (name.to_string(), in_one_line(error)))
+    errors.iter().map(move |error| {
+        // The remedy is on a line of its own, which would look like a line of the report.
+        let text = error.to_string().replace("\n  help: ", "; ");
+        (name.to_string(), text)
+    })
 }

@@ -82,7 +82,7 @@ pub struct Metrics {
     pub beacon_multicasts: u64,
     /// Number of their bytes if one message could reach all near.
     pub beacon_multicast_bytes: u64,
-    /// Seconds that all talks took on the network, one after the other; none where one process
+    /// Seconds that all conversations took on the network, one after the other; none where one process
     /// decides for all, or where messages take no time.
     pub network_s: Option<f64>,
     /// Number of optimizations run.
@@ -206,9 +206,10 @@ pub fn airplane_metrics(
     state: &AirspaceState,
     id: EntityId,
 ) -> AirplaneMetrics {
-    let (cell, alone_s) = (&state.airplanes[id as usize], world.alone_s[id as usize]);
+    let airplane = &state.airplanes[id as usize];
+    let alone_s = world.alone_s[id as usize];
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
-    let arrived_s = cell.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
+    let arrived_s = airplane.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
     let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_always_replayed(world, id));
     AirplaneMetrics {
         airplane: id,
@@ -217,14 +218,14 @@ pub fn airplane_metrics(
         alone_s,
         delay_percent: flown_s
             .filter(|_| alone_s > 0.0 && alone_s.is_finite())
-            // One that minds no other is never delayed.
-            .filter(|_| !world.airplanes[id as usize].is_intruder)
+            // One that avoids nobody is never delayed.
+            .filter(|_| !world.airplanes[id as usize].is_non_cooperative)
             .map(|s| 100.0 * (s - alone_s) / alone_s),
-        shield_overrides: cell.overrides.get(),
-        shield_orbits: cell.orbits.get(),
-        left: cell.has_left(),
-        orders: cell.orders.get(),
-        orders_delayed: cell.waits.get(),
+        shield_overrides: airplane.overrides.get(),
+        shield_orbits: airplane.orbits.get(),
+        left: airplane.has_left(),
+        orders: airplane.orders.get(),
+        orders_delayed: airplane.waits.get(),
     }
 }
 
@@ -235,27 +236,32 @@ fn is_always_replayed(world: &AirspaceWorld, id: EntityId) -> bool {
 }
 
 /// Returns the metrics of all pairs that came near each other, by ids.
-pub fn pair_metrics(world: &AirspaceWorld, ledger: &Counters) -> Vec<PairMetrics> {
-    let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
-    let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
-        airplanes: [a, b],
-        callsigns: world.callsigns([a, b]),
-        nearest_m: record.nearest_m,
-        losses: record.losses,
-        lost_s: record.lost_ns as f64 / 1e9,
-        severity: (1.0 - record.nearest_m / separation_m(a).max(separation_m(b))).max(0.0),
-    };
-    ledger.pairs.iter().map(one).collect()
+pub fn pair_metrics(world: &AirspaceWorld, counters: &Counters) -> Vec<PairMetrics> {
+    let mut pairs = Vec::with_capacity(counters.pairs.len());
+    for (&(a, b), record) in &counters.pairs {
+        let separation_a_m = world.airplanes[a as usize].model.separation_m;
+        let separation_b_m = world.airplanes[b as usize].model.separation_m;
+        let separation_m = separation_a_m.max(separation_b_m);
+        pairs.push(PairMetrics {
+            airplanes: [a, b],
+            callsigns: world.callsigns([a, b]),
+            nearest_m: record.nearest_m,
+            losses: record.losses,
+            lost_s: record.lost_ns as f64 / 1e9,
+            severity: (1.0 - record.nearest_m / separation_m).max(0.0),
+        });
+    }
+    pairs
 }
 
 fn count(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
-    state.airplanes.iter().filter(|cell| is(cell)).count() as u64
+    state.airplanes.iter().filter(|airplane| is(airplane)).count() as u64
 }
 
 /// Returns the number of airplanes that have flown their recorded way to its end.
 fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     let all = (0..).zip(&state.airplanes);
-    let ended = all.filter(|(_, cell)| cell.arrived_step().is_some());
+    let ended = all.filter(|(_, airplane)| airplane.arrived_step().is_some());
     ended.filter(|(id, _)| is_always_replayed(world, *id)).count() as u64
 }
 
@@ -265,9 +271,9 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
 
 /// Returns the number of airplanes that were not in the air before a cycle, because they come in later.
 fn not_appeared_count(world: &AirspaceWorld, now: Cycle) -> u64 {
-    // At the very start, the airplanes that begin with it are there.
-    let later = |&i: &usize| world.first_cycle(i) >= now.max(1);
-    (0..world.airplanes.len()).filter(later).count() as u64
+    // At the very start, the airplanes that start with the run are there.
+    let cycle = now.max(1);
+    (0..world.airplanes.len()).filter(|&i| world.first_cycle(i) >= cycle).count() as u64
 }
 
 /// Returns the metrics of a run until a cycle; `decide_s` is the time spent deciding, in seconds.
@@ -275,18 +281,19 @@ pub(crate) fn metrics(
     world: &AirspaceWorld,
     state: &AirspaceState,
     now: Cycle,
-    ledger: &Counters,
+    counters: &Counters,
     decide_s: f64,
 ) -> Metrics {
     let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-    let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } = ledger.effort;
+    let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } =
+        counters.effort;
     Metrics {
-        min_separation_m: ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
-        losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-        lost_s: ledger.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
-        arrived: count(state, |cell| cell.arrived_step().is_some()),
+        min_separation_m: counters.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
+        losses_of_separation: counters.pairs.values().map(|r| u64::from(r.losses)).sum(),
+        lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
+        arrived: count(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
         messages: traffic.messages,
@@ -304,50 +311,56 @@ pub(crate) fn metrics(
         optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
-        shield_held_back: ledger.count(EventKind::HeldBack),
-        contacts_lost: ledger.count(EventKind::Unheard),
-        deadlines_missed: ledger.count(EventKind::Deadline),
-        groups_too_large: ledger.count(EventKind::GroupTooLarge),
+        shield_held_back: counters.count(EventKind::HeldBack),
+        contacts_lost: counters.count(EventKind::Unheard),
+        deadlines_missed: counters.count(EventKind::Deadline),
+        groups_too_large: counters.count(EventKind::GroupTooLarge),
         not_appeared: not_appeared_count(world, now),
         left: count(state, AirplaneState::has_left),
         replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
-        too_close: too_close(world, ledger),
-        beyond_bound: beyond_bound(world, ledger),
+        too_close: too_close(world, counters),
+        beyond_bound: beyond_bound(world, counters),
     }
 }
 
-/// Returns the time that talks took on the network, in seconds; none where that is reliable.
+/// Returns the time that conversations took on the network, in seconds; none where that is reliable.
 fn network_s(world: &AirspaceWorld, ticks: u64) -> Option<f64> {
     world.network.as_ref().map(|network| network.seconds(ticks))
 }
 
 /// Returns the airplanes whose errors exceeded the shield's bounds, by ids.
-fn beyond_bound(world: &AirspaceWorld, ledger: &Counters) -> Vec<BeyondBound> {
-    let one = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
-        at_s: world.cycle_start_s(cycle),
-        airplane,
-        callsign: world.callsign(airplane),
-    };
-    ledger.beyond_bound.iter().map(one).collect()
+fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<BeyondBound> {
+    counters
+        .beyond_bound
+        .iter()
+        .map(|(&airplane, &cycle)| BeyondBound {
+            at_s: world.cycle_start_s(cycle),
+            airplane,
+            callsign: world.callsign(airplane),
+        })
+        .collect()
 }
 
-/// Returns the pairs for which the shield promises nothing, by the time when that began.
-fn too_close(world: &AirspaceWorld, ledger: &Counters) -> Vec<TooClose> {
-    let mut pairs: Vec<_> = ledger.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
+/// Returns the pairs whose separation the shield does not guarantee, by the time when that began.
+fn too_close(world: &AirspaceWorld, counters: &Counters) -> Vec<TooClose> {
+    let mut pairs: Vec<_> =
+        counters.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
     pairs.sort_unstable();
-    let one = |(cycle, (a, b))| TooClose {
-        at_s: world.cycle_start_s(cycle),
-        airplanes: [a, b],
-        callsigns: world.callsigns([a, b]),
-    };
-    pairs.into_iter().map(one).collect()
+    pairs
+        .into_iter()
+        .map(|(cycle, (a, b))| TooClose {
+            at_s: world.cycle_start_s(cycle),
+            airplanes: [a, b],
+            callsigns: world.callsigns([a, b]),
+        })
+        .collect()
 }
 
 /// Returns whether all airplanes have arrived or left by now.
 pub fn have_all_ended(state: &AirspaceState) -> bool {
-    state.airplanes.iter().all(|cell| !cell.is_flying())
+    state.airplanes.iter().all(|airplane| !airplane.is_flying())
 }
 
 #[cfg(test)]
@@ -399,13 +412,13 @@ mod tests {
         }
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
         run.advance(run.config().cycles);
-        let named = run.collector().counters.count(super::EventKind::Intruder);
-        let told = run.metrics().too_close;
-        let mut pairs: Vec<_> = told.iter().map(|one| one.airplanes).collect();
+        let events = run.collector().counters.count(super::EventKind::Intruder);
+        let too_close = run.metrics().too_close;
+        let mut pairs: Vec<_> = too_close.iter().map(|one| one.airplanes).collect();
         pairs.sort_unstable();
         pairs.dedup();
-        assert_eq!(pairs.len(), told.len(), "{told:?}");
-        assert!(named > told.len() as u64, "one is named twice: {named}, {told:?}");
-        assert!(told.is_sorted_by_key(|one| one.at_s), "{told:?}");
+        assert_eq!(pairs.len(), too_close.len(), "{too_close:?}");
+        assert!(events > too_close.len() as u64, "one is exempt twice: {events}, {too_close:?}");
+        assert!(too_close.is_sorted_by_key(|one| one.at_s), "{too_close:?}");
     }
 }

@@ -1,7 +1,7 @@
-//! Intruders: airplanes that mind no other, recorded or silent, which all others must avoid.
+//! Non-cooperative aircraft: airplanes that avoid nobody, recorded or silent, and that all others must avoid.
 //!
-//! Others see where an intruder is, how it moves now, and how fast its kind can fly; not where it
-//! wants to go. Methods take it to fly straight on. The shield knows where it can be within `dt`:
+//! Others see where such an airplane is, how it moves now, and how fast its kind can fly; not where it
+//! is bound for. Methods assume that it flies straight on. The shield knows where it can be within `dt`:
 //! anywhere in a circle that grows at its greatest speed.
 
 use crate::flight::{Levels, Point};
@@ -9,18 +9,19 @@ use serde::{Deserialize, Serialize};
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::Slot;
 
-/// Bounds on reports of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or takes
-/// forever to look at. Recorded speeds are over the ground, and no wind is as fast as an airplane.
+/// Meters beyond which squares of distances lose all sense.
 const MAX_COORDINATE_M: f64 = 1e15;
+/// Recorded speeds are over the ground, and no wind is as fast as an airplane.
 const MAX_GROUND_SPEED_M_S: f64 = 2.0 * MAX_SPEED_M_S;
-const MAX_AGE_S: f64 = 1e4;
+/// Longest `dt` that is accepted from a network: the search for a closest approach takes longer the longer it is.
+const MAX_DT_S: f64 = 1e4;
 
-/// An intruder as all of a group see it.
+/// A non-cooperative airplane as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NonCooperative {
     /// The airplane.
     pub(crate) slot: Slot,
-    /// Its place.
+    /// Its position.
     pub(crate) at: Point,
     /// Its velocity through the air, in meters per second.
     pub(crate) velocity_m_s: Point,
@@ -44,20 +45,26 @@ impl NonCooperative {
 
     /// Returns whether its numbers can be computed with.
     pub(crate) fn is_valid(&self) -> bool {
-        let Self { at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = self;
-        // Comparisons with NaN are false; levels may be all that there are.
-        let is_within = |most: f64| move |v: &f64| v.abs() <= most;
-        at.iter().all(is_within(MAX_COORDINATE_M))
-            && velocity_m_s.iter().chain([top_m_s]).all(is_within(MAX_GROUND_SPEED_M_S))
-            && [separation_m, error_m].into_iter().all(is_within(MAX_COORDINATE_M))
-            && is_within(MAX_AGE_S)(dt_s)
-            && [top_m_s, separation_m, error_m, dt_s].into_iter().all(|size| *size >= 0.0)
+        let Self { velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = *self;
+        let [x_m, y_m] = self.at;
+        let [vx, vy] = velocity_m_s;
+        are_within([x_m, y_m, separation_m, error_m], MAX_COORDINATE_M)
+            && are_within([vx, vy, top_m_s], MAX_GROUND_SPEED_M_S)
+            && are_within([dt_s], MAX_DT_S)
+            && [top_m_s, separation_m, error_m, dt_s].iter().all(|size| *size >= 0.0)
+            // Those of a recorded airplane are infinite.
             && levels.low_m <= levels.high_m
     }
 
-    /// Returns its place in the moving air after some seconds, if it flies straight on.
+    /// Returns its position in the moving air after some seconds, if it flies straight on.
     pub(crate) fn position_after(&self, seconds: f64) -> Point {
-        let ([x, y], [vx, vy]) = (self.at, self.velocity_m_s);
+        let [x, y] = self.at;
+        let [vx, vy] = self.velocity_m_s;
         [x + vx * seconds, y + vy * seconds]
     }
+}
+
+/// Returns whether numbers are at most so large; comparisons with NaN are false.
+fn are_within<const N: usize>(numbers: [f64; N], max: f64) -> bool {
+    numbers.iter().all(|number| number.abs() <= max)
 }

@@ -15,7 +15,7 @@ use sidestep_kernel::interrupt;
 /// The weights of separation and deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Objective {
-    /// Weight of deviations from the optimal way.
+    /// Weight of deviations from the optimal path.
     pub alpha: f64,
     /// Factor on penalties per step into the future, in (0, 1].
     pub beta: f64,
@@ -28,50 +28,58 @@ pub struct Objective {
 }
 
 impl Objective {
-    /// Returns the cost of a predicted way of an airplane with this separation beside an intruder, which is taken to
-    /// fly straight on.
+    /// Returns the cost of a prediction of an airplane with this separation beside a non-cooperative one, which is
+    /// assumed to fly straight on.
     fn non_cooperative_cost(
         &self,
         one: &NonCooperative,
-        way: &Prediction,
+        prediction: &Prediction,
         separation_m: f64,
         dtau_s: f64,
     ) -> f64 {
-        let point = |k: usize| one.position_after(k as f64 * dtau_s);
-        let points: Vec<Point> = (1..=way.points.len()).map(point).collect();
+        let points: Vec<Point> =
+            (1..=prediction.points.len()).map(|k| one.position_after(k as f64 * dtau_s)).collect();
         let straight = Prediction { counted: points.len(), points };
-        self.collision(way, &straight, [one.clearance_m(separation_m), 0.0])[0]
+        self.collision(prediction, &straight, [one.clearance_m(separation_m), 0.0])[0]
     }
 
     /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
     /// meters (eq. 9). Sums slice by slice of time, so that a caller that skips slices which are
     /// apart gets the same bits.
     pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
-        let counted = |way: &Prediction| if self.mask { way.counted } else { way.points.len() };
-        let most = counted(a).min(counted(b));
-        let (mut sums, mut weight) = ([0.0; 2], 1.0);
-        let slices = a.points[..most].chunks(SLICE).zip(b.points[..most].chunks(SLICE));
+        let end = self.counted_points(a).min(self.counted_points(b));
+        let mut sums = [0.0; 2];
+        let mut weight = 1.0;
+        let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
         for (of_a, of_b) in slices {
             let parts = self.slice_collision(of_a, of_b, weight, r);
-            (0..2).for_each(|k| sums[k] += parts[k]);
+            sums[0] += parts[0];
+            sums[1] += parts[1];
             weight = self.decay(weight);
         }
         sums
     }
 
+    fn counted_points(&self, prediction: &Prediction) -> usize {
+        if self.mask { prediction.counted } else { prediction.points.len() }
+    }
+
     /// Returns the same over the points of one slice, of which the first has the weight `weight`.
     fn slice_collision(&self, a: &[Point], b: &[Point], mut weight: f64, r: [f64; 2]) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
-        let widest = ra.max(rb) * ra.max(rb);
+        let max_square_m2 = ra.max(rb) * ra.max(rb);
         let mut sums = [0.0; 2];
         for (p, q) in a.iter().zip(b) {
-            let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
-            let square = dx * dx + dy * dy;
-            if square < widest {
-                let d = square.sqrt();
-                let miss = |r: f64| (r - d).max(0.0);
-                sums[0] += weight * miss(ra) * miss(ra);
-                sums[1] += weight * miss(rb) * miss(rb);
+            let dx = p[0] - q[0];
+            let dy = p[1] - q[1];
+            let square_m2 = dx * dx + dy * dy;
+            // Nearly all points are farther apart than that, and need no root.
+            if square_m2 < max_square_m2 {
+                let distance_m = square_m2.sqrt();
+                let shortfall_a_m = (ra - distance_m).max(0.0);
+                let shortfall_b_m = (rb - distance_m).max(0.0);
+                sums[0] += weight * shortfall_a_m * shortfall_a_m;
+                sums[1] += weight * shortfall_b_m * shortfall_b_m;
             }
             weight *= self.beta;
         }
@@ -79,7 +87,7 @@ impl Objective {
     }
 
     /// Returns the weight of a slice's first point if that of the slice before has the weight
-    /// `weight`.
+    /// `weight`. It is multiplied step by step, as within a slice, and not by a power, which rounds differently.
     fn decay(&self, weight: f64) -> f64 {
         (0..SLICE).fold(weight, |weight, _| weight * self.beta)
     }
@@ -88,7 +96,8 @@ impl Objective {
     pub fn deviation(&self, of: &Prediction, optimal: &Prediction) -> f64 {
         match (of.points.last(), optimal.points.last()) {
             (Some(p), Some(q)) => {
-                let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+                let dx = p[0] - q[0];
+                let dy = p[1] - q[1];
                 dx * dx + dy * dy
             }
             _ => 0.0,
@@ -96,7 +105,7 @@ impl Objective {
     }
 }
 
-/// Number of points of a slice of time. Within a slice ways move little, so bounds around it are
+/// Number of points of a slice of time. Within a slice airplanes move little, so bounds around it are
 /// tight.
 const SLICE: usize = 16;
 
@@ -109,49 +118,58 @@ pub struct ActionPredictions {
     pub separation_m: f64,
     /// The levels that the airplane occupies.
     pub levels: Levels,
-    /// Costs of the actions beside intruders; empty where there are none.
-    beside: Vec<f64>,
+    /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
+    non_cooperative_costs: Vec<f64>,
     slices: Vec<Slice>,
 }
 
 impl ActionPredictions {
     /// Returns options with their slices.
     pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
-        let longest = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
-        let slices = (0..longest).step_by(SLICE).map(|from| Slice::new(&predictions, from));
-        let slices = slices.collect();
-        Self { predictions, separation_m, levels, beside: Vec::new(), slices }
+        let max_points = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
+        let slices =
+            (0..max_points).step_by(SLICE).map(|from| Slice::new(&predictions, from)).collect();
+        Self { predictions, separation_m, levels, non_cooperative_costs: Vec::new(), slices }
     }
 
-    /// Returns the same options beside intruders, seen at each point of the predictions.
+    /// Returns the same options beside non-cooperative aircraft, seen at each point of the predictions.
     #[must_use]
     pub(crate) fn with_non_cooperative(
         mut self,
-        intruders: &[NonCooperative],
+        non_cooperative: &[NonCooperative],
         objective: &Objective,
         dtau_s: f64,
     ) -> Self {
-        if !intruders.is_empty() {
-            let minds =
-                |one: &&NonCooperative| one.levels.overlaps(&self.levels, objective.vertical_m);
-            let cost = |way: &Prediction| {
-                let cost =
-                    |one| objective.non_cooperative_cost(one, way, self.separation_m, dtau_s);
-                intruders.iter().filter(minds).map(cost).sum()
-            };
-            self.beside = self.predictions.iter().map(cost).collect();
+        if non_cooperative.is_empty() {
+            return self;
         }
+        let on_level: Vec<&NonCooperative> = non_cooperative
+            .iter()
+            .filter(|one| one.levels.overlaps(&self.levels, objective.vertical_m))
+            .collect();
+        self.non_cooperative_costs = self
+            .predictions
+            .iter()
+            .map(|prediction| {
+                on_level
+                    .iter()
+                    .map(|one| {
+                        objective.non_cooperative_cost(one, prediction, self.separation_m, dtau_s)
+                    })
+                    .sum()
+            })
+            .collect();
         self
     }
 
     fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
-        let way = &self.predictions[piece.actions[0]];
-        let end = if mask { piece.counted } else { way.points.len().min(from + SLICE) };
-        &way.points[from.min(end)..end]
+        let points = &self.predictions[piece.actions[0]].points;
+        let end = if mask { piece.counted } else { points.len().min(from + SLICE) };
+        &points[from.min(end)..end]
     }
 }
 
-/// The ways of all actions of an airplane in one slice of time.
+/// The paths of all actions of an airplane in one slice of time.
 #[derive(Debug, Clone)]
 struct Slice {
     pieces: Vec<Piece>,
@@ -172,17 +190,16 @@ struct Piece {
 impl Slice {
     fn new(predictions: &[Prediction], from: usize) -> Self {
         let mut pieces: Vec<Piece> = Vec::new();
-        for (action, way) in predictions.iter().enumerate() {
-            let end = way.points.len().min(from + SLICE);
-            let points = &way.points[from.min(end)..end];
-            let counted = way.counted.clamp(from.min(end), end);
-            // Compared from the end, because most ways that differ do so there.
-            let is_alike = |piece: &&mut Piece| {
-                let other = &predictions[piece.actions[0]].points;
-                let other = &other[from.min(other.len())..other.len().min(from + SLICE)];
+        for (action, prediction) in predictions.iter().enumerate() {
+            let points = slice_points(prediction, from);
+            let end = prediction.points.len().min(from + SLICE);
+            let counted = prediction.counted.clamp(from.min(end), end);
+            // The last points are compared first, because most paths that differ do so there.
+            let same = pieces.iter_mut().find(|piece| {
+                let other = slice_points(&predictions[piece.actions[0]], from);
                 piece.counted == counted && points.last() == other.last() && points == other
-            };
-            match pieces.iter_mut().find(is_alike) {
+            });
+            match same {
                 Some(piece) => piece.actions.push(action),
                 None => {
                     let bounds = BoundingBox::from_points(points);
@@ -194,6 +211,12 @@ impl Slice {
             pieces.iter().flat_map(|p| [p.bounds.low, p.bounds.high]).collect();
         Self { pieces, all: BoundingBox::from_points(&corners) }
     }
+}
+
+/// Returns the points of a prediction in the slice that starts with point `from`.
+fn slice_points(prediction: &Prediction, from: usize) -> &[Point] {
+    let end = prediction.points.len().min(from + SLICE);
+    &prediction.points[from.min(end)..end]
 }
 
 /// The smallest upright rectangle around some points.
@@ -232,12 +255,17 @@ pub fn game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame 
     game
 }
 
-/// Returns `alpha Gdev` of every action, and its cost beside intruders.
+/// Returns the sum of `alpha Gdev` of every action and its cost beside non-cooperative aircraft.
 pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
-    let deviation = |p: &Prediction| objective.alpha * objective.deviation(p, optimal);
-    let mut costs: Vec<f64> = options.predictions.iter().map(deviation).collect();
-    costs.iter_mut().zip(&options.beside).for_each(|(cost, beside)| *cost += beside);
+    let mut costs: Vec<f64> = options
+        .predictions
+        .iter()
+        .map(|prediction| objective.alpha * objective.deviation(prediction, optimal))
+        .collect();
+    for (cost, further) in costs.iter_mut().zip(&options.non_cooperative_costs) {
+        *cost += further;
+    }
     costs
 }
 
@@ -256,7 +284,7 @@ pub(super) fn add_pair_costs(
     }
 }
 
-/// Returns `Gcol` of both for every two actions, if any two cost anything. Most slices of ways
+/// Returns `Gcol` of both for every two actions, if any two cost anything. Most slices of two airplanes
 /// never come near each other, and the points that several actions share are computed once.
 fn pair_costs(
     objective: &Objective,
@@ -270,17 +298,18 @@ fn pair_costs(
     let mut costs = None;
     let mut weight = 1.0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
-        let near = |p: &&Piece| p.bounds.is_within(&of_b.all, gap_m);
-        let rows = of_a.pieces.iter().filter(|_| of_a.all.is_within(&of_b.all, gap_m));
-        for p in rows.filter(near) {
+        let is_near = of_a.all.is_within(&of_b.all, gap_m);
+        let rows = of_a.pieces.iter().filter(|_| is_near);
+        for p in rows.filter(|p| p.bounds.is_within(&of_b.all, gap_m)) {
             let of_p = a.piece(p, k * SLICE, objective.mask);
             for q in of_b.pieces.iter().filter(|q| p.bounds.is_within(&q.bounds, gap_m)) {
                 let of_q = b.piece(q, k * SLICE, objective.mask);
                 let parts = objective.slice_collision(of_p, of_q, weight, r);
                 if parts != [0.0; 2] {
+                    // Most pairs never need the table, which is large.
                     let costs =
                         costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
-                    add_to_all(costs, columns, &p.actions, &q.actions, parts);
+                    add_to_all(costs, columns, [&p.actions, &q.actions], parts);
                 }
             }
         }
@@ -293,14 +322,14 @@ fn pair_costs(
 fn add_to_all(
     costs: &mut [[f64; 2]],
     columns: usize,
-    rows: &[usize],
-    others: &[usize],
+    [actions_a, actions_b]: [&[usize]; 2],
     parts: [f64; 2],
 ) {
-    for row in rows {
-        for other in others {
-            let sums = &mut costs[row * columns + other];
-            (0..2).for_each(|k| sums[k] += parts[k]);
+    for action_a in actions_a {
+        for action_b in actions_b {
+            let sums = &mut costs[action_a * columns + action_b];
+            sums[0] += parts[0];
+            sums[1] += parts[1];
         }
     }
 }
@@ -438,9 +467,9 @@ mod tests {
                 let pilot =
                     Autopilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
                 let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
-                let ways = all[k as usize % 2].iter().map(predict).collect();
+                let predictions = all[k as usize % 2].iter().map(predict).collect();
                 ActionPredictions::new(
-                    ways,
+                    predictions,
                     model.separation_m * (1.0 - 0.1 * side),
                     Levels::at(0.0),
                 )

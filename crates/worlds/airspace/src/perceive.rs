@@ -1,18 +1,19 @@
-//! *Perceive*: airplanes list themselves in the neighborhood, and are perceived there.
+//! *Perceive*: airplanes enter the spatial index, and what each of them and its group perceives.
 
-use super::PhaseContext;
 use super::flight::{KnownAircraft, Levels, Pose2};
 use super::non_cooperative::NonCooperative;
+use super::pilot::{OwnshipState, SurveillanceReport};
 use super::purpose;
+use super::scratch::PhaseContext;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::{Cycle, Slot, math};
 use std::ops::Range;
 
-/// Lists those of `bodies` that are in the air.
-pub(super) fn claim(turn: &mut PhaseContext<'_>, bodies: Range<usize>) {
-    let PhaseContext { world, state, now, .. } = *turn;
+/// Enters those of `bodies` that are in the air into the spatial index.
+pub(super) fn claim(context: &mut PhaseContext<'_>, bodies: Range<usize>) {
+    let PhaseContext { world, state, now, .. } = *context;
     for slot in bodies {
         if state.is_active(world, slot as Slot, now) {
             let at = state.airplanes[slot].pose().at;
@@ -30,7 +31,9 @@ pub(super) fn observed_pose(
 ) -> Pose2 {
     if world.disturbance.position_m > 0.0 {
         let mut draws = world.streams.draws(slot, now, purpose::POSITION);
-        pose.at.iter_mut().for_each(|v| *v += world.disturbance.position_m * normal(&mut draws));
+        for coordinate in &mut pose.at {
+            *coordinate += world.disturbance.position_m * normal(&mut draws);
+        }
     }
     pose
 }
@@ -42,30 +45,72 @@ pub(super) fn known_aircraft(
     now: Cycle,
     slot: Slot,
 ) -> KnownAircraft {
-    let cell = &state.airplanes[slot as usize];
-    let pose = observed_pose(world, slot, now, cell.pose());
-    let (orders, altitude_m) = (u32::from(cell.orders.get()), cell.altitude_m.get());
-    KnownAircraft { slot, pose, next: cell.next.get() as usize, orders, altitude_m }
+    let current = &state.airplanes[slot as usize];
+    KnownAircraft {
+        slot,
+        pose: observed_pose(world, slot, now, current.pose()),
+        next: current.next.get() as usize,
+        orders: current.orders.get().into(),
+        altitude_m: current.altitude_m.get(),
+    }
 }
 
-/// Returns the intruders of a group, by id.
+/// Returns an airplane as those aboard know it.
+pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: Slot) -> OwnshipState {
+    let PhaseContext { world, state, now, .. } = *context;
+    let current = &state.airplanes[slot as usize];
+    let pose = current.pose();
+    let orbit_pose = state.orbit_pose(slot);
+    OwnshipState {
+        id: slot,
+        pose,
+        orbit_pose,
+        seen: observed_pose(world, slot, now, pose),
+        seen_orbit_pose: observed_pose(world, slot, now, orbit_pose),
+        altitude_m: current.altitude_m.get(),
+        next: current.next.get(),
+        orders: current.orders.get().into(),
+        fallback: current.fallback.get(),
+        refusals: current.overrides.get(),
+        exempt: state.exempt_with(slot).to_vec(),
+        external_action: state.external_action(slot),
+    }
+}
+
+/// Returns an airplane as others see it.
+pub(super) fn surveillance_report(context: &PhaseContext<'_>, slot: Slot) -> SurveillanceReport {
+    let PhaseContext { world, state, now, .. } = *context;
+    let current = &state.airplanes[slot as usize];
+    SurveillanceReport {
+        id: slot,
+        pose: observed_pose(world, slot, now, current.pose()),
+        altitude_m: current.altitude_m.get(),
+        orbit: (current.orbiting.get() > 0).then(|| current.fallback.get()),
+    }
+}
+
+/// Returns the non-cooperative airplanes of a group, by id.
 pub(super) fn non_cooperative_aircraft(
-    turn: &PhaseContext<'_>,
+    context: &PhaseContext<'_>,
     group: &[Slot],
 ) -> Vec<NonCooperative> {
-    let is_intruder = |slot: &&Slot| turn.world.is_non_cooperative(**slot, turn.now);
-    group.iter().filter(is_intruder).map(|&slot| non_cooperative_at(turn, slot)).collect()
+    group
+        .iter()
+        .filter(|slot| context.world.is_non_cooperative(**slot, context.now))
+        .map(|&slot| non_cooperative_at(context, slot))
+        .collect()
 }
 
-fn non_cooperative_at(turn: &PhaseContext<'_>, slot: Slot) -> NonCooperative {
-    let PhaseContext { world, state, now, .. } = *turn;
-    let (airplane, cell) = (&world.airplanes[slot as usize], &state.airplanes[slot as usize]);
-    let Pose2 { at, heading_rad } = observed_pose(world, slot, now, cell.pose());
+fn non_cooperative_at(context: &PhaseContext<'_>, slot: Slot) -> NonCooperative {
+    let PhaseContext { world, state, now, .. } = *context;
+    let airplane = &world.airplanes[slot as usize];
+    let current = &state.airplanes[slot as usize];
+    let Pose2 { at, heading_rad } = observed_pose(world, slot, now, current.pose());
     let [wx, wy] = world.wind_m_s;
-    let stage = state.segment(world, slot);
+    let segment = state.segment(world, slot);
     let along = |speed: f64| [speed * math::cos(heading_rad), speed * math::sin(heading_rad)];
     let dt_s = world.timing.dt_s;
-    let altitude_m = cell.altitude_m.get();
+    let altitude_m = current.altitude_m.get();
     let (velocity_m_s, top_m_s, levels) = match &airplane.track {
         // Recorded speeds are over the ground.
         Some(track) if world.is_replayed(slot, now) => {
@@ -76,10 +121,18 @@ fn non_cooperative_at(turn: &PhaseContext<'_>, slot: Slot) -> NonCooperative {
             ([vx - wx, vy - wy], top_m_s, levels)
         }
         _ => {
-            let levels = Levels::between(altitude_m, stage.altitude_m);
-            (along(stage.model.v_m_s), world.top_m_s[slot as usize], levels)
+            let levels = Levels::between(altitude_m, segment.altitude_m);
+            (along(segment.model.v_m_s), world.top_m_s[slot as usize], levels)
         }
     };
-    let (separation_m, error_m) = (stage.model.separation_m, world.bounds.position_m);
-    NonCooperative { slot, at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s }
+    NonCooperative {
+        slot,
+        at,
+        velocity_m_s,
+        top_m_s,
+        separation_m: segment.model.separation_m,
+        error_m: world.bounds.position_m,
+        levels,
+        dt_s,
+    }
 }

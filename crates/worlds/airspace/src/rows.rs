@@ -3,7 +3,7 @@
 use super::decide::Optimization;
 use super::events::{Event, EventKind, Measure};
 use super::flight::Leg;
-use super::scenario::RecordSection;
+use super::settings::RecordSection;
 use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
@@ -29,10 +29,13 @@ fn trajectories(callsigns: &[Option<String>]) -> Table<FlownLeg> {
     let mut names: Vec<String> = callsigns.iter().flatten().cloned().collect();
     names.sort_unstable();
     names.dedup();
-    let of = |callsign: &Option<String>| {
-        callsign.as_ref().and_then(|c| names.binary_search(c).ok()).map(|label| label as u32)
-    };
-    let labels: Vec<Option<u32>> = callsigns.iter().map(of).collect();
+    let labels: Vec<Option<u32>> = callsigns
+        .iter()
+        .map(|callsign| {
+            let label = callsign.as_ref().and_then(|name| names.binary_search(name).ok())?;
+            Some(label as u32)
+        })
+        .collect();
     Table::new("trajectories")
         .u64("cycle", "cycle of dt in which this leg is flown", |f: &FlownLeg| f.cycle)
         .u32("airplane", "entity id", |f| f.airplane)

@@ -3,22 +3,25 @@
 mod airplanes;
 mod compile;
 mod network;
-mod settings;
-mod values;
+mod optimizer;
+mod start_groups;
 
-use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
+use super::settings::{
+    Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise, Inflation, LevelGap,
+    LookAhead, Method, RecordSection, Rounds, Step, Tolerance, Weight,
+};
 use super::shield::Side;
 use super::state::{AirplaneRecord, PackedEnd, Snapshot};
-use super::world::{AirspaceWorld, Grouping, Method};
+use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
+use optimizer::{LegsSection, ReactiveSection, Switch, Times};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Update, UpdateOrder, Utility};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
@@ -27,11 +30,6 @@ use sidestep_scenario::{
     Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
 };
 use std::sync::Arc;
-use values::{
-    Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
-    Step, Tolerance, Weight,
-};
-pub(super) use values::{SeparationM, Speed, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -119,39 +117,11 @@ impl Rule for ReplayEnd {
     }
 
     fn description() -> String {
-        "seconds after the start, 0 to fly all anew, or inf to replay all".into()
+        "seconds after the start, 0 to fly all of them by the method, or inf to replay all".into()
     }
 
     fn limits() -> Value {
         schema::with_infinity(json!({ "minimum": 0 }))
-    }
-}
-
-/// The tables that a run keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RecordSection {
-    /// A row per airplane and cycle.
-    pub trajectories: bool,
-    /// A row per event, see [`super::events`].
-    pub events: bool,
-    /// A row per optimization.
-    pub optimizations: bool,
-    /// The controls of airplanes with pilots outside of the run, so that it can be computed again.
-    pub controls: bool,
-    /// Number of cycles between two checkpoints; 0 for none.
-    pub checkpoint_every: u64,
-}
-
-impl Default for RecordSection {
-    fn default() -> Self {
-        Self {
-            trajectories: true,
-            events: true,
-            optimizations: true,
-            controls: false,
-            checkpoint_every: 1000,
-        }
     }
 }
 
@@ -197,7 +167,7 @@ impl CompiledAirspace {
     }
 
     /// Returns the same scenario with another seed, as if compiled with that seed. Traffic that is drawn, and
-    /// everything that follows from positions with errors, is made anew; all else is shared.
+    /// everything that depends on positions with errors, is computed anew; all else is shared.
     ///
     /// # Errors
     /// When generated airplanes find no place with this seed, or come too near to be optimized together.
@@ -215,29 +185,39 @@ impl CompiledAirspace {
 
     /// Returns the state at the start.
     pub fn start_snapshot(&self) -> Snapshot {
-        let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
-            pose: airplane.start,
-            ended: PackedEnd::NONE,
-            counts: [0; 4],
-            fallback,
-            altitude_m: match &airplane.track {
-                Some(track) => track.altitude_at_m(airplane.appears_s),
-                None => airplane.altitude_m,
-            },
-            orders: [0; 2],
-            turn_rate_rad_s: 0.0,
-        };
-        let airplanes = self.world.airplanes.iter().zip(&*self.fallbacks).map(record).collect();
+        let airplanes = self
+            .world
+            .airplanes
+            .iter()
+            .zip(&*self.fallbacks)
+            .map(|(airplane, &fallback)| start_record(airplane, fallback))
+            .collect();
         Snapshot {
             cycle: 0,
             airplanes,
             contacts: Vec::new(),
             resolving: Vec::new(),
-            named: self.too_close.clone(),
-            held: Vec::new(),
-            wishes: Vec::new(),
-            handed: None,
+            exempt: self.too_close.clone(),
+            orbit_poses: Vec::new(),
+            external_actions: Vec::new(),
+            controls: None,
         }
+    }
+}
+
+/// Returns the state of an airplane at the start of its flight.
+fn start_record(airplane: &Airplane, fallback: Side) -> AirplaneRecord {
+    AirplaneRecord {
+        pose: airplane.start,
+        ended: PackedEnd::NONE,
+        counts: [0; 4],
+        fallback,
+        altitude_m: match &airplane.track {
+            Some(track) => track.altitude_at_m(airplane.appears_s),
+            None => airplane.altitude_m,
+        },
+        orders: [0; 2],
+        turn_rate_rad_s: 0.0,
     }
 }
 
@@ -292,15 +272,17 @@ mod tests {
             assert_eq!(one.interaction_range_m(0, 1), half.interaction_range_m(0, 1));
             // Two head-on airplanes, against the price of one that has left its way by 700 m.
             let price = |world: &AirspaceWorld| {
-                let way = |from_m: f64, v_m_s: f64| {
+                let straight = |from_m: f64, v_m_s: f64| {
                     let at =
                         |k: usize| [from_m + v_m_s * world.timing.dtau_s * (k + 1) as f64, 0.0];
                     let points: Vec<_> = (0..world.timing.horizon).map(at).collect();
                     crate::flight::Prediction { counted: points.len(), points }
                 };
-                let (a, b) = (way(-2000.0, 35.0), way(2000.0, -35.0));
+                let a = straight(-2000.0, 35.0);
+                let b = straight(2000.0, -35.0);
                 let [cost, _] = world.objective.collision(&a, &b, [500.0; 2]);
-                cost / world.objective.deviation(&a, &way(-1300.0, 35.0)) / world.objective.alpha
+                cost / world.objective.deviation(&a, &straight(-1300.0, 35.0))
+                    / world.objective.alpha
             };
             let ratio = price(&half) / price(&one);
             assert!((ratio - 1.0).abs() < 0.01, "{preset}: {ratio}");

@@ -9,8 +9,9 @@ use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{FlightSegment, Pose2};
 use super::pilot::{Control, Memory};
+use super::settings::Method;
 use super::shield::{ExemptIds, Side};
-use super::world::{AirspaceWorld, Method};
+use super::world::AirspaceWorld;
 pub use end::{End, PackedEnd};
 use neighborhood::Neighborhood;
 use sidestep_kernel::column::AtomicCell;
@@ -29,15 +30,15 @@ pub struct AirspaceState {
     contacts: Box<[Mutex<TrafficPicture>]>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
     resolving: Box<[Mutex<ActiveResolutions>]>,
-    /// The others with which each airplane is named, see [`Self::exempt_pair`].
+    /// The others with which each airplane is an exempt pair, see [`Self::exempt_pair`].
     exempt: Box<[Mutex<ExemptIds>]>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
     orbit_poses: Box<[OrbitPose]>,
     /// The turn rate of each airplane in the step that it flew last, in radians per second.
     turn_rates_rad_s: Box<[AtomicCell<f64>]>,
-    /// The wish that was ordered for each airplane; empty unless airplanes are decided from outside.
-    wishes: Box<[Mutex<Option<ExternalAction>>]>,
-    /// The cycle for which controls were handed over, or [`NEVER`].
+    /// The action that a caller has ordered for each airplane; empty unless callers decide.
+    external_actions: Box<[Mutex<Option<ExternalAction>>]>,
+    /// The cycle for which controls were submitted, or [`NEVER`].
     controls_cycle: AtomicCell<u64>,
     /// These controls.
     controls: Mutex<BTreeMap<EntityId, Control>>,
@@ -62,7 +63,7 @@ pub struct AirplaneState {
     pub end: AtomicCell<PackedEnd>,
     /// Number of way-points done with.
     pub next: AtomicCell<u32>,
-    /// Number of times that the shield changed its wish.
+    /// Number of times that the shield did not allow its preferred maneuver.
     pub overrides: AtomicCell<u32>,
     /// Number of those times when it fell back to its orbit.
     pub orbits: AtomicCell<u32>,
@@ -112,6 +113,18 @@ impl AirplaneState {
         self.waits.set(waits);
     }
 
+    fn record(&self, turn_rate_rad_s: f64) -> AirplaneRecord {
+        AirplaneRecord {
+            pose: self.pose(),
+            ended: self.end.get(),
+            counts: [self.next.get(), self.overrides.get(), self.orbits.get(), self.orbiting.get()],
+            fallback: self.fallback.get(),
+            altitude_m: self.altitude_m.get(),
+            orders: [self.orders.get(), self.waits.get()],
+            turn_rate_rad_s,
+        }
+    }
+
     /// Returns whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
         self.end.get() == PackedEnd::NONE
@@ -148,8 +161,13 @@ fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// Takes out the memories of the airplanes of a group; nothing where airplanes have no memory. No two groups share an
 /// airplane, so no other worker asks for the same.
 fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
-    let one = |&slot: &Slot| all.get(slot as usize).map(|one| std::mem::take(&mut *lock(one)));
-    group.iter().map(|slot| one(slot).unwrap_or_default()).collect()
+    group
+        .iter()
+        .map(|&slot| match all.get(slot as usize) {
+            Some(memory) => std::mem::take(&mut *lock(memory)),
+            None => T::default(),
+        })
+        .collect()
 }
 
 /// Puts memories back.
@@ -178,90 +196,89 @@ impl AirspaceState {
     /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();
-        let all = 0..n;
-        let farthest = all.clone().map(|i| world.interaction_range_m(i, i)).fold(1.0, f64::max);
-        let airplanes: Box<[AirplaneState]> = all.map(|_| AirplaneState::default()).collect();
-        for (cell, record) in airplanes.iter().zip(&snapshot.airplanes) {
-            cell.restore(record);
+        let max_range_m = (0..n).map(|i| world.interaction_range_m(i, i)).fold(1.0, f64::max);
+        let airplanes: Box<[AirplaneState]> = (0..n).map(|_| AirplaneState::default()).collect();
+        for (airplane, record) in airplanes.iter().zip(&snapshot.airplanes) {
+            airplane.restore(record);
         }
-        let contacts =
-            restore_memories(world.network.as_ref().map_or(0, |_| n), &snapshot.contacts);
-        let is_mvp = world.method == Method::Mvp;
-        let resolving = restore_memories(if is_mvp { n } else { 0 }, &snapshot.resolving);
-        let neighborhood = Neighborhood::new(n, farthest);
-        let named = (0..n).map(|_| Mutex::default()).collect();
-        let gusts = world.shield && world.disturbance.heading_rad > 0.0;
-        let held = (0..if gusts { n } else { 0 }).map(|_| OrbitPose::default()).collect();
-        let turn_rates_rad_s = snapshot
-            .airplanes
-            .iter()
-            .map(|record| AtomicCell::new(record.turn_rate_rad_s))
-            .collect();
-        let is_external = world.method == Method::External;
-        let wishes = restore_memories(if is_external { n } else { 0 }, &snapshot.wishes);
-        let (handed_for, handed) = (AtomicCell::default(), Mutex::default());
-        handed_for.set(NEVER);
+        // What no airplane needs with these settings takes no memory, and is in no checkpoint.
+        let with_contacts = if world.network.is_some() { n } else { 0 };
+        let with_resolutions = if world.has_resolutions() { n } else { 0 };
+        let has_gusts = world.shield && world.disturbance.heading_rad > 0.0;
+        let with_orbit_poses = if has_gusts { n } else { 0 };
+        let with_external_actions = if world.method == Method::External { n } else { 0 };
+        let controls_cycle = AtomicCell::default();
+        controls_cycle.set(NEVER);
         let state = Self {
             airplanes,
-            neighborhood,
-            contacts,
-            resolving,
-            exempt: named,
-            orbit_poses: held,
-            turn_rates_rad_s,
-            wishes,
-            controls_cycle: handed_for,
-            controls: handed,
+            neighborhood: Neighborhood::new(n, max_range_m),
+            contacts: restore_memories(with_contacts, &snapshot.contacts),
+            resolving: restore_memories(with_resolutions, &snapshot.resolving),
+            exempt: (0..n).map(|_| Mutex::default()).collect(),
+            orbit_poses: (0..with_orbit_poses).map(|_| OrbitPose::default()).collect(),
+            turn_rates_rad_s: snapshot
+                .airplanes
+                .iter()
+                .map(|record| AtomicCell::new(record.turn_rate_rad_s))
+                .collect(),
+            external_actions: restore_memories(with_external_actions, &snapshot.external_actions),
+            controls_cycle,
+            controls: Mutex::default(),
         };
-        if let Some(handed) = &snapshot.handed {
-            state.set_controls(snapshot.cycle, handed.clone());
+        if let Some(controls) = &snapshot.controls {
+            state.set_controls(snapshot.cycle, controls.clone());
         }
-        let held = snapshot.held.iter().copied();
-        let held = held.chain(snapshot.airplanes.iter().skip(snapshot.held.len()).map(|a| a.pose));
-        (0..).zip(held).for_each(|(slot, pose)| state.set_orbit_pose(slot, pose));
-        snapshot.named.iter().for_each(|&(a, b)| state.exempt_pair(a, b));
+        for (i, record) in snapshot.airplanes.iter().enumerate() {
+            // A snapshot without gusts has no orbit poses.
+            let pose = snapshot.orbit_poses.get(i).copied().unwrap_or(record.pose);
+            state.set_orbit_pose(i as Slot, pose);
+        }
+        for &(a, b) in &snapshot.exempt {
+            state.exempt_pair(a, b);
+        }
         state
     }
 
     /// Returns the pose that an airplane has on its stored orbit, if no gust has taken it off that.
     pub(super) fn orbit_pose(&self, slot: Slot) -> Pose2 {
-        let on_orbit = |held: &OrbitPose| Pose2 {
-            at: [held.x_m.get(), held.y_m.get()],
-            heading_rad: held.heading_rad.get(),
-        };
-        let there = || self.airplanes[slot as usize].pose();
-        self.orbit_poses.get(slot as usize).map_or_else(there, on_orbit)
+        match self.orbit_poses.get(slot as usize) {
+            Some(orbit_pose) => Pose2 {
+                at: [orbit_pose.x_m.get(), orbit_pose.y_m.get()],
+                heading_rad: orbit_pose.heading_rad.get(),
+            },
+            None => self.airplanes[slot as usize].pose(),
+        }
     }
 
     /// Stores the pose that an airplane has on its orbit.
     pub(super) fn set_orbit_pose(&self, slot: Slot, pose: Pose2) {
-        if let Some(held) = self.orbit_poses.get(slot as usize) {
-            held.x_m.set(pose.at[0]);
-            held.y_m.set(pose.at[1]);
-            held.heading_rad.set(pose.heading_rad);
+        if let Some(orbit_pose) = self.orbit_poses.get(slot as usize) {
+            orbit_pose.x_m.set(pose.at[0]);
+            orbit_pose.y_m.set(pose.at[1]);
+            orbit_pose.heading_rad.set(pose.heading_rad);
         }
     }
 
-    /// Returns the others with which an airplane is named.
+    /// Returns the others with which an airplane is an exempt pair.
     pub(super) fn exempt_with(&self, slot: Slot) -> ExemptIds {
         lock(&self.exempt[slot as usize]).clone()
     }
 
-    /// Names two airplanes of a group: from now on the shield promises nothing for this pair.
+    /// Exempts two airplanes of a group: from now on the shield does not guarantee separation of this pair.
     pub(super) fn exempt_pair(&self, a: Slot, b: Slot) {
         for (one, other) in [(a, b), (b, a)] {
-            let mut named = lock(&self.exempt[one as usize]);
-            if let Err(place) = named.binary_search(&other) {
-                let (before, after) = named.split_at(place);
-                *named = before.iter().chain([&other]).chain(after).copied().collect();
+            let mut exempt = lock(&self.exempt[one as usize]);
+            if let Err(place) = exempt.binary_search(&other) {
+                let (before, after) = exempt.split_at(place);
+                *exempt = before.iter().chain([&other]).chain(after).copied().collect();
             }
         }
     }
 
-    /// Keeps only those others with which an airplane is to stay named.
+    /// Keeps only those exempt pairs of an airplane that are to stay.
     pub(super) fn retain_exempt(&self, slot: Slot, stays: impl Fn(EntityId) -> bool) {
-        let mut named = lock(&self.exempt[slot as usize]);
-        *named = named.iter().copied().filter(|&other| stays(other)).collect();
+        let mut exempt = lock(&self.exempt[slot as usize]);
+        *exempt = exempt.iter().copied().filter(|&other| stays(other)).collect();
     }
 
     /// Takes out the memories of the airplanes of a group.
@@ -287,30 +304,30 @@ impl AirspaceState {
         self.controls_cycle.set(cycle);
     }
 
-    /// Returns whether controls were handed over for a cycle.
+    /// Returns whether controls were submitted for a cycle.
     pub(super) fn has_controls(&self, cycle: Cycle) -> bool {
         self.controls_cycle.get() == cycle
     }
 
-    /// Takes out the controls that were handed over for the airplanes of a group.
+    /// Takes out the controls that were submitted for the airplanes of a group.
     pub(super) fn take_controls(&self, group: &[Slot]) -> Vec<Option<Control>> {
-        let mut handed = lock(&self.controls);
-        group.iter().map(|slot| handed.remove(slot)).collect()
+        let mut controls = lock(&self.controls);
+        group.iter().map(|slot| controls.remove(slot)).collect()
     }
 
-    /// Returns the wish that was ordered for an airplane, if there is one.
+    /// Returns the action that was ordered for an airplane, if there is one.
     pub(super) fn external_action(&self, slot: Slot) -> Option<ExternalAction> {
-        self.wishes.get(slot as usize).and_then(|wish| lock(wish).clone())
+        self.external_actions.get(slot as usize).and_then(|action| lock(action).clone())
     }
 
-    /// Drops the wishes that were ordered for the airplanes of a group: they have decided.
+    /// Drops the actions that were ordered for the airplanes of a group: they have decided.
     pub(super) fn drop_external_actions(&self, group: &[Slot]) {
-        take(&self.wishes, group);
+        take(&self.external_actions, group);
     }
 
-    /// Stores the wish that was ordered for an airplane, in place of any other.
-    pub(super) fn set_external_action(&self, slot: Slot, wish: ExternalAction) {
-        put(&self.wishes, &[slot], vec![Some(wish)]);
+    /// Stores the action that was ordered for an airplane, in place of any other.
+    pub(super) fn set_external_action(&self, slot: Slot, action: ExternalAction) {
+        put(&self.external_actions, &[slot], vec![Some(action)]);
     }
 
     /// Returns the turn rate of an airplane in the step that it flew last, in radians per second.
@@ -325,29 +342,28 @@ impl AirspaceState {
 
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        let record = |(cell, turn_rate): (&AirplaneState, &AtomicCell<f64>)| AirplaneRecord {
-            pose: cell.pose(),
-            ended: cell.end.get(),
-            counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.orbiting.get()],
-            fallback: cell.fallback.get(),
-            altitude_m: cell.altitude_m.get(),
-            orders: [cell.orders.get(), cell.waits.get()],
-            turn_rate_rad_s: turn_rate.get(),
-        };
-        let resolving = self.resolving.iter().map(|resolving| lock(resolving).clone()).collect();
-        let contacts = self.contacts.iter().map(|contacts| lock(contacts).clone()).collect();
-        let named = (0..).zip(&self.exempt).flat_map(|(a, others)| {
-            let others = lock(others).clone();
-            let pairs: Vec<_> = others.iter().filter(|b| **b > a).map(|b| (a, *b)).collect();
-            pairs
-        });
-        let named = named.collect();
-        let wishes = self.wishes.iter().map(|wish| lock(wish).clone()).collect();
-        let handed = || lock(&self.controls).values().cloned().collect();
-        let handed = self.has_controls(cycle).then(handed);
-        let held = (0..self.orbit_poses.len() as Slot).map(|slot| self.orbit_pose(slot)).collect();
-        let airplanes = self.airplanes.iter().zip(&self.turn_rates_rad_s).map(record).collect();
-        Snapshot { cycle, airplanes, contacts, resolving, named, held, wishes, handed }
+        let mut exempt = Vec::new();
+        for (a, others) in (0..).zip(&self.exempt) {
+            exempt.extend(lock(others).iter().filter(|b| **b > a).map(|b| (a, *b)));
+        }
+        let controls =
+            self.has_controls(cycle).then(|| lock(&self.controls).values().cloned().collect());
+        let orbits = 0..self.orbit_poses.len() as Slot;
+        Snapshot {
+            cycle,
+            airplanes: self
+                .airplanes
+                .iter()
+                .zip(&self.turn_rates_rad_s)
+                .map(|(airplane, turn_rate_rad_s)| airplane.record(turn_rate_rad_s.get()))
+                .collect(),
+            contacts: self.contacts.iter().map(|one| lock(one).clone()).collect(),
+            resolving: self.resolving.iter().map(|one| lock(one).clone()).collect(),
+            exempt,
+            orbit_poses: orbits.map(|slot| self.orbit_pose(slot)).collect(),
+            external_actions: self.external_actions.iter().map(|one| lock(one).clone()).collect(),
+            controls,
+        }
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.

@@ -1,12 +1,13 @@
-//! Texts for people: a scenario's contents, a run's outcome, and the place of every airplane.
+//! Texts for people: a scenario's contents, a run's outcome, and the pose of every airplane.
 
 use super::metrics::{BeyondBound, Metrics, TooClose};
 use super::scenario::CompiledAirspace;
-use super::state::{AirplaneRecord, Snapshot};
+use super::state::Snapshot;
 use super::world::AirspaceWorld;
 use serde_json::json;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands, key_value};
+use std::fmt::Write;
 
 /// Returns the contents of a compiled scenario.
 pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
@@ -18,10 +19,10 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
         Cycle::MAX => f64::INFINITY,
         cycles => world.cycle_start_s(cycles),
     };
-    let intruders = world.airplanes.iter().filter(|a| a.is_intruder).count() as u64;
+    let non_cooperative = world.airplanes.iter().filter(|a| a.is_non_cooperative).count() as u64;
     let json = json!({
         "airplanes": world.airplanes.len(),
-        "intruders": intruders,
+        "intruders": non_cooperative,
         "method": world.method.name(),
         "deployment": world.deployment.name(),
         "shield": shield,
@@ -36,8 +37,8 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
         "replay_until_s": (recorded > 0).then_some(until_s),
     });
     let mut lines = vec![key_value("airplanes", group_thousands(world.airplanes.len() as u64))];
-    if intruders > 0 {
-        lines.push(key_value("intruders", group_thousands(intruders)));
+    if non_cooperative > 0 {
+        lines.push(key_value("intruders", group_thousands(non_cooperative)));
     }
     lines.extend(abilities(world));
     if recorded > 0 {
@@ -56,15 +57,19 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
 /// Returns how often the airplanes decide, and for how long they fly.
 fn times(compiled: &CompiledAirspace) -> KeyValues {
     let dt_s = compiled.world.timing.dt_s;
-    let (cycles, lasts_s) = (group_thousands(compiled.cycles), compiled.cycles as f64 * dt_s);
+    let cycles = group_thousands(compiled.cycles);
+    let duration_s = compiled.cycles as f64 * dt_s;
     let look_ahead_s = compiled.world.reactive_settings().look_ahead_s;
     vec![
         key_value("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
-        key_value("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
+        key_value(
+            "run",
+            format!("at most {cycles} cycles ({duration_s} s), seed {}", compiled.seed),
+        ),
     ]
 }
 
-/// Returns the place of the origin on earth, if it has one.
+/// Returns the position of the origin on earth, if it has one.
 fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
     let [lat, lon] = world.origin_deg?;
     Some(key_value("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
@@ -74,7 +79,8 @@ fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
 fn abilities(world: &AirspaceWorld) -> KeyValues {
     let models = || world.airplanes.iter().map(|airplane| &airplane.model);
     let height_m = world.vertical_m.round();
-    let (method, deployment) = (world.method.name(), world.deployment.name());
+    let method = world.method.name();
+    let deployment = world.deployment.name();
     let shield = if world.shield { "on" } else { "off" };
     vec![
         key_value(
@@ -93,15 +99,21 @@ fn abilities(world: &AirspaceWorld) -> KeyValues {
     ]
 }
 
-/// Returns a number that all have, or the least and the greatest, to a tenth.
+/// Returns a number that all have, or the smallest and the largest, to a tenth.
 fn range_text(numbers: impl Iterator<Item = f64>) -> String {
-    let (least, greatest) =
-        numbers.fold((f64::INFINITY, 0.0_f64), |(least, most), x| (least.min(x), most.max(x)));
-    let rounded = |x: f64| ((x * 10.0).round() / 10.0).to_string();
-    match (rounded(least), rounded(greatest)) {
-        (one, other) if one == other => one,
-        (one, other) => format!("{one} to {other}"),
+    let mut min = f64::INFINITY;
+    let mut max: f64 = 0.0;
+    for number in numbers {
+        min = min.min(number);
+        max = max.max(number);
     }
+    let min = round_to_tenth(min).to_string();
+    let max = round_to_tenth(max).to_string();
+    if min == max { min } else { format!("{min} to {max}") }
+}
+
+fn round_to_tenth(number: f64) -> f64 {
+    (number * 10.0).round() / 10.0
 }
 
 /// Returns the outcome of a run.
@@ -109,30 +121,31 @@ pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
     let mut lines = flights(metrics);
     lines.extend(not_appeared(metrics));
     lines.extend(network(metrics));
-    lines.extend(on_the_way(metrics));
+    lines.extend(orders_and_tracks(metrics));
     lines.extend(warning(&metrics.too_close));
     lines.extend(beyond_bound(&metrics.beyond_bound));
     lines
 }
 
-/// Returns the place of every airplane, by entity id.
+/// Returns the pose of every airplane, by entity id.
 pub(super) fn poses(snapshot: &Snapshot) -> Description {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
-    let heading = "  airplane       x_m         y_m    heading_deg\n".to_string();
-    let row = |(id, a): (usize, &AirplaneRecord)| {
-        let ([x, y], heading_deg) = (a.pose.at, a.pose.heading_rad.to_degrees());
-        format!("  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}\n")
-    };
-    let text = snapshot.airplanes.iter().enumerate().map(row).fold(heading, |t, r| t + &r);
+    let mut text = "  airplane       x_m         y_m    heading_deg\n".to_string();
+    for (id, airplane) in snapshot.airplanes.iter().enumerate() {
+        let [x, y] = airplane.pose.at;
+        let heading_deg = airplane.pose.heading_rad.to_degrees();
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}");
+    }
     Description { json, text }
 }
 
 /// Returns the first pairs with first fallbacks that are not apart, and the number of others.
 fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
-    let named =
-        |&(a, b): &(u32, u32)| format!("{} and {}", world.display_name(a), world.display_name(b));
-    let told = first_names(pairs, named)?;
-    Some(key_value("warning", format!("start too close for the shield: {told}")))
+    let names = first_names(pairs, |&(a, b)| {
+        format!("{} and {}", world.display_name(a), world.display_name(b))
+    })?;
+    Some(key_value("warning", format!("start too close for the shield: {names}")))
 }
 
 /// Returns the traffic on the network, and its faults.
@@ -154,11 +167,13 @@ fn network(m: &Metrics) -> KeyValues {
         (m.shield_held_back, "plans held back"),
         (m.groups_too_large, "groups too large to optimize"),
     ];
-    let said = counts.iter().filter(|(n, _)| *n > 0);
-    let said: Vec<String> =
-        said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
-    if !said.is_empty() {
-        lines.push(key_value("trouble", said.join(", ")));
+    let faults: Vec<String> = counts
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{} {what}", group_thousands(*n)))
+        .collect();
+    if !faults.is_empty() {
+        lines.push(key_value("trouble", faults.join(", ")));
     }
     lines
 }
@@ -174,8 +189,8 @@ fn not_appeared(m: &Metrics) -> Option<(String, String)> {
     Some(key_value("WARNING", format!("{many} not appeared by now: more cycles would show them")))
 }
 
-/// Returns lines on recorded ways, orders and removals; none where there were none.
-fn on_the_way(m: &Metrics) -> KeyValues {
+/// Returns lines on recorded tracks, orders and removals; none where there were none.
+fn orders_and_tracks(m: &Metrics) -> KeyValues {
     let mut lines = Vec::new();
     if m.replayed > 0 {
         lines.push(key_value(
@@ -190,7 +205,8 @@ fn on_the_way(m: &Metrics) -> KeyValues {
         ));
     }
     if m.orders + m.orders_delayed > 0 {
-        let (done, waits) = (group_thousands(m.orders), group_thousands(m.orders_delayed));
+        let done = group_thousands(m.orders);
+        let waits = group_thousands(m.orders_delayed);
         lines.push(key_value(
             "orders",
             format!("{done} carried out, delayed {waits} times by one dt"),
@@ -199,38 +215,38 @@ fn on_the_way(m: &Metrics) -> KeyValues {
     lines
 }
 
-/// Number of pairs or airplanes that a warning names.
+/// Largest number of pairs or airplanes that a warning lists.
 const MAX_NAMES: usize = 5;
 
 /// Returns the first of many in words, and the number of others; `None` without any.
 fn first_names<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
-    let mut named: Vec<String> = all.iter().take(MAX_NAMES).map(words).collect();
+    let mut names: Vec<String> = all.iter().take(MAX_NAMES).map(words).collect();
     if all.len() > MAX_NAMES {
-        named.push(format!("and {} more", group_thousands((all.len() - MAX_NAMES) as u64)));
+        names.push(format!("and {} more", group_thousands((all.len() - MAX_NAMES) as u64)));
     }
-    (!named.is_empty()).then(|| named.join(", "))
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 /// Returns the first airplanes with errors beyond the shield's bounds, and the number of others.
 fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
-    let told = first_names(all, |one| {
+    let names = first_names(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
         format!("{name} at {} s", one.at_s)
     })?;
-    Some(key_value("WARNING", format!("errors beyond the bound: {told}")))
+    Some(key_value("WARNING", format!("errors beyond the bound: {names}")))
 }
 
-/// Returns the first pairs for which the shield promises nothing, and the number of others.
+/// Returns the first pairs whose separation the shield does not guarantee, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    let told = first_names(too_close, |TooClose { at_s, airplanes, callsigns }| {
+    let names = first_names(too_close, |TooClose { at_s, airplanes, callsigns }| {
         let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
     })?;
-    Some(key_value("WARNING", format!("too close for the shield: {told}")))
+    Some(key_value("WARNING", format!("too close for the shield: {names}")))
 }
 
 fn flights(m: &Metrics) -> KeyValues {
-    let nearest = m.min_separation_m.map_or("nobody came near".into(), |d| format!("{d:.1} m"));
+    let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),
         n => format!("{}, {:.1} s in all", group_thousands(n), m.lost_s),
@@ -262,7 +278,7 @@ mod tests {
     use super::contents;
     use crate::airspace_run;
     use crate::scenario::CompiledAirspace;
-    use sidestep_kernel::{Simulation, World};
+    use sidestep_kernel::{Simulation, WorldMetrics};
     use sidestep_scenario::Source;
 
     /// Many airplanes close together.
@@ -279,10 +295,10 @@ mod tests {
         let compiled = CompiledAirspace::new(&heap("")).expect("a scenario");
         let pairs = compiled.too_close.len();
         assert!(pairs > 50, "{pairs}");
-        let told = contents(&compiled).text;
-        let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(words.matches("too close for the shield").count(), 1, "{told}");
-        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{told}");
+        let contents_text = contents(&compiled).text;
+        let words = contents_text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words.matches("too close for the shield").count(), 1, "{contents_text}");
+        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{contents_text}");
     }
 
     #[test]
@@ -309,15 +325,15 @@ mod tests {
         let head = "format = 1\nworld = \"airspace\"\ncycles = 20\n";
         let text = format!("{head}{}{}", one(0, 0), one(9000, 50));
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
-        let told = |run: &crate::AirspaceRun| {
+        let says_not_appeared = |run: &crate::AirspaceRun| {
             let lines = run.world().summary_lines(&run.metrics());
             lines.into_iter().any(|(_, words)| words.contains("1 airplane has not appeared"))
         };
         assert_eq!(run.metrics().not_appeared, 1, "the other one is there from the start");
         run.advance(10);
-        assert_eq!(run.metrics().not_appeared, 1, "it would come in with the next cycle");
-        assert!(told(&run));
+        assert_eq!(run.metrics().not_appeared, 1, "it enters with the next cycle");
+        assert!(says_not_appeared(&run));
         run.advance(1);
-        assert!(!told(&run) && run.metrics().not_appeared == 0);
+        assert!(!says_not_appeared(&run) && run.metrics().not_appeared == 0);
     }
 }

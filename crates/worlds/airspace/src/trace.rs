@@ -1,4 +1,4 @@
-//! Notes on one airplane while its group decides and flies.
+//! Records of one airplane while its group decides and flies.
 
 use crate::agents::ActionChoice;
 use crate::agents::network_traffic::NetworkTraffic;
@@ -12,72 +12,80 @@ use crate::shield::{SafeManeuver, ShieldDecision, ShieldedAircraft, Side, TurnPr
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, Slot};
 
-/// Notes for an inspection; no run makes any.
+/// Records for an inspection; no run makes any.
 #[derive(Debug, Default)]
 pub(crate) struct InspectionTrace {
     /// The airplane.
     pub(crate) slot: Slot,
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<KnownAircraft>,
-    /// Those of the group that mind no other.
-    pub(crate) intruders: Vec<NonCooperative>,
+    /// The non-cooperative ones of the group.
+    pub(crate) non_cooperative: Vec<NonCooperative>,
     /// Its knowledge of others before.
     pub(crate) contacts: TrafficPicture,
     /// The optimizer's decision for it.
     pub(crate) choice: Option<ActionChoice>,
     /// Messages of the group's optimization.
     pub(crate) optimization: NetworkTraffic,
-    /// Its actions in the order in which it wants them; none by methods that give a heading.
-    pub(crate) wishes: Vec<Action>,
-    /// The different ways of those for one `dt`.
-    pub(crate) ways: Vec<TurnProfile>,
+    /// Its actions by falling preference; none by methods that give a heading.
+    pub(crate) actions: Vec<Action>,
+    /// Their different turn profiles for one `dt`.
+    pub(crate) profiles: Vec<TurnProfile>,
     /// The shield's decision on that.
     pub(crate) decision: Option<ShieldDecision>,
     /// Its stored orbit before.
     pub(crate) aircraft: Option<ShieldedAircraft>,
-    /// The others that keep it from flying its first wish.
+    /// The others that keep it from flying its first candidate.
     pub(crate) blockers: Vec<EntityId>,
     /// Beacons by which those of the group have found each other.
     pub(crate) beacons: NetworkTraffic,
     /// Messages of the group's shield.
     pub(crate) exchange: NetworkTraffic,
-    /// The way that it flies.
+    /// The turn profile that it flies.
     pub(crate) flown: Option<TurnProfile>,
     /// Its events.
     pub(crate) events: Vec<Event>,
 }
 
 impl InspectionTrace {
-    /// Notes the knowledge, the considerations and the decisions of a group.
+    /// Records the knowledge, the considerations and the decisions of a group.
     pub(crate) fn record_decisions(
         &mut self,
         world: &AirspaceWorld,
         own: &[OwnshipState],
-        intruders: &[NonCooperative],
+        non_cooperative: &[NonCooperative],
         controls: &[Option<Control>],
         considered: &[ManeuverCandidates],
     ) {
         let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(OwnshipState::known_aircraft).collect();
-        self.intruders = intruders.to_vec();
-        let ManeuverCandidates { actions, ways, decided } = considered[me].clone();
-        (self.wishes, self.ways, self.choice) = (actions, ways, decided);
+        self.non_cooperative = non_cooperative.to_vec();
+        let candidates = considered[me].clone();
+        self.actions = candidates.actions;
+        self.profiles = candidates.profiles;
+        self.choice = candidates.decided;
         for control in controls.iter().flatten() {
             self.beacons.merge_participant(control.grouping);
             self.optimization.merge_participant(control.deciding);
             self.exchange.merge_participant(control.shielding);
         }
         if world.shield {
-            let flyers: Vec<ShieldedAircraft> =
+            let group: Vec<ShieldedAircraft> =
                 own.iter().map(|own| own.shielded_aircraft(world)).collect();
-            let wishes: Vec<&[TurnProfile]> = considered.iter().map(|one| &one.ways[..]).collect();
-            let decision = |(flyer, control): (&ShieldedAircraft, &Option<Control>)| {
-                let course = control.as_ref().map_or(&Maneuver::Orbit, |control| &control.course);
-                course.shield_decision(flyer.fallback)
+            let mut decisions = Vec::with_capacity(group.len());
+            for (aircraft, control) in group.iter().zip(controls) {
+                let maneuver = control.as_ref().map_or(&Maneuver::Orbit, |one| &one.maneuver);
+                decisions.push(maneuver.shield_decision(aircraft.fallback));
+            }
+            self.aircraft = Some(group[me].clone());
+            self.decision = Some(decisions[me]);
+            let shield = ShieldOutcome {
+                group: &group,
+                candidates: considered,
+                decisions: &decisions,
+                dtau_s: world.timing.dtau_s,
             };
-            let decisions: Vec<ShieldDecision> =
-                flyers.iter().zip(controls).map(decision).collect();
-            self.record_shield(me, &flyers, &wishes, &decisions, world.timing.dtau_s);
+            self.blockers = shield.blockers(me);
         }
     }
 
@@ -90,37 +98,60 @@ impl InspectionTrace {
     pub(crate) fn own_part<'a, T>(&self, of_all: &'a [T]) -> Option<&'a T> {
         of_all.get(self.place(self.group.iter().map(|known| known.slot))?)
     }
+}
 
-    /// Notes the shield's decision, and the others because of which it refused the first wish.
-    fn record_shield(
-        &mut self,
-        me: usize,
-        flyers: &[ShieldedAircraft],
-        wishes: &[&[TurnProfile]],
-        decisions: &[ShieldDecision],
-        dtau_s: f64,
-    ) {
-        self.aircraft = Some(flyers[me].clone());
-        self.decision = Some(decisions[me]);
-        let Some(wish) = wishes[me].first().filter(|_| decisions[me].candidate != Some(0)) else {
-            return;
+/// What the shield of a group has decided, and on what.
+struct ShieldOutcome<'a> {
+    group: &'a [ShieldedAircraft],
+    candidates: &'a [ManeuverCandidates],
+    decisions: &'a [ShieldDecision],
+    dtau_s: f64,
+}
+
+impl ShieldOutcome<'_> {
+    /// Returns the others because of which the shield refused the first candidate of an airplane.
+    fn blockers(&self, me: usize) -> Vec<EntityId> {
+        let own = &self.group[me];
+        let Some(preferred) = self.candidates[me].profiles.first() else { return Vec::new() };
+        if self.decisions[me].candidate == Some(0) {
+            return Vec::new();
+        }
+        let steps = preferred.omegas_rad_s.len();
+        let preferred = SafeManeuver::new(own.clone(), preferred, self.dtau_s, own.fallback);
+        // It gave way to the plan that another one flies, to the one that the other preferred before it gave way too,
+        // or to the orbit on which the other may always stay.
+        let flown = |k: usize| {
+            let ShieldDecision { candidate, fallback } = self.decisions[k];
+            self.plan(k, candidate, fallback, steps)
         };
-        let steps = wish.omegas_rad_s.len();
-        let fallback = |k: usize| SafeManeuver::fallback(flyers[k].clone(), steps, dtau_s);
-        let plan = |k: usize, way: Option<usize>, side: Side| match way.map(|way| &wishes[k][way]) {
-            Some(way) => SafeManeuver::new(flyers[k].clone(), way, dtau_s, side),
-            None => fallback(k),
+        let first = |k: usize| {
+            let candidate = (!self.candidates[k].profiles.is_empty()).then_some(0);
+            self.plan(k, candidate, self.group[k].fallback, steps)
         };
-        let wanted = SafeManeuver::new(flyers[me].clone(), wish, dtau_s, flyers[me].fallback);
-        let against = |other: &dyn Fn(usize) -> SafeManeuver| -> Vec<EntityId> {
-            let refuses = |k: &usize| *k != me && !wanted.is_compatible(&other(*k));
-            (0..flyers.len()).filter(refuses).map(|k| flyers[k].id).collect()
-        };
-        // It gave way to the way that another one flies, to the one that the other wanted before it gave way too, or
-        // to the orbit on which the other may always stay.
-        let flown = |k: usize| plan(k, decisions[k].candidate, decisions[k].fallback);
-        let first = |k: usize| plan(k, (!wishes[k].is_empty()).then_some(0), flyers[k].fallback);
-        let all = [against(&flown), against(&first), against(&fallback)];
-        self.blockers = all.into_iter().find(|some| !some.is_empty()).unwrap_or_default();
+        let orbit = |k: usize| SafeManeuver::fallback(self.group[k].clone(), steps, self.dtau_s);
+        let plans: [&dyn Fn(usize) -> SafeManeuver; 3] = [&flown, &first, &orbit];
+        for plan in plans {
+            let others = (0..self.group.len()).filter(|&k| k != me);
+            let blockers: Vec<EntityId> = others
+                .filter(|&k| !preferred.is_compatible(&plan(k)))
+                .map(|k| self.group[k].id)
+                .collect();
+            if !blockers.is_empty() {
+                return blockers;
+            }
+        }
+        Vec::new()
+    }
+
+    /// Returns the plan of an airplane with a candidate, or else on its stored orbit.
+    fn plan(&self, k: usize, candidate: Option<usize>, side: Side, steps: usize) -> SafeManeuver {
+        let aircraft = self.group[k].clone();
+        match candidate {
+            Some(candidate) => {
+                let profile = &self.candidates[k].profiles[candidate];
+                SafeManeuver::new(aircraft, profile, self.dtau_s, side)
+            }
+            None => SafeManeuver::fallback(aircraft, steps, self.dtau_s),
+        }
     }
 }

@@ -6,9 +6,9 @@
 //!
 //! Aircraft of BlueSky files fly their routes, and follow the commands on the way (`HDG`, `SPD`,
 //! `ALT`, `LNAV ON`, `DEL`). One without a destination flies half an hour ahead, and one that is
-//! created without a speed comes in when it gets one. A true airspeed stays as it is until the next
+//! created without a speed enters when it gets one. A true airspeed stays as it is until the next
 //! `SPD`, also in climbs. Settings are rules of the scenario or refused by name
-//! (`traffic/rules.rs`); `not_flown` counts all other commands.
+//! (`traffic/import_settings.rs`); `not_flown` counts all other commands.
 //!
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
 //! by default, they are flown anew.
@@ -32,17 +32,19 @@ const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 const BANKED_TURN_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
 /// Time in seconds for which an airplane without a destination flies ahead.
 const UNROUTED_FLIGHT_S: f64 = 1800.0;
-/// Seconds between two decisions: a route that is given no later than this counts as known at once.
+/// Seconds between two decisions, for traffic with long horizons: a route that is given no later than this after the
+/// creation counts as known at once.
 const DT_S: f64 = 10.0;
 /// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
 const ZONE: Zone = Zone { gap_m: 5.0 * NAUTICAL_MILE_M, vertical_m: 1000.0 * FOOT_M };
 
-/// Slowest speed in meters per second at which an aircraft is in the air.
+/// Smallest speed in meters per second at which an aircraft counts as in the air.
 const MIN_SPEED_M_S: f64 = 1.0;
 
-/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a place and a speed.
+/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
-    let (traffic, rules) = (&file.traffic, &bluesky_settings(name, file));
+    let traffic = &file.traffic;
+    let rules = &bluesky_settings(name, file);
     let aircraft: Vec<MovingAircraft> =
         traffic.aircraft.iter().filter_map(moving_aircraft).collect();
     let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
@@ -58,12 +60,12 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     Some(text)
 }
 
-/// Returns the rules of a BlueSky file, which `place` names in errors, and all aircraft that cannot
+/// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
 /// fly among them.
 pub(crate) fn bluesky_settings(place: &str, file: &ScnFile) -> ImportSettings {
     let mut rules = import_settings(place, file, DT_S);
-    let stands = |one: &&ScnAircraft| moving_aircraft(one).is_none();
-    for ScnAircraft { id, .. } in file.traffic.aircraft.iter().filter(stands) {
+    let never_moving = file.traffic.aircraft.iter().filter(|one| moving_aircraft(one).is_none());
+    for ScnAircraft { id, .. } in never_moving {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
         let error =
             InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
@@ -77,30 +79,32 @@ pub(crate) fn bluesky_settings(place: &str, file: &ScnFile) -> ImportSettings {
 struct MovingAircraft(ScnAircraft);
 
 impl MovingAircraft {
-    /// Returns the least speed that it has or is given.
+    /// Returns the smallest speed that it has or is given.
     fn min_speed_m_s(&self) -> f64 {
-        let told = change_commands(&self.0, false).into_iter().filter_map(|(_, told)| match told {
-            FlightCommand::Speed(v_m_s) => Some(v_m_s),
-            _ => None,
-        });
-        told.fold(self.0.speed.true_airspeed_mps(self.0.altitude_ft), f64::min)
+        let mut min_m_s = self.0.speed.true_airspeed_mps(self.0.altitude_ft);
+        for (_, command) in change_commands(&self.0, false) {
+            if let FlightCommand::Speed(v_m_s) = command {
+                min_m_s = min_m_s.min(v_m_s);
+            }
+        }
+        min_m_s
     }
 }
 
-/// Returns an aircraft as it is when it gets a speed: at its creation, or later, after which its
-/// heading and level are those told until then. `None` for one that never gets a speed.
+/// Returns an aircraft as it is when it gets a speed: at its creation, or later, then with the
+/// heading and level that it was given until then. `None` for one that never gets a speed.
 fn moving_aircraft(aircraft: &ScnAircraft) -> Option<MovingAircraft> {
     let mut one = aircraft.clone();
-    let moves = |speed: Airspeed, at_ft: f64| speed.true_airspeed_mps(at_ft) >= MIN_SPEED_M_S;
-    if moves(one.speed, one.altitude_ft) {
+    if is_flying_speed(one.speed, one.altitude_ft) {
         return Some(MovingAircraft(one));
     }
     for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
         match change {
             AircraftCommand::HeadingDeg(deg) => one.heading_deg = deg,
             AircraftCommand::AltitudeFt(ft) => one.altitude_ft = ft,
-            AircraftCommand::Speed(speed) if moves(speed, one.altitude_ft) => {
-                (one.speed, one.created_s) = (speed, at_s);
+            AircraftCommand::Speed(speed) if is_flying_speed(speed, one.altitude_ft) => {
+                one.speed = speed;
+                one.created_s = at_s;
                 one.changes.drain(..=k);
                 return one
                     .deleted_s
@@ -113,7 +117,11 @@ fn moving_aircraft(aircraft: &ScnAircraft) -> Option<MovingAircraft> {
     None
 }
 
-/// Returns the place of the plane's origin on earth, as a scenario writes it.
+fn is_flying_speed(speed: Airspeed, altitude_ft: f64) -> bool {
+    speed.true_airspeed_mps(altitude_ft) >= MIN_SPEED_M_S
+}
+
+/// Returns the position of the plane's origin on earth, as a scenario writes it.
 fn origin(plane: &LocalPlane) -> String {
     let LatLon { lat_deg, lon_deg } = plane.center();
     format!("origin_deg = {:?}\n", [lat_deg, lon_deg])
@@ -122,10 +130,10 @@ fn origin(plane: &LocalPlane) -> String {
 /// Returns a call sign as a line of the scenario; none where it would not be one.
 fn callsign(name: &str) -> String {
     let name: String = name.trim().chars().filter(|c| !c.is_control()).take(40).collect();
-    match name.is_empty() {
-        true => String::new(),
-        false => format!("callsign = {}\n", toml::Value::from(name)),
+    if name.is_empty() {
+        return String::new();
     }
+    format!("callsign = {}\n", toml::Value::from(name))
 }
 
 /// Returns the settings of a scenario that follow from rules.
@@ -160,13 +168,14 @@ pub(crate) fn omitted_commands(file: &ScnFile) -> BTreeMap<String, u64> {
         let points = &aircraft.way_points;
         count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());
         count("ADDWPT speed", points.iter().filter(|p| p.speed.is_some()).count());
-        let told = |is: fn(&AircraftCommand) -> bool| {
-            aircraft.changes.iter().filter(|(_, c)| is(c)).count()
+        let given = |is: fn(&AircraftCommand) -> bool| {
+            aircraft.changes.iter().filter(|(_, command)| is(command)).count()
         };
-        count("VNAV", told(|c| matches!(c, AircraftCommand::VerticalNavigation(_))));
-        count("LNAV OFF", told(|c| matches!(c, AircraftCommand::LateralNavigation(false))));
-        if told(|c| matches!(c, AircraftCommand::AltitudeFt(_))) == 0 {
-            count("VS", told(|c| matches!(c, AircraftCommand::VerticalSpeedFpm(_))));
+        count("VNAV", given(|c| matches!(c, AircraftCommand::VerticalNavigation(_))));
+        count("LNAV OFF", given(|c| matches!(c, AircraftCommand::LateralNavigation(false))));
+        // Without a change of level, a vertical speed has no effect.
+        if given(|c| matches!(c, AircraftCommand::AltitudeFt(_))) == 0 {
+            count("VS", given(|c| matches!(c, AircraftCommand::VerticalSpeedFpm(_))));
         }
     }
     counts
@@ -206,19 +215,21 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
         aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
     let orders = flight_commands(aircraft, !way_points_m.is_empty());
     if way_points_m.is_empty() {
-        let (heading_rad, ahead_m) = (heading_deg.to_radians(), UNROUTED_FLIGHT_S * v_m_s);
+        let heading_rad = heading_deg.to_radians();
+        let ahead_m = UNROUTED_FLIGHT_S * v_m_s;
         let goal = [
             at_m[0] + ahead_m * math::cos(heading_rad),
             at_m[1] + ahead_m * math::sin(heading_rad),
         ];
         way_points_m.push(goal);
     }
-    let told_m_s = orders.iter().filter_map(|(_, told)| match told {
+    let ordered_m_s = orders.iter().filter_map(|(_, command)| match command {
         FlightCommand::Speed(v_m_s) => Some(*v_m_s),
         _ => None,
     });
-    let omega_deg_s = banked_turn_deg_s(told_m_s.fold(v_m_s, f64::max));
-    let (altitude_m, appears_s) = (aircraft.altitude_ft * FOOT_M, aircraft.created_s);
+    let omega_deg_s = banked_turn_deg_s(ordered_m_s.fold(v_m_s, f64::max));
+    let altitude_m = aircraft.altitude_ft * FOOT_M;
+    let appears_s = aircraft.created_s;
     // Writing to a string cannot fail.
     let _ = write!(
         text,
@@ -231,13 +242,13 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
         return;
     }
     text.push_str("orders = [\n");
-    for (at_s, told) in orders {
-        let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", told.text());
+    for (at_s, command) in orders {
+        let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", command.text());
     }
     text.push_str("]\n");
 }
 
-/// Returns the commands to an aircraft on its way, by rising time.
+/// Returns the commands to an aircraft in flight, by rising time.
 fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
     let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
     let mut routed_s: Vec<f64> = route_times_s(aircraft);
@@ -251,7 +262,7 @@ fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightC
     orders.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut keeps_heading = false;
     // Proceeding changes nothing for an airplane that is already doing so.
-    orders.retain(|(_, told)| match told {
+    orders.retain(|(_, command)| match command {
         FlightCommand::Heading(_) => {
             keeps_heading = true;
             true
@@ -279,59 +290,62 @@ fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
 }
 
 fn change_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
-    let (mut altitude_ft, mut climb_m_s) = (aircraft.altitude_ft, CLIMB_M_S);
-    let mut told: Vec<(f64, FlightCommand)> = Vec::new();
+    let mut altitude_ft = aircraft.altitude_ft;
+    let mut climb_m_s = CLIMB_M_S;
+    let mut commands: Vec<(f64, FlightCommand)> = Vec::new();
     for &(at_s, change) in &aircraft.changes {
         match change {
             AircraftCommand::HeadingDeg(deg) => {
-                told.push((at_s, FlightCommand::Heading(90.0 - deg)))
+                commands.push((at_s, FlightCommand::Heading(90.0 - deg)))
             }
             AircraftCommand::Speed(speed) => {
                 let v_m_s = speed.true_airspeed_mps(altitude_ft).max(MIN_SPEED_M_S);
-                told.push((at_s, FlightCommand::Speed(v_m_s)));
+                commands.push((at_s, FlightCommand::Speed(v_m_s)));
             }
             AircraftCommand::AltitudeFt(to_ft) => {
                 altitude_ft = to_ft;
-                told.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
+                commands.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
             }
             AircraftCommand::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
                 climb_m_s = fpm.abs() * FOOT_M / 60.0;
                 // A rate after an `ALT` of the same time belongs to that command.
-                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = told.last_mut()
+                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = commands.last_mut()
                     && *last_s == at_s
                 {
                     *rate_m_s = climb_m_s;
                 }
             }
             AircraftCommand::LateralNavigation(true) if has_route => {
-                told.push((at_s, FlightCommand::Proceed))
+                commands.push((at_s, FlightCommand::Proceed))
             }
             _ => {}
         }
     }
-    told
+    commands
 }
 
 /// Returns the scenario of recorded tracks, which replays them. `None` without any track.
 pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
     let plane = LocalPlane::from_positions(samples().map(|s| s.position))?;
-    let begins_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
+    let start_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
-    let more = format!("{replay}start_utc_s = {begins_s:?}\n{}", origin(&plane));
+    let more = format!("{replay}start_utc_s = {start_s:?}\n{}", origin(&plane));
     let mut text = header_text(name, ZONE, None, &more);
-    let tracks = || traffic.tracks.iter().filter(|track| has_length(track));
-    tracks().for_each(|track| write_track(&mut text, track, &plane, begins_s));
-    tracks().next().map(|_| text)
+    let tracks: Vec<&Track> = traffic.tracks.iter().filter(|track| has_length(track)).collect();
+    for track in &tracks {
+        write_track(&mut text, track, &plane, start_s);
+    }
+    (!tracks.is_empty()).then_some(text)
 }
 
-/// Returns whether a track has the two samples that a way needs at least.
+/// Returns whether a track has the two samples that it needs at least to lead anywhere.
 pub fn has_length(track: &Track) -> bool {
     track.samples.len() >= 2
 }
 
-fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f64) {
+fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, start_s: f64) {
     let speed_kt =
         track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / track.samples.len() as f64;
     let omega_deg_s = banked_turn_deg_s((speed_kt * KNOT_M_S).max(1.0));
@@ -345,7 +359,8 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
     );
     for sample in &track.samples {
         let [x, y] = plane.to_plane_m(sample.position);
-        let (t_s, altitude_m) = (sample.time_s - begins_s, sample.altitude_ft * FOOT_M);
+        let t_s = sample.time_s - start_s;
+        let altitude_m = sample.altitude_ft * FOOT_M;
         let _ = writeln!(text, "  [{t_s:?}, {x:?}, {y:?}, {altitude_m:?}],");
     }
     text.push_str("]\n");
@@ -397,8 +412,8 @@ mod tests {
     fn compiled(commands: &str) -> CompiledAirspace {
         let line = |command: &str| format!("00:00:00.00>{command}\n");
         let text: String = commands.lines().map(line).collect();
-        let text = from_bluesky("told", &parse(&"told.scn", &text)).expect("it has aircraft");
-        CompiledAirspace::new(&Source::new("told", text, "")).expect("a scenario")
+        let text = from_bluesky("bluesky", &parse(&"bluesky.scn", &text)).expect("it has aircraft");
+        CompiledAirspace::new(&Source::new("bluesky", text, "")).expect("a scenario")
     }
 
     #[test]
@@ -414,8 +429,11 @@ mod tests {
             let compiled = compiled(&format!("{flights}{settings}"));
             assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
             assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
-            let told = crate::text::contents(&compiled).text;
-            assert!(told.contains(&format!("decides every 10 s, looks {s} s ahead")), "{told}");
+            let contents = crate::text::contents(&compiled).text;
+            assert!(
+                contents.contains(&format!("decides every 10 s, looks {s} s ahead")),
+                "{contents}"
+            );
         }
         // MVP that is chosen by `--set` instead of the file looks as far.
         assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
@@ -450,8 +468,8 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
         let compiled = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario");
-        let told = crate::text::contents(&compiled).text;
-        assert!(told.contains("looks 45 s ahead"), "{told}");
+        let contents = crate::text::contents(&compiled).text;
+        assert!(contents.contains("looks 45 s ahead"), "{contents}");
     }
 
     #[test]

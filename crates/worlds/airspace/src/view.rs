@@ -1,7 +1,7 @@
 //! The visible part of an airspace: airplanes, the zones around them, their starts and goals.
 
 use super::events::{Event, EventKind};
-use super::flight::{Airplane, Point, distance_m};
+use super::flight::{Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
@@ -10,49 +10,50 @@ use sidestep_kernel::view::{
 };
 use sidestep_kernel::{Cycle, Slot};
 
-/// Length of a drawn airplane, as a part of its zone's radius: large enough to be seen, and small
+/// Length of a drawn airplane, as a fraction of its zone's radius: large enough to be seen, and small
 /// enough that airplanes with touching zones are drawn apart.
 const LENGTH_FRACTION: f64 = 0.6;
-/// Width of a drawn airplane, as a part of its length.
+/// Width of a drawn airplane, as a fraction of its length.
 const WIDTH_FRACTION: f64 = 0.7;
-/// Height of a zone, as a part of its radius.
+/// Height of a zone, as a fraction of its radius: a flat disc hides little.
 const ZONE_HEIGHT_FRACTION: f64 = 0.02;
-/// Radius of a goal, as a part of the zone's radius.
+/// Radius of a goal, as a fraction of the zone's radius.
 const GOAL_FRACTION: f64 = 0.15;
 
 /// Returns the starts of airplanes, as wide as their zones, and their last way-points.
 pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
-    let start = |(id, airplane): (u32, &Airplane)| {
-        let ([x_m, y_m], radius_m) = (airplane.start.at, zone_radius_m(world, id));
-        let disc = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m };
-        Body::new(BodyKind::Start, id, Pose::from_position([x_m, y_m, airplane.altitude_m]), disc)
-    };
-    let goal = |(id, airplane): (u32, &Airplane)| {
-        let at = airplane.mission.last()?;
-        let radius_m = GOAL_FRACTION * zone_radius_m(world, id);
-        let pose = Pose::from_position([at[0], at[1], airplane.altitude_m]);
-        Some(Body::new(BodyKind::Goal, id, pose, Shape::Sphere { radius_m }))
-    };
-    let starts = (0..).zip(world.airplanes.iter()).map(start);
+    let mut bodies = Vec::new();
+    for (id, airplane) in (0..).zip(world.airplanes.iter()) {
+        let [x_m, y_m] = airplane.start.at;
+        let pose = Pose::from_position([x_m, y_m, airplane.altitude_m]);
+        bodies.push(Body::new(BodyKind::Start, id, pose, zone_shape(world, id)));
+    }
+    for (id, airplane) in (0..).zip(world.airplanes.iter()) {
+        if let Some([x_m, y_m]) = airplane.mission.last() {
+            let pose = Pose::from_position([*x_m, *y_m, airplane.altitude_m]);
+            let radius_m = GOAL_FRACTION * zone_radius_m(world, id);
+            bodies.push(Body::new(BodyKind::Goal, id, pose, Shape::Sphere { radius_m }));
+        }
+    }
     Scenery {
         name: name.into(),
         dimensions: if is_level(world) { 2 } else { 3 },
         cycle_s: world.timing.dt_s,
         floor: None,
-        bodies: starts.chain((0..).zip(world.airplanes.iter()).filter_map(goal)).collect(),
+        bodies,
         names: names(world),
     }
 }
 
 /// Returns the call signs.
 fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
-    let named = |(id, airplane): (u32, &Airplane)| {
-        Some((BodyKind::Airplane, id, airplane.callsign.clone()?))
-    };
-    (0..).zip(world.airplanes.iter()).filter_map(named).collect()
+    (0..)
+        .zip(world.airplanes.iter())
+        .filter_map(|(id, airplane)| Some((BodyKind::Airplane, id, airplane.callsign.clone()?)))
+        .collect()
 }
 
-/// Returns how recorded poses give the places of airplanes.
+/// Returns the columns of recorded tables that give the positions of airplanes.
 pub(super) fn position_columns() -> Vec<PositionColumns> {
     vec![PositionColumns {
         table: "trajectories",
@@ -82,6 +83,12 @@ fn zone_radius_m(world: &AirspaceWorld, slot: Slot) -> f64 {
     0.5 * world.airplanes[slot as usize].model.separation_m
 }
 
+/// Returns the disc that stands for an airplane's zone.
+fn zone_shape(world: &AirspaceWorld, slot: Slot) -> Shape {
+    let radius_m = zone_radius_m(world, slot);
+    Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m }
+}
+
 /// Returns the airplanes that are in the air, each followed by its zone.
 pub(super) fn visible_bodies(
     world: &AirspaceWorld,
@@ -89,9 +96,9 @@ pub(super) fn visible_bodies(
     now: Cycle,
 ) -> Vec<Body> {
     let ids = 0..world.airplanes.len() as Slot;
-    let there: Vec<Slot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
-    let too_near = too_close(world, state, &there);
-    there.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
+    let active: Vec<Slot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
+    let too_near = too_close(world, state, &active);
+    active.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
 }
 
 fn airplane_and_zone(
@@ -100,27 +107,28 @@ fn airplane_and_zone(
     id: Slot,
     too_near: &[Slot],
 ) -> [Body; 2] {
-    let cell = &state.airplanes[id as usize];
-    let ([x_m, y_m], radius_m) = (cell.pose().at, zone_radius_m(world, id));
-    let pose = Pose::from_heading([x_m, y_m, cell.altitude_m.get()], cell.pose().heading_rad);
-    let length_m = LENGTH_FRACTION * radius_m;
+    let current = &state.airplanes[id as usize];
+    let [x_m, y_m] = current.pose().at;
+    let pose = Pose::from_heading([x_m, y_m, current.altitude_m.get()], current.pose().heading_rad);
+    let length_m = LENGTH_FRACTION * zone_radius_m(world, id);
     let dart = Shape::Dart { length_m, width_m: WIDTH_FRACTION * length_m };
-    let zone = Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m };
-    let bodies =
-        [Body::new(BodyKind::Airplane, id, pose, dart), Body::new(BodyKind::Zone, id, pose, zone)];
+    let bodies = [
+        Body::new(BodyKind::Airplane, id, pose, dart),
+        Body::new(BodyKind::Zone, id, pose, zone_shape(world, id)),
+    ];
     bodies.map(|body| body.with_state_if(too_near.binary_search(&id).is_ok(), Condition::Touching))
 }
 
 /// Returns the airplanes that are nearer to another than allowed, by id.
-fn too_close(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Vec<Slot> {
+fn too_close(world: &AirspaceWorld, state: &AirspaceState, active: &[Slot]) -> Vec<Slot> {
     let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
-    let widest_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
+    let max_gap_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
     // Sorted from west to east, so that only neighbors have to be compared.
-    let mut by_x: Vec<(Point, Slot)> = there.iter().map(|&slot| (at(slot), slot)).collect();
+    let mut by_x: Vec<(Point, Slot)> = active.iter().map(|&slot| (at(slot), slot)).collect();
     by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
     let mut near = Vec::new();
     for (k, &(p, a)) in by_x.iter().enumerate() {
-        let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < widest_m);
+        let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < max_gap_m);
         for &(q, b) in candidates {
             let gap_m = 2.0 * zone_radius_m(world, a).max(zone_radius_m(world, b));
             if distance_m(p, q) < gap_m && are_on_one_level(world, state, a, b) {
@@ -134,13 +142,15 @@ fn too_close(world: &AirspaceWorld, state: &AirspaceState, there: &[Slot]) -> Ve
 }
 
 fn are_on_one_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> bool {
-    let altitude_m = |slot: Slot| state.airplanes[slot as usize].altitude_m.get();
-    (altitude_m(a) - altitude_m(b)).abs() < world.vertical_m
+    let altitude_a_m = state.airplanes[a as usize].altitude_m.get();
+    let altitude_b_m = state.airplanes[b as usize].altitude_m.get();
+    (altitude_a_m - altitude_b_m).abs() < world.vertical_m
 }
 
 /// Returns an event in words.
 pub(super) fn log_event(event: &Event) -> LogEvent {
-    let (value, other) = (event.value, event.other);
+    let value = event.value;
+    let other = event.other;
     let (level, words) = match event.kind {
         EventKind::LossOfSeparation => {
             (Severity::Error, format!("loses separation from airplane/{other} at {value:.1} m"))

@@ -4,65 +4,20 @@ mod solo_flight;
 #[cfg(test)]
 mod tests;
 
-use super::baseline::ReactiveSettings;
-use super::deploy::Deployment;
 use super::flight::{
     Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
     SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, Objective};
+use super::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
 use super::shield::{ErrorBounds, Side, common_rates};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
-
-/// The methods by which airplanes choose their actions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Probability collectives.
-    #[default]
-    Pc,
-    /// Optimal reciprocal collision avoidance.
-    Orca,
-    /// Modified voltage potential.
-    Mvp,
-    /// Straight to the way-point, without regard to others.
-    None,
-    /// Follows the orders of a caller of the library; without them, its flight plan.
-    External,
-}
-
-impl Method {
-    /// The methods by which airplanes decide themselves.
-    pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
-
-    /// Returns its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pc => "pc",
-            Self::Orca => "orca",
-            Self::Mvp => "mvp",
-            Self::None => "none",
-            Self::External => "external",
-        }
-    }
-}
-
-/// Random errors that the optimizer does not know of.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Disturbance {
-    /// Standard deviation of known positions, per coordinate, in meters.
-    pub position_m: f64,
-    /// Standard deviation of the unwanted change of heading per `dt`, in radians.
-    pub heading_rad: f64,
-}
 
 /// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
@@ -89,7 +44,7 @@ pub struct AirspaceWorld {
     pub orca: ReactiveSettings,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
-    /// The way in which its agents learn their groups.
+    /// How its agents learn their groups.
     pub groups: Grouping,
     /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
@@ -97,14 +52,14 @@ pub struct AirspaceWorld {
     pub group_bytes: u64,
     /// Whether the shield filters decisions.
     pub shield: bool,
-    /// Airplanes at least this many meters above each other need not mind each other. It is
+    /// Airplanes at least this many meters above each other need not avoid each other. It is
     /// slightly less than the scenario asks for, so that levels in feet are apart when they are
     /// nominally so.
     pub vertical_m: f64,
     /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
     /// them.
     pub replay_cycles: Cycle,
-    /// Latitude and longitude of the origin, in degrees, where traffic has a place on earth.
+    /// Latitude and longitude of the origin, in degrees, where traffic has a position on earth.
     pub origin_deg: Option<Point>,
     /// Time of the start, in seconds since 1970, UTC, where traffic has a date.
     pub start_utc_s: Option<f64>,
@@ -133,17 +88,6 @@ pub struct AirspaceWorld {
     pub(crate) teams: Arc<Teams>,
 }
 
-/// The way in which airplanes learn their groups.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Grouping {
-    /// Groups are announced, by an observer that sees all.
-    #[default]
-    Announced,
-    /// Airplanes find their groups from beacons of those near them.
-    Heard,
-}
-
 impl AirspaceWorld {
     /// Returns the call sign of an airplane, if it has one.
     pub(crate) fn callsign(&self, id: EntityId) -> Option<String> {
@@ -169,38 +113,43 @@ impl AirspaceWorld {
             self.actions = Arc::clone(&known.actions);
             self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
             self.top_m_s = Arc::clone(&known.top_m_s);
-            self.teams = Arc::clone(&known.teams);
         } else {
-            let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
-            self.actions = Arc::new(self.airplanes.iter().map(of).collect());
+            self.actions = Arc::new(
+                self.airplanes
+                    .iter()
+                    .map(|a| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs))
+                    .collect(),
+            );
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.per_airplane(Self::max_speed_m_s));
-            self.teams = Arc::new(self.find_teams());
         }
         self.alone_s = Arc::new(self.per_airplane(Self::solo_s));
         self
     }
 
     /// Returns a number of each airplane.
-    fn per_airplane(&self, of: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
-        (0..self.airplanes.len()).map(|i| of(self, i)).collect()
+    fn per_airplane(&self, number: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
+        (0..self.airplanes.len()).map(|i| number(self, i)).collect()
     }
 
     /// Returns the turn rates at which airplanes orbit under the shield.
     fn orbits_rad_s(&self) -> Vec<f64> {
-        let largest = |airplane: &Airplane| {
-            let held = self.bounds.max_orbit_rate_rad_s(&airplane.model, self.timing.dt_s);
-            held.filter(|_| self.shield).unwrap_or(airplane.model.omega_max_rad_s)
-        };
-        let mut rates: Vec<f64> = self.airplanes.iter().map(largest).collect();
-        let orbits = |&i: &usize| self.shield && self.is_controlled(i);
-        let orbiting: Vec<usize> = (0..rates.len()).filter(orbits).collect();
-        let largest: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
-        orbiting.iter().zip(common_rates(&largest)).for_each(|(&i, rate)| rates[i] = rate);
+        let mut rates: Vec<f64> = Vec::with_capacity(self.airplanes.len());
+        for Airplane { model, .. } in &*self.airplanes {
+            let max_rad_s = self.bounds.max_orbit_rate_rad_s(model, self.timing.dt_s);
+            rates.push(max_rad_s.filter(|_| self.shield).unwrap_or(model.omega_max_rad_s));
+        }
+        // Only airplanes that may come to orbit have to share a rate.
+        let orbiting: Vec<usize> =
+            (0..rates.len()).filter(|&i| self.shield && self.is_controlled(i)).collect();
+        let max_rates: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
+        for (&i, rate) in orbiting.iter().zip(common_rates(&max_rates)) {
+            rates[i] = rate;
+        }
         rates
     }
 
-    /// Returns how far an airplane may be from where its plans are seen, in meters.
+    /// Returns how far an airplane may be from its plans as they are seen, in meters.
     pub(crate) fn error_m(&self, i: usize) -> f64 {
         self.bounds.error_m(self.top_m_s[i], self.timing.dt_s)
     }
@@ -208,11 +157,11 @@ impl AirspaceWorld {
     fn max_speed_m_s(&self, i: usize) -> f64 {
         let airplane = &self.airplanes[i];
         let recorded = airplane.track.as_ref().map_or(0.0, Track::max_speed_m_s);
-        let told = airplane.orders.iter().filter_map(|order| match order.task {
+        let ordered = airplane.orders.iter().filter_map(|order| match order.task {
             FlightTask::Speed(v_m_s) => Some(v_m_s),
             _ => None,
         });
-        told.fold(airplane.model.v_m_s.max(recorded), f64::max)
+        ordered.fold(airplane.model.v_m_s.max(recorded), f64::max)
     }
 
     /// Returns the properties of the air, which are the same for all airplanes.
@@ -230,7 +179,7 @@ impl AirspaceWorld {
         }
     }
 
-    /// Returns whether an airplane's radio is dead in a cycle.
+    /// Returns whether an airplane's radio is off in a cycle.
     pub(crate) fn is_silent(&self, id: EntityId, cycle: Cycle) -> bool {
         self.network
             .as_ref()
@@ -247,57 +196,61 @@ impl AirspaceWorld {
         now as f64 * self.timing.dt_s
     }
 
-    /// Returns the cycle in which an airplane appears: at its start, or within it on a recorded
-    /// way.
+    /// Returns the cycle in which an airplane appears: at the start of the cycle, or within it on a recorded track.
     pub fn first_cycle(&self, i: usize) -> Cycle {
         let airplane = &self.airplanes[i];
         let cycles = airplane.appears_s / self.timing.dt_s;
         let is_on_track = airplane.track.is_some()
-            && (airplane.is_intruder || (cycles.floor() as Cycle) < self.replay_cycles);
-        (if is_on_track { cycles.floor() } else { cycles.ceil() }) as Cycle
+            && (airplane.is_non_cooperative || (cycles.floor() as Cycle) < self.replay_cycles);
+        if is_on_track { cycles.floor() as Cycle } else { cycles.ceil() as Cycle }
     }
 
     /// Returns the cycle from which the method flies an airplane.
     pub fn first_controlled_cycle(&self, i: usize) -> Cycle {
         let recorded = match &self.airplanes[i] {
             Airplane { track: None, .. } => 0,
-            Airplane { is_intruder: true, .. } => Cycle::MAX,
+            Airplane { is_non_cooperative: true, .. } => Cycle::MAX,
             _ => self.replay_cycles,
         };
         self.first_cycle(i).max(recorded)
     }
 
-    /// Returns whether an airplane minds no other in a cycle: it was recorded, or the scenario says
-    /// so. All that the method flies mind it.
+    /// Returns whether an airplane is non-cooperative in a cycle: it follows its track, or the scenario says so.
+    /// It avoids nobody, and all that the method flies avoid it.
     pub fn is_non_cooperative(&self, slot: Slot, now: Cycle) -> bool {
-        self.airplanes[slot as usize].is_intruder || self.is_replayed(slot, now)
+        self.airplanes[slot as usize].is_non_cooperative || self.is_replayed(slot, now)
     }
 
-    /// Returns whether the method ever flies an airplane, unless its recorded way ends before.
+    /// Returns whether the method ever flies an airplane, unless its track ends before.
     pub(crate) fn is_controlled(&self, i: usize) -> bool {
-        // An airplane that never minds any other never decides, and never orbits.
+        // An airplane that is never cooperative never decides, and never orbits.
         !self.is_non_cooperative(i as Slot, Cycle::MAX - 1)
     }
 
-    /// Returns whether an airplane follows its recorded way in a cycle.
+    /// Returns whether an airplane follows its track in a cycle.
     pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
         self.airplanes[slot as usize].track.is_some()
             && now < self.first_controlled_cycle(slot as usize)
     }
 
-    /// Returns the distance in meters up to which two airplanes have to mind each other, because
+    /// Returns the distance in meters up to which two airplanes have to avoid each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
     pub fn interaction_range_m(&self, a: usize, b: usize) -> f64 {
-        let ReactiveSettings { look_ahead_s, margin } = self.reactive_settings();
-        let reach = |i: usize| {
-            let v_m_s = self.top_m_s[i];
-            let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
-            // Places are seen with an error, too.
-            (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
-        };
-        let separation_m = |i: usize| self.airplanes[i].model.separation_m;
-        let gap_m = separation_m(a).max(separation_m(b)) * margin.max(1.0);
-        reach(a) + reach(b) + gap_m + 1.0
+        let separation_a_m = self.airplanes[a].model.separation_m;
+        let separation_b_m = self.airplanes[b].model.separation_m;
+        let gap_m = separation_a_m.max(separation_b_m) * self.reactive_settings().margin.max(1.0);
+        // A meter for all that is rounded.
+        self.reach_m(a) + self.reach_m(b) + gap_m + 1.0
+    }
+
+    /// Returns how far from where it is seen an airplane may get within the horizon, or on an orbit after the next
+    /// `dt`, in meters.
+    fn reach_m(&self, i: usize) -> f64 {
+        let v_m_s = self.top_m_s[i];
+        let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
+        let look_ahead_s = self.reactive_settings().look_ahead_s;
+        // Positions are seen with an error, too.
+        (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
     }
 
     /// Returns how far the method looks ahead, and how much separation it asks for.
@@ -332,7 +285,8 @@ impl AirspaceWorld {
         next: usize,
         now_s: f64,
     ) -> (u32, usize) {
-        let (mut orders, mut next) = (orders, next);
+        let mut orders = orders;
+        let mut next = next;
         while self.airplanes[slot].due_order(orders as usize, now_s).is_some() {
             next = self.later[slot][orders as usize].next.map_or(next, |next| next as usize);
             orders += 1;
@@ -350,17 +304,17 @@ impl AirspaceWorld {
         Levels::between(known.altitude_m, self.segment(known.slot, known.orders).altitude_m)
     }
 
-    /// Returns where each action would lead an airplane, and the cost of that beside intruders.
+    /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft.
     pub(crate) fn action_predictions(
         &self,
         known: KnownAircraft,
-        intruders: &[NonCooperative],
+        non_cooperative: &[NonCooperative],
     ) -> ActionPredictions {
         let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.actions(known.slot);
         let predictions = self.air().predictions(model, actions, mission, known.pose, known.next);
         ActionPredictions::new(predictions, model.separation_m, self.levels(known))
-            .with_non_cooperative(intruders, &self.objective, self.timing.dtau_s)
+            .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
     }
 
     /// Returns the largest number of samples that one optimization may draw from an airplane's

@@ -5,9 +5,10 @@ use super::events::Event;
 use super::metrics::{self, Counters, Metrics};
 use super::rows::{FlownLeg, Rows};
 use super::scenario::CompiledAirspace;
+use super::scratch::Scratch;
 use super::state::{AirspaceState, Snapshot};
 use super::world::AirspaceWorld;
-use super::{Scratch, text, view};
+use super::{text, view};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
@@ -16,7 +17,10 @@ use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
 };
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_kernel::{
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
@@ -36,12 +40,13 @@ impl CompiledAirspace {
     /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
         let state = AirspaceState::restore(&self.world, &self.start_snapshot());
-        let mut ledger = Counters::default();
-        self.too_close.iter().for_each(|&pair| ledger.add_too_close(0, pair));
-        let books =
-            Collector { counters: ledger, rows: Rows::new(self.record), ..Collector::default() };
+        let mut counters = Counters::default();
+        self.too_close.iter().for_each(|&pair| counters.add_too_close(0, pair));
+        let collector =
+            Collector { counters, rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, state, books, &source.text, workers)
+        let start = RunStart { config: plan, state, collector };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.
@@ -84,100 +89,115 @@ impl World for AirspaceWorld {
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
-    type Snapshot = (Snapshot, Counters);
-    type Metrics = Metrics;
 
     fn agents(&self) -> usize {
         self.airplanes.len()
     }
 
-    fn cycles_until_flush(&self, _: &AirspaceState, books: &Collector, _: Cycle) -> u64 {
-        if books.rows.is_full() { 0 } else { u64::MAX }
+    fn cycles_until_flush(&self, _: &AirspaceState, collector: &Collector, _: Cycle) -> u64 {
+        if collector.rows.is_full() { 0 } else { u64::MAX }
     }
 
     fn is_over(&self, state: &AirspaceState) -> bool {
         metrics::have_all_ended(state)
     }
 
-    fn collect(&self, books: &mut Collector, scratch: &mut Scratch) {
-        let ledger = &mut books.counters;
+    fn collect(&self, collector: &mut Collector, scratch: &mut Scratch) {
+        let counters = &mut collector.counters;
         for (pair, record) in std::mem::take(&mut scratch.pairs) {
-            ledger.add_pair(pair, record);
+            counters.add_pair(pair, record);
         }
-        ledger.effort.beacons.add(std::mem::take(&mut scratch.grouped));
-        ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
+        counters.effort.beacons.add(std::mem::take(&mut scratch.grouped));
+        counters.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
         for (now, a, b) in std::mem::take(&mut scratch.too_close) {
-            ledger.add_too_close(now, (a, b));
+            counters.add_too_close(now, (a, b));
         }
-        books.decide_ns += std::mem::take(&mut scratch.decide_ns);
-        books.pending.events.append(&mut scratch.events);
-        books.pending.optimizations.append(&mut scratch.optimizations);
-        books.pending.flown.append(&mut scratch.flown);
+        collector.decide_ns += std::mem::take(&mut scratch.decide_ns);
+        collector.pending.events.append(&mut scratch.events);
+        collector.pending.optimizations.append(&mut scratch.optimizations);
+        collector.pending.flown.append(&mut scratch.flown);
     }
 
-    fn commit(&self, books: &mut Collector) {
+    fn commit(&self, collector: &mut Collector) {
         let PendingRows { mut events, mut optimizations, mut flown } =
-            std::mem::take(&mut books.pending);
+            std::mem::take(&mut collector.pending);
         // Stable, because a pair may lose separation more than once in a cycle.
         events.sort_by_key(Event::key);
         optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
         // Stable, because an airplane may fly several legs in a cycle.
         flown.sort_by_key(FlownLeg::key);
-        flown.into_iter().for_each(|leg| books.rows.push_leg(leg));
+        flown.into_iter().for_each(|leg| collector.rows.push_leg(leg));
         for event in events {
-            books.counters.add_event(&event);
-            books.log.push(event);
-            books.rows.push_event(event);
+            collector.counters.add_event(&event);
+            collector.log.push(event);
+            collector.rows.push_event(event);
         }
         for optimization in optimizations {
-            books.counters.effort.add(&optimization);
-            books.rows.push_optimization(optimization);
+            collector.counters.effort.add(&optimization);
+            collector.rows.push_optimization(optimization);
         }
     }
+}
 
-    fn start_recording(&self, _: &mut AirspaceState, books: &mut Collector, _: Cycle) {
-        books.rows.start(self);
+impl WorldRecording for AirspaceWorld {
+    fn start_recording(&self, _: &mut AirspaceState, collector: &mut Collector, _: Cycle) {
+        collector.rows.start(self);
     }
 
-    fn enable_events(&self, books: &mut Collector) {
-        books.log.is_enabled = true;
+    fn enable_events(&self, collector: &mut Collector) {
+        collector.log.is_enabled = true;
     }
 
-    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
-        books.rows.schemas()
+    fn schemas(&self, collector: &Collector) -> Vec<TableSchema> {
+        collector.rows.schemas()
     }
 
     fn record(
         &self,
         _: &mut AirspaceState,
-        books: &mut Collector,
+        collector: &mut Collector,
         _: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError> {
-        books.rows.record(recorder)
+        collector.rows.record(recorder)
     }
+
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        view::position_columns()
+    }
+}
+
+impl WorldCheckpoint for AirspaceWorld {
+    type Snapshot = (Snapshot, Counters);
 
     fn digest(&self, state: &AirspaceState, now: Cycle) -> Digest {
         state.snapshot(now).digest()
     }
 
-    fn save(&self, state: &AirspaceState, books: &Collector, now: Cycle) -> (Snapshot, Counters) {
-        (state.snapshot(now), books.counters.clone())
+    fn save(
+        &self,
+        state: &AirspaceState,
+        collector: &Collector,
+        now: Cycle,
+    ) -> (Snapshot, Counters) {
+        (state.snapshot(now), collector.counters.clone())
     }
 
     fn restore(
         &self,
         saved: Self::Snapshot,
-        books: &mut Collector,
+        collector: &mut Collector,
     ) -> Result<AirspaceState, CheckpointError> {
-        let (snapshot, ledger) = saved;
+        let (snapshot, counters) = saved;
         if snapshot.airplanes.len() != self.airplanes.len() {
             return Err(CheckpointError::Damaged);
         }
-        books.counters = ledger;
+        collector.counters = counters;
         Ok(AirspaceState::restore(self, &snapshot))
     }
+}
 
+impl WorldView for AirspaceWorld {
     fn scenery(&self, name: &str) -> Scenery {
         view::scenery(self, name)
     }
@@ -185,11 +205,11 @@ impl World for AirspaceWorld {
     fn frame(
         &self,
         state: &AirspaceState,
-        books: &mut Collector,
+        collector: &mut Collector,
         now: Cycle,
         _: FrameOptions,
     ) -> Frame {
-        let (events, log_left_out) = books.log.take();
+        let (events, log_left_out) = collector.log.take();
         Frame {
             cycle: now,
             time_s: self.cycle_start_s(now),
@@ -210,13 +230,15 @@ impl World for AirspaceWorld {
     ) -> Option<Inspection> {
         AirspaceWorld::inspect(self, state, now, who)
     }
+}
 
+impl WorldControl for AirspaceWorld {
     fn teams(&self) -> Arc<Teams> {
         self.teams.clone()
     }
 
     fn check_order(&self, order: &Order<'_>) -> Result<(), String> {
-        self.external_action(order).map_or(Ok(()), |wish| wish.check())
+        self.external_action(order).map_or(Ok(()), |action| action.check())
     }
 
     fn order(&self, state: &mut AirspaceState, order: &Order<'_>) {
@@ -232,37 +254,43 @@ impl World for AirspaceWorld {
         self.store_controls(state, now, controls)
     }
 
-    fn records_controls(&self, books: &Collector) -> bool {
-        books.rows.has_controls()
+    fn records_controls(&self, collector: &Collector) -> bool {
+        collector.rows.has_controls()
     }
 
-    fn observe(&self, state: &AirspaceState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
-        AirspaceWorld::observe(self, state, now, team, room);
+    fn observe(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        team: usize,
+        buffers: &mut [BufferMut<'_>],
+    ) {
+        AirspaceWorld::observe(self, state, now, team, buffers);
     }
+}
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        view::position_columns()
-    }
+impl WorldMetrics for AirspaceWorld {
+    type Metrics = Metrics;
 
     fn metrics(
         &self,
         state: &AirspaceState,
-        books: &Collector,
+        collector: &Collector,
         now: Cycle,
         _: &RunStats,
     ) -> Metrics {
-        metrics::metrics(self, state, now, &books.counters, books.decide_ns as f64 / 1e9)
+        metrics::metrics(self, state, now, &collector.counters, collector.decide_ns as f64 / 1e9)
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Collector, _: Cycle) -> Value {
-        let one = |id| {
-            serde_json::to_value(metrics::airplane_metrics(self, state, id)).unwrap_or_default()
-        };
-        (0..self.airplanes.len() as EntityId).map(one).collect()
+        (0..self.airplanes.len() as EntityId)
+            .map(|id| metrics::airplane_metrics(self, state, id))
+            .map(|metrics| serde_json::to_value(metrics).unwrap_or_default())
+            .collect()
     }
 
-    fn pair_metrics(&self, books: &Collector) -> Value {
-        serde_json::to_value(metrics::pair_metrics(self, &books.counters)).unwrap_or_default()
+    fn pair_metrics(&self, collector: &Collector) -> Value {
+        serde_json::to_value(metrics::pair_metrics(self, &collector.counters)).unwrap_or_default()
     }
 
     fn summary_lines(&self, metrics: &Metrics) -> KeyValues {

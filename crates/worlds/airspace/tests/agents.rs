@@ -2,9 +2,10 @@
 //! decide as one process does for all.
 
 use sidestep_airspace::agents::traffic_state::TrafficPicture;
-use sidestep_airspace::airspace_run;
-use sidestep_airspace::pilot::{Control, Fleet, Packet, Percept, Pilot};
+use sidestep_airspace::pilot::{Control, Percept, Pilot};
 use sidestep_airspace::world::AirspaceWorld;
+use sidestep_airspace::{Fleet, airspace_run};
+use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep_kernel::{Digest, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -37,7 +38,7 @@ fn fly(
             PilotMessage::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
             PilotMessage::End => return,
         }
-        for Packet { to, payload, .. } in pilot.take_packets() {
+        for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
             to.iter().for_each(|&id| {
                 // A pilot that has come to an end hears no more.
                 let _ = others[id as usize].send(PilotMessage::Packet(pilot.id(), payload.clone()));

@@ -33,7 +33,7 @@ pub(crate) struct Task<const D: usize> {
     pub(crate) lasts_s: f64,
     /// The time for which a vetoed motion is retried before the task is given up, s.
     pub(crate) patience_s: f64,
-    /// The time for which its local rules may come no nearer to a target before a way is planned, s; none if
+    /// The time for which its local rules may come no nearer to a target before a path is planned, s; none if
     /// nothing is ever planned.
     pub(crate) plans_after_s: Option<f64>,
 }
@@ -45,13 +45,13 @@ pub(crate) enum TaskKind<const D: usize> {
     Rest,
     /// Go anywhere, autonomously.
     Wander(Wander<D>),
-    /// Go where a script says, as an operator would.
+    /// Move as a script says, as an operator would.
     Script(Arc<Script>),
-    /// Go to places one after the other, as a planner would, but around anything in the way.
+    /// Move to targets one after the other, as a planner would, but around obstacles.
     Targets(Targets<D>),
-    /// Find the way on wheels, with a laser; in the plane.
+    /// Navigate on wheels, with a laser; in the plane.
     Navigate(Arc<Navigator>),
-    /// Go where a caller orders, cycle by cycle.
+    /// Move as an external caller orders, cycle by cycle.
     External,
 }
 
@@ -102,15 +102,15 @@ impl<const D: usize> Task<D> {
 pub struct TaskProgress {
     /// The present task.
     pub task: u32,
-    /// Cycles since the task started,
+    /// Cycles since the task started.
     pub cycles: Cycle,
-    /// of these, the most recent ones without progress.
+    /// The most recent cycles, of these, without progress.
     pub idle: u32,
     /// Cycles since it last came nearer to its present target than ever before.
     pub late: u32,
     /// Motions of the script, or targets, that are finished.
     pub next: u32,
-    /// Cycles that it has rested because the script says so, or because a robot is late.
+    /// Cycles that it has rested because the script says so, or because a robot lags.
     pub rested: u32,
     /// Place and heading at the start of the task.
     pub start: Turtle,
@@ -118,15 +118,15 @@ pub struct TaskProgress {
     pub ahead: [f64; 3],
     /// Smallest distance to its present target so far, meters.
     pub nearest_m: f64,
-    /// Kind of the last event reported since a motion went as wished.
-    pub told: Option<EventKind>,
+    /// Kind of the last event since a motion succeeded at the first try; not reported again until then.
+    pub last_event: Option<EventKind>,
     /// The last objection in this part of the task.
     pub objection: Option<VetoRecord>,
     /// Its rung on the ladder after vetoes.
     pub ladder: RecoveryMemory,
     /// Memory of a navigator on wheels.
     pub leader: Option<LeaderState>,
-    /// Lengths of way in this task, meters.
+    /// Distances in this task, meters.
     pub way_m: TravelStats,
 }
 
@@ -139,12 +139,12 @@ pub struct VetoRecord {
     pub reason: VetoReason,
 }
 
-/// The distance that an initiator got, as a share of its wish.
+/// The distances that an initiator wanted to move and has moved.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TravelStats {
-    /// Length of the way that it wanted to go, meters.
+    /// Distance that it wanted to move, meters.
     pub wanted: f64,
-    /// Length of the way that it went, meters.
+    /// Distance that it has moved, meters.
     pub gone: f64,
 }
 
@@ -161,7 +161,7 @@ impl TaskProgress {
             start: Turtle { position_m: [0.0; 3], ahead: [0.0; 3], left: [0.0; 3] },
             ahead: [0.0; 3],
             nearest_m: f64::INFINITY,
-            told: None,
+            last_event: None,
             objection: None,
             ladder: RecoveryMemory::default(),
             leader: None,
@@ -175,18 +175,28 @@ impl TaskProgress {
     fn start_task<const D: usize>(&mut self, agent: usize, points: &[Point<D>]) {
         self.start = initial_turtle(agent, points);
         self.ahead = self.start.ahead;
-        (self.cycles, self.idle, self.next, self.rested) = (0, 0, 0, 0);
-        (self.nearest_m, self.late, self.leader) = (f64::INFINITY, 0, None);
-        (self.told, self.objection) = (None, None);
-        (self.ladder, self.way_m) = (RecoveryMemory::default(), TravelStats::default());
+        self.cycles = 0;
+        self.idle = 0;
+        self.next = 0;
+        self.rested = 0;
+        self.nearest_m = f64::INFINITY;
+        self.late = 0;
+        self.leader = None;
+        self.last_event = None;
+        self.objection = None;
+        self.ladder = RecoveryMemory::default();
+        self.way_m = TravelStats::default();
     }
 
     /// Goes on to the next motion or target.
     pub fn advance_part(&mut self) {
         self.next += 1;
-        (self.rested, self.idle) = (0, 0);
-        (self.told, self.objection) = (None, None);
-        (self.nearest_m, self.late) = (f64::INFINITY, 0);
+        self.rested = 0;
+        self.idle = 0;
+        self.last_event = None;
+        self.objection = None;
+        self.nearest_m = f64::INFINITY;
+        self.late = 0;
     }
 
     /// Goes on to the next task, which `agent` carries out.
@@ -203,7 +213,7 @@ impl TaskProgress {
         let motions = script.motions(self.start);
         let motions: Vec<ScriptMotion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
         if motions.len() > MAX_MOTIONS {
-            let cause = format!("comes to more than {MAX_MOTIONS} motions");
+            let cause = format!("makes more than {MAX_MOTIONS} motions");
             return Err(InputError::new("script", cause, "repeat less often"));
         }
         Ok(motions)
@@ -213,18 +223,13 @@ impl TaskProgress {
 /// Returns a turtle at a connector, facing away from the chain.
 fn initial_turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     let at = points[agent];
-    let behind = match agent {
-        0 => points.get(1),
-        _ => points.get(agent - 1),
-    };
+    let behind = if agent == 0 { points.get(1) } else { points.get(agent - 1) };
     let ahead = behind.and_then(|b| normalized(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
     let ahead = ahead.map_or([1.0, 0.0, 0.0], with_dimensions);
     // Left is level: across the upward axis, or along y if the turtle faces straight up or down.
     let across = math::hypot(ahead[0], ahead[1]);
-    let left = match across > 1e-9 {
-        true => [-ahead[1] / across, ahead[0] / across, 0.0],
-        false => [0.0, 1.0, 0.0],
-    };
+    let left =
+        if across > 1e-9 { [-ahead[1] / across, ahead[0] / across, 0.0] } else { [0.0, 1.0, 0.0] };
     Turtle { position_m: with_dimensions(at), ahead, left }
 }
 

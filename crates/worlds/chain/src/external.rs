@@ -132,10 +132,10 @@ impl<const D: usize> ChainWorld<D> {
             let near = |slot: &Slot| {
                 *slot != id && boxes[*slot as usize].meets(&boxes[id as usize].grown(self.look_m))
             };
-            scratch.around.gather(self, state, now, (0..state.len() as Slot).filter(near));
+            scratch.nearby.gather(self, state, now, (0..state.len() as Slot).filter(near));
             let body = &state.body(id as usize);
             let mut row = ObservationRow { row, rooms: room.iter_mut() };
-            self.observe_body(id, body, &scratch.around.all, &mut row);
+            self.observe_body(id, body, &scratch.nearby.all, &mut row);
             if !ordered.is_empty() {
                 self.observe_order_result(id, body, &mut row);
             }
@@ -173,9 +173,10 @@ impl<const D: usize> ChainWorld<D> {
             self.current_task(id, body).filter(|task| !matches!(task.driver, TaskKind::Rest));
         row.push_integer(leads.map_or(-1, |task| task.agent as i64));
         row.push_integer(i64::from(!is_whole));
-        let veto = match self.chains[id as usize].is_external() {
-            true => body.external.answer.veto,
-            false => body.driving.objection,
+        let veto = if self.chains[id as usize].is_external() {
+            body.external.answer.veto
+        } else {
+            body.driving.objection
         };
         row.push_integer(veto.map_or(0, |VetoRecord { reason, .. }| reason.number() as i64 + 1));
         row.push_integer(veto.map_or(-1, |VetoRecord { by, .. }| i64::from(by)));
@@ -193,8 +194,8 @@ impl<const D: usize> ChainWorld<D> {
         row.push_integer(cause);
         row.push_integer(number);
         row.push_integer(i64::from(heeds));
-        row.push_integer(answer.came as i64);
-        row.push_reals(answer.wish_m[0][..D].iter().chain(&answer.wish_m[1][..D]).copied());
+        row.push_integer(answer.outcome as i64);
+        row.push_reals(answer.target_m[0][..D].iter().chain(&answer.target_m[1][..D]).copied());
         row.push_reals(answer.reached_m[..D].iter().copied());
         row.push_reals([answer.done_share]);
     }

@@ -1,5 +1,6 @@
 //! Numbers, chains and surroundings that several tests share.
 
+pub(super) mod convoy;
 pub(super) mod random_worlds;
 
 use super::ground::Corridor;
@@ -46,9 +47,9 @@ pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
     Corridor::pinned(width_m).expect("a width").walls(0)
 }
 
-/// Robots in a row on the first axis, the leader at `lead_m`; the tail of a long convoy is still
-/// outside the corridor.
-pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
+/// A straight chain on the first axis, its leader at `lead_m`; the tail of a long one is still outside
+/// the corridor.
+pub(super) fn straight_chain(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> Chain<2> {
     Chain::straight([lead_m, 0.0], [-1.0, 0.0], followers, rod, Connector::free(radius_m))
         .expect("a straight chain is right")
 }

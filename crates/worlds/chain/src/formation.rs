@@ -34,7 +34,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     /// Returns the body as lasers and bumpers see it.
-    pub(crate) fn to_robot_body(&self) -> Seen {
+    pub(crate) fn robot_body(&self) -> Seen {
         Seen::disc(self.at, self.radius_m)
     }
 }

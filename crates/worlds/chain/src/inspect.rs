@@ -1,5 +1,5 @@
-//! The wish of a chain's initiator, the objections and their reasons, the ladder's response, and the
-//! outcome for one connector: the cycle is tried on a copy of the state, for its group alone.
+//! The move that a chain's initiator wants, the vetoes and their reasons, the response of the recovery ladder, and the
+//! outcome for one connector: the cycle is tried on a copy of the state, for its conflict group alone.
 
 mod motion;
 #[cfg(test)]
@@ -45,11 +45,11 @@ impl<const D: usize> ChainWorld<D> {
             return None;
         }
         let mut scratch = Scratch::new(self);
-        scratch.notes = Some(Box::new(InspectionTrace { slot, ..InspectionTrace::default() }));
+        scratch.trace = Some(Box::new(InspectionTrace { slot, ..InspectionTrace::default() }));
         let mut told = Inspection::new(who, now, self.title(who));
         let (after, group) =
             self.try_cycle(&state.trial_copy(), now, slot, &mut scratch, &mut told);
-        let notes = *scratch.notes.take()?;
+        let trace = *scratch.trace.take()?;
         let asked = ConnectorInspection {
             world: self,
             slot,
@@ -57,7 +57,7 @@ impl<const D: usize> ChainWorld<D> {
             k: part as usize,
             before,
             after,
-            notes,
+            trace,
             scratch,
         };
         asked.add_all(&mut told, &group);
@@ -117,7 +117,8 @@ fn add_navigation<const D: usize>(
     let Some(sight) = looking.percept(slot) else { return };
     let leader = &sight.navigator.leader;
     let decision = leader.decide(sight.leader.followed, &sight.percept);
-    let (walls, target) = (sight.percept.walls_m, sight.percept.target);
+    let walls = sight.percept.walls_m;
+    let target = sight.percept.target;
     told.add_section(
         FactSection::new("Perceives")
             .fact("wall on the left", FactValue::meters(walls.left))
@@ -145,7 +146,7 @@ struct ConnectorInspection<'a, const D: usize> {
     k: usize,
     before: Body<D>,
     after: Body<D>,
-    notes: InspectionTrace<D>,
+    trace: InspectionTrace<D>,
     scratch: Scratch<D>,
 }
 
@@ -217,23 +218,24 @@ impl<const D: usize> ConnectorInspection<'_, D> {
 
     /// Tells the wish of the initiator.
     fn add_intention(&self, told: &mut Inspection) {
-        let (Some(task), Some(wish)) = (self.task(), self.notes.wish) else { return };
-        let at = self.before.chain.points()[wish.of];
+        let Some(task) = self.task() else { return };
+        let Some(intended) = self.trace.intended else { return };
+        let at = self.before.chain.points()[intended.connector];
         let target = match &task.driver {
             TaskKind::Targets(targets) => targets.places.get(self.before.driving.next as usize),
             _ => None,
         };
         told.add_section(
             FactSection::new("Wish")
-                .fact("of", self.connector(wish.of))
-                .fact("what", wish.words)
-                .fact("to", wish.to.map(with_dimensions::<D, 3>))
-                .fact("way", wish.to.map(|to| FactValue::meters(distance(at, to))))
+                .fact("of", self.connector(intended.connector))
+                .fact("what", intended.words)
+                .fact("to", intended.to.map(with_dimensions::<D, 3>))
+                .fact("way", intended.to.map(|to| FactValue::meters(distance(at, to))))
                 .fact_if("target", target.map(|target| with_dimensions::<D, 3>(*target)))
                 .fact_if("way to the target", target.map(|t| FactValue::meters(distance(at, *t)))),
         );
-        if let Some(to) = wish.to {
-            told.add_mark(MarkRole::Wish, wish.words, line(&[at, to]));
+        if let Some(to) = intended.to {
+            told.add_mark(MarkRole::Wish, intended.words, line(&[at, to]));
         }
         if let Some(target) = target {
             told.add_mark(
@@ -279,11 +281,11 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     /// Returns all objections, each once.
     fn vetoes(&self) -> impl Iterator<Item = &Veto<D>> {
         use super::motion::recovery::RecoveryOutcome;
-        let others = match &self.notes.climbed {
+        let others = match &self.trace.climbed {
             Some(RecoveryOutcome::Stuck { vetoes }) => &vetoes[..],
             _ => &[],
         };
-        let own = &self.notes.vetoes;
+        let own = &self.trace.vetoes;
         own.iter().chain(others.iter().filter(|veto| !own.contains(veto)))
     }
 }

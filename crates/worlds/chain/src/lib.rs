@@ -21,7 +21,6 @@ pub mod agents;
 mod bundle;
 mod claim;
 mod clearance;
-pub mod convoy;
 mod deferred;
 mod deploy;
 mod driver;

@@ -10,10 +10,11 @@ use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 use sidestep_rods::geometry::distance;
 
-/// Time for which a navigator stands for a body that moves ahead before it takes that for a wall, s.
+/// Time for which a navigator stands for a body that moves ahead before it treats that as a wall, s. Without a limit
+/// two navigators that meet would wait for each other.
 const STAND_TIMEOUT_S: f64 = 10.0;
 
-/// A worker's read-only look at a state that does not change meanwhile.
+/// A worker that perceives for navigators; the state does not change meanwhile.
 pub(crate) struct Perceiver<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
     pub(crate) state: &'a ChainState<D>,
@@ -33,8 +34,8 @@ pub(crate) struct NavigatorPercept<'a> {
 impl<'a, const D: usize> Perceiver<'a, D> {
     /// Returns a navigator's decision; none for other drivers.
     pub(crate) fn decide(&mut self, slot: Slot) -> Option<Decision> {
-        let sight = self.percept(slot)?;
-        Some(sight.navigator.leader.decide(sight.leader.followed, &sight.percept))
+        let own = self.percept(slot)?;
+        Some(own.navigator.leader.decide(own.leader.followed, &own.percept))
     }
 
     /// Returns a navigator's perception; its laser's ranges are in the scratch.
@@ -43,14 +44,16 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         let body = state.deferred_body(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let TaskKind::Navigate(navigator) = &task.driver else { return None };
-        let (leader, stood) = (body.leader_state(task), body.stood);
+        let leader = body.leader_state(task);
+        let stood = body.standstill.cycles;
         drop(body);
         self.gather_others(slot, task.agent, navigator, &leader);
-        self.scratch.around.gather(world, state, now, std::iter::empty());
+        self.scratch.nearby.gather(world, state, now, std::iter::empty());
         let noise = &mut world.streams.draws(slot, now, purpose::LASER);
-        let Scratch { around, scan, seen, .. } = &mut *self.scratch;
+        let Scratch { nearby, scan, robot_bodies, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(NavigationGoal::target);
-        let around = Surroundings { obstacles: around.all.in_plane()?, bodies: seen, target };
+        let obstacles = nearby.all.in_plane()?;
+        let around = Surroundings { obstacles, bodies: robot_bodies, target };
         let is_patient = world.start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
         let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
         Some(NavigatorPercept { navigator, agent: task.agent, leader, percept })
@@ -65,17 +68,19 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         leader: &LeaderState,
     ) {
         let range_m = navigator.leader.laser.range_m();
-        let Scratch { seen, near, .. } = &mut *self.scratch;
-        seen.clear();
+        let Scratch { robot_bodies, near, .. } = &mut *self.scratch;
+        robot_bodies.clear();
         self.state.list_near(leader.pose.at, range_m, near);
         for &other in &*near {
             let body = self.state.body(other as usize);
             let is_own = other == slot;
-            body.solids().filter(|(k, _)| !(is_own && *k == agent)).for_each(|(_, solid)| {
-                if distance(leader.pose.at, solid.at) - solid.radius_m <= range_m {
-                    seen.push(solid.to_robot_body());
+            for (k, solid) in body.solids() {
+                let is_itself = is_own && k == agent;
+                let gap_m = distance(leader.pose.at, solid.at) - solid.radius_m;
+                if !is_itself && gap_m <= range_m {
+                    robot_bodies.push(solid.robot_body());
                 }
-            });
+            }
         }
     }
 }
@@ -84,7 +89,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
 mod tests {
     use super::*;
     use crate::scenario::ChainScenario;
-    use crate::swarm::laser::RobotBody as Seen;
+    use crate::swarm::laser::RobotBody;
     use proptest::prelude::*;
     use sidestep_rods::geometry::Point;
     use sidestep_scenario::Source;
@@ -117,7 +122,7 @@ mod tests {
     }
 
     /// Returns the parts of all chains that the first connector of one of them sees by a look at each.
-    fn seen_of_all(state: &ChainState<2>, slot: usize) -> Vec<Seen> {
+    fn seen_of_all(state: &ChainState<2>, slot: usize) -> Vec<RobotBody> {
         let at = state.body(slot).chain.points()[0];
         let mut seen = Vec::new();
         for other in 0..state.len() {
@@ -125,17 +130,17 @@ mod tests {
             let others = body.solids().filter(|(k, _)| (other, *k) != (slot, 0));
             let near =
                 others.filter(|(_, solid)| distance(at, solid.at) - solid.radius_m <= RANGE_M);
-            seen.extend(near.map(|(_, solid)| solid.to_robot_body()));
+            seen.extend(near.map(|(_, solid)| solid.robot_body()));
         }
         seen
     }
 
     fn assert_all_is_seen(world: &ChainWorld<2>, state: &ChainState<2>) {
         let mut scratch = Scratch::new(world);
-        let mut looking = Perceiver { world, state, now: 0, scratch: &mut scratch };
+        let mut perceiver = Perceiver { world, state, now: 0, scratch: &mut scratch };
         for slot in 0..state.len() {
-            looking.percept(slot as Slot).expect("it navigates");
-            assert_eq!(looking.scratch.seen, seen_of_all(state, slot), "chain {slot}");
+            perceiver.percept(slot as Slot).expect("it navigates");
+            assert_eq!(perceiver.scratch.robot_bodies, seen_of_all(state, slot), "chain {slot}");
         }
     }
 

@@ -22,9 +22,10 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
     let idle = given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds });
     idle.map(|(key, of_movers)| {
-        let why = match of_movers {
-            true => "no obstacle moves: give one velocity_m_s or patrol_m",
-            false => "no connector is held: give one a mobility",
+        let why = if of_movers {
+            "no obstacle moves: give one velocity_m_s or patrol_m"
+        } else {
+            "no connector is held: give one a mobility"
         };
         Remark::note(
             format!("chain.{key}"),

@@ -27,9 +27,10 @@ impl<const D: usize> ChainWorld<D> {
     /// turn it is, because those before them have handed over their decisions. Nothing changes. Where no
     /// team is deployed there is no perception.
     pub fn percepts_at(&self, state: &ChainState<D>, now: Cycle) -> Vec<ChainPercepts<D>> {
-        let (state, clock) = (&state.trial_copy(), &ManualClock::default());
+        let state = &state.trial_copy();
+        let clock = &ManualClock::default();
         let mut scratch = Scratch::new(self);
-        scratch.shown = Some(Vec::new());
+        scratch.percept_log = Some(Vec::new());
         let turn = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };
         let groups = ConflictGroups::new(state.len());
         (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
@@ -44,7 +45,7 @@ impl<const D: usize> ChainWorld<D> {
             groups.members(slot, &mut group);
             group.sort_unstable();
             let is_shown =
-                |turn: &PhaseContext<'_, Self>| turn.scratch.shown.as_ref().map(Vec::len);
+                |turn: &PhaseContext<'_, Self>| turn.scratch.percept_log.as_ref().map(Vec::len);
             let before = is_shown(turn);
             for &member in &group {
                 act::act_one(turn, &group, member);
@@ -53,7 +54,7 @@ impl<const D: usize> ChainWorld<D> {
                 }
             }
         }
-        scratch.shown.unwrap_or_default()
+        scratch.percept_log.unwrap_or_default()
     }
 
     /// Hands over the decisions of a chain's agents for the cycle to come. Unless all that take part in a
@@ -76,7 +77,7 @@ impl<const D: usize> ChainWorld<D> {
         if let Err((cause, remedy)) = handed.check(spec.start.points().len()) {
             return wrong(cause, remedy);
         }
-        state.body_mut(chain as usize).handed = Some(handed);
+        state.body_mut(chain as usize).submitted = Some(handed);
         Ok(())
     }
 
@@ -122,7 +123,7 @@ impl<const D: usize> ChainWorld<D> {
         let mut known = BTreeSet::new();
         for (id, bytes) in controls {
             let refused =
-                |cause: String| OrderError::Control { who: self.connector_name(*id), cause };
+                |cause: String| OrderError::Control { agent: self.connector_name(*id), cause };
             let control = self.read_control(now, *id, bytes).map_err(refused)?;
             if !known.insert(*id) {
                 return Err(refused("there are two of it; give one for each connector".into()));
@@ -153,7 +154,7 @@ impl<const D: usize> ChainWorld<D> {
             return Err(OrderError::NoExternalAgents { cause: cause.into() });
         }
         for (chain, handed) in self.read_controls(now, controls)?.into_iter().enumerate() {
-            state.body_mut(chain).handed = Some(handed);
+            state.body_mut(chain).submitted = Some(handed);
         }
         Ok(())
     }

@@ -118,13 +118,11 @@ struct BoxSection<const D: usize>(Bounds<D>);
 impl<'de, const D: usize> Deserialize<'de> for BoxSection<D> {
     fn deserialize<S: serde::Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let [lo, hi] = <[PointValue<D>; 2]>::deserialize(deserializer)?.map(PointValue::get);
-        match (0..D).all(|i| lo[i] < hi[i]) {
-            true => Ok(Self(Bounds { lo, hi })),
-            false => {
-                let remedy = "give the lower corner first, then the upper";
-                Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
-            }
+        if (0..D).all(|i| lo[i] < hi[i]) {
+            return Ok(Self(Bounds { lo, hi }));
         }
+        let remedy = "give the lower corner first, then the upper";
+        Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
     }
 }
 
@@ -148,7 +146,7 @@ impl<const D: usize> JsonSchema for BoxSection<D> {
 
 impl<const D: usize> BoxSection<D> {
     /// Returns the floor of the box.
-    fn to_plane(&self) -> Bounds<2> {
+    fn floor(&self) -> Bounds<2> {
         Bounds { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
     }
 }

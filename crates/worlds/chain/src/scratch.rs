@@ -2,10 +2,9 @@
 
 use super::agents::percept::ChainPercepts;
 use super::events::Event;
-use super::formation::Solid;
 use super::motion::escape::Escaper;
 use super::state::{Body, ChainState};
-use super::swarm::laser::{RobotBody as Seen, Scan};
+use super::swarm::laser::{RobotBody, Scan};
 use super::trace::InspectionTrace;
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
@@ -18,24 +17,24 @@ pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
     pub(crate) escaper: Option<Escaper<D>>,
     /// The obstacles around a chain.
-    pub(crate) around: NearbyObstacles<D>,
-    /// Robots around a robot.
-    pub(crate) seen: Vec<Seen>,
+    pub(crate) nearby: NearbyObstacles<D>,
+    /// Robots that another robot can perceive.
+    pub(crate) robot_bodies: Vec<RobotBody>,
     /// Chains near a robot.
     pub(crate) near: Vec<Slot>,
     pub(crate) scan: Scan,
     /// Boxes around a chain's rods.
-    pub(crate) own: RodBvh<D>,
-    /// Places of a chain before a cycle,
+    pub(crate) own_rods: RodBvh<D>,
+    /// Positions of a chain before a cycle.
     pub(crate) before: PositionBuffer<D>,
-    /// and after parts got out of the way.
+    /// Positions of a chain after parts of it escaped.
     pub(crate) escaped: PositionBuffer<D>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
-    /// Notes for an inspection of a chain; none in a run.
-    pub(crate) notes: Option<Box<InspectionTrace<D>>>,
-    /// Perceptions of connectors, for a caller that asks; none in a run.
-    pub(crate) shown: Option<Vec<ChainPercepts<D>>>,
+    /// Record of an inspection of a chain; none in a run.
+    pub(crate) trace: Option<Box<InspectionTrace<D>>>,
+    /// Percepts of connectors, for a caller that runs their agents elsewhere; none in a run.
+    pub(crate) percept_log: Option<Vec<ChainPercepts<D>>>,
 }
 
 /// The obstacles around a chain at a given moment.
@@ -48,11 +47,11 @@ pub(crate) struct NearbyObstacles<const D: usize> {
     solid: Obstacles<D>,
     moment: Option<Cycle>,
     /// Moving obstacles, and parts of other chains.
-    guests: Vec<Obstacle<D>>,
+    movers: Vec<Obstacle<D>>,
     has_others: bool,
 }
 
-/// The places of a chain's connectors at some time of its cycle.
+/// The positions of a chain's connectors at some moment of its cycle.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PositionBuffer<const D: usize> {
     pub(crate) points: Vec<Point<D>>,
@@ -61,21 +60,21 @@ pub(crate) struct PositionBuffer<const D: usize> {
 }
 
 impl<const D: usize> Scratch<D> {
-    /// Returns a scratch that has gathered nothing yet.
+    /// Returns empty buffers.
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
             propagator: Propagator::new(world.rules),
             escaper: world.escape.map(Escaper::new),
-            around: NearbyObstacles::new(world),
-            seen: Vec::new(),
+            nearby: NearbyObstacles::new(world),
+            robot_bodies: Vec::new(),
             near: Vec::new(),
             scan: Scan::default(),
-            own: RodBvh::default(),
+            own_rods: RodBvh::default(),
             before: PositionBuffer::default(),
             escaped: PositionBuffer::default(),
             events: Vec::new(),
-            notes: None,
-            shown: None,
+            trace: None,
+            percept_log: None,
         }
     }
 }
@@ -86,7 +85,7 @@ impl<const D: usize> NearbyObstacles<D> {
             all: (*world.obstacles).clone(),
             solid: (*world.obstacles).clone(),
             moment: None,
-            guests: Vec::new(),
+            movers: Vec::new(),
             has_others: false,
         }
     }
@@ -103,24 +102,26 @@ impl<const D: usize> NearbyObstacles<D> {
         const CHECKED: &str = "movers and chains were checked when the scenario was compiled";
         let mut others = others.peekable();
         let has_others = others.peek().is_some();
+        // Most chains of a worker meet no other one, so the obstacles of the last chain serve the next, too.
         if self.moment == Some(moment) && !self.has_others && !has_others {
             return;
         }
-        self.guests.clear();
+        self.movers.clear();
         let movers = world.movers.at(world.start_time_s(moment));
-        self.guests.extend(movers.filter(Obstacle::is_in_range));
-        let movers = self.guests.len();
+        self.movers.extend(movers.filter(Obstacle::is_in_range));
+        let mover_count = self.movers.len();
         let others: Vec<Slot> = others.collect();
         if has_others {
-            others.iter().for_each(|&slot| push_robots(&mut self.guests, slot, state));
-            self.solid.set_moving(&self.guests).expect(CHECKED);
-            self.guests.truncate(movers);
+            others.iter().for_each(|&slot| push_robots(&mut self.movers, slot, state));
+            self.solid.set_moving(&self.movers).expect(CHECKED);
+            self.movers.truncate(mover_count);
         }
         for slot in others {
-            push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
+            push_parts(&mut self.movers, slot, &state.body(slot as usize).chain);
         }
-        self.all.set_moving(&self.guests).expect(CHECKED);
-        (self.moment, self.has_others) = (Some(moment), has_others);
+        self.all.set_moving(&self.movers).expect(CHECKED);
+        self.moment = Some(moment);
+        self.has_others = has_others;
     }
 
     /// Returns the obstacles that are solid to robots: of other chains the robots, not the rods.
@@ -130,7 +131,7 @@ impl<const D: usize> NearbyObstacles<D> {
 }
 
 impl<const D: usize> PositionBuffer<D> {
-    /// Notes the places of a chain.
+    /// Records the positions of a chain.
     pub(crate) fn record(&mut self, body: &Body<D>) {
         self.points.clear();
         self.points.extend_from_slice(body.chain.points());
@@ -138,7 +139,7 @@ impl<const D: usize> PositionBuffer<D> {
         self.joints.extend_from_slice(body.joints.as_deref().unwrap_or_default());
     }
 
-    /// Puts a chain back to these places.
+    /// Moves a chain back to these positions.
     pub(crate) fn restore(&self, body: &mut Body<D>) {
         body.chain.points_mut().copy_from_slice(&self.points);
         if let Some(joints) = &mut body.joints {
@@ -154,8 +155,7 @@ fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: 
     if body.robots.is_empty() {
         return push_parts(parts, slot, &body.chain);
     }
-    let solid = |solid: Solid| {
-        Obstacle::ball(OTHER_CHAIN + slot, with_dimensions(solid.at), solid.radius_m)
-    };
-    parts.extend(body.solids().map(|(_, robot)| solid(robot)));
+    parts.extend(body.solids().map(|(_, robot)| {
+        Obstacle::ball(OTHER_CHAIN + slot, with_dimensions(robot.at), robot.radius_m)
+    }));
 }

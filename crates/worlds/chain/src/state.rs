@@ -1,31 +1,27 @@
-//! The changing state of a run, and its snapshot.
+//! The changing state of a run.
 
-use super::agents::chain_controls::ChainControls;
-use super::deferred::DeferredMotions;
-use super::driver::external::External;
-use super::driver::{Task, TaskProgress};
-use super::formation::{Robot, Solid};
+mod body;
+mod snapshot;
+
+pub use body::Body;
+pub(crate) use body::{MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten};
+pub(crate) use snapshot::Snapshot;
+
 use super::metrics::ChainTally;
-use super::motion::escape::EscapePlan;
 use super::neighbors::Neighbors;
-use super::script::ScriptMotion;
-use super::swarm::drive::Pose2;
-use super::swarm::leader::{Decision, LeaderState};
-use super::world::{ChainSpec, ChainWorld};
-use serde::{Deserialize, Serialize};
+use super::swarm::leader::Decision;
+use super::world::ChainWorld;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::math::atan2;
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Slot};
-use sidestep_rods::geometry::{Bounds, Point, normalized, with_dimensions};
-use sidestep_rods::{Chain, Grid, bounds_around};
-use std::collections::VecDeque;
+use sidestep_kernel::{Cycle, EntityId, InputError, Slot};
+use sidestep_rods::geometry::{Bounds, Point};
+use sidestep_rods::{Grid, bounds_around};
+use snapshot::{Component, ComponentList};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-/// Number of chains up to which a look at each takes no longer than finding those nearby.
+/// Number of chains up to which checking each takes no longer than searching a grid of them.
 const MAX_LINEAR_SCAN: usize = 16;
-/// Room for rounding between boxes and distances, meters.
+/// Margin for rounding between boxes and distances, meters.
 const ROUNDING_M: f64 = 1e-6;
 
 /// State of a world of chains; slots are ids.
@@ -42,8 +38,8 @@ pub struct ChainState<const D: usize> {
     crowd: RwLock<Grid<2>>,
 }
 
-/// One chain's share of the state. None of its locks is ever waited for: in the first phase all workers only
-/// read the bodies, and in the last phase only the one worker that has a group writes its bodies.
+/// One chain's share of the state. No worker ever waits for one of its locks: in the first phase all workers
+/// only read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
 struct ChainCell<const D: usize> {
     body: RwLock<Body<D>>,
@@ -51,230 +47,6 @@ struct ChainCell<const D: usize> {
     claim: Mutex<Bounds<D>>,
     /// Decision of its navigator in this cycle.
     decision: Mutex<Option<Decision>>,
-}
-
-/// One chain as it is now.
-#[derive(Debug, Clone)]
-pub struct Body<const D: usize> {
-    /// Its connectors and rods.
-    pub chain: Chain<D>,
-    /// Progress of its initiator through its tasks.
-    pub driving: TaskProgress,
-    /// Scattered connectors, and the places where they will be joined again; none while the chain
-    /// is whole.
-    pub scattered: Option<ScatterState>,
-    /// The robots that keep to its connectors; empty if nothing is on wheels.
-    pub robots: Vec<Robot>,
-    /// Radius of their bodies, meters.
-    pub(crate) robot_radius_m: f64,
-    /// Counts so far.
-    pub tally: ChainTally,
-    /// Cycles that its navigator has stood because something moves ahead.
-    pub(crate) stood: u32,
-    /// Memory of its way out of where it was caught.
-    pub(crate) way_out: EscapePlan,
-    /// The motions of the present script, which follow from the place where it started.
-    pub(crate) motions: Vec<ScriptMotion>,
-    /// Orders from outside, and the answer to the last ones.
-    pub(crate) external: External,
-    /// Joint values of an arm, in rad or m: its connectors are where forward kinematics puts them.
-    pub joints: Option<Vec<f64>>,
-    /// The way that it follows because local rules came no nearer.
-    pub(crate) plan: Option<MotionPlan<D>>,
-    /// The nearest lost connectors below and above, as each connector knows; empty while none is lost.
-    pub(crate) missing: Vec<MissingNeighbors>,
-    /// Decisions of its agents for a cycle, if they run elsewhere.
-    pub(crate) handed: Option<ChainControls<D>>,
-    /// Motions that the chain has yet to follow; none whenever it is looked at.
-    pub(crate) put_off: DeferredMotions<D>,
-}
-
-/// Parts of a broken chain.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScatterState {
-    /// The first scattered connector,
-    pub first: u32,
-    /// and the last.
-    pub last: u32,
-    /// Speed of each, m/s,
-    pub speed_m_s: f64,
-    /// and the places where all connectors will be joined again, coordinate after coordinate; empty
-    /// while the parts lie where they are.
-    pub goals_m: Vec<f64>,
-    /// Cycles in a row in which something kept the parts from being joined; see [`Snapshot::waited`].
-    #[serde(skip)]
-    pub(crate) waited: Cycle,
-}
-
-/// A way to a target: the postures that are not reached yet, each straight from the one before; at least one.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum MotionPlan<const D: usize> {
-    /// Places of all connectors.
-    Rods(VecDeque<Vec<Point<D>>>),
-    /// Values of an arm's joints.
-    Joints(VecDeque<Vec<f64>>),
-}
-
-/// A plan in a snapshot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlanRecord {
-    /// The chain.
-    pub chain: EntityId,
-    /// Its postures that are not reached yet, each coordinate after coordinate, or of an arm joint after joint.
-    pub way: Vec<Vec<f64>>,
-}
-
-/// One chain in a snapshot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ChainRecord {
-    /// Positions of the connectors, coordinate after coordinate.
-    pub points_m: Vec<f64>,
-    /// See [`Body::driving`].
-    pub driving: TaskProgress,
-    /// See [`Body::scattered`].
-    pub scattered: Option<ScatterState>,
-    /// See [`Body::robots`].
-    pub robots: Vec<Robot>,
-}
-
-/// A state by id: the content of a checkpoint, covered by the digest.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Snapshot {
-    /// Cycles done.
-    pub cycle: Cycle,
-    /// The chains by id.
-    pub chains: Vec<ChainRecord>,
-    /// Joint values of arms, by id.
-    pub joints: Vec<(EntityId, Vec<f64>)>,
-    /// Their plans, of those that have one; by id.
-    pub plans: Vec<PlanRecord>,
-    /// Chains that are on a way out of where they were caught, by id.
-    pub(crate) ways_out: Vec<(u32, EscapePlan)>,
-    /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
-    pub(crate) stood: Vec<(EntityId, u32)>,
-    /// Cycles for which scattered parts have waited for an obstacle in their way, where they have, by id.
-    pub(crate) waited: Vec<(EntityId, Cycle)>,
-    /// Orders from outside and answers, of chains that have any, by id.
-    pub(crate) externals: Vec<(u32, External)>,
-    /// Lost connectors, as known to those of their chain, of chains in which one is lost; by id.
-    pub(crate) missing: Vec<(u32, Vec<MissingNeighbors>)>,
-    /// Decisions for the cycle that comes next, by id, if those were handed over by agents elsewhere; serialized.
-    pub(crate) handed: Vec<(u32, Vec<u8>)>,
-}
-
-/// The nearest lost connectors below and above, as a connector knows.
-pub(crate) type MissingNeighbors = [Option<u32>; 2];
-
-impl<const D: usize> Body<D> {
-    /// Returns a chain at its start.
-    pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
-        let chain = spec.start.clone();
-        let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
-        let mut body = Self {
-            robots: spec.robots_at(chain.points(), &driving),
-            robot_radius_m: spec.robot_radius_m(),
-            driving,
-            chain,
-            scattered: None,
-            tally: ChainTally::default(),
-            stood: 0,
-            way_out: EscapePlan::default(),
-            motions: Vec::new(),
-            external: External::default(),
-            joints: spec.arm.as_ref().map(|arm| arm.values.clone()),
-            plan: None,
-            missing: Vec::new(),
-            handed: None,
-            put_off: DeferredMotions::default(),
-        };
-        body.motions = spec.motions(&body.driving)?;
-        Ok(body)
-    }
-
-    /// Lets the chain follow motions that were put off.
-    pub(crate) fn catch_up(&mut self) {
-        self.put_off.catch_up(&mut self.chain, &mut self.tally);
-    }
-
-    /// Returns the solid parts that others see: the chain's robots, or its connectors if it has
-    /// none.
-    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, Solid)> + '_ {
-        let solid = |k: usize| match self.robots.get(k) {
-            Some(robot) => Solid { at: robot.pose.at, radius_m: self.robot_radius_m },
-            None => {
-                let radius_m = self.chain.connectors()[k].radius_m;
-                Solid { at: with_dimensions(self.chain.points()[k]), radius_m }
-            }
-        };
-        (0..self.chain.points().len()).map(move |k| (k, solid(k)))
-    }
-
-    /// Returns the box around its solid parts in the plane.
-    fn solid_bounds(&self) -> Bounds<2> {
-        let boxes =
-            self.solids().map(|(_, solid)| Bounds::from_points(&[solid.at]).grown(solid.radius_m));
-        boxes.fold(Bounds::empty(), |all, one| all.joined(&one))
-    }
-
-    /// Returns a navigator's memory; at the start of its task it stands at its connector and looks
-    /// ahead.
-    pub(crate) fn leader_state(&self, task: &Task<D>) -> LeaderState {
-        self.driving.leader.unwrap_or_else(|| {
-            let [x, y, _] = self.driving.ahead;
-            let [x, y] = normalized([x, y]).unwrap_or([1.0, 0.0]);
-            let at = with_dimensions(self.chain.points()[task.agent]);
-            LeaderState::new(Pose2 { at, heading_rad: atan2(y, x) })
-        })
-    }
-
-    /// Returns the decisions that were handed over for a cycle, serialized.
-    fn submitted_controls(&self, cycle: Cycle) -> Option<Vec<u8>> {
-        let handed = self.handed.as_ref().filter(|handed| handed.cycle == cycle)?;
-        Some(postcard::to_stdvec(handed).expect("decisions are plain data"))
-    }
-
-    fn record(&self) -> ChainRecord {
-        ChainRecord {
-            points_m: flatten(self.chain.points()),
-            driving: self.driving.clone(),
-            scattered: self.scattered.clone(),
-            robots: self.robots.clone(),
-        }
-    }
-
-    /// Returns the body that a record describes, after `cycle` cycles.
-    fn restore(
-        spec: &ChainSpec<D>,
-        record: &ChainRecord,
-        tally: ChainTally,
-        cycle: Cycle,
-    ) -> Result<Self, CheckpointError> {
-        let mut chain = spec.start.clone();
-        let n = chain.points().len();
-        let robots = if spec.robots.is_some() { n } else { 0 };
-        if record.robots.len() != robots
-            || record.points_m.len() != n * D
-            || record.driving.task as usize > spec.tasks.len()
-        {
-            return Err(CheckpointError::Damaged);
-        }
-        for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
-            change.constrain(&mut chain);
-        }
-        for (point, at) in chain.points_mut().iter_mut().zip(record.points_m.chunks_exact(D)) {
-            point.copy_from_slice(at);
-        }
-        let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
-        let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
-        let fresh = Self::new(spec).map_err(|_| CheckpointError::Damaged)?;
-        let robots = record.robots.clone();
-        Ok(Self { chain, driving, scattered, robots, tally, motions, ..fresh })
-    }
-}
-
-/// Returns the coordinates one after the other.
-pub(crate) fn flatten<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
-    points.iter().flatten().copied().collect()
 }
 
 impl<const D: usize> ChainState<D> {
@@ -318,28 +90,7 @@ impl<const D: usize> ChainState<D> {
         let bodies =
             all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
         let mut bodies = bodies.collect::<Result<Vec<_>, _>>()?;
-        for (slot, values) in &snapshot.joints {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let joints = body.joints.as_mut().filter(|joints| joints.len() == values.len());
-            joints.ok_or(CheckpointError::Damaged)?.clone_from(values);
-        }
-        for record in &snapshot.plans {
-            let body = bodies.get_mut(record.chain as usize).ok_or(CheckpointError::Damaged)?;
-            let n = body.chain.points().len();
-            body.plan = Some(MotionPlan::restore(record, body.joints.as_deref(), n)?);
-        }
-        for (slot, way_out) in &snapshot.ways_out {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            body.way_out = *way_out;
-        }
-        for (slot, stood) in &snapshot.stood {
-            bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?.stood = *stood;
-        }
-        for (slot, waited) in &snapshot.waited {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            body.scattered.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
-        }
-        restore_agents(&mut bodies, snapshot)?;
+        snapshot.restore_components(&mut bodies)?;
         Ok(Self::from_bodies(bodies.into_iter()))
     }
 
@@ -358,10 +109,11 @@ impl<const D: usize> ChainState<D> {
         self.cells.is_empty()
     }
 
-    /// Locks one chain for reading.
+    /// Locks one chain for reading, after it has followed its deferred motions; those need the lock for writing
+    /// for a moment.
     pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         let body = self.deferred_body(slot);
-        if body.put_off.is_empty() {
+        if body.deferred.is_empty() {
             return body;
         }
         drop(body);
@@ -369,20 +121,20 @@ impl<const D: usize> ChainState<D> {
         self.deferred_body(slot)
     }
 
-    /// Locks one chain for reading, of which all connectors except the initiator may have motions to follow.
+    /// Locks one chain for reading as it is: all connectors except the initiator may have motions still to follow.
     pub(crate) fn deferred_body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns whether the decisions of a chain's agents for a cycle were handed over, and are not carried out yet.
+    /// Returns whether the decisions of a chain's agents for a cycle were submitted, and are not carried out yet.
     pub fn has_submitted_controls(&self, slot: usize, cycle: Cycle) -> bool {
         let body = self.deferred_body(slot);
-        body.handed.as_ref().is_some_and(|handed| handed.cycle == cycle)
+        body.submitted.as_ref().is_some_and(|submitted| submitted.cycle == cycle)
     }
 
     /// Locks one chain for writing.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
-        // Workers that act would wait for each other if all of them wrote it.
+        // Reading first: if every worker wrote the flag, its cache line would move between them in each cycle.
         if !self.has_changed.load(Relaxed) {
             self.has_changed.store(true, Relaxed);
         }
@@ -404,8 +156,8 @@ impl<const D: usize> ChainState<D> {
         )
     }
 
-    /// Lists the chains, in order, of which some solid part may be within a distance of a place, among them all of
-    /// which one is; valid while no body changes.
+    /// Lists, in order, all chains with a solid part within a distance of a point, and perhaps some others nearby;
+    /// valid while no body changes.
     pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
         slots.clear();
         if self.len() <= MAX_LINEAR_SCAN {
@@ -440,28 +192,32 @@ impl<const D: usize> ChainState<D> {
 
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        let slots = 0..self.len();
-        let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
-        let joints = slots.clone().map(|slot| (slot as EntityId, self.body(slot).joints.clone()));
-        let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
-        let stood = slots.clone().map(|slot| (slot as EntityId, self.body(slot).stood));
-        let waited = |slot| Some((slot as EntityId, self.body(slot).scattered.as_ref()?.waited));
-        let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
-        let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
-        let handed =
-            slots.clone().map(|slot| (slot as EntityId, self.body(slot).submitted_controls(cycle)));
+        let bodies = 0..self.len();
         Snapshot {
             cycle,
-            chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
-            joints: joints.filter_map(|(slot, values)| Some((slot, values?))).collect(),
-            waited: slots.clone().filter_map(waited).filter(|(_, cycles)| *cycles > 0).collect(),
-            plans: slots.filter_map(plan).collect(),
-            ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
-            stood: stood.filter(|(_, cycles)| *cycles > 0).collect(),
-            externals: externals.filter(|(_, external)| !external.is_none()).collect(),
-            missing: missing.filter(|(_, missing)| !missing.is_empty()).collect(),
-            handed: handed.filter_map(|(slot, handed)| Some((slot, handed?))).collect(),
+            chains: bodies.map(|slot| self.body(slot).record()).collect(),
+            joints: self.save_component(cycle, |body| &body.joints),
+            plans: self.save_component(cycle, |body| &body.plan),
+            escape_plans: self.save_component(cycle, |body| &body.escape_plan),
+            standstills: self.save_component(cycle, |body| &body.standstill),
+            waited: self.save_component(cycle, |body| &body.scattered),
+            externals: self.save_component(cycle, |body| &body.external),
+            missing: self.save_component(cycle, |body| &body.missing),
+            submitted: self.save_component(cycle, |body| &body.submitted),
         }
+    }
+
+    /// Returns the records of one component, by chain.
+    fn save_component<C: Component>(
+        &self,
+        cycle: Cycle,
+        component: fn(&Body<D>) -> &C,
+    ) -> ComponentList<C::Record> {
+        let record = |slot| {
+            let record = component(&self.body(slot)).save(cycle)?;
+            Some((slot as EntityId, record))
+        };
+        (0..self.len()).filter_map(record).collect()
     }
 
     /// Returns the counts of each chain so far.
@@ -470,123 +226,22 @@ impl<const D: usize> ChainState<D> {
     }
 }
 
-/// Returns the content of a lock, renewed by the first worker that comes if it is out of date.
+/// Returns the content of a lock, renewed by the first worker that needs it if it is out of date.
 fn refresh<T>(
     lock: &RwLock<T>,
     is_current: impl Fn(&T) -> bool,
     renew: impl FnOnce(&mut T),
 ) -> RwLockReadGuard<'_, T> {
-    let read = || lock.read().unwrap_or_else(PoisonError::into_inner);
-    let known = read();
+    let known = lock.read().unwrap_or_else(PoisonError::into_inner);
     if is_current(&known) {
         return known;
     }
     drop(known);
-    let mut held = lock.write().unwrap_or_else(PoisonError::into_inner);
-    if !is_current(&held) {
-        renew(&mut held);
+    let mut content = lock.write().unwrap_or_else(PoisonError::into_inner);
+    // Another worker may have renewed it while this one waited for the lock.
+    if !is_current(&content) {
+        renew(&mut content);
     }
-    drop(held);
-    read()
-}
-
-/// Gives bodies back the orders and decisions from outside, and their agents' knowledge of each other.
-fn restore_agents<const D: usize>(
-    bodies: &mut [Body<D>],
-    snapshot: &Snapshot,
-) -> Result<(), CheckpointError> {
-    for (slot, external) in &snapshot.externals {
-        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-        let is_its_own = external.is_within(body.chain.points().len());
-        body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
-    }
-    for (slot, missing) in &snapshot.missing {
-        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-        let n = body.chain.points().len();
-        let is_its_own = |k: &u32| (*k as usize) < n;
-        if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
-            return Err(CheckpointError::Damaged);
-        }
-        body.missing = missing.clone();
-    }
-    for (slot, handed) in &snapshot.handed {
-        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-        let (n, now) = (body.chain.points().len(), snapshot.cycle);
-        let read = postcard::from_bytes::<ChainControls<D>>(handed).ok();
-        let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
-        body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
-    }
-    Ok(())
-}
-
-impl<const D: usize> MotionPlan<D> {
-    /// Returns the number of postures that are not reached yet.
-    pub(crate) fn len(&self) -> usize {
-        match self {
-            Self::Rods(way) => way.len(),
-            Self::Joints(way) => way.len(),
-        }
-    }
-
-    fn record(&self, chain: EntityId) -> PlanRecord {
-        let way = match self {
-            Self::Rods(way) => way.iter().map(|posture| flatten(posture)).collect(),
-            Self::Joints(way) => way.iter().cloned().collect(),
-        };
-        PlanRecord { chain, way }
-    }
-
-    /// Returns the plan that a record describes, of a chain of `n` connectors, or of an arm with these joints.
-    fn restore(
-        record: &PlanRecord,
-        joints: Option<&[f64]>,
-        n: usize,
-    ) -> Result<Self, CheckpointError> {
-        let values = joints.map_or(n * D, <[f64]>::len);
-        if record.way.is_empty() || record.way.iter().any(|posture| posture.len() != values) {
-            return Err(CheckpointError::Damaged);
-        }
-        if joints.is_some() {
-            return Ok(Self::Joints(record.way.iter().cloned().collect()));
-        }
-        let point = |at: &[f64]| std::array::from_fn(|i| at[i]);
-        let posture = |m: &Vec<f64>| m.chunks_exact(D).map(point).collect();
-        Ok(Self::Rods(record.way.iter().map(posture).collect()))
-    }
-}
-
-impl Snapshot {
-    /// Returns the digest of this state: it covers every value, by id.
-    pub fn digest(&self) -> Digest {
-        let mut hasher = Hasher::default();
-        add(&mut hasher, &(self.cycle, &self.chains));
-        // Empty lists add nothing, so that worlds without plans, ways out and orders keep their digests.
-        add_any(&mut hasher, &self.joints);
-        add_any(&mut hasher, &self.plans);
-        add_any(&mut hasher, &self.ways_out);
-        add_any(&mut hasher, &self.stood);
-        add_any(&mut hasher, &self.waited);
-        add_any(&mut hasher, &self.externals);
-        add_any(&mut hasher, &self.missing);
-        add_any(&mut hasher, &self.handed);
-        hasher.finish()
-    }
-}
-
-/// Adds a list to a digest, unless it is empty.
-fn add_any<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
-    if !list.is_empty() {
-        add(hasher, &list);
-    }
-}
-
-/// Adds plain data to a digest.
-fn add(hasher: &mut Hasher, data: &impl Serialize) {
-    let bytes = postcard::to_stdvec(data).expect("a snapshot is plain data");
-    bytes.chunks(8).for_each(|chunk| {
-        let mut word = [0; 8];
-        word[..chunk.len()].copy_from_slice(chunk);
-        hasher.write_u64(u64::from_le_bytes(word));
-    });
-    hasher.write_u64(bytes.len() as u64);
+    drop(content);
+    lock.read().unwrap_or_else(PoisonError::into_inner)
 }

@@ -97,9 +97,10 @@ pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
 const ROUNDING_M: f64 = 1e-9;
 
 fn rods(violation_m: f64) -> String {
-    match violation_m <= ROUNDING_M {
-        true => "within their limits".into(),
-        false => format!("out of their limits by up to {} m", format_fixed(violation_m, 6)),
+    if violation_m <= ROUNDING_M {
+        "within their limits".into()
+    } else {
+        format!("out of their limits by up to {} m", format_fixed(violation_m, 6))
     }
 }
 
@@ -186,8 +187,8 @@ fn after_vetoes(m: &Metrics) -> KeyValues {
         (rungs.waited, "waited"),
         (rungs.pulled_back, "pulled by the other end"),
         (rungs.stuck, "stuck"),
-        (rungs.planned, "ways planned"),
-        (rungs.not_planned, "plans without a way"),
+        (rungs.planned, "paths planned"),
+        (rungs.not_planned, "plans without a path"),
     ]);
     let escaped = some(&[
         (escapes.moves, "parts moved away"),
@@ -238,11 +239,12 @@ fn abandoned_part(told: &ChainAbandonedPart) -> (String, String) {
     let what = &told.what;
     let why = match (&what.by, &what.reason) {
         (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
-        _ => "nobody objected".into(),
+        _ => "no connector objected".into(),
     };
-    let nearest = match what.nearest_m.is_finite() {
-        true => format!(", came within {:.4} m", what.nearest_m),
-        false => String::new(),
+    let nearest = if what.nearest_m.is_finite() {
+        format!(", came within {:.4} m", what.nearest_m)
+    } else {
+        String::new()
     };
     let who = format!("chain {}, task {}, part {}", told.chain, what.task, what.part);
     key_value("given up", format!("{who}{nearest}; {why}"))

@@ -1,32 +1,32 @@
-//! Notes on one chain while it acts.
+//! What an inspection records of a chain while it acts.
 
 use crate::motion::recovery::RecoveryOutcome;
 use sidestep_kernel::Slot;
 use sidestep_rods::Veto;
 use sidestep_rods::geometry::Point;
 
-/// Notes for an inspection; no run makes any.
+/// The record of an inspection; runs make none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct InspectionTrace<const D: usize> {
     /// The chain.
     pub(crate) slot: Slot,
-    /// Its driver's wish.
-    pub(crate) wish: Option<IntendedMove<D>>,
-    /// Its initiator's steps on the ladder.
+    /// The move that its driver wanted.
+    pub(crate) intended: Option<IntendedMove<D>>,
+    /// The outcome of its initiator's recovery ladder.
     pub(crate) climbed: Option<RecoveryOutcome<D>>,
-    /// Objections, in their order.
+    /// Vetoes, in the order in which they arose.
     pub(crate) vetoes: Vec<Veto<D>>,
     /// Motions by which parts got out of the way.
     pub(crate) escapes: usize,
 }
 
-/// A driver's wish.
+/// A move that a driver wants.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct IntendedMove<const D: usize> {
-    /// The connector that wants it.
-    pub(crate) of: usize,
-    /// The note in words.
+    /// The connector that is to move.
+    pub(crate) connector: usize,
+    /// Its description.
     pub(crate) words: &'static str,
-    /// The place that the initiator wants to reach.
+    /// The position that the connector is to reach.
     pub(crate) to: Option<Point<D>>,
 }

@@ -16,15 +16,15 @@ use sidestep_rods::geometry::{Core, Cuboid, cross, with_dimensions};
 use sidestep_rods::{Chain, Obstacle};
 use std::ops::RangeInclusive;
 
-/// Drawn radius of connectors without a body, as a part of the longest rod.
+/// Drawn radius of connectors without a body, as a fraction of the longest rod.
 const POINT_RADIUS_FRACTION: f64 = 0.05;
-/// Drawn height of bodies that have a place in the plane only, meters.
+/// Drawn height of bodies in the plane, meters.
 const HEIGHT_M: f64 = 0.1;
 /// The name of a leader's laser.
 const LASER: &str = "laser";
 
 impl<const D: usize> ChainWorld<D> {
-    /// Returns the static obstacles, and the places to go to.
+    /// Returns the static obstacles, and the targets.
     pub(crate) fn scenery(&self, name: &str) -> Scenery {
         // Walls of one room share their number.
         let still = (0..).zip(self.obstacles.still());
@@ -75,8 +75,8 @@ impl<const D: usize> ChainWorld<D> {
     pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, of: &ScanSelection) -> Vec<Scan> {
         let scratch = &mut Scratch::new(self);
         scratch.scan.keeps_truth = true;
-        let mut looking = Perceiver { world: self, state, now, scratch };
-        let mut scan = |slot| leader_scan(&mut looking, slot);
+        let mut perceiver = Perceiver { world: self, state, now, scratch };
+        let mut scan = |slot| leader_scan(&mut perceiver, slot);
         let slots = 0..state.len() as Slot;
         match of {
             ScanSelection::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
@@ -92,17 +92,18 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Returns the scan that a leader on wheels is about to take; none for other chains.
-fn leader_scan<const D: usize>(looking: &mut Perceiver<'_, D>, slot: Slot) -> Option<Scan> {
-    let sight = looking.percept(slot)?;
-    let (laser, [x_m, y_m]) = (&sight.navigator.leader.laser, sight.leader.pose.at);
-    let beams = laser.readings(&looking.scratch.scan);
+fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> Option<Scan> {
+    let percept = perceiver.percept(slot)?;
+    let laser = &percept.navigator.leader.laser;
+    let [x_m, y_m] = percept.leader.pose.at;
+    let beams = laser.readings(&perceiver.scratch.scan);
     let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
     let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
-    let true_m = laser.true_ranges(&looking.scratch.scan).map(beyond).collect();
+    let true_m = laser.true_ranges(&perceiver.scratch.scan).map(beyond).collect();
     Some(Scan {
-        of: BodyId::new(BodyKind::Connector, slot, Some(sight.agent as u32)),
+        of: BodyId::new(BodyKind::Connector, slot, Some(percept.agent as u32)),
         sensor: LASER.into(),
-        pose: Pose::from_heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
+        pose: Pose::from_heading([x_m, y_m, 0.0], percept.leader.pose.heading_rad),
         bearings_rad,
         ranges_m,
         true_m,
@@ -110,7 +111,7 @@ fn leader_scan<const D: usize>(looking: &mut Perceiver<'_, D>, slot: Slot) -> Op
     })
 }
 
-/// Returns the places that a chain shall reach.
+/// Returns the targets of a chain.
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     let of_task = |task: &Task<D>| -> Vec<(Vec3, f64)> {
         match &task.driver {
@@ -148,7 +149,8 @@ fn push_chain<const D: usize>(
     spec: &ChainSpec<D>,
     body: &ChainBody<D>,
 ) {
-    let (chain, least_m) = (&body.chain, point_radius_m(&spec.start));
+    let chain = &body.chain;
+    let least_m = point_radius_m(&spec.start);
     let points_m: Vec<Vec3> = chain.points().iter().map(|p| with_dimensions(*p)).collect();
     let radius_m = chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max);
     for (part, whole) in (0..).zip(whole_parts(chain)) {
@@ -185,7 +187,8 @@ fn leader<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<us
 
 /// Returns runs of connectors that are joined, because a broken chain's rods hold nothing.
 fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
-    let (mut parts, mut first) = (Vec::new(), 0);
+    let mut parts = Vec::new();
+    let mut first = 0;
     for rod in 0..chain.rods().len() {
         if !chain.is_rod_within_limits(rod) {
             parts.push(first..=rod);
@@ -218,17 +221,15 @@ fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
-    let side_m = |i: usize| match i < D {
-        true => 2.0 * (cuboid.half_m[i] + radius_m),
-        false => HEIGHT_M,
-    };
+    let side_m = |i: usize| if i < D { 2.0 * (cuboid.half_m[i] + radius_m) } else { HEIGHT_M };
     Shape::Cuboid { size_m: std::array::from_fn(side_m) }
 }
 
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
     let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| with_dimensions(*axis));
-    let (x, y) = (axis(0), axis(1));
-    // Two axes give the third up to its sign, and a box looks the same both ways.
+    let x = axis(0);
+    let y = axis(1);
+    // Two axes determine the third up to its sign, and a box is symmetric.
     Pose::from_axes(with_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 

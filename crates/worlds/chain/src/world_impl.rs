@@ -19,7 +19,8 @@ use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
 };
 use sidestep_kernel::{
-    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, Simulation, World,
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, Simulation, World,
+    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -49,7 +50,8 @@ impl<const D: usize> ChainScenario<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
         let books = Collector { rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, state, books, &source.text, workers)
+        let start = RunStart { config: plan, state, collector: books };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.
@@ -101,8 +103,6 @@ impl<const D: usize> World for ChainWorld<D> {
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
-    type Snapshot = (Snapshot, Vec<ChainTally>);
-    type Metrics = Metrics;
 
     fn agents(&self) -> usize {
         self.chains.iter().map(|spec| spec.start.points().len()).sum()
@@ -132,7 +132,9 @@ impl<const D: usize> World for ChainWorld<D> {
             books.rows.add_event(event);
         }
     }
+}
 
+impl<const D: usize> WorldRecording for ChainWorld<D> {
     fn start_recording(&self, _: &mut ChainState<D>, books: &mut Collector, _: Cycle) {
         books.rows.start(self);
     }
@@ -155,6 +157,14 @@ impl<const D: usize> World for ChainWorld<D> {
         books.rows.record(recorder)
     }
 
+    fn position_columns(&self, books: &Collector) -> Vec<PositionColumns> {
+        ChainWorld::<D>::position_columns(books.rows.interval())
+    }
+}
+
+impl<const D: usize> WorldCheckpoint for ChainWorld<D> {
+    type Snapshot = (Snapshot, Vec<ChainTally>);
+
     fn digest(&self, state: &ChainState<D>, now: Cycle) -> Digest {
         state.snapshot(now).digest()
     }
@@ -176,7 +186,9 @@ impl<const D: usize> World for ChainWorld<D> {
         books.steps_before = tallies.iter().map(|t| t.steps).sum();
         ChainState::restore(self, &snapshot, tallies)
     }
+}
 
+impl<const D: usize> WorldView for ChainWorld<D> {
     fn scenery(&self, name: &str) -> Scenery {
         ChainWorld::scenery(self, name)
     }
@@ -209,7 +221,9 @@ impl<const D: usize> World for ChainWorld<D> {
     ) -> Option<Inspection> {
         ChainWorld::inspect(self, state, now, who)
     }
+}
 
+impl<const D: usize> WorldControl for ChainWorld<D> {
     fn teams(&self) -> Arc<Teams> {
         self.teams.clone()
     }
@@ -238,10 +252,10 @@ impl<const D: usize> World for ChainWorld<D> {
     fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
         ChainWorld::observe(self, state, now, team, room);
     }
+}
 
-    fn position_columns(&self, books: &Collector) -> Vec<PositionColumns> {
-        ChainWorld::<D>::position_columns(books.rows.interval())
-    }
+impl<const D: usize> WorldMetrics for ChainWorld<D> {
+    type Metrics = Metrics;
 
     fn metrics(
         &self,

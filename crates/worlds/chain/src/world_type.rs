@@ -36,7 +36,7 @@ impl WorldType for Chains {
     }
 
     fn random_quantities(&self) -> &'static str {
-        "fields, anywhere = true of a chain, tasks of kind wander, navigator.noise_m, and planned ways"
+        "fields, anywhere = true of a chain, tasks of kind wander, navigator.noise_m, and planned paths"
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {

@@ -1,198 +1,191 @@
-//! The exact Markov chain of one robot in a building, computed without random draws.
-//!
-//! A robot that is alone, with walls and closed doors around it, is a Markov chain over its poses.
-//! This module computes the chain from the same tables that the simulator draws from, but by other
-//! code, so that each can be checked against the other; and it writes the model as a POMDP for
-//! planners.
-//!
-//! ```text
-//! Compiled -> Model   outcomes of every action at every pose      obstacle.rs building.rs
-//!               |---> Chain under a policy: distributions         chain.rs
-//!               |        `---> Comparison with the simulator      compare.rs
-//!               `---> Pomdp: observations as well, as text        observe.rs pomdp.rs names.rs
-//! ```
+//! The exact Markov chain of a scenario with one robot, and the simulator compared with it.
 
-mod compare;
-mod markov_chain;
-mod names;
-mod observe;
-mod obstacle;
-mod pomdp;
-mod sparse;
-mod static_map;
-mod summary;
-
-pub use compare::{Comparison, SIGNIFICANCE, compare, sampling_limit};
-pub use markov_chain::{ChainState, MarkovChain, StationaryDistribution, total_variation};
-pub use observe::Beam;
-pub use obstacle::{ActionOutcome, GridPose, outcome_distribution};
-pub use pomdp::{MAX_BEAMS, Pomdp, PomdpOptions, PomdpSize};
-pub use summary::{Summary, VisitedBox};
-
-use super::decide::RandomPolicy;
-use super::effector::{ActionId, FORWARD, ObstacleRule, Side};
-use super::scenario::Compiled;
-use sidestep_kernel::InputError;
-use sparse::SparseMatrix;
-use static_map::{Robot, StaticMap};
+use crate::RobotsRun;
+use crate::purpose;
+use crate::scenario::Compiled;
+use crate::world::{Body, Door, RobotModel, RobotsWorld, Role};
+use sidestep_error_models::RandomPolicy;
+use sidestep_exact::{Comparison, GridPose, MarkovModel, SingleRobot};
+use sidestep_kernel::distr::Bernoulli;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{EntityId, InputError, Seed, Simulation};
+use sidestep_scenario::Source;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// Largest number of poses of a model.
-pub const MAX_STATES: usize = 200_000;
-/// Largest number of outcomes over all poses and actions.
-const MAX_OUTCOMES: usize = 20_000_000;
-
-/// The names of the policies that have one.
-pub const POLICIES: [&str; 3] = ["uniform", "forward", "bounce"];
-
-/// Returns the policy of a name: `uniform` (each standard action alike), `forward` (always ahead),
-/// or `bounce` (ahead, and a turn to either side after a contact).
+/// Computes the model of a scenario's one robot.
 ///
 /// # Errors
-/// When there is no such policy.
-pub fn policy(name: &str) -> Result<RandomPolicy, InputError> {
-    match name {
-        "uniform" => Ok(RandomPolicy::uniform()),
-        "forward" => Ok(RandomPolicy::always(FORWARD)),
-        "bounce" => Ok(RandomPolicy::bounce()),
-        _ => {
-            let remedy = sidestep_scenario::suggestion(name, &POLICIES);
-            Err(InputError::new("--policy", format!("unknown policy `{name}`"), remedy))
-        }
-    }
+/// Those of [`single_robot`] and [`MarkovModel::new`].
+pub fn markov_model(compiled: &Compiled) -> Result<MarkovModel, InputError> {
+    MarkovModel::new(single_robot(compiled)?)
 }
 
-/// Every pose that a robot can reach from its start, with the outcomes of each action there.
-#[derive(Debug, Clone)]
-pub struct MarkovModel {
-    place: String,
-    building: StaticMap,
-    robot: Robot,
-    rule: ObstacleRule,
-    kinds: Vec<String>,
-    /// Poses in the order in which the search finds them; the first is the start.
-    poses: Vec<GridPose>,
-    /// Outcomes, in row `pose * actions + action`.
-    outcomes: SparseMatrix<ModelTransition>,
-}
-
-/// One outcome of an action at a pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct ModelTransition {
-    /// Index of the pose reached.
-    to: u32,
-    contact: Option<(u8, Side)>,
-    p: f64,
-}
-
-impl MarkovModel {
-    /// Computes the model of a scenario with one robot and nothing else that moves; doors
-    /// that never open are walls of their kind.
-    ///
-    /// # Errors
-    /// When there are more robots or other moving bodies, or more than [`MAX_STATES`] poses.
-    pub fn new(compiled: &Compiled) -> Result<Self, InputError> {
-        let (building, robot) = static_map::single_robot(compiled)?;
-        let mut model = Self {
-            place: static_map::source_name(compiled),
-            building,
-            poses: vec![robot.start],
-            robot,
-            rule: compiled.world.obstacle_rule,
-            kinds: compiled.world.kinds.clone(),
-            outcomes: SparseMatrix::default(),
-        };
-        model.explore()?;
-        Ok(model)
-    }
-
-    /// Follows every action from every pose found, until there is no new pose.
-    fn explore(&mut self) -> Result<(), InputError> {
-        let mut index_of = BTreeMap::from([(self.robot.start, 0)]);
-        let mut next = 0;
-        while let Some(&pose) = self.poses.get(next) {
-            next += 1;
-            for action in 0..self.actions().len() {
-                let outcomes = self.outcome_distribution(pose, action as ActionId);
-                let poses = &mut self.poses;
-                let arrivals = outcomes.into_iter().map(|(ActionOutcome { pose, contact }, p)| {
-                    let to = *index_of.entry(pose).or_insert_with(|| {
-                        poses.push(pose);
-                        poses.len() as u32 - 1
-                    });
-                    ModelTransition { to, contact, p }
-                });
-                self.outcomes.push(arrivals);
+/// Returns the one robot of a scenario in which nothing else moves; doors that never open are walls of their kind.
+///
+/// # Errors
+/// When there are more robots or none, or other bodies that move.
+pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
+    let world = &compiled.world;
+    let refuse =
+        |cause: String, remedy: &str| Err(InputError::new(source_name(compiled), cause, remedy));
+    let mut doors = BTreeMap::new();
+    let mut robots = Vec::new();
+    for &body in &world.bodies {
+        let ty = &world.types[usize::from(body.ty)];
+        match &ty.role {
+            Role::Robot(model) => robots.push((body, model, ty.size.0)),
+            Role::Mover(_) => {
+                let kind = &world.kinds[usize::from(ty.kind)];
+                let cause = format!("body {} (kind `{kind}`) moves by itself", body.id);
+                return refuse(cause, "leave out [people]: a chain has one moving body");
             }
-            self.check_size()?;
+            Role::Door(door) if is_always_closed(door) => {
+                doors.extend(covered_boxes(compiled, body.id).map(|at| (at, ty.kind)));
+            }
+            Role::Door(_) => {
+                return refuse(
+                    format!("door {} opens", body.id),
+                    "keep doors closed with periodic = { open = 0, closed = 1 }, or leave out [doors]",
+                );
+            }
         }
-        Ok(())
     }
+    match robots[..] {
+        [(body, model, size)] => Ok(robot(compiled, doors, body, model, size)),
+        _ => refuse(
+            format!("{} robots", robots.len()),
+            "give one robot: [robots] with count = 1, or --set robots.count=1",
+        ),
+    }
+}
 
-    fn check_size(&self) -> Result<(), InputError> {
-        if self.poses.len() <= MAX_STATES && self.outcomes.len() <= MAX_OUTCOMES {
-            return Ok(());
+fn is_always_closed(door: &Door) -> bool {
+    match *door {
+        Door::Periodic { open, .. } => open == 0,
+        Door::Random { open, .. } => open == Bernoulli::new(0.0),
+    }
+}
+
+/// Returns the boxes that a body covers at the start.
+fn covered_boxes(compiled: &Compiled, id: EntityId) -> impl Iterator<Item = (i32, i32)> {
+    let (width, height) = compiled.world.type_of(id).size;
+    let ((col, row), _) = compiled.start[id as usize];
+    let boxes = (row..row + height).flat_map(move |r| (col..col + width).map(move |c| (c, r)));
+    boxes.map(|(c, r)| (c as i32, r as i32))
+}
+
+fn robot(
+    compiled: &Compiled,
+    doors: BTreeMap<(i32, i32), u8>,
+    timing: Body,
+    model: &RobotModel,
+    size: u32,
+) -> SingleRobot {
+    let world = &compiled.world;
+    let ((col, row), heading) = compiled.start[timing.id as usize];
+    SingleRobot {
+        place: source_name(compiled),
+        map: Arc::clone(&world.map),
+        doors,
+        kinds: world.kinds.clone(),
+        obstacle_rule: world.obstacle_rule,
+        start: GridPose { col: col as i32, row: row as i32, heading },
+        size,
+        period: timing.period,
+        phase: timing.phase,
+        sensors: model.body.sensors.iter().map(|sensor| sensor.model.clone()).collect(),
+        has_reliable_sensors: world.regime.has_reliable_sensors(),
+        effector: model.body.effector.clone(),
+        has_reliable_effector: world.regime.has_reliable_effectors(),
+    }
+}
+
+/// Returns the name of the scenario in errors.
+fn source_name(compiled: &Compiled) -> String {
+    if compiled.name.is_empty() {
+        "the scenario".into()
+    } else {
+        format!("scenario `{}`", compiled.name)
+    }
+}
+
+/// Runs the scenario's robot `runs` times for `cycles` cycles from its start under `policy`
+/// (each run with a seed that is drawn from the scenario's) and compares where it ends with
+/// [`MarkovChain::distribution_after`](sidestep_exact::MarkovChain::distribution_after).
+///
+/// # Errors
+/// When the scenario is not a chain, see [`markov_model`], or `runs` is 0.
+pub fn compare(
+    compiled: &Compiled,
+    source: &Source,
+    policy: &RandomPolicy,
+    cycles: u64,
+    runs: u32,
+) -> Result<Comparison, InputError> {
+    if runs == 0 {
+        return Err(InputError::new("--runs", "no run at all", "give 1000 or more"));
+    }
+    let model = markov_model(compiled)?;
+    let chain = model.chain(policy)?;
+    let exact = chain.pose_distribution(&chain.distribution_after(model.actions_in(cycles)));
+    let counts = count_final_poses(compiled, source, policy, cycles, runs);
+    Ok(Comparison::new(&exact, &counts, cycles, runs))
+}
+
+/// Counts how often each pose is the final one.
+fn count_final_poses(
+    compiled: &Compiled,
+    source: &Source,
+    policy: &RandomPolicy,
+    cycles: u64,
+    runs: u32,
+) -> BTreeMap<GridPose, u32> {
+    let mut world = (*compiled.world).clone();
+    set_policy(&mut world, policy);
+    let mut counts = BTreeMap::new();
+    for run in 0..u64::from(runs) {
+        world.streams = Streams::new(run_seed(compiled.seed, run));
+        let compiled = Compiled { world: Arc::new(world.clone()), ..compiled.clone() };
+        let mut simulation = compiled.start(source, 1);
+        simulation.advance(cycles);
+        *counts.entry(robot_pose(&simulation)).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Returns the seed of a run. It is drawn, because scenarios with neighboring seeds would share
+/// runs if it were counted up from theirs.
+fn run_seed(seed: u64, run: u64) -> Seed {
+    Seed(Streams::new(Seed(seed)).draws(0, run, purpose::RUN).next_u64())
+}
+
+/// Gives the robots another behavior.
+fn set_policy(world: &mut RobotsWorld, policy: &RandomPolicy) {
+    for ty in &mut world.types {
+        if let Role::Robot(model) = &mut ty.role {
+            model.behaviour = Arc::new(policy.clone());
         }
-        let cause = format!(
-            "the robot reaches more than {MAX_STATES} poses, or its actions have more than {MAX_OUTCOMES} outcomes there"
-        );
-        let remedy = "use larger boxes (map.box_size_m), a smaller map, or fewer transitions";
-        Err(InputError::new(&self.place, cause, remedy))
     }
+}
 
-    /// Returns the distribution of outcomes of an action at a pose, merged; it sums to 1.
-    ///
-    /// # Panics
-    /// When the robot has no such action.
-    pub fn outcome_distribution(
-        &self,
-        pose: GridPose,
-        action: ActionId,
-    ) -> Vec<(ActionOutcome, f64)> {
-        let transitions = &self.robot.actions[usize::from(action)];
-        let kind_at = |col, row| self.building.kind_at(col, row);
-        outcome_distribution(transitions, self.robot.size, pose, self.rule, kind_at)
-    }
+fn robot_pose(simulation: &RobotsRun) -> GridPose {
+    let (world, state) = (simulation.world(), simulation.state());
+    let slot = world.robots()[0];
+    let (col, row) = world.map_position(state.position(slot));
+    let heading = state.bodies[slot as usize].facing.get().heading();
+    GridPose { col: col as i32, row: row as i32, heading }
+}
 
-    /// Returns every pose that can be reached; the first is the start.
-    pub fn poses(&self) -> &[GridPose] {
-        &self.poses
-    }
+#[cfg(test)]
+mod tests {
+    use super::run_seed;
+    use std::collections::BTreeSet;
 
-    /// Returns the names of the actions, by id.
-    pub fn actions(&self) -> &[String] {
-        &self.robot.body.effector.actions
-    }
-
-    /// Returns the number of outcomes over all poses and actions.
-    pub fn outcomes(&self) -> usize {
-        self.outcomes.len()
-    }
-
-    /// Returns how often the robot acts in the first `cycles` cycles.
-    pub fn actions_in(&self, cycles: u64) -> u64 {
-        let (period, phase) = (u64::from(self.robot.timing.period), self.robot.timing.phase);
-        (cycles + u64::from(phase)).div_ceil(period) - u64::from(phase).div_ceil(period)
-    }
-
-    /// Returns the Markov chain of the robot under a policy.
-    ///
-    /// # Errors
-    /// When the policy chooses an action that the robot does not have.
-    pub fn chain(&self, policy: &RandomPolicy) -> Result<MarkovChain, InputError> {
-        MarkovChain::new(self, policy)
-    }
-
-    /// Returns the model with its observations, in the form that planners read.
-    ///
-    /// # Errors
-    /// When `options` do not fit the scenario, or ask for too much.
-    pub fn pomdp(&self, options: &PomdpOptions) -> Result<Pomdp, InputError> {
-        Pomdp::new(self, options)
-    }
-
-    /// Returns the outcomes of an action at the pose with this index.
-    fn model_transitions(&self, pose: usize, action: usize) -> &[ModelTransition] {
-        self.outcomes.row(pose * self.actions().len() + action)
+    #[test]
+    fn scenarios_with_neighboring_seeds_share_no_run() {
+        let runs = |seed| (0..2000).map(move |run| run_seed(seed, run).0);
+        let all: BTreeSet<u64> = (1..=3).flat_map(runs).collect();
+        assert_eq!(all.len(), 3 * 2000);
     }
 }

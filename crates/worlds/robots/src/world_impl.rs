@@ -13,7 +13,10 @@ use sidestep_kernel::control::{BufferMut, Order, Teams};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStats, World};
+use sidestep_kernel::{
+    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
+    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
@@ -35,7 +38,8 @@ impl Compiled {
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let (plan, books) = (self.plan(), Collector::new(self.record));
-        Run::new(self.world, plan, state, books, &source.text, workers)
+        let start = RunStart { config: plan, state, collector: books };
+        Run::new(self.world, start, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.
@@ -71,8 +75,6 @@ impl World for RobotsWorld {
     const AGENT: &'static str = "robot";
 
     type Collector = Collector;
-    type Snapshot = Snapshot;
-    type Metrics = Metrics;
 
     fn agents(&self) -> usize {
         self.robots.len()
@@ -89,7 +91,9 @@ impl World for RobotsWorld {
     fn commit(&self, books: &mut Collector) {
         books.commit(self);
     }
+}
 
+impl WorldRecording for RobotsWorld {
     fn start_recording(&self, state: &mut RobotsState, books: &mut Collector, now: Cycle) {
         books.start(self, state, now);
     }
@@ -120,6 +124,14 @@ impl World for RobotsWorld {
         books.record(self, state, now, recorder)
     }
 
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        RobotsWorld::position_columns(self)
+    }
+}
+
+impl WorldCheckpoint for RobotsWorld {
+    type Snapshot = Snapshot;
+
     fn digest(&self, state: &RobotsState, now: Cycle) -> Digest {
         state.snapshot(self, now).digest()
     }
@@ -142,7 +154,9 @@ impl World for RobotsWorld {
         books.resume(self, &mut state, saved.cycle);
         Ok(state)
     }
+}
 
+impl WorldView for RobotsWorld {
     fn scenery(&self, name: &str) -> Scenery {
         RobotsWorld::scenery(self, name)
     }
@@ -175,7 +189,9 @@ impl World for RobotsWorld {
     ) -> Option<Inspection> {
         RobotsWorld::inspect(self, state, now, who)
     }
+}
 
+impl WorldControl for RobotsWorld {
     fn teams(&self) -> Arc<Teams> {
         Arc::clone(&self.teams)
     }
@@ -187,10 +203,10 @@ impl World for RobotsWorld {
     fn observe(&self, state: &RobotsState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
         RobotsWorld::observe(self, state, now, team, room);
     }
+}
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        RobotsWorld::position_columns(self)
-    }
+impl WorldMetrics for RobotsWorld {
+    type Metrics = Metrics;
 
     fn metrics(
         &self,

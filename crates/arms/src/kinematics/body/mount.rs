@@ -59,7 +59,7 @@ impl Mounts {
         for joint in model.joint_path(base, tip).expect("an arm of this model") {
             let joint = &model.joints[joint];
             let origin = Transform::from_origin(&joint.origin);
-            let before = found[joint.parent].clone().expect("the way goes out from the base");
+            let before = found[joint.parent].clone().expect("the path goes out from the base");
             found[joint.child] = Some(if joint.kind.has_one_value() {
                 link += 1;
                 Mount { link, steps: Vec::new(), last: Transform::IDENTITY }

@@ -18,13 +18,16 @@ pub(super) fn collision_pairs(
         model.joints.iter().map(|joint| sorted(rigid[joint.parent], rigid[joint.child])).collect();
     let masked: BTreeSet<_> = may_touch.iter().map(|&(a, b)| sorted(a, b)).collect();
     let moves = |a: usize, b: usize| {
-        let (a, b) = (mounts.link(a), mounts.link(b));
+        let a = mounts.link(a);
+        let b = mounts.link(b);
         a.link != b.link || !a.is_rigid() || !b.is_rigid()
     };
     let all = (0..links.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
     all.filter(|&(a, b)| {
-        let (a, b) = (links[a], links[b]);
-        let (ra, rb) = (rigid[a], rigid[b]);
+        let a = links[a];
+        let b = links[b];
+        let ra = rigid[a];
+        let rb = rigid[b];
         ra != rb
             && moves(a, b)
             && !joined.contains(&sorted(ra, rb))

@@ -9,7 +9,8 @@ use super::result::{ArmPart, CollidesWith, Collision};
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 use sidestep_rods::geometry::nearest_on_segment;
 
-/// Distance from all bodies that steps aim at, in parts of the reach.
+/// Clearance from all bodies that steps aim at, as a fraction of the reach: without it a posture that only
+/// touches a body would count as a collision by rounding.
 const MARGIN: f64 = 1e-4;
 
 /// The parts of an arm, and the bodies that they must not enter.
@@ -37,7 +38,7 @@ pub(super) struct ContactSet {
 pub(super) struct Contact {
     /// The unit vector in which the part gets away.
     pub(super) away: Vector,
-    /// The way that it must go, in m.
+    /// The distance by which it must move, in m.
     pub(super) wanted_m: f64,
     /// The points that move it.
     pub(super) pulls: [ContactPoint; 2],
@@ -178,7 +179,8 @@ impl<'a> ContactFinder<'a> {
 
 /// Returns the links that hold the rod between two anchors, or on either side of its slide.
 fn holders(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
-    let (first, last) = (outer.first.max(inner.first), inner.last.min(outer.last));
+    let first = outer.first.max(inner.first);
+    let last = inner.last.min(outer.last);
     first.min(last)..=first.max(last)
 }
 

@@ -13,12 +13,13 @@ use super::goal::{ArmGoal, OrientationMask};
 use sidestep_kernel::geometry::{cross, dot, norm, normalized, perpendicular, scaled, sub};
 use sidestep_kernel::math::atan2;
 
-/// The length that an error of 1 rad counts as, in parts of the arm's reach.
+/// The length as which an error of 1 rad counts, as a fraction of the arm's reach: about the lever of a
+/// turn at the tip.
 const RADIAN_LENGTH: f64 = 0.3;
 
 /// The criteria for a posture.
 pub(super) struct IkCriteria<'a> {
-    quick: FastFk,
+    fast_fk: FastFk,
     goal: &'a ArmGoal,
     contacts: ContactFinder<'a>,
     /// The axes along which the tip's position counts, in the base's frame.
@@ -26,7 +27,7 @@ pub(super) struct IkCriteria<'a> {
     radian_m: f64,
 }
 
-/// A posture as it was looked at.
+/// The errors of a posture.
 #[derive(Debug, Clone)]
 pub(super) struct Evaluation {
     pub(super) placed: LinkTransforms,
@@ -53,7 +54,7 @@ impl<'a> IkCriteria<'a> {
             if goal.asked.has_whole_position() { &Transform::IDENTITY } else { &goal.target };
         let counts = (0..3).filter(|&axis| goal.asked.along[axis]);
         Self {
-            quick: FastFk::new(chain),
+            fast_fk: FastFk::new(chain),
             along: counts.map(|axis| axes.axis(axis)).collect(),
             contacts: ContactFinder::new(skeleton, goal),
             radian_m: RADIAN_LENGTH * skeleton.reach_m.max(f64::MIN_POSITIVE),
@@ -61,7 +62,7 @@ impl<'a> IkCriteria<'a> {
         }
     }
 
-    /// Returns a look at nothing, to be used by [`IkCriteria::evaluate`].
+    /// Returns an evaluation of no posture, as a buffer for [`IkCriteria::evaluate`].
     pub(super) fn empty_evaluation(chain: &SerialChain) -> Evaluation {
         Evaluation {
             placed: LinkTransforms::from_chain(chain),
@@ -74,43 +75,45 @@ impl<'a> IkCriteria<'a> {
     }
 
     /// Computes the errors of a posture.
-    pub(super) fn evaluate(&self, values: &[f64], look: &mut Evaluation) {
-        self.quick.compute(values, &mut look.placed);
-        let tip = look.placed.tip;
+    pub(super) fn evaluate(&self, values: &[f64], evaluation: &mut Evaluation) {
+        self.fast_fk.compute(values, &mut evaluation.placed);
+        let tip = evaluation.placed.tip;
         let missing = sub(self.goal.target.origin_m, tip.origin_m);
-        look.wanted.clear();
-        look.wanted.extend(self.along.iter().map(|axis| dot(missing, *axis)));
-        look.tip_m = look.merit().sqrt();
-        self.evaluate_orientation(&tip, look);
-        self.contacts.find(values, &look.placed, &mut look.touched);
-        look.wanted.extend(look.touched.contacts.iter().map(|contact| contact.wanted_m));
+        evaluation.wanted.clear();
+        evaluation.wanted.extend(self.along.iter().map(|axis| dot(missing, *axis)));
+        evaluation.tip_m = evaluation.merit().sqrt();
+        self.evaluate_orientation(&tip, evaluation);
+        self.contacts.find(values, &evaluation.placed, &mut evaluation.touched);
+        evaluation
+            .wanted
+            .extend(evaluation.touched.contacts.iter().map(|contact| contact.wanted_m));
     }
 
-    fn evaluate_orientation(&self, tip: &Transform, look: &mut Evaluation) {
-        look.about.clear();
+    fn evaluate_orientation(&self, tip: &Transform, evaluation: &mut Evaluation) {
+        evaluation.about.clear();
         let target = &self.goal.target;
         match self.goal.asked.turn {
-            OrientationMask::Free => look.turn_rad = 0.0,
+            OrientationMask::Free => evaluation.turn_rad = 0.0,
             OrientationMask::Whole => {
                 let turn = rotation_between(&tip.rotation, &target.rotation);
-                look.turn_rad = norm(turn);
-                look.about.extend(Transform::IDENTITY.rotation);
-                look.wanted.extend(turn.map(|x| x * self.radian_m));
+                evaluation.turn_rad = norm(turn);
+                evaluation.about.extend(Transform::IDENTITY.rotation);
+                evaluation.wanted.extend(turn.map(|x| x * self.radian_m));
             }
             OrientationMask::Axis(axis) => {
                 let [own, wanted] = [tip.axis(axis as usize), target.axis(axis as usize)];
                 let normal = cross(own, wanted);
-                look.turn_rad = atan2(norm(normal), dot(own, wanted));
+                evaluation.turn_rad = atan2(norm(normal), dot(own, wanted));
                 // Where the axes are parallel, any normal will do.
                 let about = normalized(normal).unwrap_or_else(|| perpendicular(own));
-                look.about.extend([about, cross(own, about)]);
-                look.wanted.extend([look.turn_rad * self.radian_m, 0.0]);
+                evaluation.about.extend([about, cross(own, about)]);
+                evaluation.wanted.extend([evaluation.turn_rad * self.radian_m, 0.0]);
             }
         }
     }
 
     /// Returns the distance of a tip from the target in m, along the axes that count, and the angle
-    /// by which it is turned otherwise than asked.
+    /// of its orientation error.
     pub(super) fn errors(&self, tip: &Transform) -> (f64, f64) {
         let missing = sub(self.goal.target.origin_m, tip.origin_m);
         let squares = self.along.iter().map(|axis| dot(missing, *axis) * dot(missing, *axis));
@@ -126,28 +129,28 @@ impl<'a> IkCriteria<'a> {
         (squares.sum::<f64>().sqrt(), turn_rad)
     }
 
-    /// Computes the Jacobian at a posture that was looked at: rows of an entry for each of `n`
+    /// Computes the Jacobian at a posture that was evaluated: rows of an entry for each of `n`
     /// variables, one row after the other.
-    pub(super) fn jacobian(&self, look: &Evaluation, n: usize, rows: &mut Vec<f64>) {
+    pub(super) fn jacobian(&self, evaluation: &Evaluation, n: usize, rows: &mut Vec<f64>) {
         rows.clear();
-        rows.resize(look.wanted.len() * n, 0.0);
-        let LinkTransforms { lines, tip, .. } = &look.placed;
+        rows.resize(evaluation.wanted.len() * n, 0.0);
+        let LinkTransforms { lines, tip, .. } = &evaluation.placed;
         let (of_tip, others) = rows.split_at_mut(self.along.len() * n);
-        self.quick.for_each_joint(lines, lines.len(), tip.origin_m, |variable, moves| {
+        self.fast_fk.for_each_joint(lines, lines.len(), tip.origin_m, |variable, moves| {
             for (row, axis) in of_tip.chunks_exact_mut(n).zip(&self.along) {
                 row[variable] += dot(moves, *axis);
             }
         });
-        let (of_turn, of_contacts) = others.split_at_mut(look.about.len() * n);
-        self.quick.for_each_turn(lines, |variable, turns| {
-            for (row, about) in of_turn.chunks_exact_mut(n).zip(&look.about) {
+        let (of_turn, of_contacts) = others.split_at_mut(evaluation.about.len() * n);
+        self.fast_fk.for_each_turn(lines, |variable, turns| {
+            for (row, about) in of_turn.chunks_exact_mut(n).zip(&evaluation.about) {
                 row[variable] += self.radian_m * dot(turns, *about);
             }
         });
-        for (row, contact) in of_contacts.chunks_exact_mut(n).zip(&look.touched.contacts) {
+        for (row, contact) in of_contacts.chunks_exact_mut(n).zip(&evaluation.touched.contacts) {
             for pull in &contact.pulls {
                 let away = scaled(contact.away, pull.share);
-                self.quick.for_each_joint(lines, pull.link, pull.at_m, |variable, moves| {
+                self.fast_fk.for_each_joint(lines, pull.link, pull.at_m, |variable, moves| {
                     row[variable] += dot(moves, away);
                 });
             }

@@ -21,76 +21,82 @@ pub(super) struct DescentLimits {
     /// Steps without gain before it is given up.
     patience: usize,
     /// Least part of the squared errors whose removal counts as gain.
-    least_gain: f64,
+    min_gain: f64,
 }
 
 impl DescentLimits {
     /// One start of many: where it goes slowly, another start is quicker (half of the time for all
     /// starts, measured).
-    pub(super) const BRIEF: Self = Self { steps: 200, patience: 6, least_gain: 0.3 };
+    pub(super) const BRIEF: Self = Self { steps: 200, patience: 6, min_gain: 0.3 };
     /// Effort that comes as near as possible.
-    pub(super) const PATIENT: Self = Self { steps: 400, patience: 24, least_gain: 1e-3 };
+    pub(super) const PATIENT: Self = Self { steps: 400, patience: 24, min_gain: 1e-3 };
 }
 
 /// The end of a descent from one start.
 #[derive(Debug, Clone)]
 pub(super) struct DescentResult {
     pub(super) values: Vec<f64>,
-    pub(super) look: Evaluation,
+    pub(super) evaluation: Evaluation,
     pub(super) steps: usize,
 }
 
-/// A scene with the memory that descents in it need.
+/// Criteria, with the buffers that descents need.
 pub(super) struct Descender<'a> {
     pub(super) chain: &'a SerialChain,
     pub(super) goal: &'a ArmGoal,
-    pub(super) scene: IkCriteria<'a>,
+    pub(super) criteria: IkCriteria<'a>,
     pub(super) bounds: JointRanges,
     pub(super) stepper: Stepper,
 }
 
 impl Descender<'_> {
-    pub(super) fn is_met(&self, look: &Evaluation) -> bool {
+    pub(super) fn is_met(&self, evaluation: &Evaluation) -> bool {
         // Forward kinematics in another order differs in the last digits.
         const SLACK: f64 = 1.0 - 1e-9;
-        look.tip_m <= SLACK * self.goal.tolerance_m
-            && look.turn_rad <= SLACK * self.goal.tolerance_rad
-            && look.touched.hit.is_none()
+        evaluation.tip_m <= SLACK * self.goal.tolerance_m
+            && evaluation.turn_rad <= SLACK * self.goal.tolerance_rad
+            && evaluation.touched.hit.is_none()
     }
 
     /// Makes damped steps from a start, until the goal is met or there is no more gain.
-    pub(super) fn descend(&mut self, mut values: Vec<f64>, effort: DescentLimits) -> DescentResult {
+    pub(super) fn descend(&mut self, mut values: Vec<f64>, limits: DescentLimits) -> DescentResult {
         self.bounds.clamp(&mut values);
         let n = values.len();
-        let mut look = IkCriteria::empty_evaluation(self.chain);
-        self.scene.evaluate(&values, &mut look);
-        let (mut next, mut next_look) = (values.clone(), look.clone());
+        let mut evaluation = IkCriteria::empty_evaluation(self.chain);
+        self.criteria.evaluate(&values, &mut evaluation);
+        let mut next = values.clone();
+        let mut next_evaluation = evaluation.clone();
         let mut damping = INITIAL_DAMPING;
-        let (mut mark, mut since, mut steps) = (look.merit(), 0, 0);
+        // The merit at the last gain, and the steps since.
+        let mut mark = evaluation.merit();
+        let mut since = 0;
+        let mut steps = 0;
         let mut is_new = true;
-        let goes_on = |steps, since| n > 0 && steps < effort.steps && since < effort.patience;
-        while goes_on(steps, since) && !self.is_met(&look) {
+        while n > 0 && steps < limits.steps && since < limits.patience && !self.is_met(&evaluation)
+        {
             steps += 1;
+            // After a step that did not help the Jacobian is still that of the best posture.
             if is_new {
-                self.scene.jacobian(&look, n, &mut self.stepper.rows);
+                self.criteria.jacobian(&evaluation, n, &mut self.stepper.rows);
             }
-            self.stepper.step(&values, &look.wanted, damping, &self.bounds, &mut next);
-            self.scene.evaluate(&next, &mut next_look);
-            is_new = next_look.merit() < look.merit();
+            self.stepper.step(&values, &evaluation.wanted, damping, &self.bounds, &mut next);
+            self.criteria.evaluate(&next, &mut next_evaluation);
+            is_new = next_evaluation.merit() < evaluation.merit();
             if is_new {
                 std::mem::swap(&mut values, &mut next);
-                std::mem::swap(&mut look, &mut next_look);
+                std::mem::swap(&mut evaluation, &mut next_evaluation);
                 damping *= DAMPING_DECREASE;
             } else {
                 damping *= DAMPING_INCREASE;
             }
             since += 1;
-            if look.merit() < (1.0 - effort.least_gain) * mark {
-                (mark, since) = (look.merit(), 0);
+            if evaluation.merit() < (1.0 - limits.min_gain) * mark {
+                mark = evaluation.merit();
+                since = 0;
             }
         }
         self.unwind(&mut values);
-        DescentResult { values, look, steps }
+        DescentResult { values, evaluation, steps }
     }
 
     /// Brings angles without limits to less than half a turn from zero.

@@ -106,24 +106,24 @@ impl FastFk {
         lines: &[Line],
         link: usize,
         p_m: Vector,
-        mut tell: impl FnMut(usize, Vector),
+        mut visit: impl FnMut(usize, Vector),
     ) {
         for (joint, line) in self.joints[..link].iter().zip(lines) {
             let moves = match joint.motion {
                 JointMotion::Turn => line.velocity_at(p_m),
                 JointMotion::Slide => line.along,
             };
-            tell(joint.drive.variable, scaled(moves, joint.drive.multiplier));
+            visit(joint.drive.variable, scaled(moves, joint.drive.multiplier));
         }
     }
 
     /// Calls a function with each joint and the angular velocity of the tip if the joint's variable
     /// changes by 1 per second.
     #[inline]
-    pub(super) fn for_each_turn(&self, lines: &[Line], mut tell: impl FnMut(usize, Vector)) {
+    pub(super) fn for_each_turn(&self, lines: &[Line], mut visit: impl FnMut(usize, Vector)) {
         for (joint, line) in self.joints.iter().zip(lines) {
             if joint.motion == JointMotion::Turn {
-                tell(joint.drive.variable, scaled(line.along, joint.drive.multiplier));
+                visit(joint.drive.variable, scaled(line.along, joint.drive.multiplier));
             }
         }
     }

@@ -48,8 +48,8 @@ impl<'a> IkSearch<'a> {
         } else {
             JointRanges::from_chain(chain)
         };
-        let scene = IkCriteria::new(chain, skeleton, goal);
-        let by = Descender { chain, goal, scene, bounds, stepper: Stepper::default() };
+        let criteria = IkCriteria::new(chain, skeleton, goal);
+        let by = Descender { chain, goal, criteria, bounds, stepper: Stepper::default() };
         Self { skeleton, by }
     }
 
@@ -64,8 +64,8 @@ impl<'a> IkSearch<'a> {
                 return answer;
             }
         }
-        let most = if out_of_reach.is_some() { FEW_RESTARTS } else { usize::MAX };
-        let mut best = self.find_best(first, self.by.goal.restarts.min(most));
+        let max_restarts = if out_of_reach.is_some() { FEW_RESTARTS } else { usize::MAX };
+        let mut best = self.find_best(first, self.by.goal.restarts.min(max_restarts));
         best.steps += steps;
         let engine = if best.starts == 1 { engine } else { Engine::Dls };
         let reason =
@@ -86,20 +86,22 @@ impl<'a> IkSearch<'a> {
         let mut descent = self.by.descend(first, DescentLimits::BRIEF);
         let mut steps = descent.steps;
         for k in 1..=restarts {
-            if self.by.is_met(&descent.look) {
+            if self.by.is_met(&descent.evaluation) {
                 return BestDescent { descent, steps, starts: k, is_met: true };
             }
-            let came = self.by.descend(self.random_posture(k), DescentLimits::BRIEF);
-            steps += came.steps;
-            if self.by.is_met(&came.look) || came.look.merit() < descent.look.merit() {
-                descent = came;
+            let result = self.by.descend(self.random_posture(k), DescentLimits::BRIEF);
+            steps += result.steps;
+            if self.by.is_met(&result.evaluation)
+                || result.evaluation.merit() < descent.evaluation.merit()
+            {
+                descent = result;
             }
         }
-        if !self.by.is_met(&descent.look) {
+        if !self.by.is_met(&descent.evaluation) {
             descent = self.by.descend(descent.values, DescentLimits::PATIENT);
             steps += descent.steps;
         }
-        let is_met = self.by.is_met(&descent.look);
+        let is_met = self.by.is_met(&descent.evaluation);
         BestDescent { descent, steps, starts: restarts + 1, is_met }
     }
 
@@ -159,12 +161,14 @@ impl<'a> IkSearch<'a> {
         (far_m < hole_m - goal.tolerance_m).then_some(IkFailure::TooNear { far_m, hole_m })
     }
 
-    /// Returns the constraint without which there would be an answer.
+    /// Returns the constraint without which there would be a solution: the goal is solved again without
+    /// each in turn, the most useful reason first.
     fn find_reason(&self, best: &BestDescent) -> IkFailure {
         let Descender { goal, .. } = &self.by;
-        let look = &best.descent.look;
-        let is_there = look.tip_m <= goal.tolerance_m && look.turn_rad <= goal.tolerance_rad;
-        if let Some(hit) = look.touched.hit.clone().filter(|_| is_there) {
+        let evaluation = &best.descent.evaluation;
+        let is_there =
+            evaluation.tip_m <= goal.tolerance_m && evaluation.turn_rad <= goal.tolerance_rad;
+        if let Some(hit) = evaluation.touched.hit.clone().filter(|_| is_there) {
             return IkFailure::Blocked(hit);
         }
         let few = ArmGoal { restarts: goal.restarts.min(FEW_RESTARTS), ..(*goal).clone() };
@@ -174,7 +178,9 @@ impl<'a> IkSearch<'a> {
         if let Some(hit) = self.without_contacts(&few, best) {
             return IkFailure::Blocked(hit);
         }
-        let (starts, error_m, error_rad) = (best.starts, look.tip_m, look.turn_rad);
+        let starts = best.starts;
+        let error_m = evaluation.tip_m;
+        let error_rad = evaluation.turn_rad;
         let unturned = PoseMask { turn: OrientationMask::Free, ..goal.asked };
         let is_turn = goal.asked.turn != OrientationMask::Free
             && unturned.along != [false; 3]
@@ -202,9 +208,9 @@ impl<'a> IkSearch<'a> {
         let spheres: Vec<Sphere> = Vec::new();
         let bare = ArmGoal { spheres, body: None, own_body: false, ..few.clone() };
         let values = self.solve_other(&bare, best)?;
-        let mut look = IkCriteria::empty_evaluation(self.by.chain);
-        self.by.scene.evaluate(&values, &mut look);
-        look.touched.hit
+        let mut evaluation = IkCriteria::empty_evaluation(self.by.chain);
+        self.by.criteria.evaluate(&values, &mut evaluation);
+        evaluation.touched.hit
     }
 
     /// Returns values that meet another goal, starting from the best posture.

@@ -7,39 +7,43 @@ use super::search::{IkSearch, SolutionSet};
 use sidestep_kernel::math::wrap_angle;
 use std::f64::consts::TAU;
 
-/// Most steps toward the start, and the first as a part of the way.
+/// Most steps toward the start.
 const MAX_STEPS: usize = 30;
+/// Length of the first step, as a fraction of the distance to the start.
 const FIRST_FRACTION: f64 = 0.5;
-/// Parts of the way below which no further step is tried.
+/// Fraction of the distance below which no further step is tried.
 const MIN_FRACTION: f64 = 0.02;
-/// Least part of the distance that a step must save.
+/// Least relative reduction of the squared distance that counts as a gain.
 const MIN_GAIN: f64 = 1e-4;
 
 impl IkSearch<'_> {
     /// Descends from `first` and from random postures, and keeps the postures that meet the goal and
     /// are distinct from all before.
     pub(super) fn find_solutions(&mut self, first: &[f64], start: &[f64]) -> SolutionSet {
-        let (wanted, nearest) = (self.by.goal.solutions, self.by.goal.nearest);
+        let wanted = self.by.goal.solutions;
+        let nearest = self.by.goal.nearest;
         let mut found: Vec<Vec<f64>> = Vec::new();
-        let (mut steps, mut starts) = (0, 0);
+        let mut steps = 0;
+        let mut starts = 0;
         for k in 0..=self.by.goal.restarts {
             let from = if k == 0 { first.to_vec() } else { self.random_posture(k) };
-            let mut came = self.by.descend(from, DescentLimits::BRIEF);
-            (steps, starts) = (steps + came.steps, k + 1);
-            if !self.by.is_met(&came.look) {
+            let mut result = self.by.descend(from, DescentLimits::BRIEF);
+            steps += result.steps;
+            starts = k + 1;
+            if !self.by.is_met(&result.evaluation) {
                 continue;
             }
-            self.unwind_toward(&mut came.values, start);
+            self.unwind_toward(&mut result.values, start);
             if nearest {
-                came = self.approach_start(came, start, &mut steps);
+                result = self.approach_start(result, start, &mut steps);
             }
-            match found.iter().position(|other| !self.is_distinct(other, &came.values)) {
-                None => found.push(came.values),
+            match found.iter().position(|other| !self.is_distinct(other, &result.values)) {
+                None => found.push(result.values),
                 Some(same)
-                    if self.squared_distance(&came.values, start)
+                    if self.squared_distance(&result.values, start)
                         < self.squared_distance(&found[same], start) =>
                 {
-                    found[same] = came.values;
+                    found[same] = result.values;
                 }
                 Some(_) => {}
             }
@@ -58,32 +62,35 @@ impl IkSearch<'_> {
     /// Returns a posture with its errors by forward kinematics.
     pub(super) fn solution(&self, values: Vec<f64>) -> IkSolution {
         let tip = self.by.chain.forward(&values).tip;
-        let (error_m, error_rad) = self.by.scene.errors(&tip);
+        let (error_m, error_rad) = self.by.criteria.errors(&tip);
         IkSolution { values, error_m, error_rad }
     }
 
-    /// Moves a posture toward the start, as far as the goal allows: a part of the way, and the least
-    /// way back to where the goal is met.
+    /// Moves a posture toward the start, as far as the goal allows: each step goes a fraction of the
+    /// distance, and then descends to the nearest posture that meets the goal.
     fn approach_start(
         &mut self,
         mut at: DescentResult,
         start: &[f64],
         steps: &mut usize,
     ) -> DescentResult {
-        let (mut part, mut away2) = (FIRST_FRACTION, self.squared_distance(&at.values, start));
+        let mut fraction = FIRST_FRACTION;
+        let mut away2 = self.squared_distance(&at.values, start);
         for _ in 0..MAX_STEPS {
-            if part < MIN_FRACTION {
+            if fraction < MIN_FRACTION {
                 break;
             }
-            let toward = at.values.iter().zip(start).map(|(from, to)| from + part * (to - from));
-            let mut came = self.by.descend(toward.collect(), DescentLimits::BRIEF);
-            *steps += came.steps;
-            self.unwind_toward(&mut came.values, start);
-            let came_away2 = self.squared_distance(&came.values, start);
-            if self.by.is_met(&came.look) && came_away2 < (1.0 - MIN_GAIN) * away2 {
-                (at, away2) = (came, came_away2);
+            let toward =
+                at.values.iter().zip(start).map(|(from, to)| from + fraction * (to - from));
+            let mut result = self.by.descend(toward.collect(), DescentLimits::BRIEF);
+            *steps += result.steps;
+            self.unwind_toward(&mut result.values, start);
+            let result_away2 = self.squared_distance(&result.values, start);
+            if self.by.is_met(&result.evaluation) && result_away2 < (1.0 - MIN_GAIN) * away2 {
+                at = result;
+                away2 = result_away2;
             } else {
-                part *= 0.5;
+                fraction *= 0.5;
             }
         }
         at

@@ -28,9 +28,11 @@ impl JointRanges {
             let drive = joint.drive;
             if let Some(limits) = joint.limits.filter(|_| drive.multiplier != 0.0) {
                 let value = |limit: f64| (limit - drive.offset) / drive.multiplier;
-                let (a, b) = (value(limits.lower), value(limits.upper));
+                let a = value(limits.lower);
+                let b = value(limits.upper);
                 let [lower, upper] = &mut ranges[drive.variable];
-                (*lower, *upper) = (lower.max(a.min(b)), upper.min(a.max(b)));
+                *lower = lower.max(a.min(b));
+                *upper = upper.min(a.max(b));
             }
         }
         Self { ranges }

@@ -17,8 +17,9 @@ const DEFAULT_SPEED_RAD_S: f64 = PI;
 const DEFAULT_SPEED_M_S: f64 = 1.0;
 /// Weight of a connector's place in the guide.
 const GUIDE_WEIGHT: f64 = 0.3;
-/// Most steps toward the guide, and to the places of those that lead.
+/// Most steps toward the guide: it need not be reached, so a few suffice.
 const MAX_GUIDE_STEPS: usize = 4;
+/// Most steps toward the targets of connectors that lead, which are to be met exactly.
 const MAX_LEAD_STEPS: usize = 24;
 /// First damping of both, in parts of the mean of the matrix's diagonal.
 const GUIDE_DAMPING: f64 = 1e-2;
@@ -34,12 +35,12 @@ const ARRIVAL_TOLERANCE: f64 = 1e-13;
 /// An arm whose joints follow the places of its connectors.
 #[derive(Debug)]
 pub struct JointTracker {
-    quick: FastFk,
+    fast_fk: FastFk,
     anchors: Vec<Anchor>,
     limits: JointRanges,
     /// Highest speed of each variable, in rad/s or m/s.
     speeds: Vec<f64>,
-    /// Bound on the way of any connector per unit of each variable, in m.
+    /// Bound on the travel of any connector per unit of each variable, in m.
     levers_m: Vec<f64>,
     /// Length of the stretched arm, in m.
     reach_m: f64,
@@ -60,7 +61,7 @@ impl JointTracker {
     pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
         let anchors = skeleton.connectors.clone();
         Self {
-            quick: FastFk::new(chain),
+            fast_fk: FastFk::new(chain),
             limits: JointRanges::from_chain(chain),
             speeds: speeds(chain),
             levers_m: levers_m(chain, &anchors),
@@ -70,7 +71,7 @@ impl JointTracker {
         }
     }
 
-    /// Returns a bound on the way of any connector per unit of each variable, in m.
+    /// Returns a bound on the travel of any connector per unit of each variable, in m.
     pub fn levers_m(&self) -> &[f64] {
         &self.levers_m
     }
@@ -99,7 +100,7 @@ impl JointTracker {
     /// Returns the places of all connectors in m, in the base's frame.
     pub fn connector_positions(&self, values: &[f64]) -> Vec<Vector> {
         let mut placed = self.blank.clone();
-        self.quick.compute(values, &mut placed);
+        self.fast_fk.compute(values, &mut placed);
         self.anchors
             .iter()
             .map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m))
@@ -114,12 +115,13 @@ impl JointTracker {
         values.iter().zip(&self.speeds).zip(&self.limits.ranges).map(of_one).collect()
     }
 
-    /// Returns the part, at most 1, of the way from one posture to another that all joints can go in `dt_s` seconds.
+    /// Returns the fraction, at most 1, of the path from one posture to another that all joints can move along
+    /// in `dt_s` seconds.
     pub fn reachable_fraction(&self, from: &[f64], to: &[f64], dt_s: f64) -> f64 {
-        let ways = from.iter().zip(to).zip(&self.speeds);
-        ways.fold(1.0, |part, ((a, b), speed)| match (b - a).abs() {
-            0.0 => part,
-            way => part.min(speed * dt_s / way),
+        let changes = from.iter().zip(to).zip(&self.speeds);
+        changes.fold(1.0, |fraction, ((a, b), speed)| match (b - a).abs() {
+            0.0 => fraction,
+            change => fraction.min(speed * dt_s / change),
         })
     }
 
@@ -161,7 +163,7 @@ impl JointTracker {
     }
 }
 
-/// Joint values on their way to places.
+/// A descent of joint values toward targets of connectors.
 struct TrackingDescent<'a> {
     arm: &'a JointTracker,
     values: Vec<f64>,
@@ -171,8 +173,7 @@ struct TrackingDescent<'a> {
 
 impl<'a> TrackingDescent<'a> {
     fn new(arm: &'a JointTracker, start: &[f64]) -> Self {
-        let (values, placed) = (start.to_vec(), arm.blank.clone());
-        Self { arm, values, placed, stepper: Stepper::default() }
+        Self { arm, values: start.to_vec(), placed: arm.blank.clone(), stepper: Stepper::default() }
     }
 
     /// Makes damped steps until the connectors are there or it gets no better.
@@ -183,9 +184,11 @@ impl<'a> TrackingDescent<'a> {
         steps: usize,
         mut damping: f64,
     ) {
-        let (mut next, mut next_placed) = (self.values.clone(), self.placed.clone());
+        let mut next = self.values.clone();
+        let mut next_placed = self.placed.clone();
         let mut wanted = self.residuals(&self.values.clone(), &aims, None);
-        let (mut is_new, mut since) = (true, 0);
+        let mut is_new = true;
+        let mut since = 0;
         for _ in 0..steps {
             if merit(&wanted).sqrt() <= ARRIVAL_TOLERANCE * self.arm.reach_m
                 || since >= MAX_IDLE_STEPS
@@ -201,7 +204,8 @@ impl<'a> TrackingDescent<'a> {
             if is_new {
                 std::mem::swap(&mut self.values, &mut next);
                 std::mem::swap(&mut self.placed, &mut next_placed);
-                (wanted, since) = (next_wanted, 0);
+                wanted = next_wanted;
+                since = 0;
                 damping *= DAMPING_DECREASE;
             } else {
                 since += 1;
@@ -210,7 +214,7 @@ impl<'a> TrackingDescent<'a> {
         }
     }
 
-    /// Returns the weighted ways from the connectors to their places at these values.
+    /// Returns the weighted vectors from the connectors to their targets at these values.
     fn residuals(
         &mut self,
         values: &[f64],
@@ -218,13 +222,13 @@ impl<'a> TrackingDescent<'a> {
         placed: Option<&mut LinkTransforms>,
     ) -> Vec<f64> {
         let placed = placed.unwrap_or(&mut self.placed);
-        self.arm.quick.compute(values, placed);
-        let way = |(aim, weight): &(ConnectorTarget, f64)| {
+        self.arm.fast_fk.compute(values, placed);
+        let residual = |(aim, weight): &(ConnectorTarget, f64)| {
             let anchor = &self.arm.anchors[aim.connector];
             let at_m = placed.links[anchor.first].transform_point(anchor.point_m);
             sub(aim.at_m, at_m).map(|x| weight * x)
         };
-        aims.iter().flat_map(way).collect()
+        aims.iter().flat_map(residual).collect()
     }
 
     /// Computes the weighted velocities of connectors per unit of each variable.
@@ -237,7 +241,7 @@ impl<'a> TrackingDescent<'a> {
             let anchor = &self.arm.anchors[aim.connector];
             let at_m = self.placed.links[anchor.first].transform_point(anchor.point_m);
             let lines = &self.placed.lines;
-            self.arm.quick.for_each_joint(lines, anchor.first, at_m, |variable, moves| {
+            self.arm.fast_fk.for_each_joint(lines, anchor.first, at_m, |variable, moves| {
                 for (axis, x) in moves.into_iter().enumerate() {
                     rows[axis * n + variable] += weight * x;
                 }
@@ -257,16 +261,17 @@ fn speeds(chain: &SerialChain) -> Vec<f64> {
     let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(usual(v.motion)));
     let mut speeds: Vec<f64> = own.collect();
     for joint in &chain.joints {
-        let (drive, usual) = (joint.drive, usual(joint.motion));
+        let drive = joint.drive;
+        let usual = usual(joint.motion);
         if drive.multiplier != 0.0 {
-            let most = joint.max_speed.unwrap_or(usual) / drive.multiplier.abs();
-            speeds[drive.variable] = speeds[drive.variable].min(most);
+            let max_speed = joint.max_speed.unwrap_or(usual) / drive.multiplier.abs();
+            speeds[drive.variable] = speeds[drive.variable].min(max_speed);
         }
     }
     speeds
 }
 
-/// Returns bounds on the way of any connector per unit of each variable: the lengths of all links between its joints
+/// Returns bounds on the travel of any connector per unit of each variable: the lengths of all links between its joints
 /// and the connector.
 fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
     let mut levers_m = vec![0.0; chain.variables.len()];
@@ -287,7 +292,7 @@ fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
     levers_m
 }
 
-/// Returns the longest way of a joint that slides; of one without limits 1 m.
+/// Returns the longest travel of a joint that slides; of one without limits 1 m.
 fn max_slide_m(joint: &MovingJoint) -> f64 {
     match (joint.motion, joint.limits) {
         (JointMotion::Turn, _) => 0.0,

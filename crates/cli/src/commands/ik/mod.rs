@@ -32,13 +32,13 @@ Examples:
   sidestep ik arm.urdf --target 0.3,0.1,0.4 --png arm.png
 
 The target is the tip's frame in the frame of the base: its position in m, and with --rpy or \
---quaternion its orientation. --free names what of it does not count, in the target's own axes: x, y, \
+--quaternion its orientation. --free lists what of it does not count, in the target's own axes: x, y, \
 z (the position along them), rx, ry, rz (the turn about them). One free turn leaves the direction of \
 that axis: `--free rz` makes a tool's axis z point as asked. All three free turns ask for the position \
 alone, `--free x,y,z` for the orientation alone.
 
 The search starts from --joints or --posture (otherwise from rest) and continues from random postures; \
-joints stay inside their limits. With --solutions N it goes on until it has N distinct postures: of \
+joints stay inside their limits. With --solutions N it continues until it has N distinct postures: of \
 every two, some joint differs by 0.1 rad or more (--apart), full turns aside; a slide counts as the \
 angle that moves the tip as far at full reach. They are listed by their distance from the start. \
 --nearest makes all restarts and draws each posture toward the start, and so finds the answer that \
@@ -47,7 +47,7 @@ moves the joints least.
 Obstacles are spheres (center and radius in m) that no link's collision shape may enter: boxes, \
 cylinders, spheres, and STL meshes as their bounding boxes. Links without a shape that can be read \
 count as rods between connectors, which are thin lines, so add the arm's thickness to the radius; what \
-is left out is told. With `--body own` links must not touch each other either, except neighbors \
+is left out is printed. With `--body own` links must not touch each other either, except neighbors \
 and the pairs whose collisions --srdf disables. The answer is a posture; the path to it is not \
 checked. Its joint values can be passed to `sidestep fk --joints`.
 

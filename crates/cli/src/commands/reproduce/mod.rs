@@ -72,7 +72,7 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
     if !is_taken {
         return Ok(());
     }
-    Err(InputError::new(folder.display(), "there is something already", "name a new folder"))
+    Err(InputError::new(folder.display(), "already exists and is not empty", "give a new folder"))
 }
 
 /// The results of a paper's experiments.

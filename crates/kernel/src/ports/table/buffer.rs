@@ -6,7 +6,8 @@ use super::values::Values;
 use crate::ports::recorder::{RecordError, Recorder};
 use std::fmt;
 
-/// The maximum number of rows of a table before they must be recorded.
+/// The maximum number of rows of a table before they must be recorded: some 100 MB of the widest tables, and few
+/// enough blocks for columns to be compressed well.
 const MAX_ROWS: usize = 1 << 20;
 
 /// The rows of one table that wait to be recorded.
@@ -22,7 +23,7 @@ pub trait Buffer {
         self.rows() >= MAX_ROWS
     }
 
-    /// Takes all waiting rows as one block. `None` for a table that is not recorded.
+    /// Moves all waiting rows out as one block. `None` for a table that is not recorded.
     fn take(&mut self) -> Option<Vec<Values>>;
 }
 
@@ -44,7 +45,7 @@ pub trait Buffers {
         self.buffers().iter().filter_map(|buffer| buffer.schema()).collect()
     }
 
-    /// Hands all rows over to a recorder of these [`schemas`](Self::schemas).
+    /// Appends all rows to a recorder of these [`schemas`](Self::schemas), and forgets them.
     ///
     /// # Errors
     /// When rows cannot be stored.

@@ -2,7 +2,8 @@
 
 use std::ops::Deref;
 
-/// A mask of the cells that have a value; without a mask all have one.
+/// A mask of the cells that have a value; without a mask all have one, which is the common case and then costs no
+/// memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Mask(Option<Vec<bool>>);
 
@@ -34,7 +35,7 @@ impl Mask {
         }
     }
 
-    /// Appends the entries of another mask of `more` rows to `rows`.
+    /// Appends the entries of another mask, which has `more` rows, to `rows`.
     fn append(&mut self, rows: usize, other: &Self, more: usize) {
         match &other.0 {
             None => self.extend(rows, more, true),
@@ -50,9 +51,10 @@ impl Mask {
     }
 
     fn pick(&self, order: &[usize]) -> Self {
-        let picked =
-            |valid: &Vec<bool>| Self::from_valid(order.iter().map(|&row| valid[row]).collect());
-        self.0.as_ref().map_or_else(Self::default, picked)
+        match &self.0 {
+            Some(valid) => Self::from_valid(order.iter().map(|&row| valid[row]).collect()),
+            None => Self::default(),
+        }
     }
 }
 

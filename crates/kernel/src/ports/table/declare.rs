@@ -121,7 +121,7 @@ impl<R> Table<R> {
         self
     }
 
-    /// Sets facts about all rows, by name: see [`TableSchema::with_about`].
+    /// Sets facts about all rows, by name: see [`TableSchema::about`].
     #[must_use]
     pub fn with_about(self, about: Vec<(String, String)>) -> Self {
         Self { about, ..self }

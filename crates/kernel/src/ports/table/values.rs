@@ -27,7 +27,7 @@ pub enum Values {
 }
 
 /// Runs the same code for the cells of any type.
-macro_rules! each {
+macro_rules! with_cells {
     ($values:expr, $cells:ident => $work:expr) => {
         match $values {
             Values::U32($cells) | Values::Label($cells) => $work,
@@ -72,7 +72,7 @@ impl Values {
 
     /// Number of values, missing ones included.
     pub fn len(&self) -> usize {
-        each!(self, cells => cells.len())
+        with_cells!(self, cells => cells.len())
     }
 
     /// Returns whether there are no values.
@@ -82,12 +82,12 @@ impl Values {
 
     /// Returns a mask of the rows that have a value; `None` where all have one.
     pub fn valid(&self) -> Option<&[bool]> {
-        each!(self, cells => cells.valid())
+        with_cells!(self, cells => cells.valid())
     }
 
     /// Returns whether the value in `row` is missing, or there is no such row.
     pub fn is_missing(&self, row: usize) -> bool {
-        each!(self, cells => cells.get(row).is_none())
+        with_cells!(self, cells => cells.get(row).is_none())
     }
 
     /// Appends the values of `more`.
@@ -110,12 +110,12 @@ impl Values {
 
     /// Makes the column `rows` long; new values are missing.
     pub fn resize(&mut self, rows: usize) {
-        each!(self, cells => cells.resize(rows));
+        with_cells!(self, cells => cells.resize(rows));
     }
 
     /// Keeps the values at which `keep` (of the same length) is true.
     pub fn retain_rows(&mut self, keep: &[bool]) {
-        each!(self, cells => cells.retain_rows(keep));
+        with_cells!(self, cells => cells.retain_rows(keep));
     }
 
     /// Returns the values of these rows, in this order.
@@ -154,16 +154,13 @@ impl Values {
 
     /// Returns the value in `row` as JSON; a missing one is null, a label its index.
     pub fn json(&self, row: usize) -> Value {
-        fn of<T: Clone + Into<Value>>(value: Option<&T>) -> Value {
-            value.cloned().map_or(Value::Null, Into::into)
-        }
         match self {
-            Self::U32(cells) | Self::Label(cells) => of(cells.get(row)),
-            Self::U64(cells) => of(cells.get(row)),
-            Self::I32(cells) => of(cells.get(row)),
-            Self::I64(cells) => of(cells.get(row)),
-            Self::F64(cells) => of(cells.get(row)),
-            Self::Bool(cells) => of(cells.get(row)),
+            Self::U32(cells) | Self::Label(cells) => cells.get(row).copied().into(),
+            Self::U64(cells) => cells.get(row).copied().into(),
+            Self::I32(cells) => cells.get(row).copied().into(),
+            Self::I64(cells) => cells.get(row).copied().into(),
+            Self::F64(cells) => cells.get(row).copied().into(),
+            Self::Bool(cells) => cells.get(row).copied().into(),
             Self::Text(cells) => cells.get(row).into(),
         }
     }
@@ -179,7 +176,7 @@ impl Values {
         {
             return to.write_str(label);
         }
-        each!(self, cells => cells.get(row).map_or(Ok(()), |value| write!(to, "{value}")))
+        with_cells!(self, cells => cells.get(row).map_or(Ok(()), |value| write!(to, "{value}")))
     }
 
     /// Returns the value in `row` as [`write`](Self::write) writes it, a label as its index; see

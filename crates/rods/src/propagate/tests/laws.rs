@@ -234,6 +234,7 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         let shared = AnyWorld::<3>::new(seed).obstacles;
         let alone = history::<3>(seed, None);
         let shared = &shared;
+        #[expect(clippy::disallowed_methods, reason = "tested from several threads")]
         std::thread::scope(|scope| {
             let threads: Vec<_> =
                 (0..3).map(|_| scope.spawn(move || history::<3>(seed, Some(shared)))).collect();

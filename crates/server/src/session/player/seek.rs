@@ -36,7 +36,7 @@ impl Player {
 
     /// Starts a seek to a cycle, from the present cycle or from a keyframe, whichever is nearer before it.
     pub(super) fn start_seek(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
-        self.cancel_seek("another way was asked for");
+        self.cancel_seek("replaced by another request");
         let target = cycle.min(self.open_run.until);
         self.state = SessionState::Seeking;
         self.seek = Some(Seek { id, target, then });

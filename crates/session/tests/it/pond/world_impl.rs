@@ -10,7 +10,10 @@ use sidestep_kernel::text::{Description, KeyValues, key_value};
 use sidestep_kernel::view::{
     Axis, Body, BodyKind, Frame, FrameOptions, Pose, PositionColumns, Scenery, Shape,
 };
-use sidestep_kernel::{Cycle, Digest, RunStats, World};
+use sidestep_kernel::{
+    Cycle, Digest, RunStats, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
+    WorldView,
+};
 
 /// The part of a run that is kept beside the state.
 #[derive(Debug, Default)]
@@ -26,8 +29,6 @@ impl World for PondWorld {
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
-    type Snapshot = Saved;
-    type Metrics = Value;
 
     fn agents(&self) -> usize {
         self.frogs as usize
@@ -52,7 +53,9 @@ impl World for PondWorld {
             books.rows.event(event);
         }
     }
+}
 
+impl WorldRecording for PondWorld {
     fn start_recording(&self, _: &mut PondState, books: &mut Collector, _: Cycle) {
         books.rows.begin();
     }
@@ -73,6 +76,25 @@ impl World for PondWorld {
         books.rows.record(recorder)
     }
 
+    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+        vec![PositionColumns {
+            table: "trajectories",
+            kind: BodyKind::Robot,
+            number: "frog",
+            part: None,
+            axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
+            plane: None,
+            is_corner: false,
+            heading: None,
+            interval: 1,
+            history: 400,
+        }]
+    }
+}
+
+impl WorldCheckpoint for PondWorld {
+    type Snapshot = Saved;
+
     fn digest(&self, state: &PondState, now: Cycle) -> Digest {
         let mut hasher = Hasher::default();
         hasher.write_u64(now);
@@ -91,7 +113,9 @@ impl World for PondWorld {
         books.sums = saved.sums;
         Ok(self.with_pads(saved.pads))
     }
+}
 
+impl WorldView for PondWorld {
     fn scenery(&self, name: &str) -> Scenery {
         Scenery {
             name: name.into(),
@@ -112,21 +136,12 @@ impl World for PondWorld {
         let bodies = (0..).zip(state.pad.iter()).map(frog).collect();
         Frame { cycle: now, time_s: now as f64, bodies, ..Frame::default() }
     }
+}
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        vec![PositionColumns {
-            table: "trajectories",
-            kind: BodyKind::Robot,
-            number: "frog",
-            part: None,
-            axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
-            plane: None,
-            is_corner: false,
-            heading: None,
-            interval: 1,
-            history: 400,
-        }]
-    }
+impl WorldControl for PondWorld {}
+
+impl WorldMetrics for PondWorld {
+    type Metrics = Value;
 
     fn metrics(&self, _: &PondState, books: &Collector, _: Cycle, _: &RunStats) -> Value {
         let Sums { hops, bumps } = books.sums;

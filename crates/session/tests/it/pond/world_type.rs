@@ -5,7 +5,7 @@ use super::world_impl::Collector;
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::text::{Description, align_pairs, key_value};
-use sidestep_kernel::{InputError, Run, RunConfig, Seed, Simulation};
+use sidestep_kernel::{InputError, Run, RunConfig, RunStart, Seed, Simulation};
 use sidestep_scenario::{CompiledScenario, ResolvedScenario, Source, WorldType};
 use std::any::Any;
 use std::sync::Arc;
@@ -101,9 +101,12 @@ impl CompiledScenario for CompiledPond {
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
-        let (world, plan) = (self.world.clone(), self.plan.clone());
-        let (state, books) = (world.start(), Collector::default());
-        let mut run = Run::new(world, plan, state, books, &source.text, workers);
+        let start = RunStart {
+            config: self.plan.clone(),
+            state: self.world.start(),
+            collector: Collector::default(),
+        };
+        let mut run = Run::new(self.world.clone(), start, &source.text, workers);
         // A pond this small would be left to one worker.
         run.force_parallel();
         Box::new(run)

@@ -1,6 +1,6 @@
 //! D1 for chains: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
 //! workers, recorded or not, resumed or not (bits.rs); laws and metrics (recount.rs); the report of a
-//! run (told.rs); targets of arms (arms.rs); an agent per connector (team.rs).
+//! run (reports.rs); targets of arms (arms.rs); an agent per connector (team.rs); robots on wheels (wheels.rs).
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};

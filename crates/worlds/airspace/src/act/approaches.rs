@@ -1,15 +1,15 @@
 //! Closest approaches of pairs of airplanes, whether the method flies them or not.
 
 use super::flight::{AircraftMotion, SubStep};
-use crate::Scratch;
 use crate::events::{Event, EventKind};
-use crate::flight::{Approach, Leg, Zone, distance_m, is_separation_lost};
+use crate::flight::{Approach, Zone, distance_m, is_separation_lost};
+use crate::scratch::Scratch;
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
 
-/// Pairs farther apart than this many separations are not recorded.
+/// Pairs farther apart than this many separations are not recorded: most pairs of a large scenario never come near.
 const MAX_RECORDED_SEPARATIONS: f64 = 4.0;
-/// Part of a step below which two times count as the same.
+/// Fraction of a step below which two times count as the same.
 const ROUNDING: f64 = 1e-6;
 
 /// Records the distances of all pairs during a step.
@@ -23,10 +23,11 @@ pub(super) fn record_distances(
     // Sorted from west to east, so that only neighbors have to be compared.
     let mut by_x: Vec<(f64, usize)> = flying.map(|(k, flight)| (flight.pose.at[0], k)).collect();
     by_x.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let most_m = max_recorded_m(world, flights);
+    let max_m = max_recorded_m(world, flights);
     for (k, &(x_m, i)) in by_x.iter().enumerate() {
-        for &(_, j) in by_x[k + 1..].iter().take_while(|(other_m, _)| other_m - x_m <= most_m) {
-            let (a, b) = (&flights[i.min(j)], &flights[i.max(j)]);
+        for &(_, j) in by_x[k + 1..].iter().take_while(|(other_m, _)| other_m - x_m <= max_m) {
+            let a = &flights[i.min(j)];
+            let b = &flights[i.max(j)];
             if is_recorded(world, a, b) {
                 record_pair(a, b, closest_approach(world, a, b, moment), moment, scratch);
             }
@@ -54,12 +55,15 @@ fn record_pair(
 
 /// Returns a distance in meters beyond which no two airplanes are worth noting.
 fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftMotion<'_>]) -> f64 {
-    let most = |of: &dyn Fn(usize) -> f64| {
-        flights.iter().map(|flight| of(flight.slot as usize)).fold(0.0, f64::max)
-    };
-    let gap_m = most(&|slot| world.airplanes[slot].model.separation_m);
-    let step_m = 2.0 * most(&|slot| world.top_m_s[slot]) * world.timing.dtau_s;
-    MAX_RECORDED_SEPARATIONS * gap_m + step_m
+    let mut max_gap_m: f64 = 0.0;
+    let mut max_speed_m_s: f64 = 0.0;
+    for flight in flights {
+        let slot = flight.slot as usize;
+        max_gap_m = max_gap_m.max(world.airplanes[slot].model.separation_m);
+        max_speed_m_s = max_speed_m_s.max(world.top_m_s[slot]);
+    }
+    let step_m = 2.0 * max_speed_m_s * world.timing.dtau_s;
+    MAX_RECORDED_SEPARATIONS * max_gap_m + step_m
 }
 
 /// Returns whether two airplanes may come so near within a step that it is to be recorded.
@@ -72,8 +76,9 @@ fn is_recorded(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion
 
 /// Returns the separation of a pair in meters.
 fn gap_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> f64 {
-    let own_m = |f: &AircraftMotion<'_>| world.airplanes[f.slot as usize].model.separation_m;
-    own_m(a).max(own_m(b))
+    let separation_a_m = world.airplanes[a.slot as usize].model.separation_m;
+    let separation_b_m = world.airplanes[b.slot as usize].model.separation_m;
+    separation_a_m.max(separation_b_m)
 }
 
 /// Returns the record of a pair in one step.
@@ -86,13 +91,17 @@ fn closest_approach(
     let zone = Zone { gap_m: gap_m(world, a, b), vertical_m: world.vertical_m };
     // A loss continues from the end of the step before; there is no step before when one of the two
     // has just come into the air.
-    let begins = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
-    let firsts = a.legs.first().zip(b.legs.first());
-    let goes_on = !begins && firsts.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, zone));
-    let mut approach = Approach::new(goes_on.then_some(0.0));
-    for one in &a.legs {
-        let meets = |other: &&Leg| one.from_s < other.until_s && other.from_s < one.until_s;
-        b.legs.iter().filter(meets).for_each(|other| approach.add(one, other, zone));
+    let is_first_step = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
+    let first_legs = a.legs.first().zip(b.legs.first());
+    let continues_loss =
+        !is_first_step && first_legs.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, zone));
+    let mut approach = Approach::new(continues_loss.then_some(0.0));
+    for leg_a in &a.legs {
+        for leg_b in &b.legs {
+            if leg_a.from_s < leg_b.until_s && leg_b.from_s < leg_a.until_s {
+                approach.add(leg_a, leg_b, zone);
+            }
+        }
     }
     PairRecord {
         nearest_m: approach.nearest_m,

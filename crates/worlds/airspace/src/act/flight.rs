@@ -1,7 +1,7 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::PhaseContext;
 use crate::flight::{FlightSegment, Leg, Levels, Point, Pose2, Track};
+use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use crate::state::End;
 use sidestep_kernel::{Cycle, Slot};
@@ -35,51 +35,59 @@ pub(super) struct AircraftMotion<'a> {
     pub(super) end: Option<End>,
 }
 
-/// The course of an airplane.
+/// The path of an airplane.
 pub(super) enum FlownPath<'a> {
-    /// A way that was decided, and the stage of the flight.
+    /// The turn rates that were decided, and the segment of the flight.
     Profile(TurnProfile, FlightSegment<'a>),
-    /// A recorded way.
+    /// A recorded track.
     Track(&'a Track),
 }
 
 impl<'a> AircraftMotion<'a> {
     /// Returns an airplane as it is at the start of the cycle.
-    pub(super) fn new(turn: &PhaseContext<'_>, slot: Slot, course: FlownPath<'a>) -> Self {
-        let PhaseContext { world, state, .. } = turn;
-        let cell = &state.airplanes[slot as usize];
+    pub(super) fn new(context: &PhaseContext<'_>, slot: Slot, path: FlownPath<'a>) -> Self {
+        let PhaseContext { world, state, .. } = context;
+        let current = &state.airplanes[slot as usize];
         let track = &world.airplanes[slot as usize].track;
         let recorded_s = track.as_ref().map_or(0.0, Track::start_s);
         let since_s = world.cycle_start_s(world.first_cycle(slot as usize)).max(recorded_s);
-        let (pose, altitude_m) = (cell.pose(), cell.altitude_m.get());
-        let next = cell.next.get() as usize;
-        let (legs, flown) = (Vec::new(), Vec::new());
-        Self { slot, path: course, pose, altitude_m, since_s, next, legs, flown, end: None }
+        Self {
+            slot,
+            path,
+            pose: current.pose(),
+            altitude_m: current.altitude_m.get(),
+            since_s,
+            next: current.next.get() as usize,
+            legs: Vec::new(),
+            flown: Vec::new(),
+            end: None,
+        }
     }
 
-    /// Returns its altitude in meters some seconds after `altitude_m`, on a decided way.
-    pub(super) fn altitude_after_m(&self, stage: &FlightSegment<'_>, seconds: f64) -> f64 {
-        let most_m = stage.climb_m_s * seconds;
-        self.altitude_m + (stage.altitude_m - self.altitude_m).clamp(-most_m, most_m)
+    /// Returns its altitude in meters some seconds after `altitude_m`, on a decided path.
+    pub(super) fn altitude_after_m(&self, segment: &FlightSegment<'_>, seconds: f64) -> f64 {
+        let max_climb_m = segment.climb_m_s * seconds;
+        self.altitude_m + (segment.altitude_m - self.altitude_m).clamp(-max_climb_m, max_climb_m)
     }
 
     /// Finds the legs that it flies in one step.
     pub(super) fn start_step(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
         match &self.path {
-            FlownPath::Profile(way, stage) => {
-                let omega = way.omegas_rad_s[moment.k];
-                let whole = Leg::new(0.0, dtau_s, self.pose, stage.model.v_m_s, omega);
-                let to_climb_m = stage.altitude_m - self.altitude_m;
-                let climbs_s = match stage.climb_m_s {
-                    rate if rate > 0.0 && to_climb_m != 0.0 => to_climb_m.abs() / rate,
-                    _ => 0.0,
+            FlownPath::Profile(profile, segment) => {
+                let omega = profile.omegas_rad_s[moment.k];
+                let whole = Leg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
+                let to_climb_m = segment.altitude_m - self.altitude_m;
+                let climbs_s = if segment.climb_m_s > 0.0 && to_climb_m != 0.0 {
+                    to_climb_m.abs() / segment.climb_m_s
+                } else {
+                    0.0
                 };
                 let climb_m_s = if climbs_s > 0.0 { to_climb_m / climbs_s } else { 0.0 };
                 let first = whole.with_climb(self.altitude_m, climb_m_s).in_wind(wind_m_s);
                 self.legs.push(first.with_times(0.0, dtau_s.min(climbs_s)));
                 if climbs_s < dtau_s {
-                    self.legs.push(first.remainder(climbs_s).with_climb(stage.altitude_m, 0.0));
+                    self.legs.push(first.remainder(climbs_s).with_climb(segment.altitude_m, 0.0));
                 }
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
@@ -104,8 +112,8 @@ impl<'a> AircraftMotion<'a> {
     /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> Levels {
         match &self.path {
-            FlownPath::Profile(_, stage) => {
-                Levels::between(self.altitude_m, self.altitude_after_m(stage, dtau_s))
+            FlownPath::Profile(_, segment) => {
+                Levels::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
             }
             FlownPath::Track(_) => Levels::ALL,
         }

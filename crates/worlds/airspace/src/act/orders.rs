@@ -1,56 +1,59 @@
-//! Orders that are due, and the conditions for carrying them out.
+//! Orders that are due, and the conditions on which they are executed.
 //!
-//! With the shield, a new speed or level is accepted only when the airplane then has a fallback
-//! apart from all stored ones, because otherwise the invariant would be lost; until then the order
-//! waits, and those after it wait with it. While it changes its level, an airplane occupies the old
-//! one, the new one and all between.
+//! With the shield, a new speed or level is accepted only when the airplane then has a fallback apart from all stored
+//! ones, because otherwise the invariant would be lost; until then the order waits, and so do those after it. While it
+//! changes its level, an airplane occupies the old one, the new one and all between.
 
 use super::protect::shielded_aircraft;
-use crate::PhaseContext;
 use crate::flight::{FlightOrder, FlightTask, Levels};
+use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, Side, safe_side};
 use sidestep_kernel::Slot;
 
-/// Carries out the orders of a group that are due and, with the shield, may be; the others
-/// wait. `flown` are the group's airplanes that the method flies, by id.
-pub(super) fn carry_out(turn: &PhaseContext<'_>, group: &[Slot], flown: &[Slot]) {
-    let PhaseContext { world, state, now, .. } = turn;
+/// Executes the orders of a group that are due and, with the shield, safe; the others wait. `flown` are the group's
+/// airplanes that the method flies, by id.
+pub(super) fn execute_due_orders(context: &PhaseContext<'_>, group: &[Slot], flown: &[Slot]) {
+    let PhaseContext { world, state, now, .. } = context;
     for &slot in group.iter().filter(|&&slot| !world.is_replayed(slot, *now)) {
-        let (airplane, cell) = (&world.airplanes[slot as usize], &state.airplanes[slot as usize]);
+        let airplane = &world.airplanes[slot as usize];
+        let current = &state.airplanes[slot as usize];
         while let Some(order) =
-            airplane.due_order(cell.orders.get().into(), world.cycle_start_s(*now))
+            airplane.due_order(current.orders.get().into(), world.cycle_start_s(*now))
         {
-            let Some(side) = fallback_after(turn, flown, slot, order) else {
-                cell.waits.set(cell.waits.get().saturating_add(1));
+            let Some(side) = fallback_after(context, flown, slot, order) else {
+                current.waits.set(current.waits.get().saturating_add(1));
                 break;
             };
-            let later = &world.later[slot as usize][usize::from(cell.orders.get())];
-            cell.orders.set(cell.orders.get() + 1);
-            cell.next.set(later.next.unwrap_or(cell.next.get()));
-            cell.fallback.set(side);
+            let later = &world.later[slot as usize][usize::from(current.orders.get())];
+            current.orders.set(current.orders.get() + 1);
+            current.next.set(later.next.unwrap_or(current.next.get()));
+            current.fallback.set(side);
         }
     }
 }
 
-/// Returns the fallback that an airplane has when it carries out its next order, if it may.
+/// Returns the fallback that an airplane has when it executes its next order, if it may.
 fn fallback_after(
-    turn: &PhaseContext<'_>,
+    context: &PhaseContext<'_>,
     flown: &[Slot],
     slot: Slot,
     order: &FlightOrder,
 ) -> Option<Side> {
-    let PhaseContext { world, state, now, .. } = turn;
-    let cell = &state.airplanes[slot as usize];
+    let PhaseContext { world, state, now, .. } = context;
+    let current = &state.airplanes[slot as usize];
     let changes_safety = matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. });
     if !world.shield || !changes_safety || world.is_non_cooperative(slot, *now) {
-        return Some(cell.fallback.get());
+        return Some(current.fallback.get());
     }
-    let stage = world.segment(slot, u32::from(cell.orders.get()) + 1);
+    let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
     let changed = ShieldedAircraft {
-        v_m_s: stage.model.v_m_s,
-        levels: Levels::between(cell.altitude_m.get(), stage.altitude_m),
-        ..shielded_aircraft(turn, slot)
+        v_m_s: segment.model.v_m_s,
+        levels: Levels::between(current.altitude_m.get(), segment.altitude_m),
+        ..shielded_aircraft(context, slot)
     };
-    let others = flown.iter().filter(|&&other| other != slot);
-    safe_side(&changed, others.map(|&other| shielded_aircraft(turn, other)))
+    let others = flown
+        .iter()
+        .filter(|&&other| other != slot)
+        .map(|&other| shielded_aircraft(context, other));
+    safe_side(&changed, others)
 }

@@ -2,12 +2,12 @@
 
 use super::approaches;
 use super::flight::{AircraftMotion, FlownPath, SubStep};
-use crate::PhaseContext;
 use crate::events::{Event, EventKind};
 use crate::flight::{Leg, Pose2};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
+use crate::scratch::PhaseContext;
 use crate::state::End;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Cycle;
@@ -16,8 +16,8 @@ use sidestep_kernel::interrupt;
 use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
-pub(super) fn step_all(turn: &mut PhaseContext<'_>, mut flights: Vec<AircraftMotion<'_>>) {
-    let (world, now) = (turn.world, turn.now);
+pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<AircraftMotion<'_>>) {
+    let PhaseContext { world, now, .. } = *context;
     let steps = world.timing.points_per_dt();
     for k in 0..steps {
         interrupt::check();
@@ -30,26 +30,27 @@ pub(super) fn step_all(turn: &mut PhaseContext<'_>, mut flights: Vec<AircraftMot
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             flight.start_step(world.wind_m_s, moment, world.timing.dtau_s);
         }
-        approaches::record_distances(world, &flights, moment, turn.scratch);
+        approaches::record_distances(world, &flights, moment, context.scratch);
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             fly(world, flight, moment);
         }
     }
-    flights.into_iter().for_each(|flight| store(turn, flight));
+    flights.into_iter().for_each(|flight| store(context, flight));
 }
 
 fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step, .. }: SubStep) {
-    let (air, dtau_s) = (world.air(), world.timing.dtau_s);
+    let air = world.air();
+    let dtau_s = world.timing.dtau_s;
     let is_at_end = match &flight.path {
-        FlownPath::Profile(way, stage) => {
-            let omega = way.omegas_rad_s[k];
-            let altitude_m = flight.altitude_after_m(stage, dtau_s);
+        FlownPath::Profile(profile, segment) => {
+            let omega = profile.omegas_rad_s[k];
+            let altitude_m = flight.altitude_after_m(segment, dtau_s);
             flight.altitude_m = altitude_m;
             let before = flight.pose;
-            flight.pose = air.after_wind_step(before.step(stage.model.v_m_s, omega, dtau_s));
-            let pilot = air.autopilot(stage.model, stage.mission);
-            flight.next = pilot.next_way_point((before, flight.pose), flight.next);
-            flight.next == stage.mission.len()
+            flight.pose = air.after_wind_step(before.step(segment.model.v_m_s, omega, dtau_s));
+            let autopilot = air.autopilot(segment.model, segment.mission);
+            flight.next = autopilot.next_way_point((before, flight.pose), flight.next);
+            flight.next == segment.mission.len()
         }
         FlownPath::Track(track) => {
             let after_s = (step + 1) as f64 * dtau_s;
@@ -61,7 +62,7 @@ fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step
     flight.end = is_at_end.then_some(End::Arrived(step + 1));
 }
 
-/// Returns the rows of an airplane: its legs, and the place where its flight ended.
+/// Returns the rows of an airplane: its legs, and the position where its flight ended.
 fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec<FlownLeg> {
     let airplane = flight.slot;
     let mut rows: Vec<FlownLeg> =
@@ -74,19 +75,19 @@ fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec
     rows
 }
 
-fn store(turn: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
-    let &mut PhaseContext { world, state, now, ref mut scratch, .. } = turn;
-    let cell = &state.airplanes[flight.slot as usize];
+fn store(context: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
+    let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
+    let current = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
     scratch.flown.extend(rows(world, now, &flight));
     let is_disturbed = matches!(flight.path, FlownPath::Profile(..));
     let turn_rate_rad_s = match &flight.path {
-        FlownPath::Profile(way, _) => way.omegas_rad_s.last().copied().unwrap_or_default(),
+        FlownPath::Profile(profile, _) => profile.omegas_rad_s.last().copied().unwrap_or_default(),
         FlownPath::Track(_) => 0.0,
     };
     state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
-    // On its orbit it has moved the pose there already.
-    if cell.orbiting.get() == 0 {
+    // While it orbits, `store_maneuver` has moved the pose along already, without the errors of the flight.
+    if current.orbiting.get() == 0 {
         state.set_orbit_pose(
             flight.slot,
             Pose2 { heading_rad: wrap_angle(pose.heading_rad), ..pose },
@@ -97,11 +98,11 @@ fn store(turn: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
         pose.heading_rad += world.disturbance.heading_rad * normal(&mut draws);
     }
     pose.heading_rad = wrap_angle(pose.heading_rad);
-    cell.set_pose(pose);
-    cell.altitude_m.set(flight.altitude_m);
-    cell.next.set(flight.next as u32);
+    current.set_pose(pose);
+    current.altitude_m.set(flight.altitude_m);
+    current.next.set(flight.next as u32);
     if let Some(end) = flight.end {
-        cell.set_end(end);
+        current.set_end(end);
         if let Some(delay_s) = airplane_metrics(world, state, flight.slot).delay_s() {
             let event = Event::new(now, EventKind::Arrival, flight.slot);
             scratch.events.push(event.with_value(delay_s));

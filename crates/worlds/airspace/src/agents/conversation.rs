@@ -1,16 +1,16 @@
-//! One talk, as one airplane takes part in it: a party, and the packets around its messages.
+//! One conversation, as one airplane takes part in it: a participant, and the packets around its messages.
 
 use super::network_traffic::NetworkTraffic;
-use super::packet::{ConversationId, Packet, PacketHeader};
+use super::packet::{ConversationId, PacketHeader};
 use super::participant::{ConversationEnd, OutgoingMessage, Participant, Progress, WithOutcome};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::DropReason;
+use sidestep_kernel::network::{DropReason, OutgoingPacket};
 use std::sync::Arc;
 
-/// The identity, participants and times of a talk.
+/// The identity, participants and times of a conversation.
 #[derive(Debug, Clone)]
 pub struct ConversationInfo {
-    /// The talk.
+    /// The conversation.
     pub id: ConversationId,
     /// Ids of all participants, rising.
     pub members: Arc<[EntityId]>,
@@ -26,7 +26,7 @@ pub struct ConversationInfo {
     pub is_silent: bool,
 }
 
-/// A talk, with the party that is aboard.
+/// A conversation, with the participant that is aboard.
 pub struct Conversation<P: ?Sized> {
     info: ConversationInfo,
     others: Arc<[EntityId]>,
@@ -37,16 +37,10 @@ pub struct Conversation<P: ?Sized> {
 }
 
 impl<P: Participant + ?Sized> Conversation<P> {
-    /// Returns a talk in which nothing has been said yet.
-    pub fn new(frame: ConversationInfo, party: Box<P>) -> Self {
-        let others = frame.members.iter().copied().filter(|&id| id != frame.me).collect();
-        Self {
-            info: frame,
-            others,
-            sent: 0,
-            traffic: NetworkTraffic::default(),
-            participant: party,
-        }
+    /// Returns a conversation in which nothing has been said yet.
+    pub fn new(info: ConversationInfo, participant: Box<P>) -> Self {
+        let others = info.members.iter().copied().filter(|&id| id != info.me).collect();
+        Self { info, others, sent: 0, traffic: NetworkTraffic::default(), participant }
     }
 
     /// Its identity, members and times.
@@ -54,7 +48,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
         &self.info
     }
 
-    /// Returns how far the party has come.
+    /// Returns how far the participant has come.
     pub fn progress(&self) -> Progress {
         self.participant.progress()
     }
@@ -65,7 +59,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Starts it.
-    pub fn start(&mut self, tick: u64, out: &mut Vec<Packet>) {
+    pub fn start(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
         self.participant.start(tick);
         self.send(out);
     }
@@ -79,7 +73,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
         from: EntityId,
         message: &[u8],
         tick: u64,
-        out: &mut Vec<Packet>,
+        out: &mut Vec<OutgoingPacket>,
     ) -> Result<(), DropReason> {
         if from == self.info.me || self.info.members.binary_search(&from).is_err() {
             return Err(DropReason::Sender);
@@ -93,7 +87,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Performs the actions that are due by a tick.
-    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<Packet>) {
+    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
         self.participant.on_timer(tick);
         self.send(out);
     }
@@ -103,13 +97,13 @@ impl<P: Participant + ?Sized> Conversation<P> {
         self.participant.next_timer()
     }
 
-    /// Returns whether the party has come to its outcome.
+    /// Returns whether the participant has come to its outcome.
     pub fn is_done(&self) -> bool {
         self.participant.is_done()
     }
 
-    /// Seals all that the party has to send, and counts it.
-    fn send(&mut self, out: &mut Vec<Packet>) {
+    /// Seals all that the participant has to send, and counts it.
+    fn send(&mut self, out: &mut Vec<OutgoingPacket>) {
         let ConversationInfo { id, me, fingerprint, is_silent, .. } = self.info;
         for OutgoingMessage { to, message } in self.participant.take_messages() {
             let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
@@ -117,26 +111,26 @@ impl<P: Participant + ?Sized> Conversation<P> {
                 continue;
             }
             let sequence = self.sent;
-            let seal = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
-            let payload = message.into_packet(&seal);
+            let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
+            let payload = message.into_packet(&header);
             self.traffic.count(to.len(), payload.len());
-            out.push(Packet { to, sequence, payload });
+            out.push(OutgoingPacket { to, sequence, payload });
             self.sent += 1;
         }
     }
 }
 
 impl<P: WithOutcome + ?Sized> Conversation<P> {
-    /// Returns the end of the talk; a party that is not done ends because time is up.
+    /// Returns the end of the conversation; a participant that is not done ends because time is up.
     pub fn finish(&mut self) -> ConversationEnd<P::Outcome> {
         self.participant.finish()
     }
 }
 
 impl<O> Conversation<dyn WithOutcome<Outcome = O>> {
-    /// Returns the talk as it remains for others once it has ended here: it answers their questions.
+    /// Returns the conversation as it remains for others once it has ended here: it answers their questions.
     pub fn into_past(self) -> Conversation<dyn Participant> {
-        let Self { info: frame, others, sent, traffic, participant: party } = self;
-        Conversation { info: frame, others, sent, traffic, participant: party }
+        let Self { info, others, sent, traffic, participant } = self;
+        Conversation { info, others, sent, traffic, participant }
     }
 }

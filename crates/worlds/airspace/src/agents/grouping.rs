@@ -1,18 +1,18 @@
 //! Groups that airplanes find by themselves, from beacons.
 //!
-//! Airplanes that have to mind each other decide together. Their group can be announced by an observer that sees all
-//! of them; here it is not. An airplane sees the others *near* it: so near that the two have to mind each other. A
-//! group reaches farther, from one to the next, and no airplane sees all of it. So before anything else they talk
-//! about that, in a talk of its own in each cycle:
+//! Airplanes that have to consider each other decide together. Their group can be announced by an observer that sees
+//! all of them; here it is not. An airplane sees the others *near* it: so near that the two have to consider each
+//! other. A group reaches farther, from one to the next, and no airplane sees all of it. So at the start of each cycle
+//! the airplanes find their group in a conversation of its own:
 //!
 //! 1. Each sends its *beacon* to those near it: where all see it (place, heading, altitude, whether it is on its
-//!    orbit), the airplanes that it sees near it, and those near that mind no other. Its speed and its abilities are
-//!    in the filed plan.
-//! 2. When the beacons of all near have come, or those that are missing were asked for so often that their senders
-//!    can hardly be in touch, it *reports* the airplanes that it has heard. It reports once, and so all that there is
-//!    to know of it in a cycle are two items, each of which is there or not: no older version can be taken for a
-//!    newer one.
-//! 3. An item goes on to those near that lack it: that do not see its airplane, or report that they have not heard
+//!    orbit), the airplanes that it sees near it, and the non-cooperative ones near it. Its speed and its abilities
+//!    are in the filed plan.
+//! 2. When the beacons of all near have come, or those that are missing were requested so often that their senders
+//!    can hardly be reached, it *reports* the airplanes that it has heard. It reports once, and so all information
+//!    about it in a cycle is two items, each of which is known or not: there are no versions of an item, and an old
+//!    one is never taken for a new one.
+//! 3. An item is relayed to those near that lack it: that do not see its airplane, or report that they have not heard
 //!    it. So each item goes from one to the next over all links that work.
 //! 4. Two airplanes *hear each other* if both say so. The *group* of an airplane are all to which a chain of such
 //!    pairs leads from it. It has all that it needs when it knows both items of every airplane in the chain, and of
@@ -20,25 +20,25 @@
 //!
 //! **Definition of a group.** Where all hear all that are near them, it is the group that the simulator would
 //! announce, because both use the same nearness. A partition, or a radio range that is too short, cuts it into parts
-//! that can talk. Two near each other may be in it that do not hear each other, as long as others hear both: the
-//! talks that follow find that out as they do where groups are announced, and go on without the one for the other. To
-//! leave out one of the two would be simpler to say but would cost more: with four links of 56 that work one way
-//! only, super-conflicts of 8 were delayed by 43 % instead of 5 %.
+//! that can communicate. Two near each other may be in it that do not hear each other, as long as others hear both: the
+//! conversations that follow find that out as they do where groups are announced, and go on without the one for the
+//! other. To leave out one of the two would be a simpler rule but would cost more: with four links of 56 that work one
+//! way only, super-conflicts of 8 were delayed by 43 % instead of 5 %.
 //!
-//! **Talking in it.** All later talks of the cycle carry the cycle and a digest of the members
-//! ([`TalkId`](super::packet::TalkId)). Packets between airplanes of different opinions are of different
-//! talks, and are dropped. So opinions never mix: either the whole group that an airplane believes in answers, or
-//! those of another opinion do not, and are given up after some questions.
+//! **Conversations of a group.** All later conversations of the cycle carry the cycle and a digest of the members
+//! ([`ConversationId`](super::packet::ConversationId)). Packets between airplanes of different beliefs are of
+//! different conversations, and are dropped. So beliefs never mix: either the whole group in which an airplane
+//! believes answers, or those of another belief do not, and are given up after some requests.
 //!
-//! **Why nothing is lost by that.** To the shield, an airplane that is near and not in the group is like one whose
+//! **Why that loses no safety.** To the shield, an airplane that is near and not in the group is like one whose
 //! radio is dead: seen, and not heard ([`exchange`](super::exchange)). The proof there is about two airplanes that
-//! see each other, regardless of the messages heard, and all that have to mind each other do. It does not ask whether
-//! the two believe in the same group: a plan counts as accepted only within one talk, and an airplane that is taken
-//! to be unheard never accepts. So an airplane may be wrong about its group in any way at all, by losses, by links
+//! see each other, regardless of the messages heard, and all that have to consider each other do. It does not ask
+//! whether the two believe in the same group: a plan counts as accepted only within one conversation, and an airplane
+//! that counts as unheard never accepts. So an airplane may be wrong about its group in any way, by losses, by links
 //! that work one way only, in a partition, or because another one lies, and the worst outcome is that it waits on its
 //! orbit. Where the network loses nothing there are no reports, because all near hear each other; no airplane goes on
-//! before it knows the whole group, and so all know the same one, as plans that are sure ([`PlanCertainty::Sure`])
-//! require.
+//! before it knows the whole group, and so all know the same one, as plans that are certain
+//! ([`PlanCertainty::Sure`]) require.
 
 mod beacon;
 mod roster;
@@ -55,7 +55,8 @@ use roster::Roster;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
 
-/// Largest number of items of a message.
+/// Largest number of items of a message: enough for most groups in one message, and few enough that the bound on its
+/// bytes, which must hold before a message is read, stays small.
 const MAX_ITEMS: usize = 64;
 
 /// The knowledge of an agent at its start.
@@ -65,8 +66,8 @@ pub struct GroupingInput {
     pub me: usize,
     /// Those near it, itself among them, by rising id.
     pub near: Vec<SurveillanceReport>,
-    /// Airplanes near it that mind no other, by rising id.
-    pub intruders: Vec<NonCooperative>,
+    /// Non-cooperative airplanes near it, by rising id.
+    pub non_cooperative: Vec<NonCooperative>,
     /// Whether each of those near was heard lately or is met for the first time.
     pub expected: Vec<bool>,
     /// Number of all airplanes.
@@ -82,8 +83,8 @@ pub struct GroupingInput {
 pub struct GroupingResult {
     /// The airplanes that decide together, its own among them, by rising id.
     pub members: Vec<SurveillanceReport>,
-    /// The airplanes near any of them that mind no other, by rising id.
-    pub intruders: Vec<NonCooperative>,
+    /// The non-cooperative airplanes near any of them, by rising id.
+    pub non_cooperative: Vec<NonCooperative>,
 }
 
 /// The agent of one airplane that looks for its group.
@@ -94,32 +95,38 @@ pub struct GroupingAgent {
     /// The airplanes near it that have sent their beacons themselves.
     heard: BTreeSet<EntityId>,
     /// Whether nothing more will come from each of those near.
-    gone: Vec<bool>,
-    /// Items that have not been passed on: airplane, and whether it is the report.
+    is_gone: Vec<bool>,
+    /// Items that have not been relayed: airplane, and whether it is the report.
     unsent: BTreeSet<(EntityId, bool)>,
     has_reported: bool,
-    /// Whether anything on which its going on depends has changed since it looked last.
-    is_stale: bool,
+    /// Whether anything has come since its last step that may let it go on.
+    has_news: bool,
     result: Option<GroupingResult>,
 }
 
 impl GroupingAgent {
     /// Returns an agent that has not sent anything yet.
-    pub fn new(start: GroupingInput) -> Self {
-        let own = &start.near[start.me];
-        let is_beyond =
-            |one: &SurveillanceReport| distance_m(own.pose.at, one.pose.at) > start.range_m;
-        let near = start.near.iter().map(|one| one.id).filter(|&id| id != own.id).collect();
-        let beacon = Beacon { own: *own, near, intruders: start.intruders.clone() };
-        let is_sure = start.certainty == PlanCertainty::Sure;
+    pub fn new(input: GroupingInput) -> Self {
+        let own = input.near[input.me];
+        let beacon = Beacon {
+            own,
+            near: input.near.iter().map(|one| one.id).filter(|&id| id != own.id).collect(),
+            non_cooperative: input.non_cooperative.clone(),
+        };
+        let is_sure = input.certainty == PlanCertainty::Sure;
+        let is_gone = input
+            .near
+            .iter()
+            .map(|other| distance_m(own.pose.at, other.pose.at) > input.range_m)
+            .collect();
         Self {
-            gone: start.near.iter().map(is_beyond).collect(),
+            is_gone,
             roster: Roster::new(beacon, is_sure),
-            input: start,
+            input,
             heard: BTreeSet::new(),
             unsent: BTreeSet::new(),
             has_reported: is_sure,
-            is_stale: true,
+            has_news: true,
             result: None,
         }
     }
@@ -130,8 +137,8 @@ impl GroupingAgent {
 
     /// Returns the others near it, with their places.
     fn others(&self) -> impl Iterator<Item = (usize, EntityId)> {
-        let all = self.input.near.iter().map(|one| one.id).enumerate();
-        all.filter(|(place, _)| *place != self.input.me)
+        let me = self.input.me;
+        self.input.near.iter().map(|one| one.id).enumerate().filter(move |(place, _)| *place != me)
     }
 
     /// Takes an item. Returns whether others may lack it now that did not before.
@@ -150,7 +157,7 @@ impl GroupingAgent {
                 if is_own {
                     self.heard.insert(id);
                 }
-                self.is_stale |= is_new | is_own;
+                self.has_news |= is_new | is_own;
                 false
             }
             Item::Report { heard, .. } => {
@@ -158,7 +165,7 @@ impl GroupingAgent {
                 if is_new {
                     self.unsent.insert((id, true));
                 }
-                self.is_stale |= is_new;
+                self.has_news |= is_new;
                 is_new && self.others().any(|(_, other)| other == id)
             }
         }
@@ -169,32 +176,31 @@ impl GroupingAgent {
         self.others().any(|(_, id)| id != about && self.roster.is_missing(id, about))
     }
 
-    /// Takes out the items that have to go on, of those `about` these airplanes.
+    /// Takes out the items that have to be relayed, of those `about` these airplanes.
     fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
-        let due = |id: EntityId| self.roster.has_beacon(id) && self.is_missing_nearby(id);
-        // Most incoming items have come before, and are no longer kept.
-        let is_kept =
-            |id: &EntityId| [false, true].iter().any(|&of| self.unsent.contains(&(*id, of)));
-        let due: Vec<(EntityId, bool)> = about
-            .iter()
-            .filter(|id| is_kept(id) && due(**id))
-            .flat_map(|&id| [(id, false), (id, true)])
-            .filter(|key| self.unsent.contains(key))
-            .collect();
-        for key in &due {
-            self.unsent.remove(key);
+        let mut items = Vec::new();
+        for &id in about {
+            let keys =
+                [(id, false), (id, true)].map(|key| self.unsent.contains(&key).then_some(key));
+            // Most incoming items have come before, and are no longer kept. This is much cheaper to find out than
+            // whether another one lacks them.
+            if keys == [None, None] || !self.roster.has_beacon(id) || !self.is_missing_nearby(id) {
+                continue;
+            }
+            for key in keys.into_iter().flatten() {
+                self.unsent.remove(&key);
+                items.extend(self.roster.item(key.0, key.1));
+            }
         }
-        let items: Vec<Item> =
-            due.iter().filter_map(|&(id, is_report)| self.roster.item(id, is_report)).collect();
         items.chunks(MAX_ITEMS).map(<[Item]>::to_vec).collect()
     }
 
-    /// Returns whether all near have been heard, or will not be.
+    /// Returns whether all near have been heard, or never will be.
     fn has_heard_all(&self) -> bool {
-        self.others().all(|(place, id)| self.gone[place] || self.heard.contains(&id))
+        self.others().all(|(place, id)| self.is_gone[place] || self.heard.contains(&id))
     }
 
-    /// Returns whether it has all that its group depends on, or can come to have.
+    /// Returns whether it has all on which its group depends, or as much as it ever will.
     fn has_all(&mut self) -> bool {
         let present = self.present();
         self.missing(&present).is_empty() && (present.is_empty() || self.roster.update_chain())
@@ -202,49 +208,59 @@ impl GroupingAgent {
 
     /// Returns the others near it from which something may come, with their places.
     fn present(&self) -> Vec<(usize, EntityId)> {
-        self.others().filter(|&(place, _)| !self.gone[place]).collect()
+        self.others().filter(|&(place, _)| !self.is_gone[place]).collect()
     }
 
     /// Returns the places of those from which an item is missing.
     fn missing(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
         // Where nothing is lost, an item may have come by way of any airplane.
-        let is_heard = |id| self.input.certainty == PlanCertainty::Sure || self.heard.contains(&id);
-        let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_fully_known(id);
-        present.iter().filter(|(_, id)| lacks(*id)).map(|(place, _)| *place).collect()
+        let is_sure = self.input.certainty == PlanCertainty::Sure;
+        present
+            .iter()
+            .filter(|(_, id)| {
+                let is_heard = is_sure || self.heard.contains(id);
+                !is_heard || !self.roster.is_fully_known(*id)
+            })
+            .map(|(place, _)| *place)
+            .collect()
     }
 
     /// Continues as far as the messages heard allow.
     fn advance(&mut self) -> Vec<Vec<Item>> {
-        let mut said = Vec::new();
-        if !std::mem::take(&mut self.is_stale) {
-            return said;
+        let mut outgoing = Vec::new();
+        // To look at all items anew for each message that says nothing new would take most of the time.
+        if !std::mem::take(&mut self.has_news) {
+            return outgoing;
         }
         if !self.has_reported && self.has_heard_all() {
             self.has_reported = true;
-            let (about, heard): (_, Vec<_>) = (self.id(), self.heard.iter().copied().collect());
+            let about = self.id();
+            let heard: Vec<EntityId> = self.heard.iter().copied().collect();
             self.roster.add_report(about, heard.clone());
-            // An agent that has heard no other one reports too: those that hear it wait for the report.
-            said.push(vec![Item::Report { about, heard }]);
+            // An agent that has heard no other one reports too, because those that hear it wait for the report.
+            outgoing.push(vec![Item::Report { about, heard }]);
         }
         if self.result.is_none() && self.has_reported && self.has_all() {
             self.find_group();
         }
-        said
+        outgoing
     }
 
     /// Finds its group from the known items.
     fn find_group(&mut self) {
         let members = self.roster.group(self.id());
-        let mut intruders = self.input.intruders.clone();
+        let mut non_cooperative = self.input.non_cooperative.clone();
         for beacon in members.iter().filter_map(|&id| self.roster.beacon(id)) {
-            intruders.extend(beacon.intruders.iter().cloned());
+            non_cooperative.extend(beacon.non_cooperative.iter().cloned());
         }
-        // A stable sort: where several airplanes report the same intruder, its own sighting comes first.
-        intruders.sort_by_key(|one| one.slot);
-        intruders.dedup_by_key(|one| one.slot);
-        let sighted = |&id: &EntityId| self.roster.beacon(id).map(|beacon| beacon.own);
-        let members = members.iter().filter_map(sighted).collect();
-        self.result = Some(GroupingResult { members, intruders });
+        // A stable sort: where several airplanes report the same intruder, its own observation comes first.
+        non_cooperative.sort_by_key(|one| one.slot);
+        non_cooperative.dedup_by_key(|one| one.slot);
+        let members = members
+            .iter()
+            .filter_map(|&id| self.roster.beacon(id).map(|beacon| beacon.own))
+            .collect();
+        self.result = Some(GroupingResult { members, non_cooperative });
     }
 }
 
@@ -254,22 +270,22 @@ impl link::Agent for GroupingAgent {
 
     fn start(&mut self) -> Vec<Vec<Item>> {
         let own = self.roster.item(self.id(), false);
-        let mut said: Vec<Vec<Item>> = own.map(|item| vec![item]).into_iter().collect();
-        said.extend(self.advance());
-        said
+        let mut outgoing: Vec<Vec<Item>> = own.map(|item| vec![item]).into_iter().collect();
+        outgoing.extend(self.advance());
+        outgoing
     }
 
     fn check(&self, _: usize, items: &Vec<Item>) -> Result<(), InvalidMessage> {
         InvalidMessage::Length.unless((1..=MAX_ITEMS).contains(&items.len()))?;
         items.iter().try_for_each(|item| {
             item.check(self.input.airplanes)?;
-            let seen = &self.input.near;
-            let place = seen.binary_search_by_key(&item.about(), |one| one.id);
-            match (item, place) {
-                // It must be where all see it.
-                (Item::Beacon(beacon), Ok(k)) => InvalidMessage::Plan.unless(beacon.own == seen[k]),
-                _ => Ok(()),
+            let near = &self.input.near;
+            let place = near.binary_search_by_key(&item.about(), |one| one.id);
+            if let (Item::Beacon(beacon), Ok(k)) = (item, place) {
+                // A beacon must say where all see its airplane; only of those farther away is it believed.
+                InvalidMessage::Plan.unless(beacon.own == near[k])?;
             }
+            Ok(())
         })
     }
 
@@ -282,16 +298,16 @@ impl link::Agent for GroupingAgent {
     fn on_message(&mut self, from: usize, items: Vec<Item>) -> Vec<Vec<Item>> {
         let from = self.input.near[from].id;
         let mut about: BTreeSet<EntityId> = items.iter().map(Item::about).collect();
-        let mut is_lacking = false;
+        let mut may_lack_more = false;
         for item in items {
-            is_lacking |= self.receive_item(from, item);
+            may_lack_more |= self.receive_item(from, item);
         }
-        if is_lacking {
+        if may_lack_more {
             about.extend(self.unsent.iter().map(|(id, _)| *id));
         }
-        let mut said = self.take_relay_items(&about);
-        said.extend(self.advance());
-        said
+        let mut outgoing = self.take_relay_items(&about);
+        outgoing.extend(self.advance());
+        outgoing
     }
 
     fn awaited_members(&self) -> Vec<usize> {
@@ -312,11 +328,13 @@ impl link::Agent for GroupingAgent {
     }
 
     fn wait_fraction(&self) -> f64 {
+        // Half of the time for beacons, the rest for reports, with some left to take out what is known.
         if self.has_reported { 0.95 } else { 0.5 }
     }
 
     fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<Item>> {
-        (self.gone[other], self.is_stale) = (true, true);
+        self.is_gone[other] = true;
+        self.has_news = true;
         self.advance()
     }
 

@@ -1,4 +1,4 @@
-//! Agents that first send each other all their possible ways, and then only the results of using
+//! Agents that first send each other all their predictions, and then only the results of using
 //! them: numbers of samples, or distributions.
 
 mod check;
@@ -17,14 +17,14 @@ use std::collections::BTreeMap;
 /// Messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum InformedMessage {
-    /// The ways of all the sender's actions.
-    Ways {
+    /// The predictions of all the sender's actions.
+    Predictions {
         /// Beacon of the sender.
         beacon: StateBeacon,
-        /// The ways, by action.
-        ways: Vec<Prediction>,
+        /// The predictions, by action.
+        predictions: Vec<Prediction>,
     },
-    /// A model, from which the others predict the sender's ways themselves.
+    /// A model, from which the others compute the predictions themselves.
     Model {
         /// Beacon of the sender.
         beacon: StateBeacon,
@@ -93,6 +93,11 @@ impl InformedMember {
         self.message_in_round(&self.samples, round)
     }
 
+    /// Returns its `k`-th sample of a round. A presumed member has nothing to choose from.
+    fn sample(&self, round: u32, k: usize) -> usize {
+        self.samples(round).and_then(|samples| samples.get(k)).copied().unwrap_or(0)
+    }
+
     /// Returns how far it has moved in a round.
     fn change(&self, round: u32) -> f64 {
         self.changes.get(&round).copied().unwrap_or(0.0)
@@ -124,7 +129,7 @@ impl InformedAgent {
     /// Returns one that has not sent anything yet.
     pub(crate) fn new(own: Ownship, by_model: bool) -> Self {
         let mut members: Vec<InformedMember> =
-            (0..own.briefing.ids.len()).map(|_| InformedMember::default()).collect();
+            (0..own.common.ids.len()).map(|_| InformedMember::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
         Self { own, by_model, members, game: None, player, round: 0, calm: 0 }
@@ -133,7 +138,10 @@ impl InformedAgent {
     fn model_message(&self) -> InformedMessage {
         let beacon = self.own.beacon.clone();
         if !self.by_model {
-            return InformedMessage::Ways { beacon, ways: self.own.options.predictions.clone() };
+            return InformedMessage::Predictions {
+                beacon,
+                predictions: self.own.options.predictions.clone(),
+            };
         }
         let KnownAircraft { slot, next, orders, altitude_m, .. } = self.own.known;
         let mission = self.own.mission.clone();
@@ -153,7 +161,7 @@ impl InformedAgent {
 
     /// Sets up the game and the first distributions, once all options are known.
     fn start_game(&mut self) {
-        let objective = &self.own.briefing.objective;
+        let objective = &self.own.common.objective;
         let all: Vec<&ActionPredictions> =
             self.members.iter().filter_map(|m| m.options.as_ref()).collect();
         let mut game = PairwiseGame::new(all.iter().map(|o| own_costs(objective, o)).collect());
@@ -179,18 +187,28 @@ impl InformedAgent {
     /// leads to the distributions `q_r`, and a step is the agent's own update or that of all;
     /// samples are those of the round after `round` rounds.
     fn awaited_in_round(&self) -> Vec<usize> {
-        let (me, sequence) = (self.own.me, self.own.settings().order == UpdateOrder::Sequence);
-        let (round, all) = (self.round, self.members.iter().enumerate());
-        let has_drawn = self.members[me].samples.contains_key(&round);
-        let missing =
-            |(j, member): (usize, &InformedMember)| match (self.is_exact(), self.has_moved()) {
-                (false, _) => has_drawn && member.samples(round).is_none(),
-                (true, true) => member.q(round + 1).is_none(),
-                (true, false) => {
-                    member.q(if sequence && j < me { round + 1 } else { round }).is_none()
-                }
+        let mut awaited = Vec::new();
+        for (j, member) in self.members.iter().enumerate() {
+            let is_missing = if !self.is_exact() {
+                let has_drawn = self.members[self.own.me].samples.contains_key(&self.round);
+                has_drawn && member.samples(self.round).is_none()
+            } else if self.has_moved() {
+                member.q(self.round + 1).is_none()
+            } else {
+                member.q(self.round_of_update(j)).is_none()
             };
-        all.filter(|(j, member)| missing((*j, member))).map(|(j, _)| j).collect()
+            if is_missing {
+                awaited.push(j);
+            }
+        }
+        awaited
+    }
+
+    /// Returns the round of which an agent's distribution enters the own update after `round` rounds: in sequence,
+    /// those before it have already moved.
+    fn round_of_update(&self, j: usize) -> u32 {
+        let is_sequence = self.own.settings().order == UpdateOrder::Sequence;
+        if is_sequence && j < self.own.me { self.round + 1 } else { self.round }
     }
 
     /// Returns whether its own update of this round is made.
@@ -203,22 +221,23 @@ impl InformedAgent {
         if !self.has_moved() {
             return OptimizerStep::Send(self.exact_update(round));
         }
-        let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
-        let stop = self.own.settings().stop;
-        self.calm = stop.count_calm_rounds(self.calm, most);
+        self.count_calm_rounds(round);
         self.round = round;
-        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        for member in &mut self.members {
+            member.forget_before(round);
+        }
+        let stop = self.own.settings().stop;
         let is_over = self.calm >= stop.calm_rounds || round >= stop.max_rounds;
         if is_over { OptimizerStep::Conclude } else { OptimizerStep::Done }
     }
 
     fn exact_update(&mut self, round: u32) -> InformedMessage {
-        let (me, settings) = (self.own.me, *self.own.settings());
-        let sequence = settings.order == UpdateOrder::Sequence;
-        let seen = |(j, member): (usize, &InformedMember)| {
-            member.q(if sequence && j < me { round } else { round - 1 }).cloned()
-        };
-        let q: Vec<Vec<f64>> = self.members.iter().enumerate().filter_map(seen).collect();
+        let me = self.own.me;
+        let settings = *self.own.settings();
+        let mut q: Vec<Vec<f64>> = Vec::with_capacity(self.members.len());
+        for (j, member) in self.members.iter().enumerate() {
+            q.extend(member.q(self.round_of_update(j)).cloned());
+        }
         if let Some(game) = &self.game {
             self.player.set_expected(|expected| game.expected_costs(me, &q, expected));
         }
@@ -229,16 +248,22 @@ impl InformedAgent {
         InformedMessage::Distribution { round, change, q }
     }
 
+    /// Counts the rounds up to this one in which no distribution moved.
+    fn count_calm_rounds(&mut self, round: u32) {
+        let max_change = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+        self.calm = self.own.settings().stop.count_calm_rounds(self.calm, max_change);
+    }
+
     /// Draws samples, unless it has; else learns from the samples of all.
     fn sampled_step(&mut self, block: usize, ageing: f64) -> OptimizerStep<InformedMessage> {
-        let (me, round) = (self.own.me, self.round);
+        let me = self.own.me;
+        let round = self.round;
         if !self.members[me].samples.contains_key(&round) {
             return OptimizerStep::Send(self.draw(block));
         }
         if round > 0 {
-            let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+            self.count_calm_rounds(round);
             let stop = self.own.settings().stop;
-            self.calm = stop.count_calm_rounds(self.calm, most);
             if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
                 return OptimizerStep::Conclude;
             }
@@ -246,12 +271,15 @@ impl InformedAgent {
         let change = self.learn(block, ageing);
         self.round += 1;
         self.members[me].changes.insert(self.round, change);
-        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        for member in &mut self.members {
+            member.forget_before(round);
+        }
         OptimizerStep::Send(self.draw(block))
     }
 
     fn draw(&mut self, block: usize) -> InformedMessage {
-        let (me, round) = (self.own.me, self.round);
+        let me = self.own.me;
+        let round = self.round;
         let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
         let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
         self.members[me].samples.insert(round, samples.clone());
@@ -264,16 +292,14 @@ impl InformedAgent {
 
     fn learn(&mut self, block: usize, ageing: f64) -> f64 {
         let Some(game) = &self.game else { return 0.0 };
-        let of = |m: &InformedMember, k: usize| {
-            // A presumed member has nothing to choose from.
-            m.samples(self.round).and_then(|all| all.get(k)).copied().unwrap_or(0)
-        };
-        let cost = |k: usize| {
-            let joint: Vec<usize> = self.members.iter().map(|m| of(m, k)).collect();
-            game.cost(&joint)
-        };
-        let costs: Vec<f64> = (0..block).map(cost).collect();
-        let own: Vec<usize> = (0..block).map(|k| of(&self.members[self.own.me], k)).collect();
+        let mut costs = Vec::with_capacity(block);
+        let mut own = Vec::with_capacity(block);
+        for k in 0..block {
+            let joint: Vec<usize> =
+                self.members.iter().map(|member| member.sample(self.round, k)).collect();
+            costs.push(game.cost(&joint));
+            own.push(joint[self.own.me]);
+        }
         self.player.learn(&own, &costs, ageing);
         let settings = *self.own.settings();
         self.player.update(settings.update, settings.cooling)
@@ -300,29 +326,31 @@ impl Optimizer for InformedAgent {
     }
 
     fn limits(&self) -> MessageLimits {
-        let briefing = &*self.own.briefing;
-        let (actions, rounds) = (briefing.max_actions(), self.own.settings().stop.max_rounds);
+        let common = &*self.own.common;
+        let actions = common.max_actions();
+        let rounds = self.own.settings().stop.max_rounds;
         let block = match self.own.settings().estimator {
             Estimator::Exact => 0,
             Estimator::Sampled { block, .. } => block,
         };
-        let ways = if self.by_model { 0 } else { actions };
-        let bytes = briefing.max_message_bytes(ways) + 8 * actions + 3 * block;
-        // Its ways or its model, and a message for each round.
+        let predictions = if self.by_model { 0 } else { actions };
+        let bytes = common.max_message_bytes(predictions) + 8 * actions + 3 * block;
+        // Its predictions or its model, and a message for each round.
         MessageLimits { bytes, messages: rounds.saturating_add(2) }
     }
 
     fn receive(&mut self, from: usize, message: InformedMessage) {
         let member = &mut self.members[from];
         match message {
-            InformedMessage::Ways { beacon, ways } => {
-                let options = ActionPredictions::new(ways, beacon.separation_m, beacon.levels);
+            InformedMessage::Predictions { beacon, predictions } => {
+                let options =
+                    ActionPredictions::new(predictions, beacon.separation_m, beacon.levels);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
             InformedMessage::Model { beacon, next, mission, .. } => {
                 let options =
-                    self.own.briefing.action_predictions(from, &beacon, &mission, next as usize);
+                    self.own.common.action_predictions(from, &beacon, &mission, next as usize);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
@@ -344,8 +372,7 @@ impl Optimizer for InformedAgent {
         if self.game.is_some() {
             return self.awaited_in_round();
         }
-        let unknown = |j: &usize| self.members[*j].options.is_none();
-        (0..self.members.len()).filter(unknown).collect()
+        (0..self.members.len()).filter(|&j| self.members[j].options.is_none()).collect()
     }
 
     fn step(&mut self) -> OptimizerStep<InformedMessage> {

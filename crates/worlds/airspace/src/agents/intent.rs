@@ -1,4 +1,4 @@
-//! Agents that tell each other where they intend to fly, once, for methods by which each then finds all headings
+//! Agents that send each other once where they intend to fly, for methods by which each then finds all headings
 //! itself.
 
 use super::link::{self, MessageLimits};
@@ -41,7 +41,7 @@ pub struct IntentInput {
 #[derive(Debug)]
 pub struct IntentAgent {
     start: IntentInput,
-    told: Vec<Option<Intent>>,
+    intents: Vec<Option<Intent>>,
     gone: Vec<bool>,
     is_over: bool,
 }
@@ -49,9 +49,9 @@ pub struct IntentAgent {
 impl IntentAgent {
     /// Returns an agent that has not sent anything yet.
     pub fn new(start: IntentInput) -> Self {
-        let mut told = vec![None; start.filed.len()];
-        told[start.me] = Some(start.own.clone());
-        Self { gone: vec![false; told.len()], told, start, is_over: false }
+        let mut intents = vec![None; start.filed.len()];
+        intents[start.me] = Some(start.own.clone());
+        Self { gone: vec![false; intents.len()], intents, start, is_over: false }
     }
 }
 
@@ -65,8 +65,8 @@ impl link::Agent for IntentAgent {
     }
 
     fn check(&self, from: usize, intent: &Intent) -> Result<(), InvalidMessage> {
-        let FiledFlight { max_way_points: most_way_points, orders, .. } = self.start.filed[from];
-        let is_filed = intent.next as usize <= most_way_points && intent.orders as usize <= orders;
+        let FiledFlight { max_way_points, orders, .. } = self.start.filed[from];
+        let is_filed = intent.next as usize <= max_way_points && intent.orders as usize <= orders;
         InvalidMessage::Plan.unless(is_filed)?;
         InvalidMessage::Number.unless(are_valid_coordinates([intent.altitude_m]))?;
         intent.resolving.check(self.start.airplanes)
@@ -78,13 +78,13 @@ impl link::Agent for IntentAgent {
 
     fn on_message(&mut self, from: usize, intent: Intent) -> Vec<Intent> {
         if !self.is_done() {
-            self.told[from] = Some(intent);
+            self.intents[from] = Some(intent);
         }
         Vec::new()
     }
 
     fn awaited_members(&self) -> Vec<usize> {
-        (0..self.told.len()).filter(|&k| self.told[k].is_none() && !self.gone[k]).collect()
+        (0..self.intents.len()).filter(|&k| self.intents[k].is_none() && !self.gone[k]).collect()
     }
 
     fn is_expected(&self, other: usize) -> bool {
@@ -105,7 +105,7 @@ impl link::Agent for IntentAgent {
     }
 
     fn outcome(&self) -> Option<Vec<Option<Intent>>> {
-        self.is_done().then(|| self.told.clone())
+        self.is_done().then(|| self.intents.clone())
     }
 }
 
@@ -116,9 +116,9 @@ impl ActiveResolutions {
     /// When there are no such airplanes, or no such heading.
     pub(crate) fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
         let with: &[EntityId] = self.slots();
-        let rises = with.windows(2).all(|pair| pair[0] < pair[1]);
+        let is_ascending = with.windows(2).all(|pair| pair[0] < pair[1]);
         let are_known = with.iter().all(|&id| (id as usize) < airplanes);
-        InvalidMessage::Airplane.unless(rises && are_known)?;
+        InvalidMessage::Airplane.unless(is_ascending && are_known)?;
         InvalidMessage::Number.unless(self.heading_rad().is_finite())
     }
 }

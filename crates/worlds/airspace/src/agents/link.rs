@@ -1,11 +1,11 @@
-//! Talking over a network that loses, delays, doubles and reorders messages.
+//! Conversations over a network that loses, delays, duplicates and reorders messages.
 //!
 //! Every agent sends all its messages to all the others of its group. An [`Endpoint`] numbers its
 //! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
-//! not answer, although asked so often that it can hardly be alive and in touch, or until the time
-//! for this step is up, is given up for this talk: the agent goes on with its knowledge of it. One
-//! that was not heard in the talk before is asked less often. So no agent waits forever, and a loss
-//! costs time instead of agreement.
+//! not answer, although asked so often that it can hardly be alive and reachable, or until the time
+//! for this step is up, is given up for this conversation: the agent goes on with its knowledge of it. One that
+//! was not heard in the conversation before is asked less often. So no agent waits forever, and a loss costs time
+//! instead of agreement.
 //!
 //! Endpoints and agents are state machines without a clock or a network of their own: ticks and
 //! messages are handed in, and messages are taken out.
@@ -15,8 +15,7 @@ use super::participant::{InvalidMessage, OutgoingMessage, Participant, Progress,
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::RetryPolicy;
-use sidestep_kernel::network::{HEADER_BYTES, PacketBuffer};
+use sidestep_kernel::network::{HEADER_BYTES, PacketBuffer, RetryPolicy, RetryTimer};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -37,7 +36,7 @@ pub trait Agent {
     /// When its content is impossible.
     fn check(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
-    /// Returns the largest number of bytes of a message, and of messages of one agent in a talk.
+    /// Returns the largest number of bytes of a message, and of messages of one agent in a conversation.
     fn limits(&self) -> MessageLimits;
 
     /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
@@ -57,7 +56,7 @@ pub trait Agent {
         true
     }
 
-    /// Returns the part of the talk, from 0 to 1, after which it goes on without those that it
+    /// Returns the part of the conversation, from 0 to 1, after which it goes on without those that it
     /// waits for now.
     fn wait_fraction(&self) -> f64 {
         1.0
@@ -82,7 +81,7 @@ pub trait Agent {
 pub struct MessageLimits {
     /// Largest number of bytes of a message.
     pub bytes: usize,
-    /// Largest number of messages of one agent in a talk.
+    /// Largest number of messages of one agent in a conversation.
     pub messages: u32,
 }
 
@@ -99,6 +98,9 @@ enum WireMessage<M> {
     Done,
 }
 
+/// Largest number of bytes of a [`WireMessage`] around its content: its kind and its number, with some to spare.
+const MAX_WIRE_BYTES: usize = 16;
+
 /// Settings of an endpoint.
 #[derive(Debug, Clone)]
 pub struct EndpointConfig {
@@ -108,7 +110,7 @@ pub struct EndpointConfig {
     pub me: usize,
     /// The time that it waits for others.
     pub patience: RetryPolicy,
-    /// Number of ticks after which the talk ends.
+    /// Number of ticks after which the conversation ends.
     pub ticks: u64,
     /// Whether the radio is dead: it sends nothing, hears nothing, and knows it.
     pub is_silent: bool,
@@ -120,18 +122,16 @@ pub struct Endpoint<A> {
     agent: A,
     config: EndpointConfig,
     limits: MessageLimits,
-    /// Number of its messages so far.
+    /// Number of its agent's messages so far.
     count: u32,
-    /// These, serialized, by number; none where they are never asked for.
+    /// These, serialized, by number; none on a network that loses nothing, where nobody asks for them again.
     sent: Vec<PacketBuffer>,
     others: Vec<PeerState>,
     /// Messages that wait to be sent.
     out: Vec<OutgoingMessage>,
-    began: u64,
-    quiet_since: u64,
-    /// Size of the largest packet that it has sent or heard, in bytes.
-    largest: usize,
-    late: bool,
+    start_tick: u64,
+    retry: RetryTimer,
+    is_late: bool,
 }
 
 /// An endpoint's knowledge of another one.
@@ -142,10 +142,12 @@ struct PeerState {
     /// Later messages that have come out of order.
     early: BTreeSet<u32>,
     unanswered: u32,
-    /// Whether anything has come from it in this talk.
+    /// Whether anything has come from it in this conversation.
     is_there: bool,
-    gone: bool,
-    unheard: bool,
+    /// Whether nothing more will come from it.
+    is_gone: bool,
+    /// Whether it was given up, rather than done.
+    is_unheard: bool,
 }
 
 impl PeerState {
@@ -166,20 +168,20 @@ pub(crate) fn to_bytes<M: Serialize>(message: &M) -> Vec<u8> {
 
 impl<A: Agent> Endpoint<A> {
     /// Returns an endpoint with an agent that has not sent anything yet.
-    pub fn new(agent: A, radio: EndpointConfig) -> Self {
-        let others = vec![PeerState::default(); radio.group.len()];
+    pub fn new(agent: A, config: EndpointConfig) -> Self {
+        let others = vec![PeerState::default(); config.group.len()];
+        let retry = RetryTimer::new(config.patience);
         Self {
             limits: agent.limits(),
             agent,
-            config: radio,
+            config,
             count: 0,
             sent: Vec::new(),
             others,
             out: Vec::new(),
-            began: 0,
-            quiet_since: 0,
-            largest: 0,
-            late: false,
+            start_tick: 0,
+            retry,
+            is_late: false,
         }
     }
 
@@ -189,7 +191,7 @@ impl<A: Agent> Endpoint<A> {
     }
 
     fn send(&mut self, to: Option<EntityId>, message: PacketBuffer) {
-        self.largest = self.largest.max(message.len());
+        self.retry.record_packet(message.len());
         self.out.push(OutgoingMessage { to, message });
     }
 
@@ -207,42 +209,44 @@ impl<A: Agent> Endpoint<A> {
 
     /// Reads a message of another one.
     fn read(&self, from: usize, bytes: &[u8]) -> Result<WireMessage<A::Message>, InvalidMessage> {
-        let read = postcard::take_from_bytes::<WireMessage<A::Message>>(bytes);
-        let (wired, rest) = read.map_err(|_| InvalidMessage::Form)?;
+        let (message, rest) = postcard::take_from_bytes::<WireMessage<A::Message>>(bytes)
+            .map_err(|_| InvalidMessage::Form)?;
         InvalidMessage::Form.unless(rest.is_empty())?;
-        if let WireMessage::Said(number, message) = &wired {
+        if let WireMessage::Said(number, content) = &message {
             InvalidMessage::Round.unless(*number < self.limits.messages)?;
-            self.agent.check(from, message)?;
+            self.agent.check(from, content)?;
         }
-        Ok(wired)
+        Ok(message)
     }
 
     fn resend_from(&mut self, to: usize, from_number: u32) {
         let missing = self.sent.get(from_number as usize..).unwrap_or_default().to_vec();
         if missing.is_empty() {
-            let nothing = if self.agent.is_done() {
+            let reply = if self.agent.is_done() {
                 WireMessage::<A::Message>::Done
             } else {
                 WireMessage::Wait
             };
-            self.send_to(to, PacketBuffer::from_message(&nothing));
+            self.send_to(to, PacketBuffer::from_message(&reply));
         }
-        missing.into_iter().for_each(|message| self.send_to(to, message));
+        for message in missing {
+            self.send_to(to, message);
+        }
     }
 
     fn drop_peer(&mut self, other: usize, is_settled: bool) {
-        if !self.others[other].gone {
-            self.others[other].gone = true;
-            let said = self.agent.on_peer_gone(other, is_settled);
-            self.broadcast(said);
+        if !self.others[other].is_gone {
+            self.others[other].is_gone = true;
+            let outgoing = self.agent.on_peer_gone(other, is_settled);
+            self.broadcast(outgoing);
         }
     }
 
-    /// Ends the talk of an airplane that is not heard and hears no other.
+    /// Ends the conversation of an airplane that is not heard and hears no other.
     fn end_unheard(&mut self) {
         let me = self.config.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {
-            self.others[j].unheard = true;
+            self.others[j].is_unheard = true;
             self.drop_peer(j, false);
         }
     }
@@ -254,7 +258,8 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     }
 
     fn start(&mut self, tick: u64) {
-        (self.began, self.quiet_since) = (tick, tick);
+        self.start_tick = tick;
+        self.retry.restart(tick);
         let first = self.agent.start();
         self.broadcast(first);
         if self.config.is_silent {
@@ -270,18 +275,19 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     ) -> Result<(), InvalidMessage> {
         let place = self.config.group.binary_search(&from).map_err(|_| InvalidMessage::Airplane)?;
         InvalidMessage::Airplane.unless(place != self.config.me)?;
-        let wired = self.read(place, bytes)?;
-        (self.others[place].unanswered, self.others[place].is_there) = (0, true);
-        self.largest = self.largest.max(HEADER_BYTES + bytes.len());
-        match wired {
-            WireMessage::Said(number, message) if self.others[place].accept(number) => {
-                self.quiet_since = tick;
-                let said = self.agent.on_message(place, message);
-                self.broadcast(said);
+        let message = self.read(place, bytes)?;
+        self.others[place].unanswered = 0;
+        self.others[place].is_there = true;
+        self.retry.record_packet(HEADER_BYTES + bytes.len());
+        match message {
+            WireMessage::Said(number, content) if self.others[place].accept(number) => {
+                self.retry.restart(tick);
+                let outgoing = self.agent.on_message(place, content);
+                self.broadcast(outgoing);
             }
             WireMessage::Said(..) | WireMessage::Wait => {}
             WireMessage::Ask(number) => self.resend_from(place, number),
-            // This answers a question for missing messages, so all of them have come.
+            // This answers a request for missing messages, so all of them have come.
             WireMessage::Done => self.drop_peer(place, true),
         }
         Ok(())
@@ -293,8 +299,8 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         if self.next_timer().is_none_or(|due| due > tick) {
             return;
         }
-        self.quiet_since = tick;
-        let waited = tick.saturating_sub(self.began) as f64;
+        self.retry.restart(tick);
+        let waited = tick.saturating_sub(self.start_tick) as f64;
         let has_time = waited < self.agent.wait_fraction() * self.config.ticks as f64;
         for j in self.agent.awaited_members() {
             let RetryPolicy { tries, first_tries, .. } = self.config.patience;
@@ -303,20 +309,17 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
             let other = &mut self.others[j];
             if other.unanswered < tries && has_time {
                 other.unanswered += 1;
-                let question =
-                    PacketBuffer::from_message(&WireMessage::<A::Message>::Ask(other.next));
-                self.send_to(j, question);
+                let request = WireMessage::<A::Message>::Ask(other.next);
+                self.send_to(j, PacketBuffer::from_message(&request));
             } else {
-                other.unheard = true;
+                other.is_unheard = true;
                 self.drop_peer(j, false);
             }
         }
     }
 
-    /// Returns the tick in which its patience ends.
     fn next_timer(&self) -> Option<u64> {
-        let ticks = self.config.patience.timeout_ticks(self.largest);
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
+        (!self.is_done()).then(|| self.retry.due_tick())
     }
 
     fn is_done(&self) -> bool {
@@ -328,8 +331,7 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     }
 
     fn max_message_bytes(&self) -> usize {
-        // Its number and kind come before it.
-        self.limits.bytes + 16
+        self.limits.bytes + MAX_WIRE_BYTES
     }
 }
 
@@ -338,10 +340,10 @@ impl<A: Agent + Send> WithOutcome for Endpoint<A> {
 
     fn finish(&mut self) -> ConversationEnd<A::Outcome> {
         if !self.is_done() {
-            self.late = true;
+            self.is_late = true;
             self.agent.on_deadline();
         }
-        let unheard = (0..self.others.len()).filter(|&j| self.others[j].unheard).collect();
-        ConversationEnd { outcome: self.agent.outcome(), unheard, late: self.late }
+        let unheard = (0..self.others.len()).filter(|&j| self.others[j].is_unheard).collect();
+        ConversationEnd { outcome: self.agent.outcome(), unheard, late: self.is_late }
     }
 }

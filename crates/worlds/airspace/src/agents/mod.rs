@@ -1,23 +1,22 @@
 //! Agents: the programs aboard the airplanes, each with its own data.
 //!
-//! An agent owns its knowledge of its airplane and of others ([`Ownship`]), the knowledge that all
-//! share ([`CommonKnowledge`]), and its part of the optimization. It is a state machine: messages in,
-//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Participant`] to a
-//! talk; a [`Conversation`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
+//! An agent owns its knowledge of its airplane and of others ([`Ownship`]), the knowledge that all share
+//! ([`CommonKnowledge`]), and its part of the optimization. It is a state machine: messages in, messages out. An
+//! [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Participant`] of a conversation;
+//! a [`Conversation`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
 //! which network carries the packets, in memory or between processes.
 //!
 //! | Module | Task |
 //! |---|---|
 //! | [`sampling`] | the paper's Algorithm 1: samples, predicts, and shares both |
-//! | [`informed`] | sends all its possible ways once, and then only samples or distributions |
+//! | [`informed`] | sends all its possible paths once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
-//! | [`intent`] | tells hidden intentions once, for methods that find headings |
+//! | [`intent`] | sends hidden intentions once, for methods that find headings |
 //! | [`grouping`] | finds the airplanes that decide together, where groups are not announced |
 //! | [`exchange`] | the shield: whether plans are safe together |
-//! | [`packet`] | the subjects of talks, and packets on their way out |
+//! | [`packet`] | the subjects of conversations, and packets on their way out |
 //!
-//! No agent waits forever: one that is not heard is presumed where it was last heard
-//! ([`traffic_state`]).
+//! No agent waits forever: one that is not heard is presumed where it was last heard ([`traffic_state`]).
 
 mod conversation;
 pub mod coordinator;

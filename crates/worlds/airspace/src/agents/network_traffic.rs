@@ -13,7 +13,7 @@ pub struct NetworkTraffic {
     pub bytes: u64,
     /// Number of bytes if one message could reach all.
     pub multicast_bytes: u64,
-    /// Number of ticks that the talks took, one after the other.
+    /// Number of ticks that the conversations took, one after the other.
     pub ticks: u64,
 }
 
@@ -27,7 +27,7 @@ impl NetworkTraffic {
         self.ticks += other.ticks;
     }
 
-    /// Adds the counts of the same talk by another participant.
+    /// Adds the counts of the same conversation by another participant.
     pub(crate) fn merge_participant(&mut self, other: Self) {
         let ticks = self.ticks.max(other.ticks);
         self.add(other);

@@ -1,4 +1,4 @@
-//! The part that agents have in common who optimize together: whatever they send each other, they go on step by
+//! What agents that optimize together have in common: whatever they send each other, they proceed step by
 //! step as far as the messages heard allow, until they conclude.
 
 use super::link::{self, MessageLimits};
@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 pub(crate) enum OptimizerStep<M> {
     /// It has only changed itself.
     Done,
-    /// It has something to say.
+    /// It has a message to send.
     Send(M),
     /// It is over.
     Conclude,
@@ -35,13 +35,13 @@ pub(crate) trait Optimizer {
     /// Checks a message of the airplane at a place, see [`link::Agent::check`].
     ///
     /// # Errors
-    /// When it says what cannot be.
+    /// When its content is impossible.
     fn check_message(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
-    /// Returns the bounds on what it may be sent.
+    /// Returns the bounds on the messages that it may be sent.
     fn limits(&self) -> MessageLimits;
 
-    /// Takes a message of the airplane at a place. Messages come in any order, each once.
+    /// Receives a message of the airplane at a place. Messages come in any order, each once.
     fn receive(&mut self, from: usize, message: Self::Message);
 
     /// Returns the places of those whose messages it needs for its next step.
@@ -50,10 +50,10 @@ pub(crate) trait Optimizer {
     /// Takes a step, for which no message is missing.
     fn step(&mut self) -> OptimizerStep<Self::Message>;
 
-    /// Goes on without another one, see [`link::Agent::on_peer_gone`].
+    /// Continues without another one, see [`link::Agent::on_peer_gone`].
     fn on_peer_gone(&mut self, other: usize, is_settled: bool);
 
-    /// Returns its decision from what it has learned; none, if that is nothing.
+    /// Returns its decision; none if it has learned nothing.
     fn action_choice(&self) -> Option<ActionChoice>;
 
     /// Hands over the beacons that it has heard, by place.
@@ -75,20 +75,22 @@ impl<O: Optimizer> OptimizingAgent<O> {
 
     /// Continues as far as the messages heard allow.
     fn advance(&mut self) -> Vec<O::Message> {
-        let mut said = Vec::new();
+        let mut outgoing = Vec::new();
         while self.conclusion.is_none() && self.optimizer.missing_members().is_empty() {
             match self.optimizer.step() {
                 OptimizerStep::Done => {}
-                OptimizerStep::Send(message) => said.push(message),
+                OptimizerStep::Send(message) => outgoing.push(message),
                 OptimizerStep::Conclude => self.conclude(),
             }
         }
-        said
+        outgoing
     }
 
     fn conclude(&mut self) {
-        let (decided, beacons) = (self.optimizer.action_choice(), self.optimizer.take_beacons());
-        self.conclusion = Some(OptimizationResult { decided, beacons });
+        self.conclusion = Some(OptimizationResult {
+            decided: self.optimizer.action_choice(),
+            beacons: self.optimizer.take_beacons(),
+        });
     }
 }
 
@@ -97,9 +99,9 @@ impl<O: Optimizer> link::Agent for OptimizingAgent<O> {
     type Outcome = OptimizationResult;
 
     fn start(&mut self) -> Vec<O::Message> {
-        let mut said = vec![self.optimizer.first_message()];
-        said.extend(self.advance());
-        said
+        let mut outgoing = vec![self.optimizer.first_message()];
+        outgoing.extend(self.advance());
+        outgoing
     }
 
     fn check(&self, from: usize, message: &O::Message) -> Result<(), InvalidMessage> {

@@ -12,7 +12,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// The knowledge that all agents of a group share before they talk.
+/// The knowledge that all agents of a group share before their conversations.
 #[derive(Debug, Clone)]
 pub struct CommonKnowledge {
     /// The present cycle.
@@ -31,8 +31,8 @@ pub struct CommonKnowledge {
     pub settings: OptimizerConfig,
     /// The random streams from which samples are drawn.
     pub streams: Streams,
-    /// Airplanes near the group that mind no other, as all see them.
-    pub intruders: Vec<NonCooperative>,
+    /// Non-cooperative airplanes near the group, as all see them.
+    pub non_cooperative: Vec<NonCooperative>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
 }
@@ -72,7 +72,7 @@ impl CommonKnowledge {
         };
         let predictions = self.air.predictions(&model, actions, mission, beacon.pose, next);
         ActionPredictions::new(predictions, beacon.separation_m, beacon.levels)
-            .with_non_cooperative(&self.intruders, &self.objective, self.air.timing.dtau_s)
+            .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
     }
 
     /// Returns the `k`-th uniform number in [0, 1) of an airplane's stream, which all can draw.
@@ -81,7 +81,7 @@ impl CommonKnowledge {
     }
 
     /// Returns the decision of an airplane's player after some rounds, of which the last `calm` were
-    /// calm; none, if it has not learned anything.
+    /// calm; none if it has not learned anything.
     pub(super) fn action_choice(
         &self,
         place: usize,
@@ -112,30 +112,31 @@ impl CommonKnowledge {
         place: usize,
         beacon: &StateBeacon,
     ) -> Result<(), InvalidMessage> {
-        let FiledFlight {
-            contact: TrafficState { beacon: filed, .. }, max_speed_m_s: top_m_s, ..
-        } = &self.filed[place];
-        let model = |b: &StateBeacon| [b.omega_max_rad_s, b.orbit_rad_s, b.separation_m];
-        let is_filed = model(beacon) == model(filed) && beacon.pose == self.poses[place];
-        InvalidMessage::Plan.unless(is_filed)?;
-        beacon.check(*top_m_s)
+        let FiledFlight { contact, max_speed_m_s, .. } = &self.filed[place];
+        let filed = &contact.beacon;
+        let is_filed = beacon.omega_max_rad_s == filed.omega_max_rad_s
+            && beacon.orbit_rad_s == filed.orbit_rad_s
+            && beacon.separation_m == filed.separation_m;
+        InvalidMessage::Plan.unless(is_filed && beacon.pose == self.poses[place])?;
+        beacon.check(*max_speed_m_s)
     }
 
-    /// Checks some predicted ways.
+    /// Checks some predictions.
     ///
     /// # Errors
     /// When there are not `expected` of them, or one does not span the whole horizon.
     pub(super) fn check_predictions(
         &self,
-        ways: &[Prediction],
+        predictions: &[Prediction],
         expected: usize,
     ) -> Result<(), InvalidMessage> {
-        InvalidMessage::Length.unless(ways.len() == expected)?;
-        ways.iter().try_for_each(|way| {
-            let is_whole = way.points.len() == self.air.timing.horizon;
-            InvalidMessage::Length.unless(is_whole && way.counted <= way.points.len())?;
+        InvalidMessage::Length.unless(predictions.len() == expected)?;
+        predictions.iter().try_for_each(|prediction| {
+            let is_whole = prediction.points.len() == self.air.timing.horizon;
+            InvalidMessage::Length
+                .unless(is_whole && prediction.counted <= prediction.points.len())?;
             InvalidMessage::Number
-                .unless(are_valid_coordinates(way.points.as_flattened().iter().copied()))
+                .unless(are_valid_coordinates(prediction.points.as_flattened().iter().copied()))
         })
     }
 
@@ -148,10 +149,11 @@ impl CommonKnowledge {
         InvalidMessage::Number.unless(change >= 0.0)
     }
 
-    /// Returns the largest number of bytes of a message with this number of predicted ways.
-    pub(super) fn max_message_bytes(&self, ways: usize) -> usize {
+    /// Returns the largest number of bytes of a message with this number of predictions.
+    pub(super) fn max_message_bytes(&self, predictions: usize) -> usize {
         let way_points = self.filed.iter().map(|filed| filed.max_way_points).max().unwrap_or(0);
-        512 + ways * (16 * self.air.timing.horizon + 20) + 16 * way_points
+        // A point takes 16 bytes, a length at most 10; the rest of a message is well below 512.
+        512 + predictions * (16 * self.air.timing.horizon + 20) + 16 * way_points
     }
 
     /// Returns the largest number of actions of any airplane of the group.
@@ -176,16 +178,16 @@ pub struct Ownship {
     /// Knowledge of others from earlier cycles.
     pub contacts: TrafficPicture,
     /// The knowledge that all share.
-    pub briefing: Arc<CommonKnowledge>,
+    pub common: Arc<CommonKnowledge>,
 }
 
 impl Ownship {
     pub(super) fn settings(&self) -> &OptimizerConfig {
-        &self.briefing.settings
+        &self.common.settings
     }
 
     pub(super) fn uniform(&self, k: u64) -> f64 {
-        self.briefing.uniform(self.me, k)
+        self.common.uniform(self.me, k)
     }
 
     /// Returns the next `block` samples of a player after `drawn`.
@@ -194,36 +196,36 @@ impl Ownship {
     }
 
     /// Returns the decision of a player of samples or of distributions after some rounds, of which
-    /// the last `calm` were calm; none, if it has not learned anything.
+    /// the last `calm` were calm; none if it has not learned anything.
     pub(super) fn action_choice(
         &self,
         player: &Player,
         rounds: u32,
         calm: u32,
     ) -> Option<ActionChoice> {
-        self.briefing.action_choice(self.me, player, rounds, calm)
+        self.common.action_choice(self.me, player, rounds, calm)
     }
 
     /// Returns whether another one was heard lately, or is met for the first time.
     pub(super) fn is_expected(&self, other: usize) -> bool {
-        let contact = self.contacts.get(&self.briefing.ids[other]);
-        contact.is_none_or(|contact| contact.heard_in + 1 >= self.briefing.now)
+        let contact = self.contacts.get(&self.common.ids[other]);
+        contact.is_none_or(|contact| contact.heard_in + 1 >= self.common.now)
     }
 
     /// Returns the predictions for another one that is not heard.
     pub(super) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
-        let id = self.briefing.ids[other];
-        let filed = || &self.briefing.filed[other].contact;
-        self.predictions_from_state(self.contacts.get(&id).unwrap_or_else(filed))
+        let id = self.common.ids[other];
+        let filed = &self.common.filed[other].contact;
+        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed))
     }
 
     /// Returns the same for one that was heard a moment ago.
     pub(super) fn predictions_from_beacon(&self, beacon: &StateBeacon) -> ActionPredictions {
-        self.predictions_from_state(&TrafficState::from_beacon(beacon.clone(), self.briefing.now))
+        self.predictions_from_state(&TrafficState::from_beacon(beacon.clone(), self.common.now))
     }
 
     fn predictions_from_state(&self, contact: &TrafficState) -> ActionPredictions {
-        let CommonKnowledge { air, is_shielded, now, .. } = &*self.briefing;
+        let CommonKnowledge { air, is_shielded, now, .. } = &*self.common;
         contact.presumed_predictions(air, *is_shielded, *now)
     }
 }

@@ -1,10 +1,9 @@
-//! Packets of airplanes: their topics, and how they leave.
+//! Protocols of airplanes, and their packets.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{EntityId, network};
-use std::sync::Arc;
+use sidestep_kernel::network;
 
-/// The subject of a talk: each cycle has one talk of each at most, in this order.
+/// The subject of a conversation: each cycle has one conversation of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Protocol {
     /// The choice of the airplanes that decide together, where groups are not announced.
@@ -30,19 +29,8 @@ impl network::Protocol for Protocol {
     }
 }
 
-/// The identity of a talk of airplanes.
+/// The identity of a conversation of airplanes.
 pub type ConversationId = network::ConversationId<Protocol>;
 
 /// The statements of an airplane's packet about its message.
 pub type PacketHeader = network::PacketHeader<Protocol>;
-
-/// A packet on its way out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Packet {
-    /// The receivers: one, or all others of the talk.
-    pub to: Arc<[EntityId]>,
-    /// Number among the sender's packets of the talk.
-    pub sequence: u32,
-    /// All of its bytes.
-    pub payload: Vec<u8>,
-}

@@ -1,15 +1,15 @@
-//! Parties to a talk: programs aboard that accept and produce messages, without a clock, a network, or the packets
-//! around the messages.
+//! Participants of a conversation: programs aboard that accept and produce messages, without a clock, a network, or
+//! the packets around the messages.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{DropReason, PacketBuffer};
 
-/// A party to a talk, as a state machine: messages and ticks in, messages out.
+/// A participant of a conversation, as a state machine: messages and ticks in, messages out.
 ///
 /// It lives on after it has come to its outcome, and answers members that have not.
 pub trait Participant: Send {
-    /// Starts the talk.
+    /// Starts the conversation.
     fn start(&mut self, tick: u64);
 
     /// Takes a message of another member, as it came off the network: any bytes, any number of times, in
@@ -45,25 +45,25 @@ pub trait Participant: Send {
     }
 }
 
-/// The progress of a party to a talk.
+/// The progress of a participant of a conversation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Progress {
-    /// Number of rounds made; 0 in a talk without rounds.
+    /// Number of rounds made; 0 in a conversation without rounds.
     pub round: u32,
     /// Number of the newest epoch that it has accepted; 0 where no coordinator migrates, or none was lost.
     pub epoch: u32,
 }
 
-/// A party that has an outcome.
+/// A participant that has an outcome.
 pub trait WithOutcome: Participant {
     /// Type of the outcome.
     type Outcome;
 
-    /// Returns the end of the talk for it; one that is not done ends because time is up.
+    /// Returns the end of the conversation for it; one that is not done ends because time is up.
     fn finish(&mut self) -> ConversationEnd<Self::Outcome>;
 }
 
-/// The end of a talk for one agent.
+/// The end of a conversation for one agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConversationEnd<O> {
     /// Its outcome, if it has one.
@@ -77,16 +77,16 @@ pub struct ConversationEnd<O> {
 /// A message on its way out.
 #[derive(Debug, Clone)]
 pub struct OutgoingMessage {
-    /// The receiver; `None` for all others of the talk.
+    /// The receiver; `None` for all others of the conversation.
     pub to: Option<EntityId>,
     /// The message.
     pub message: PacketBuffer,
 }
 
-/// A reason why a message is not taken: its sender does not belong to the talk, or lies.
+/// A reason to reject a message: its sender does not belong to the conversation, or lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum InvalidMessage {
-    /// Its bytes are no message of the talk.
+    /// Its bytes are no message of the conversation.
     Form,
     /// It is of a kind that no agent sends with these settings.
     Kind,
@@ -106,9 +106,9 @@ pub enum InvalidMessage {
 const MAX_COORDINATE_M: f64 = 1e15;
 
 /// Returns whether coordinates and altitudes in meters can be computed with.
-pub(super) fn are_valid_coordinates(told_m: impl IntoIterator<Item = f64>) -> bool {
-    // Comparisons with NaN are false. Looking at all of them, without an early exit, handles several at a time.
-    told_m.into_iter().fold(true, |are, m| are & (m.abs() <= MAX_COORDINATE_M))
+pub(super) fn are_valid_coordinates(values_m: impl IntoIterator<Item = f64>) -> bool {
+    // Comparisons with NaN are false. Without an early exit the compiler compares several values at a time.
+    values_m.into_iter().fold(true, |are_valid, m| are_valid & (m.abs() <= MAX_COORDINATE_M))
 }
 
 impl InvalidMessage {

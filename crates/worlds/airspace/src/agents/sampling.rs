@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// The messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum SamplingMessage {
-    /// Lines 6 to 9: the predicted ways of the round's samples, and how far the sender's
+    /// Lines 6 to 9: the predictions of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
     Predictions {
         /// Number of the round, from 0.
@@ -23,8 +23,8 @@ pub enum SamplingMessage {
         change: f64,
         /// Beacon of the sender.
         beacon: StateBeacon,
-        /// The ways, by sample.
-        ways: Vec<Prediction>,
+        /// The predictions, by sample.
+        predictions: Vec<Prediction>,
     },
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
     Costs {
@@ -39,8 +39,8 @@ pub enum SamplingMessage {
 #[derive(Debug, Default)]
 struct SamplingMember {
     beacon: Option<StateBeacon>,
-    /// The ways of its samples, by round.
-    ways: BTreeMap<u32, Vec<Prediction>>,
+    /// The predictions of its samples, by round.
+    predictions: BTreeMap<u32, Vec<Prediction>>,
     /// Its changes of probabilities in the round before, by round.
     changes: BTreeMap<u32, f64>,
     /// Its part of the costs, by round.
@@ -55,19 +55,19 @@ impl SamplingMember {
     }
 
     fn prediction(&self, round: u32, k: usize) -> Option<&Prediction> {
-        let presumed = || self.presumed.as_ref().and_then(|options| options.predictions.first());
-        self.ways.get(&round).and_then(|ways| ways.get(k)).or_else(presumed)
+        let heard = self.predictions.get(&round).and_then(|predictions| predictions.get(k));
+        heard.or_else(|| self.presumed.as_ref()?.predictions.first())
     }
 
     fn levels(&self) -> Option<Levels> {
-        let presumed = || self.presumed.as_ref().map(|options| options.levels);
-        self.beacon.as_ref().map(|beacon| beacon.levels).or_else(presumed)
+        let heard = self.beacon.as_ref().map(|beacon| beacon.levels);
+        heard.or_else(|| Some(self.presumed.as_ref()?.levels))
     }
 
-    /// Drops old rounds. The ways of the round before are kept, because they may be the last ones
+    /// Drops old rounds. The predictions of the round before are kept, because they may be the last ones
     /// heard.
     fn forget_before(&mut self, round: u32) {
-        self.ways.retain(|r, _| *r + 1 >= round);
+        self.predictions.retain(|r, _| *r + 1 >= round);
         self.changes.retain(|r, _| *r >= round);
         self.costs.retain(|r, _| *r >= round);
     }
@@ -92,9 +92,9 @@ impl SamplingAgent {
     /// Returns one that has not sent anything yet.
     pub(crate) fn new(own: Ownship, block: usize, ageing: f64) -> Self {
         Self {
-            own_costs: own_costs(&own.briefing.objective, &own.options),
+            own_costs: own_costs(&own.common.objective, &own.options),
             player: Player::new(own.options.predictions.len()),
-            members: own.briefing.ids.iter().map(|_| SamplingMember::default()).collect(),
+            members: own.common.ids.iter().map(|_| SamplingMember::default()).collect(),
             own,
             block,
             ageing,
@@ -111,12 +111,12 @@ impl SamplingAgent {
 
     fn predictions(&mut self) -> SamplingMessage {
         self.samples = self.own.samples(&self.player, self.sample_count(), self.block);
-        let ways = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
+        let predictions = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
         SamplingMessage::Predictions {
             round: self.round,
             change: self.change,
             beacon: self.own.beacon.clone(),
-            ways: ways.collect(),
+            predictions: predictions.collect(),
         }
     }
 
@@ -135,8 +135,8 @@ impl SamplingAgent {
         let stop = self.own.settings().stop;
         if self.round > 0 {
             let heard = self.others().filter_map(|(_, m)| m.changes.get(&self.round).copied());
-            let most = heard.fold(self.change, f64::max);
-            self.calm = stop.count_calm_rounds(self.calm, most);
+            let max_change = heard.fold(self.change, f64::max);
+            self.calm = stop.count_calm_rounds(self.calm, max_change);
         }
         self.calm >= stop.calm_rounds || self.round >= stop.max_rounds
     }
@@ -150,20 +150,23 @@ impl SamplingAgent {
 
     /// Returns its part of the cost of joint sample `k`.
     fn cost_of(&self, k: usize) -> f64 {
-        let objective = &self.own.briefing.objective;
-        let Ownship { options, .. } = &self.own;
+        let objective = &self.own.common.objective;
+        let options = &self.own.options;
         let x = self.samples[k];
-        let way = &options.predictions[x];
-        let on_level = |(_, member): &(usize, &SamplingMember)| {
-            let theirs = member.levels();
-            theirs.is_none_or(|levels| levels.overlaps(&options.levels, objective.vertical_m))
-        };
-        self.others().filter(on_level).fold(self.own_costs[x], |sum, (_, member)| {
-            let Some(theirs) = member.prediction(self.round, k) else { return sum };
-            let wanted_m = member.presumed.as_ref().map_or(0.0, |options| options.separation_m);
-            let r = options.separation_m.max(wanted_m);
-            sum + objective.collision(way, theirs, [r, r])[0]
-        })
+        let prediction = &options.predictions[x];
+        let mut cost = self.own_costs[x];
+        for (_, member) in self.others() {
+            let is_on_level = member
+                .levels()
+                .is_none_or(|levels| levels.overlaps(&options.levels, objective.vertical_m));
+            if is_on_level && let Some(other) = member.prediction(self.round, k) {
+                let presumed = member.presumed.as_ref();
+                let other_separation_m = presumed.map_or(0.0, |options| options.separation_m);
+                let r = options.separation_m.max(other_separation_m);
+                cost += objective.collision(prediction, other, [r, r])[0];
+            }
+        }
+        cost
     }
 
     /// Learns (lines 18 to 24). Costs are summed in the order of the airplanes, because then all
@@ -171,14 +174,17 @@ impl SamplingAgent {
     fn learn(&mut self) {
         let mut total = vec![0.0; self.block];
         for costs in self.members.iter().filter_map(|m| m.costs.get(&self.round)) {
-            total.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
+            for (sum, cost) in total.iter_mut().zip(costs) {
+                *sum += cost;
+            }
         }
         self.player.learn(&self.samples, &total, self.ageing);
         let settings = self.own.settings();
         self.change = self.player.update(settings.update, settings.cooling);
         self.round += 1;
-        let round = self.round;
-        self.members.iter_mut().for_each(|m| m.forget_before(round));
+        for member in &mut self.members {
+            member.forget_before(self.round);
+        }
     }
 }
 
@@ -194,25 +200,25 @@ impl Optimizer for SamplingAgent {
     }
 
     fn check_message(&self, from: usize, message: &SamplingMessage) -> Result<(), InvalidMessage> {
-        let briefing = &*self.own.briefing;
+        let common = &*self.own.common;
         match message {
-            SamplingMessage::Predictions { round, change, beacon, ways } => {
-                briefing.check_round(*round, *change)?;
-                briefing.check_beacon(from, beacon)?;
-                briefing.check_predictions(ways, self.block)
+            SamplingMessage::Predictions { round, change, beacon, predictions } => {
+                common.check_round(*round, *change)?;
+                common.check_beacon(from, beacon)?;
+                common.check_predictions(predictions, self.block)
             }
             SamplingMessage::Costs { round, costs } => {
-                briefing.check_round(*round, 0.0)?;
+                common.check_round(*round, 0.0)?;
                 InvalidMessage::Length.unless(costs.len() == self.block)?;
-                // Large ones are taken, unless their sum would not be a number.
+                // Large ones are accepted, unless their sum would not be a number.
                 InvalidMessage::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
             }
         }
     }
 
     fn limits(&self) -> MessageLimits {
-        let bytes = self.own.briefing.max_message_bytes(self.block) + 8 * self.block;
-        // The ways of its samples and their costs in each round.
+        let bytes = self.own.common.max_message_bytes(self.block) + 8 * self.block;
+        // The predictions of its samples and their costs in each round.
         let rounds = self.own.settings().stop.max_rounds;
         MessageLimits { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
     }
@@ -220,10 +226,10 @@ impl Optimizer for SamplingAgent {
     fn receive(&mut self, from: usize, message: SamplingMessage) {
         let member = &mut self.members[from];
         match message {
-            SamplingMessage::Predictions { round, change, beacon, ways } => {
+            SamplingMessage::Predictions { round, change, beacon, predictions } => {
                 member.beacon = Some(beacon);
                 member.changes.insert(round, change);
-                member.ways.insert(round, ways);
+                member.predictions.insert(round, predictions);
             }
             SamplingMessage::Costs { round, costs } => {
                 member.costs.insert(round, costs);
@@ -232,11 +238,18 @@ impl Optimizer for SamplingAgent {
     }
 
     fn missing_members(&self) -> Vec<usize> {
-        let missing = |member: &SamplingMember| match self.has_sent_costs() {
-            false => !member.ways.contains_key(&self.round),
-            true => !member.costs.contains_key(&self.round),
-        };
-        self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
+        let has_sent_costs = self.has_sent_costs();
+        self.others()
+            .filter(|(_, member)| {
+                let has_come = if has_sent_costs {
+                    member.costs.contains_key(&self.round)
+                } else {
+                    member.predictions.contains_key(&self.round)
+                };
+                !member.is_gone() && !has_come
+            })
+            .map(|(place, _)| place)
+            .collect()
     }
 
     fn step(&mut self) -> OptimizerStep<SamplingMessage> {
@@ -254,10 +267,11 @@ impl Optimizer for SamplingAgent {
     /// message; a silent one is presumed where it was.
     fn on_peer_gone(&mut self, other: usize, is_settled: bool) {
         let member = &mut self.members[other];
-        let last = member.ways.values().next_back().and_then(|ways| ways.first());
+        let last =
+            member.predictions.values().next_back().and_then(|predictions| predictions.first());
         member.presumed = Some(match (&member.beacon, last) {
-            (Some(beacon), Some(way)) if is_settled => {
-                ActionPredictions::new(vec![way.clone()], beacon.separation_m, beacon.levels)
+            (Some(beacon), Some(prediction)) if is_settled => {
+                ActionPredictions::new(vec![prediction.clone()], beacon.separation_m, beacon.levels)
             }
             (Some(beacon), _) => self.own.predictions_from_beacon(beacon),
             _ => self.own.presumed_predictions(other),

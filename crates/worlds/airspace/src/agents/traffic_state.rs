@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, math};
 use std::collections::BTreeMap;
 
-/// Factor on the separation from an airplane that is not heard.
+/// Factor on the separation from an airplane that is not heard: where it is presumed to fly is a guess.
 const UNHEARD_SEPARATION_FACTOR: f64 = 1.5;
 
 /// A message in which an airplane describes itself.
@@ -50,7 +50,7 @@ pub struct TrafficState {
     pub beacon: StateBeacon,
     /// The orbit on which it is presumed under the shield.
     pub presumed: Option<OrbitState>,
-    /// The end of the plan that it told in the exchange before, if it may have flown that one.
+    /// The end of the plan that it sent in the exchange before, if it may have flown that one.
     pub planned: Option<PlanEnd>,
     /// The exchange, if it is the last one, in which it was present and not heard.
     pub unheard_in: Option<Cycle>,
@@ -71,25 +71,29 @@ pub type TrafficPicture = BTreeMap<EntityId, TrafficState>;
 impl OrbitState {
     /// Returns its pose at the start of cycle `now`.
     fn pose(&self, air: &Air, beacon: &StateBeacon, now: Cycle) -> Pose2 {
-        let gone_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
+        let elapsed_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
-        let Pose2 { at: [x, y], heading_rad } = self.pose.step(beacon.v_m_s, omega_rad_s, gone_s);
+        let Pose2 { at: [x, y], heading_rad } =
+            self.pose.step(beacon.v_m_s, omega_rad_s, elapsed_s);
         let [wx, wy] = air.wind_m_s;
-        Pose2 { at: [x + wx * gone_s, y + wy * gone_s], heading_rad: math::wrap_angle(heading_rad) }
+        Pose2 {
+            at: [x + wx * elapsed_s, y + wy * elapsed_s],
+            heading_rad: math::wrap_angle(heading_rad),
+        }
     }
 }
 
 impl StateBeacon {
-    /// Returns the beacon of an airplane with unknown wishes.
-    pub(crate) fn from_aircraft(flyer: &ShieldedAircraft) -> Self {
+    /// Returns the beacon of an airplane whose next way-point is unknown.
+    pub(crate) fn from_aircraft(aircraft: &ShieldedAircraft) -> Self {
         Self {
-            pose: flyer.pose,
+            pose: aircraft.pose,
             goal: None,
-            v_m_s: flyer.v_m_s,
-            omega_max_rad_s: flyer.omega_max_rad_s,
-            orbit_rad_s: flyer.orbit_rad_s,
-            separation_m: flyer.separation_m,
-            levels: flyer.levels,
+            v_m_s: aircraft.v_m_s,
+            omega_max_rad_s: aircraft.omega_max_rad_s,
+            orbit_rad_s: aircraft.orbit_rad_s,
+            separation_m: aircraft.separation_m,
+            levels: aircraft.levels,
         }
     }
 
@@ -99,11 +103,12 @@ impl StateBeacon {
     /// When they cannot be those of an airplane.
     pub(crate) fn check(&self, top_m_s: f64) -> Result<(), InvalidMessage> {
         let Self { pose: Pose2 { at: [x, y], heading_rad }, goal, v_m_s, levels, .. } = self;
-        let places = [*x, *y, *heading_rad].into_iter().chain(goal.iter().flatten().copied());
-        let is_flown = 0.0 < *v_m_s && *v_m_s <= top_m_s;
+        let numbers = [*x, *y, *heading_rad].into_iter().chain(goal.iter().flatten().copied());
+        let is_valid_speed = 0.0 < *v_m_s && *v_m_s <= top_m_s;
         let Levels { low_m, high_m } = levels;
-        let is_level = low_m <= high_m && are_valid_coordinates([*low_m, *high_m]);
-        InvalidMessage::Number.unless(are_valid_coordinates(places) && is_flown && is_level)
+        let is_valid_level = low_m <= high_m && are_valid_coordinates([*low_m, *high_m]);
+        let is_valid = are_valid_coordinates(numbers) && is_valid_speed && is_valid_level;
+        InvalidMessage::Number.unless(is_valid)
     }
 }
 
@@ -135,29 +140,32 @@ impl TrafficState {
         let StateBeacon { v_m_s, orbit_rad_s, .. } = self.beacon;
         let pose = orbiting.pose(air, &self.beacon, now);
         let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
-        let point = |k: usize| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at;
-        (1..=air.timing.horizon).map(point).collect()
+        (1..=air.timing.horizon)
+            .map(|k| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at)
+            .collect()
     }
 
     fn straight_points(&self, air: &Air, now: Cycle) -> Vec<Point> {
         let StateBeacon { pose: Pose2 { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
-        let toward = match goal.map(|goal| air.aim_point(at, goal, v_m_s)) {
+        let bearing_rad = match goal.map(|goal| air.aim_point(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
             _ => heading_rad,
         };
-        let [vx, vy] = [v_m_s * math::cos(toward), v_m_s * math::sin(toward)];
+        let vx = v_m_s * math::cos(bearing_rad);
+        let vy = v_m_s * math::sin(bearing_rad);
         let [wx, wy] = air.wind_m_s;
-        let gone_s = now.saturating_sub(self.heard_in) as f64 * air.timing.dt_s;
-        let from = [at[0] + (vx + wx) * gone_s, at[1] + (vy + wy) * gone_s];
-        let point = |k: usize| {
-            let t_s = k as f64 * air.timing.dtau_s;
-            [from[0] + vx * t_s, from[1] + vy * t_s]
-        };
-        (1..=air.timing.horizon).map(point).collect()
+        let elapsed_s = now.saturating_sub(self.heard_in) as f64 * air.timing.dt_s;
+        let from = [at[0] + (vx + wx) * elapsed_s, at[1] + (vy + wy) * elapsed_s];
+        (1..=air.timing.horizon)
+            .map(|k| {
+                let t_s = k as f64 * air.timing.dtau_s;
+                [from[0] + vx * t_s, from[1] + vy * t_s]
+            })
+            .collect()
     }
 }
 
-/// Notes the message in which another airplane described itself in cycle `now`.
+/// Records the message in which another airplane described itself in cycle `now`.
 pub(crate) fn record_beacon(
     contacts: &mut TrafficPicture,
     id: EntityId,
@@ -165,7 +173,12 @@ pub(crate) fn record_beacon(
     now: Cycle,
 ) {
     match contacts.get_mut(&id) {
-        Some(contact) => (contact.beacon, contact.heard_in) = (beacon, now),
-        None => drop(contacts.insert(id, TrafficState::from_beacon(beacon, now))),
+        Some(contact) => {
+            contact.beacon = beacon;
+            contact.heard_in = now;
+        }
+        None => {
+            contacts.insert(id, TrafficState::from_beacon(beacon, now));
+        }
     }
 }

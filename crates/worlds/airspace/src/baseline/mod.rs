@@ -1,10 +1,11 @@
-//! Other methods under the same limits, for comparison: each looks at the airplanes near it once per
+//! Other methods under the same limits, for comparison: each considers the airplanes near it once per
 //! step of `dtau`, and gives a heading, toward which the airplane turns as fast as it can.
 
 pub(super) mod mvp;
 pub(super) mod orca;
 
 use super::flight::{Levels, Point};
+use super::settings::ReactiveSettings;
 use sidestep_kernel::{Slot, math};
 
 /// The part of an airplane that a method knows.
@@ -22,15 +23,6 @@ pub(super) struct AircraftState {
     pub(super) levels: Levels,
     /// Whether it gives way to others, too.
     pub(super) yields: bool,
-}
-
-/// The settings of a method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReactiveSettings {
-    /// Time in seconds within which losses of separation are avoided.
-    pub look_ahead_s: f64,
-    /// Factor on separations when avoiding.
-    pub margin: f64,
 }
 
 impl AircraftState {

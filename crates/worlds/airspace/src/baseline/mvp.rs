@@ -6,8 +6,9 @@
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::{AircraftState, ReactiveSettings, length};
+use super::{AircraftState, length};
 use crate::flight::Point;
+use crate::settings::ReactiveSettings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{Slot, math};
@@ -18,12 +19,12 @@ const MAX_HEAD_ON_M: f64 = 10.0;
 /// Factor on the zone out of which the closest point is moved (`RFACH`), BlueSky's default.
 const RESOLUTION_FACTOR: f64 = 1.05;
 /// Difference of headings in radians below which two airplanes near each other fly side by side: they
-/// would soon be in conflict again.
+/// would soon be in conflict again. BlueSky's value.
 const MAX_SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Squared speed in m²/s² below which two airplanes do not move against each other.
 const MIN_SPEED_SQUARED: f64 = 1e-6;
 
-/// The conflicts that an airplane resolves, from one look to the next.
+/// The conflicts that an airplane resolves, from one step to the next.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActiveResolutions {
     /// The others, by slot.
@@ -46,7 +47,7 @@ impl ActiveResolutions {
 
 /// A closest approach that two airplanes will have, or have had, if both fly straight on.
 struct ClosestApproach {
-    /// The other's place then, seen from the airplane.
+    /// The other's position then, relative to the airplane.
     at: Point,
     /// Seconds from now.
     in_s: f64,
@@ -54,30 +55,39 @@ struct ClosestApproach {
 
 /// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
 /// `meets` says whether two are on one level.
-pub(in super::super) fn headings(
+pub(crate) fn headings(
     all: &[AircraftState],
     resolving: &mut [ActiveResolutions],
     settings: ReactiveSettings,
     meets: impl Fn(&AircraftState, &AircraftState) -> bool,
 ) -> Vec<Option<f64>> {
-    let conflicts = |own: &AircraftState| -> Vec<(usize, ClosestApproach)> {
-        let others = (0..all.len()).filter(|&j| all[j].slot != own.slot && meets(own, &all[j]));
-        let found = others.map(|j| (j, find_conflict(own, &all[j], settings)));
-        found.filter_map(|(j, closest)| Some((j, closest?))).collect()
-    };
-    let found: Vec<Vec<(usize, ClosestApproach)>> = all.iter().map(conflicts).collect();
+    let mut conflicts = Vec::with_capacity(all.len());
+    for own in all {
+        let mut own_conflicts = Vec::new();
+        for (j, other) in all.iter().enumerate() {
+            if other.slot != own.slot
+                && meets(own, other)
+                && let Some(closest) = find_conflict(own, other, settings)
+            {
+                own_conflicts.push((j, closest));
+            }
+        }
+        conflicts.push(own_conflicts);
+    }
     let by_slot = sorted_by_slot(all);
     // As in BlueSky, the headings are kept only while no airplane is in conflict.
-    let is_anybody_in_conflict = found.iter().any(|conflicts| !conflicts.is_empty());
-    for ((own, conflicts), memory) in all.iter().zip(&found).zip(&mut *resolving) {
-        if is_anybody_in_conflict {
-            memory.heading_rad = resolution_heading_rad(all, own, conflicts, settings);
+    let has_conflict = conflicts.iter().any(|own_conflicts| !own_conflicts.is_empty());
+    for ((own, own_conflicts), memory) in all.iter().zip(&conflicts).zip(&mut *resolving) {
+        if has_conflict {
+            memory.heading_rad = resolution_heading_rad(all, own, own_conflicts, settings);
         }
-        memory.with.extend(conflicts.iter().map(|(j, _)| all[*j].slot));
+        memory.with.extend(own_conflicts.iter().map(|(j, _)| all[*j].slot));
         memory.with.sort_unstable();
         memory.with.dedup();
-        let is_on = |other: &AircraftState| meets(own, other) && is_active(own, other, settings);
-        memory.with.retain(|&slot| find_slot(&by_slot, slot).is_some_and(is_on));
+        memory.with.retain(|&slot| {
+            find_slot(&by_slot, slot)
+                .is_some_and(|other| meets(own, other) && is_active(own, other, settings))
+        });
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
 }
@@ -96,14 +106,15 @@ fn find_slot<'a>(by_slot: &[&'a AircraftState], slot: Slot) -> Option<&'a Aircra
     by_slot.get(first).copied().filter(|one| one.slot == slot)
 }
 
-/// Returns the closest approach of two airplanes if one enters the other's zone within the time of
-/// looking ahead, or has entered it.
+/// Returns the closest approach of two airplanes if one enters the other's zone within the look-ahead time, or has
+/// entered it.
 fn find_conflict(
     own: &AircraftState,
     other: &AircraftState,
     settings: ReactiveSettings,
 ) -> Option<ClosestApproach> {
-    let (zone_m, apart) = (own.zone_m(other, settings), sub(other.at, own.at));
+    let zone_m = own.zone_m(other, settings);
+    let apart = sub(other.at, own.at);
     let closing = sub(other.velocity, own.velocity);
     let speed2 = dot(closing, closing).max(MIN_SPEED_SQUARED);
     let in_s = -dot(apart, closing) / speed2;
@@ -124,12 +135,16 @@ fn resolution_heading_rad(
     conflicts: &[(usize, ClosestApproach)],
     settings: ReactiveSettings,
 ) -> f64 {
-    let change = |v: Point, (j, closest): &(usize, ClosestApproach)| {
-        let shift = velocity_change(own, &all[*j], closest, settings);
-        [v[0] - shift[0], v[1] - shift[1]]
-    };
-    let [vx, vy] = conflicts.iter().fold(own.velocity, change);
-    if conflicts.is_empty() { own.heading_rad } else { math::atan2(vy, vx) }
+    if conflicts.is_empty() {
+        return own.heading_rad;
+    }
+    let [mut vx, mut vy] = own.velocity;
+    for (j, closest) in conflicts {
+        let [change_x, change_y] = velocity_change(own, &all[*j], closest, settings);
+        vx -= change_x;
+        vy -= change_y;
+    }
+    math::atan2(vy, vx)
 }
 
 /// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
@@ -141,7 +156,8 @@ fn velocity_change(
 ) -> Point {
     let zone_m = own.zone_m(other, settings) * RESOLUTION_FACTOR;
     let apart = sub(other.at, own.at);
-    let (distance_m, mut at) = (length(apart).max(1e-9), closest.at);
+    let distance_m = length(apart).max(1e-9);
+    let mut at = closest.at;
     let mut miss_m = length(at);
     if miss_m <= MAX_HEAD_ON_M {
         miss_m = MAX_HEAD_ON_M;
@@ -149,22 +165,25 @@ fn velocity_change(
     }
     let mut reach_m = zone_m;
     if zone_m < distance_m && miss_m < distance_m {
-        // The way past the zone is its tangent, so a shift to its rim would cut it.
-        let off = math::asin(zone_m / distance_m) - math::asin(miss_m / distance_m);
-        reach_m /= math::cos(off);
+        // The path past the zone is its tangent, so a shift to its rim would cut it.
+        let angle_rad = math::asin(zone_m / distance_m) - math::asin(miss_m / distance_m);
+        reach_m /= math::cos(angle_rad);
     }
     let size = (reach_m - miss_m) / (closest.in_s.abs().max(1e-6) * miss_m);
     [at[0] * size, at[1] * size]
 }
 
-/// Returns whether a conflict that was found is still to be minded.
+/// Returns whether a conflict that was found is still to be resolved.
 fn is_active(own: &AircraftState, other: &AircraftState, settings: ReactiveSettings) -> bool {
-    let (apart, closing) = (sub(other.at, own.at), sub(other.velocity, own.velocity));
-    let (distance_m, zone_m) = (length(apart), own.zone_m(other, settings));
+    let apart = sub(other.at, own.at);
+    let closing = sub(other.velocity, own.velocity);
+    let distance_m = length(apart);
+    let zone_m = own.zone_m(other, settings);
     let is_past = dot(apart, closing) > 0.0;
     let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();
-    let is_beside = angle_rad < MAX_SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLUTION_FACTOR;
-    !is_past || distance_m < zone_m || is_beside
+    let is_side_by_side =
+        angle_rad < MAX_SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLUTION_FACTOR;
+    !is_past || distance_m < zone_m || is_side_by_side
 }
 
 #[cfg(test)]

@@ -8,8 +8,9 @@
 //! one that violates the half-planes least. The margin on separations allows for the time that
 //! turning takes.
 
-use super::{AircraftState, ReactiveSettings, length};
+use super::{AircraftState, length};
 use crate::flight::Point;
+use crate::settings::ReactiveSettings;
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
@@ -19,15 +20,15 @@ const HEADINGS: u32 = 90;
 /// equally bad, the nearest one is flown.
 const TURN_WEIGHT_M_S: f64 = 1e-6;
 
-/// The velocities that one neighbor allows: those with at least `least` along `normal`.
+/// The velocities that one neighbor allows: those with at least `min_m_s` along `normal`.
 struct HalfPlane {
     normal: Point,
-    least: f64,
+    min_m_s: f64,
 }
 
 /// Returns the heading in radians that an airplane should fly among the others; `None` if it may
-/// fly to its way-point. `step_s` is the time until it looks again.
-pub(in super::super) fn heading_rad<'a>(
+/// fly to its way-point. `step_s` is the time until it chooses again.
+pub(crate) fn heading_rad<'a>(
     own: &AircraftState,
     others: impl Iterator<Item = &'a AircraftState>,
     settings: ReactiveSettings,
@@ -36,23 +37,26 @@ pub(in super::super) fn heading_rad<'a>(
     let planes: Vec<HalfPlane> =
         others.map(|other| half_plane(own, other, settings, step_s)).collect();
     let v_m_s = length(own.velocity);
-    let excess = |heading_rad: f64| {
-        let v = [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)];
-        planes.iter().map(|p| dot(p.normal, v) - p.least).fold(f64::INFINITY, f64::min)
-    };
-    if excess(own.preferred_rad) >= 0.0 {
+    if min_excess_m_s(&planes, own.preferred_rad, v_m_s) >= 0.0 {
         return None;
     }
-    // Prefers any allowed heading to all others, and then the nearest.
-    let worth = |off_rad: f64| {
-        let excess = excess(own.preferred_rad + off_rad);
-        (excess >= 0.0, excess.min(0.0) - TURN_WEIGHT_M_S * off_rad.abs())
-    };
-    let one_rad = std::f64::consts::TAU / f64::from(HEADINGS);
-    let offs = (0..HEADINGS).map(|k| math::wrap_angle(f64::from(k) * one_rad));
-    let ranked = offs.map(|off_rad| (worth(off_rad), off_rad));
-    let best = ranked.max_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y)));
-    best.map(|(_, off_rad)| own.preferred_rad + off_rad)
+    let spacing_rad = std::f64::consts::TAU / f64::from(HEADINGS);
+    let ranked = (0..HEADINGS).map(|k| {
+        let turn_rad = math::wrap_angle(f64::from(k) * spacing_rad);
+        let excess_m_s = min_excess_m_s(&planes, own.preferred_rad + turn_rad, v_m_s);
+        // Any allowed heading is better than all others; among equals the nearest one is.
+        let is_allowed = excess_m_s >= 0.0;
+        let score = excess_m_s.min(0.0) - TURN_WEIGHT_M_S * turn_rad.abs();
+        (is_allowed, score, turn_rad)
+    });
+    let best = ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    best.map(|(_, _, turn_rad)| own.preferred_rad + turn_rad)
+}
+
+/// Returns by how much the velocity of a heading is within the half-planes, at the one that it satisfies least.
+fn min_excess_m_s(planes: &[HalfPlane], heading_rad: f64, v_m_s: f64) -> f64 {
+    let velocity = [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)];
+    planes.iter().map(|p| dot(p.normal, velocity) - p.min_m_s).fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the velocities of `own` that avoid one neighbor: if that one yields, it does its half.
@@ -62,16 +66,19 @@ fn half_plane(
     settings: ReactiveSettings,
     step_s: f64,
 ) -> HalfPlane {
-    let (apart, relative) = (sub(other.at, own.at), sub(own.velocity, other.velocity));
+    let apart = sub(other.at, own.at);
+    let relative = sub(own.velocity, other.velocity);
     let radius_m = own.zone_m(other, settings);
     let distance2 = dot(apart, apart);
     let is_too_near = distance2 <= radius_m * radius_m;
-    // A pair that is already too near has to be out of the zone by the next look.
+    // A pair that is already too near has to be out of the zone by the next step.
     let within_s = if is_too_near { step_s } else { settings.look_ahead_s };
     let from_center = [relative[0] - apart[0] / within_s, relative[1] - apart[1] / within_s];
-    let (size, along) = (length(from_center).max(1e-9), dot(from_center, apart));
-    let is_round = along < 0.0 && along * along > radius_m * radius_m * size * size;
-    let (normal, needed) = if is_too_near || is_round {
+    let size = length(from_center).max(1e-9);
+    let along = dot(from_center, apart);
+    // The velocity obstacle is a cone whose tip is cut off by a disc: the nearest point of its border is on the disc.
+    let is_nearest_on_disc = along < 0.0 && along * along > radius_m * radius_m * size * size;
+    let (normal, needed_m_s) = if is_too_near || is_nearest_on_disc {
         // To the rim of the disc of velocities that lead into the zone at the end of the time.
         let normal = [from_center[0] / size, from_center[1] / size];
         (normal, radius_m / within_s - size)
@@ -87,7 +94,7 @@ fn half_plane(
         (normal, -dot(relative, normal))
     };
     let share = if other.yields { 0.5 } else { 1.0 };
-    HalfPlane { normal, least: dot(own.velocity, normal) + share * needed }
+    HalfPlane { normal, min_m_s: dot(own.velocity, normal) + share * needed_m_s }
 }
 
 #[cfg(test)]
@@ -127,8 +134,8 @@ mod tests {
             x in -4000.0f64..4000.0, y in -4000.0f64..4000.0, heading_rad in -3.1f64..3.1,
         ) {
             let (own, other) = (moving(0, [0.0, 0.0], 0.3), moving(1, [x, y], heading_rad));
-            let HalfPlane { normal, least } = half_plane(&own, &other, SETTINGS, 1.0);
-            let lacks = (least - dot(normal, own.velocity)).max(0.0);
+            let HalfPlane { normal, min_m_s } = half_plane(&own, &other, SETTINGS, 1.0);
+            let lacks = (min_m_s - dot(normal, own.velocity)).max(0.0);
             let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
             let theirs = by_library(&own, &other);
             let off = sub(nearest, theirs);
@@ -141,7 +148,7 @@ mod tests {
             let (own, other) = (moving(0, [0.0, 0.0], 0.0), moving(1, [x, y], 3.1));
             let plane = half_plane(&own, &other, SETTINGS, 1.0);
             let excess = |rad: f64| {
-                dot(plane.normal, [35.0 * math::cos(rad), 35.0 * math::sin(rad)]) - plane.least
+                dot(plane.normal, [35.0 * math::cos(rad), 35.0 * math::sin(rad)]) - plane.min_m_s
             };
             match heading_rad(&own, [other].iter(), SETTINGS, 1.0) {
                 Some(rad) => prop_assert!(excess(rad) >= 0.0 && excess(0.0) < 0.0),

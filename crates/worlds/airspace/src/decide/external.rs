@@ -1,4 +1,4 @@
-//! Wishes that a caller has ordered.
+//! Candidates that a caller has ordered.
 
 use super::ManeuverCandidates;
 use super::preferences::rank_straight_first;
@@ -9,14 +9,14 @@ use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::math;
 
-/// Returns the ways that an airplane considers: the ordered one, and then the others by rank, or by how little they
+/// Returns the candidates of an airplane: the ordered one, and then the others by rank, or by how little they
 /// differ from it. Without an order it follows its flight plan.
 pub(super) fn candidates_by_action(
     world: &AirspaceWorld,
     known: KnownAircraft,
-    wish: Option<&ExternalAction>,
+    external_action: Option<&ExternalAction>,
 ) -> ManeuverCandidates {
-    match wish {
+    match external_action {
         Some(&ExternalAction::TurnRate(omega_rad_s)) => {
             let omegas_rad_s = vec![omega_rad_s; world.timing.points_per_dt()];
             ManeuverCandidates::from_profiles(rank_by_similarity(
@@ -26,8 +26,8 @@ pub(super) fn candidates_by_action(
             ))
         }
         Some(&ExternalAction::Velocity([vx, vy])) => {
-            let way = turn_toward(world, known, math::atan2(vy, vx));
-            ManeuverCandidates::from_profiles(rank_by_similarity(world, known, way))
+            let profile = turn_toward(world, known, math::atan2(vy, vx));
+            ManeuverCandidates::from_profiles(rank_by_similarity(world, known, profile))
         }
         Some(ExternalAction::Ranking(order)) => {
             let actions = world.actions(known.slot);
@@ -38,8 +38,10 @@ pub(super) fn candidates_by_action(
     }
 }
 
-/// Returns the way of one `dt` on which an airplane turns to a heading as fast as it can.
+/// Returns the turn profile of one `dt` with which an airplane turns to a heading as fast as it can.
 fn turn_toward(world: &AirspaceWorld, mut known: KnownAircraft, heading_rad: f64) -> TurnProfile {
-    let turn = |_| step(world, &mut known, Some(heading_rad));
-    TurnProfile { omegas_rad_s: (0..world.timing.points_per_dt()).map(turn).collect() }
+    let steps = 0..world.timing.points_per_dt();
+    TurnProfile {
+        omegas_rad_s: steps.map(|_| step(world, &mut known, Some(heading_rad))).collect(),
+    }
 }

@@ -1,4 +1,4 @@
-//! Wishes: the actions of an airplane in order of preference, and the ways that they lead.
+//! The actions of an airplane by preference, and their turn profiles.
 
 use crate::agents::ActionChoice;
 use crate::flight::{Action, FlightSegment, KnownAircraft};
@@ -21,17 +21,25 @@ pub(super) fn rank_straight_first(world: &AirspaceWorld, known: KnownAircraft) -
 pub(super) fn rank_by_turn_rate(
     world: &AirspaceWorld,
     known: KnownAircraft,
-    wanted_rad_s: f64,
+    desired_rad_s: f64,
 ) -> Vec<Action> {
     let mut others: Vec<Action> = world.actions(known.slot).to_vec();
-    let turn = |action: &Action| match *action {
+    others.sort_by(|a, b| {
+        rate_difference_rad_s(*a, desired_rad_s)
+            .total_cmp(&rate_difference_rad_s(*b, desired_rad_s))
+    });
+    others
+}
+
+/// Returns how much the turn rate of an action differs from the desired one; less than any other for proceeding,
+/// which comes first.
+fn rate_difference_rad_s(action: Action, desired_rad_s: f64) -> f64 {
+    match action {
         Action::Hold { omega_rad_s }
         | Action::Then { omega_rad_s, .. }
-        | Action::Leg { omega_rad_s, .. } => (omega_rad_s - wanted_rad_s).abs(),
+        | Action::Leg { omega_rad_s, .. } => (omega_rad_s - desired_rad_s).abs(),
         Action::Proceed => -1.0,
-    };
-    others.sort_by(|a, b| turn(a).total_cmp(&turn(b)));
-    others
+    }
 }
 
 /// Returns the chosen action, and then the others by rising expected cost.
@@ -52,31 +60,33 @@ pub(super) fn rank_by_cost(
 pub(super) fn turn_profiles(
     world: &AirspaceWorld,
     known: KnownAircraft,
-    wishes: &[Action],
+    actions: &[Action],
 ) -> Vec<TurnProfile> {
-    let mut ways: Vec<TurnProfile> = Vec::new();
-    for &action in wishes {
-        let way = turn_profile(world, known, action);
-        if !ways.contains(&way) {
-            ways.push(way);
+    let mut profiles: Vec<TurnProfile> = Vec::new();
+    for &action in actions {
+        let profile = turn_profile(world, known, action);
+        if !profiles.contains(&profile) {
+            profiles.push(profile);
         }
     }
-    ways
+    profiles
 }
 
 fn turn_profile(world: &AirspaceWorld, known: KnownAircraft, action: Action) -> TurnProfile {
     let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
-    let (air, dtau_s) = (world.air(), world.timing.dtau_s);
-    let pilot = air.autopilot(model, mission);
-    let (mut pose, mut next) = (known.pose, known.next);
+    let air = world.air();
+    let dtau_s = world.timing.dtau_s;
+    let autopilot = air.autopilot(model, mission);
+    let mut pose = known.pose;
+    let mut next = known.next;
     let mut omegas_rad_s = Vec::new();
     for k in 0..world.timing.points_per_dt() {
-        let held = action.turn_rate_rad_s(k as f64 * dtau_s);
-        let omega = held.unwrap_or_else(|| air.steer(&pilot, pose, next));
+        let fixed_rad_s = action.turn_rate_rad_s(k as f64 * dtau_s);
+        let omega = fixed_rad_s.unwrap_or_else(|| air.steer(&autopilot, pose, next));
         omegas_rad_s.push(omega);
         let before = pose;
         pose = air.after_wind_step(before.step(model.v_m_s, omega, dtau_s));
-        next = pilot.next_way_point((before, pose), next);
+        next = autopilot.next_way_point((before, pose), next);
     }
     TurnProfile { omegas_rad_s }
 }

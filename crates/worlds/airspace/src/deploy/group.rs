@@ -1,53 +1,54 @@
 //! The pilots of a group, on a network in memory.
 
-use super::drive::drive;
-use crate::PhaseContext;
 use crate::decide::ManeuverCandidates;
 use crate::join::ControlledGroup;
 use crate::non_cooperative::NonCooperative;
-use crate::pilot::{Control, Memory, Percept, Pilot, Schedule};
+use crate::pilot::{Control, Memory, Pilot, Schedule};
 use crate::purpose;
+use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::network::{Distances, FaultInjector, FaultStreams, FaultyTransport};
+use sidestep_kernel::network::{
+    AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, ReplyTiming,
+};
 use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
 
-/// Lets the pilots of a group decide. Returns the control of each, and the ways that it has considered.
+/// Lets the pilots of a group decide. Returns the control of each, and what it has considered.
 pub(crate) fn decide_group(
-    turn: &mut PhaseContext<'_>,
+    context: &mut PhaseContext<'_>,
     flown: &ControlledGroup,
-    intruders: &[NonCooperative],
+    non_cooperative: &[NonCooperative],
 ) -> Vec<(Control, ManeuverCandidates)> {
-    let PhaseContext { world, state, now, clock, .. } = *turn;
-    let began_ns = clock.thread_cpu_ns();
+    let PhaseContext { world, state, now, clock, .. } = *context;
+    let start_ns = clock.thread_cpu_ns();
     let schedule = Schedule::for_cycle(now, world.network.as_ref());
-    let sights = Percept::from_group(turn, flown, intruders);
-    let talks = world.conversation_times_on(now, schedule);
-    let mut transport = network(world, state, &talks);
+    let percepts = flown.percepts(context, non_cooperative);
+    let conversations = world.conversation_times_on(now, schedule);
+    let mut network = network(world, state, &conversations);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
-    for (pilot, sight) in pilots.iter_mut().zip(sights) {
-        pilot.start_with_schedule(sight, schedule);
+    for (pilot, percept) in pilots.iter_mut().zip(percepts) {
+        pilot.start_with_schedule(percept, schedule);
     }
-    drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
-    turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
-    drive(&mut transport, &mut pilots, schedule.begins, Pilot::is_done);
+    network.run(&mut pilots, schedule.begins, Pilot::has_decided);
+    context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
+    network.run(&mut pilots, schedule.begins, Pilot::is_done);
     outcomes(pilots)
 }
 
-/// Returns the outcome of the talks of a group. Where one waits for a message that never comes, all stay on their
-/// orbits, because plans that are sure are safe only if all fly them.
+/// Returns the outcome of the conversations of a group. Where one waits for a message that never comes, all stay on
+/// their orbits, because plans that are sure are safe only if all fly them.
 fn outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
-    let all_have_ended = pilots.iter().all(Pilot::is_done);
-    let one = |pilot: Pilot| match all_have_ended {
-        true => pilot.into_outcome().expect("it has come to an end"),
-        false => pilot.into_fallback(),
-    };
-    pilots.into_iter().map(one).collect()
+    if pilots.iter().all(Pilot::is_done) {
+        let outcomes = pilots.into_iter().map(Pilot::into_outcome);
+        outcomes.map(|outcome| outcome.expect("it has come to an end")).collect()
+    } else {
+        pilots.into_iter().map(Pilot::into_fallback).collect()
+    }
 }
 
-/// Lets pilots that have begun a cycle talk until all have come to an end.
+/// Runs the conversations of pilots that have begun a cycle until all have ended.
 #[cfg(test)]
 pub(crate) fn run_pilots(
     world: &AirspaceWorld,
@@ -55,18 +56,23 @@ pub(crate) fn run_pilots(
     (now, schedule): (Cycle, Schedule),
     pilots: &mut [Pilot],
 ) {
-    let talks = world.conversation_times_on(now, schedule);
-    let mut transport = network(world, state, &talks);
-    drive(&mut transport, pilots, schedule.begins, Pilot::is_done);
+    let conversations = world.conversation_times_on(now, schedule);
+    network(world, state, &conversations).run(pilots, schedule.begins, Pilot::is_done);
 }
 
-/// Returns the network of the talks of a cycle.
+/// Returns the network of the conversations of a cycle.
 fn network<'a>(
     world: &'a AirspaceWorld,
     state: &'a AirspaceState,
-    talks: &'a [(u64, f64)],
-) -> FaultyTransport<'a, MemoryTransport> {
-    FaultyTransport::in_memory(world.network.as_ref(), world.fault_streams(), Some(state), talks)
+    conversations: &'a [(u64, f64)],
+) -> AgentLoop<FaultyTransport<'a, MemoryTransport>> {
+    let transport = FaultyTransport::in_memory(
+        world.network.as_ref(),
+        world.fault_streams(),
+        Some(state),
+        conversations,
+    );
+    AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None }
 }
 
 impl Distances for AirspaceState {
@@ -76,8 +82,8 @@ impl Distances for AirspaceState {
 }
 
 impl AirspaceWorld {
-    /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run: the
-    /// first talk starts with the cycle, and the shield's exchange when that has to be over.
+    /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run: the
+    /// first conversation starts with the cycle, and the shield's exchange when that has to be over.
     fn conversation_times_on(&self, now: Cycle, schedule: Schedule) -> [(u64, f64); 2] {
         let starts_s = self.cycle_start_s(now);
         let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
@@ -90,7 +96,7 @@ impl AirspaceWorld {
         Some(FaultInjector::new(self.network.clone()?, self.fault_streams()))
     }
 
-    /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run.
+    /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run.
     pub fn conversation_times(&self, now: Cycle) -> [(u64, f64); 2] {
         self.conversation_times_on(now, Schedule::for_cycle(now, self.network.as_ref()))
     }
@@ -104,27 +110,30 @@ impl AirspaceWorld {
 fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
-    let pilot = |(&slot, memory)| Pilot::with_memory(world.clone(), slot, memory);
-    flown.iter().zip(memories).map(pilot).collect()
+    flown
+        .iter()
+        .zip(memories)
+        .map(|(&slot, memory)| Pilot::with_memory(world.clone(), slot, memory))
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::events::EventKind;
-    use crate::pilot::{Fleet, Maneuver};
-    use crate::{AirspaceRun, airspace_run};
+    use crate::pilot::{Maneuver, Percept};
+    use crate::{AirspaceRun, Fleet, airspace_run};
     use sidestep_scenario::Source;
 
     /// Returns the pilots of a group that looks for itself; the first one is of another build, and no other takes it
     /// in.
     fn begun(run: &AirspaceRun) -> Vec<Pilot> {
         let world = run.world();
-        let pilot = |sight: Percept| {
-            let build = if sight.own.id == 0 { "another" } else { "this" };
-            let pilot = Pilot::new(world.clone(), sight.own.id, Default::default());
+        let pilot = |percept: Percept| {
+            let build = if percept.own.id == 0 { "another" } else { "this" };
+            let pilot = Pilot::new(world.clone(), percept.own.id, Default::default());
             let mut pilot = pilot.with_build(build);
-            pilot.start_with_schedule(sight, Schedule::for_cycle(0, None));
+            pilot.start_with_schedule(percept, Schedule::for_cycle(0, None));
             pilot
         };
         run.percepts().into_iter().map(pilot).collect()
@@ -139,9 +148,9 @@ mod tests {
         run_pilots(run.world(), run.state(), (0, Schedule::for_cycle(0, None)), &mut pilots);
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
         for (control, _) in outcomes(pilots) {
-            assert_eq!(control.course, Maneuver::Orbit);
-            let told: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
-            assert_eq!(told, [EventKind::Deadline]);
+            assert_eq!(control.maneuver, Maneuver::Orbit);
+            let kinds: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
+            assert_eq!(kinds, [EventKind::Deadline]);
         }
     }
 }

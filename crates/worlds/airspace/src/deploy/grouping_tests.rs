@@ -14,7 +14,7 @@ fn run(text: &str, more: &str) -> AirspaceRun {
     airspace_run(&Source::new("heard", text, ""), 1).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Flies a scenario with both ways to find groups. Returns the digests and the metrics.
+/// Flies a scenario with groups announced and with groups heard. Returns the digests and the metrics.
 fn both(text: &str, cycles: u64) -> [(Digest, Metrics); 2] {
     ["announced", "heard"].map(|groups| {
         let mut run = run(text, &format!("groups = \"{groups}\""));
@@ -25,14 +25,14 @@ fn both(text: &str, cycles: u64) -> [(Digest, Metrics); 2] {
 
 /// Checks that a scenario is flown alike, however groups are found.
 fn is_alike(text: &str, cycles: u64) {
-    let [(announced, told), (heard, found)] = both(text, cycles);
-    assert_eq!(heard, announced, "{text}");
+    let [(announced_digest, announced), (heard_digest, heard)] = both(text, cycles);
+    assert_eq!(heard_digest, announced_digest, "{text}");
     assert_eq!(
-        (found.messages, found.bytes, found.rounds_mean),
-        (told.messages, told.bytes, told.rounds_mean)
+        (heard.messages, heard.bytes, heard.rounds_mean),
+        (announced.messages, announced.bytes, announced.rounds_mean)
     );
-    assert_eq!(told.beacons, 0);
-    assert!(found.beacons > 0 && found.beacon_bytes > 0, "{found:?}");
+    assert_eq!(announced.beacons, 0);
+    assert!(heard.beacons > 0 && heard.beacon_bytes > 0, "{heard:?}");
 }
 
 /// Streams that meet: long groups, in which hardly any airplane sees all.
@@ -124,11 +124,11 @@ fn who_loses_nothing_and_cannot_know_it_finds_the_same_group() {
     let network =
         "deployment = \"compact-team\"\nnetwork = { duplication = 0.3, max_delay_s = 0.004 }";
     for airplanes in [CONFLICT, NON_COOPERATIVE, STREAMS] {
-        let [(_, told), (_, found)] = both(&scenario(network, airplanes), 15);
-        assert_eq!((found.contacts_lost, found.deadlines_missed), (0, 0), "{found:?}");
+        let [(_, announced), (_, heard)] = both(&scenario(network, airplanes), 15);
+        assert_eq!((heard.contacts_lost, heard.deadlines_missed), (0, 0), "{heard:?}");
         let flown =
             |m: &Metrics| (m.min_separation_m, m.shield_overrides, m.rounds_mean, m.arrived);
-        assert_eq!(flown(&found), flown(&told));
+        assert_eq!(flown(&heard), flown(&announced));
     }
 }
 
@@ -169,10 +169,10 @@ fn two_that_do_not_hear_each_other_are_in_one_group_by_way_of_one_that_hears_bot
         run.advance(250);
         run.metrics()
     };
-    let [metrics, told] = ["heard", "announced"].map(flown);
-    assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 3), "{metrics:?}");
-    let [found, told] = [&metrics, &told].map(|m| m.mean_delay_percent.expect("arrived"));
-    assert!(found < told + 5.0, "{found} %, {told} % where groups are announced");
+    let [heard, announced] = ["heard", "announced"].map(flown);
+    assert_eq!((heard.losses_of_separation, heard.arrived), (0, 3), "{heard:?}");
+    let [heard, announced] = [&heard, &announced].map(|m| m.mean_delay_percent.expect("arrived"));
+    assert!(heard < announced + 5.0, "{heard} %, {announced} % where groups are announced");
 }
 
 /// Flies a scenario of faults of [`RandomScenario`] by groups that are heard. Returns the pairs that lose separation

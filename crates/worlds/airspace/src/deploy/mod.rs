@@ -12,19 +12,17 @@
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
 //! The programs aboard are [`crate::agents`], and a [`Pilot`](crate::pilot::Pilot) goes with them through the
-//! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
-//! faults of the scenario ([`sidestep_kernel::network`]), by a loop that knows neither (`drive.rs`).
+//! conversations of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
+//! faults of the scenario ([`sidestep_kernel::network`]).
 
-mod deployment;
-mod drive;
+#[cfg(test)]
+mod conversation_tests;
 mod group;
 #[cfg(test)]
 mod grouping_tests;
 #[cfg(test)]
 mod outage_tests;
 
-pub use deployment::Deployment;
-pub(crate) use deployment::unsupported_reason;
 pub(crate) use group::decide_group;
 #[cfg(test)]
 pub(crate) use group::run_pilots;
@@ -147,7 +145,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         /// Whichever airplane falls silent, wherever and whenever, met before or not, and whichever
-        /// comes in later: all airplanes that had orbits apart when they came in stay apart.
+        /// enters later: all airplanes that had orbits apart when they entered stay apart.
         #[test]
         fn nobody_comes_near_a_silent_airplane(
             seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,
@@ -169,9 +167,9 @@ mod tests {
             let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("valid");
             run.advance(90);
             let metrics = run.metrics();
-            let told = &metrics.too_close;
+            let too_close = &metrics.too_close;
             prop_assert!(
-                metrics.losses_of_separation == 0 || !told.is_empty(), "{metrics:?}"
+                metrics.losses_of_separation == 0 || !too_close.is_empty(), "{metrics:?}"
             );
         }
     }

@@ -1,8 +1,8 @@
-//! Percepts: the knowledge with which an airplane decides, as numbers of fixed shapes.
+//! Observations: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
-use crate::PhaseContext;
 use crate::flight::{FlightSegment, KnownAircraft, Point, distance_m};
 use crate::non_cooperative::NonCooperative;
+use crate::scratch::PhaseContext;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{BufferMut, Space, SpaceKind};
 use sidestep_kernel::geometry::sub;
@@ -11,7 +11,8 @@ use sidestep_kernel::{EntityId, Slot};
 use std::array::from_fn;
 use std::f64::consts::PI;
 
-/// Most others that one airplane observes: the nearest.
+/// Most others that one airplane observes, the nearest. Spaces have a fixed shape, and a crowd within a horizon of
+/// flight is rarely larger.
 pub(super) const MAX_NEIGHBORS: usize = 16;
 
 /// An airplane as all of its group see it.
@@ -35,7 +36,7 @@ pub(super) struct Observation {
     heading_rad: f64,
     speed_m_s: f64,
     turn_rate_rad_s: f64,
-    /// Its next way-point, seen from it.
+    /// Its next way-point, relative to its place.
     way_point: Point,
     way_points_left: usize,
     delay_s: f64,
@@ -43,15 +44,14 @@ pub(super) struct Observation {
     neighbors: Vec<Neighbor>,
 }
 
-/// Another airplane, seen from one.
+/// Another airplane, relative to the one that observes.
 #[derive(Debug)]
 struct Neighbor {
-    seen: VisibleAircraft,
-    /// Its place, seen from the airplane.
-    apart: Point,
+    aircraft: VisibleAircraft,
+    relative_m: Point,
     above_m: f64,
     separation_m: f64,
-    is_named: bool,
+    is_exempt: bool,
     /// Seconds since it was heard, if it ever was.
     unheard_s: Option<f64>,
 }
@@ -59,12 +59,12 @@ struct Neighbor {
 impl VisibleAircraft {
     /// Returns all airplanes of a group.
     pub(super) fn from_group(
-        turn: &PhaseContext<'_>,
-        flown: &[KnownAircraft],
-        intruders: &[NonCooperative],
+        context: &PhaseContext<'_>,
+        members: &[KnownAircraft],
+        non_cooperative: &[NonCooperative],
     ) -> Vec<Self> {
-        let PhaseContext { world, state, .. } = turn;
-        let own = flown.iter().map(|known| {
+        let PhaseContext { world, state, .. } = context;
+        let cooperative = members.iter().map(|known| {
             let model = world.segment(known.slot, known.orders).model;
             Self {
                 slot: known.slot,
@@ -76,7 +76,7 @@ impl VisibleAircraft {
                 is_cooperative: true,
             }
         });
-        let others = intruders.iter().map(|one| {
+        let others = non_cooperative.iter().map(|one| {
             let [vx, vy] = one.velocity_m_s;
             Self {
                 slot: one.slot,
@@ -88,18 +88,18 @@ impl VisibleAircraft {
                 is_cooperative: false,
             }
         });
-        own.chain(others).collect()
+        cooperative.chain(others).collect()
     }
 }
 
 impl Observation {
-    /// Returns the percept of one of a group.
+    /// Returns the observation of one of a group.
     pub(super) fn new(
-        turn: &PhaseContext<'_>,
+        context: &PhaseContext<'_>,
         own: &KnownAircraft,
         all: &[VisibleAircraft],
     ) -> Self {
-        let PhaseContext { world, state, .. } = turn;
+        let PhaseContext { world, state, .. } = context;
         let FlightSegment { model, mission, .. } = world.segment(own.slot, own.orders);
         let ahead = mission.get(own.next..).unwrap_or_default();
         Self {
@@ -111,14 +111,14 @@ impl Observation {
             turn_rate_rad_s: state.turn_rate_rad_s(own.slot),
             way_point: ahead.first().map_or([0.0; 2], |&goal| sub(goal, own.pose.at)),
             way_points_left: ahead.len(),
-            delay_s: delay_s(turn, own, ahead),
-            neighbors: neighbors(turn, own, all),
+            delay_s: delay_s(context, own, ahead),
+            neighbors: neighbors(context, own, all),
         }
     }
 
-    /// Writes it into a row of each room, in the order of [`spaces`].
-    pub(super) fn write(&self, world: &AirspaceWorld, row: usize, room: &mut [BufferMut<'_>]) {
-        let mut row = Row { rooms: room.iter_mut(), row };
+    /// Writes it into a row of each buffer, in the order of [`spaces`].
+    pub(super) fn write(&self, world: &AirspaceWorld, row: usize, buffers: &mut [BufferMut<'_>]) {
+        let mut row = Row { buffers: buffers.iter_mut(), row };
         row.write_integers(&[i64::from(self.is_due)]);
         row.write_reals(&self.at);
         row.write_reals(&[self.altitude_m]);
@@ -129,14 +129,14 @@ impl Observation {
         row.write_integers(&[self.way_points_left as i64]);
         row.write_reals(&[self.delay_s]);
         row.write_integers(&[self.neighbors.len() as i64]);
-        row.write_integers(&self.neighbor_values(-1, |one| one.seen.slot.into()));
-        row.write_reals(self.neighbor_values([0.0; 2], |one| one.apart).as_flattened());
+        row.write_integers(&self.neighbor_values(-1, |one| one.aircraft.slot.into()));
+        row.write_reals(self.neighbor_values([0.0; 2], |one| one.relative_m).as_flattened());
         row.write_reals(&self.neighbor_values(0.0, |one| one.above_m));
-        row.write_reals(&self.neighbor_values(0.0, |one| one.seen.heading_rad));
-        row.write_reals(&self.neighbor_values(0.0, |one| one.seen.speed_m_s));
+        row.write_reals(&self.neighbor_values(0.0, |one| one.aircraft.heading_rad));
+        row.write_reals(&self.neighbor_values(0.0, |one| one.aircraft.speed_m_s));
         row.write_reals(&self.neighbor_values(0.0, |one| one.separation_m));
-        row.write_integers(&self.neighbor_values(0, |one| one.seen.is_cooperative.into()));
-        row.write_integers(&self.neighbor_values(0, |one| one.is_named.into()));
+        row.write_integers(&self.neighbor_values(0, |one| one.aircraft.is_cooperative.into()));
+        row.write_integers(&self.neighbor_values(0, |one| one.is_exempt.into()));
         if world.network.is_some() {
             row.write_reals(&self.neighbor_values(-1.0, |one| one.unheard_s.unwrap_or(-1.0)));
         }
@@ -148,70 +148,77 @@ impl Observation {
     }
 }
 
-/// One airplane's row in rooms that are written one after the other.
+/// One airplane's row in buffers that are written one after the other.
 struct Row<'a, 'b> {
-    rooms: std::slice::IterMut<'a, BufferMut<'b>>,
+    buffers: std::slice::IterMut<'a, BufferMut<'b>>,
     row: usize,
 }
 
 impl Row<'_, '_> {
     fn write_integers(&mut self, values: &[i64]) {
-        let Some(room) = self.rooms.next() else { return };
+        let Some(buffer) = self.buffers.next() else { return };
         let first = self.row * values.len();
-        (first..).zip(values).for_each(|(at, &value)| room.set_integer(at, value));
+        (first..).zip(values).for_each(|(at, &value)| buffer.set_integer(at, value));
     }
 
     fn write_reals(&mut self, values: &[f64]) {
-        let Some(room) = self.rooms.next() else { return };
+        let Some(buffer) = self.buffers.next() else { return };
         let first = self.row * values.len();
-        (first..).zip(values).for_each(|(at, &value)| room.set_real(at, value));
+        (first..).zip(values).for_each(|(at, &value)| buffer.set_real(at, value));
     }
 }
 
 /// Returns the nearest others of an airplane's group, the nearest first.
 fn neighbors(
-    turn: &PhaseContext<'_>,
+    context: &PhaseContext<'_>,
     own: &KnownAircraft,
     all: &[VisibleAircraft],
 ) -> Vec<Neighbor> {
-    let PhaseContext { world, state, now, .. } = turn;
+    let PhaseContext { world, state, now, .. } = context;
     let others = all.iter().filter(|other| other.slot != own.slot);
     let mut nearest: Vec<(f64, &VisibleAircraft)> =
         others.map(|other| (distance_m(own.pose.at, other.at), other)).collect();
     nearest.sort_unstable_by(|(a_m, a), (b_m, b)| a_m.total_cmp(b_m).then(a.slot.cmp(&b.slot)));
     nearest.truncate(MAX_NEIGHBORS);
-    let named = state.exempt_with(own.slot);
+    let exempt = state.exempt_with(own.slot);
     let contacts = state.traffic_picture(own.slot);
     let separation_m = world.segment(own.slot, own.orders).model.separation_m;
-    let neighbor = |(_, seen): (f64, &VisibleAircraft)| Neighbor {
-        seen: *seen,
-        apart: sub(seen.at, own.pose.at),
-        above_m: seen.altitude_m - own.altitude_m,
-        separation_m: separation_m.max(seen.separation_m),
-        is_named: named.binary_search(&seen.slot).is_ok(),
-        unheard_s: contacts
-            .get(&seen.slot)
-            .map(|contact| world.cycle_start_s(now.saturating_sub(contact.heard_in))),
-    };
-    nearest.into_iter().map(neighbor).collect()
+    nearest
+        .into_iter()
+        .map(|(_, other)| Neighbor {
+            aircraft: *other,
+            relative_m: sub(other.at, own.pose.at),
+            above_m: other.altitude_m - own.altitude_m,
+            separation_m: separation_m.max(other.separation_m),
+            is_exempt: exempt.binary_search(&other.slot).is_ok(),
+            unheard_s: contacts
+                .get(&other.slot)
+                .map(|contact| world.cycle_start_s(now.saturating_sub(contact.heard_in))),
+        })
+        .collect()
 }
 
 /// Returns how much later an airplane will arrive than it would alone, if it now flies straight from
 /// way-point to way-point; 0 for one that goes to none, or does not arrive.
-fn delay_s(turn: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> f64 {
-    let PhaseContext { world, now, .. } = turn;
+fn delay_s(context: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> f64 {
+    let PhaseContext { world, now, .. } = context;
     let i = own.slot as usize;
-    let (airplane, alone_s) = (&world.airplanes[i], world.alone_s[i]);
+    let airplane = &world.airplanes[i];
+    let alone_s = world.alone_s[i];
     let arrives = alone_s.is_finite() && airplane.leaves_s.is_infinite();
     if !arrives || airplane.has_fixed_heading(own.orders as usize) {
         return 0.0;
     }
     let flown_s = world.cycle_start_s(*now) - world.cycle_start_s(world.first_controlled_cycle(i));
-    let (air, v_m_s) = (world.air(), world.segment(own.slot, own.orders).model.v_m_s);
-    let left_s = ahead.iter().scan(own.pose.at, |from, &to| {
-        Some(air.straight_s(std::mem::replace(from, to), to, v_m_s))
-    });
-    flown_s + left_s.sum::<f64>() - alone_s
+    let air = world.air();
+    let v_m_s = world.segment(own.slot, own.orders).model.v_m_s;
+    let mut from = own.pose.at;
+    let mut left_s = 0.0;
+    for &to in ahead {
+        left_s += air.straight_s(from, to, v_m_s);
+        from = to;
+    }
+    flown_s + left_s - alone_s
 }
 
 /// Returns a heading within half a turn to either side; one that already is stays the same to the bit.
@@ -219,17 +226,17 @@ fn wrap_heading(heading_rad: f64) -> f64 {
     if heading_rad.abs() <= PI { heading_rad } else { wrap_angle(heading_rad) }
 }
 
-/// Returns the spaces of the percepts of a team's airplanes.
+/// Returns the spaces of the observations of a team's airplanes.
 pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
-    let most_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
-    let goals = |&id: &EntityId| {
-        let orders = 0..=world.airplanes[id as usize].orders.len() as u32;
-        orders.map(|done| world.segment(id, done).mission.len()).max().unwrap_or(0)
-    };
-    let most_goals = agents.iter().map(goals).max().unwrap_or(0) as i64;
-    let is = || SpaceKind::Discrete(["no", "yes"].map(String::from).into());
+    let max_turn_rate_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
+    let max_way_points =
+        agents.iter().map(|&id| max_way_points(world, id)).max().unwrap_or(0) as i64;
     let mut spaces = vec![
-        Space::new("due", is(), "whether it decides in the next cycle; all else is padding if not"),
+        Space::new(
+            "due",
+            yes_or_no(),
+            "whether it decides in the next cycle; all else is padding if not",
+        ),
         Space::new("place_m", UNBOUNDED, "its place, east and north, as all see it")
             .with_shape([2]),
         Space::new("altitude_m", UNBOUNDED, "its altitude"),
@@ -237,7 +244,7 @@ pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
         Space::new("speed_m_s", POSITIVE, "its speed through the air"),
         Space::new(
             "turn_rate_rad_s",
-            SpaceKind::Real { low: -most_rad_s, high: most_rad_s },
+            SpaceKind::Real { low: -max_turn_rate_rad_s, high: max_turn_rate_rad_s },
             "its turn rate in the last step, positive to the left; 0 before the first",
         ),
         Space::new(
@@ -248,7 +255,7 @@ pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
         .with_shape([2]),
         Space::new(
             "way_points_left",
-            SpaceKind::Integer { low: 0, high: most_goals },
+            SpaceKind::Integer { low: 0, high: max_way_points },
             "way-points that it is still to reach",
         ),
         Space::new(
@@ -262,13 +269,22 @@ pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
     spaces
 }
 
+/// Returns the largest number of way-points that an airplane has at any time, after any of its orders.
+fn max_way_points(world: &AirspaceWorld, id: EntityId) -> usize {
+    let orders = world.airplanes[id as usize].orders.len() as u32;
+    (0..=orders).map(|done| world.segment(id, done).mission.len()).max().unwrap_or(0)
+}
+
+fn yes_or_no() -> SpaceKind {
+    SpaceKind::Discrete(["no", "yes"].map(String::from).into())
+}
+
 const UNBOUNDED: SpaceKind = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
 const POSITIVE: SpaceKind = SpaceKind::Real { low: 0.0, high: f64::INFINITY };
 const ANGLE: SpaceKind = SpaceKind::Real { low: -PI, high: PI };
 
-/// Returns the spaces of the neighbors in percepts.
+/// Returns the spaces of the neighbors in observations.
 fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
-    let is = || SpaceKind::Discrete(["no", "yes"].map(String::from).into());
     let ids = SpaceKind::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
     let each = |name: &str, bounds: SpaceKind, meaning: &str| {
         Space::new(name, bounds, meaning).with_shape([MAX_NEIGHBORS])
@@ -291,8 +307,8 @@ fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
         each("neighbor_heading_rad", ANGLE, "their headings, counterclockwise from east"),
         each("neighbor_speed_m_s", POSITIVE, "their speeds through the air"),
         each("neighbor_separation_m", POSITIVE, "the distances that it and they are to keep"),
-        each("neighbor_minds", is(), "whether they mind others"),
-        each("neighbor_named", is(), "whether the shield promises nothing for it and them"),
+        each("neighbor_minds", yes_or_no(), "whether they mind others"),
+        each("neighbor_named", yes_or_no(), "whether the shield promises nothing for it and them"),
     ];
     if world.network.is_some() {
         let bounds = SpaceKind::Real { low: -1.0, high: f64::INFINITY };

@@ -209,7 +209,7 @@ fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<KnownAircraft>, Vec<NonCooperat
     let mut scratch = Scratch { trace: notes, ..Scratch::default() };
     world.try_cycle(&copy, now, id, &mut scratch);
     let notes = *scratch.trace.take().expect("they were put there");
-    (notes.group, notes.intruders)
+    (notes.group, notes.non_cooperative)
 }
 
 /// Values of one airplane's row.
@@ -220,10 +220,10 @@ fn compare_own(run: &AirspaceRun, of: Row<'_>, me: &KnownAircraft) {
     let Pose2 { at: [x, y], heading_rad } = me.pose;
     let pose = [of("place_m", 0), of("place_m", 1), of("heading_rad", 0)];
     assert_eq!(pose, [x, y, heading_rad]);
-    let stage = run.world().segment(me.slot, me.orders);
-    assert_eq!(of("speed_m_s", 0), stage.model.v_m_s);
-    assert_eq!(of("way_points_left", 0), (stage.mission.len() - me.next) as f64);
-    let [goal_x, goal_y] = stage.mission[me.next];
+    let segment = run.world().segment(me.slot, me.orders);
+    assert_eq!(of("speed_m_s", 0), segment.model.v_m_s);
+    assert_eq!(of("way_points_left", 0), (segment.mission.len() - me.next) as f64);
+    let [goal_x, goal_y] = segment.mission[me.next];
     assert_eq!([of("way_point_m", 0), of("way_point_m", 1)], [goal_x - x, goal_y - y]);
 }
 
@@ -233,11 +233,11 @@ fn compare_others(
     of: Row<'_>,
     me: &KnownAircraft,
     group: &[KnownAircraft],
-    intruders: &[NonCooperative],
+    non_cooperative: &[NonCooperative],
 ) -> [usize; 2] {
     let [x, y] = me.pose.at;
     let flying = group.iter().map(|known| (known.slot, known.pose.at, true));
-    let minding_nobody = intruders.iter().map(|one| (one.slot, one.at, false));
+    let minding_nobody = non_cooperative.iter().map(|one| (one.slot, one.at, false));
     let others = flying.chain(minding_nobody).filter(|(slot, ..)| *slot != me.slot);
     let mut near: Vec<_> = others.collect();
     near.sort_by(|a, b| distance_m(a.1, [x, y]).total_cmp(&distance_m(b.1, [x, y])));
@@ -248,7 +248,7 @@ fn compare_others(
         assert_eq!(place, [their_x - x, their_y - y]);
         assert_eq!(of("neighbor_minds", k), f64::from(minds));
     }
-    [group.len() - 1, intruders.len()]
+    [group.len() - 1, non_cooperative.len()]
 }
 
 #[test]
@@ -259,7 +259,7 @@ fn what_is_observed_is_what_the_group_knows_when_it_decides() {
         for team in 0..run.teams().len() {
             let (seen, agents) = (observed(&run, team), run.teams()[team].agents.clone());
             for (row, &id) in agents.iter().enumerate() {
-                let (group, intruders) = known_in(&run, id);
+                let (group, non_cooperative) = known_in(&run, id);
                 let width = |name: &str| seen[name].len() / agents.len();
                 let of = |name: &str, part: usize| seen[name][row * width(name) + part];
                 let me = group.iter().find(|known| known.slot == id);
@@ -269,7 +269,7 @@ fn what_is_observed_is_what_the_group_knows_when_it_decides() {
                     continue;
                 };
                 compare_own(&run, &of, me);
-                let [some, more] = compare_others(&of, me, &group, &intruders);
+                let [some, more] = compare_others(&of, me, &group, &non_cooperative);
                 (own, minding, minding_nobody) = (own + 1, minding + some, minding_nobody + more);
             }
         }

@@ -37,36 +37,49 @@ impl Action {
     /// way-point by then.
     #[inline]
     pub fn turn_rate_rad_s(self, flown_s: f64) -> Option<f64> {
-        // A tolerance, because rounding of step times must not decide.
-        let before = |end_s: f64| flown_s < end_s - 1e-9;
         match self {
             Self::Hold { omega_rad_s } => Some(omega_rad_s),
-            Self::Then { omega_rad_s, hold_s } => before(hold_s).then_some(omega_rad_s),
-            Self::Leg { omega_rad_s, turn_s, .. } if before(turn_s) => Some(omega_rad_s),
-            Self::Leg { until_s, .. } => before(until_s).then_some(0.0),
+            Self::Then { omega_rad_s, hold_s } => is_before(flown_s, hold_s).then_some(omega_rad_s),
+            Self::Leg { omega_rad_s, turn_s, .. } if is_before(flown_s, turn_s) => {
+                Some(omega_rad_s)
+            }
+            Self::Leg { until_s, .. } => is_before(flown_s, until_s).then_some(0.0),
             Self::Proceed => None,
         }
     }
 }
 
+/// Returns whether a time is before another one by more than the rounding of step times, which must not decide.
+#[inline]
+fn is_before(time_s: f64, end_s: f64) -> bool {
+    time_s < end_s - 1e-9
+}
+
 impl fmt::Display for Action {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let turn = |omega_rad_s: f64| match omega_rad_s {
-            0.0 => "straight on".into(),
-            _ => format!("{:+.1} °/s", omega_rad_s.to_degrees()),
-        };
         match *self {
-            Self::Hold { omega_rad_s } => f.write_str(&turn(omega_rad_s)),
-            Self::Then { omega_rad_s, hold_s } => write!(f, "{} for {hold_s} s", turn(omega_rad_s)),
+            Self::Hold { omega_rad_s } => f.write_str(&turn_text(omega_rad_s)),
+            Self::Then { omega_rad_s, hold_s } => {
+                write!(f, "{} for {hold_s} s", turn_text(omega_rad_s))
+            }
             Self::Leg { omega_rad_s, turn_s, until_s } => {
-                write!(f, "{} for {turn_s} s, straight on until {until_s} s", turn(omega_rad_s))
+                let turn = turn_text(omega_rad_s);
+                write!(f, "{turn} for {turn_s} s, straight on until {until_s} s")
             }
             Self::Proceed => f.write_str("to the way-point"),
         }
     }
 }
 
-/// Ways around others: a turn, a straight leg, and then proceeding.
+fn turn_text(omega_rad_s: f64) -> String {
+    if omega_rad_s == 0.0 {
+        "straight on".into()
+    } else {
+        format!("{:+.1} °/s", omega_rad_s.to_degrees())
+    }
+}
+
+/// Detours around others: a turn, a straight leg, and then proceeding.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Legs {
@@ -89,17 +102,19 @@ impl Legs {
     }
 
     /// Returns the legs that start with a turn rate. For straight on there is one turning time
-    /// only, because all of them lead the same way.
+    /// only, because all of them are the same path.
     fn actions_with_turn_rate(&self, omega_rad_s: f64) -> Vec<Action> {
-        let straight = |&hold_s: &f64| Action::Then { omega_rad_s: 0.0, hold_s };
+        let mut actions = Vec::new();
         if omega_rad_s == 0.0 {
-            return self.until_s.iter().map(straight).collect();
+            actions.extend(self.until_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
+            return actions;
         }
-        let leg = |(&turn_s, &until_s): (&f64, &f64)| Action::Leg { omega_rad_s, turn_s, until_s };
-        self.turns_s
-            .iter()
-            .flat_map(|turn_s| self.until_s.iter().map(move |until_s| leg((turn_s, until_s))))
-            .collect()
+        for &turn_s in &self.turns_s {
+            for &until_s in &self.until_s {
+                actions.push(Action::Leg { omega_rad_s, turn_s, until_s });
+            }
+        }
+        actions
     }
 }
 
@@ -108,14 +123,9 @@ impl Legs {
 /// never start a turn only to undo it, these take the place of the held turns; straight on forever
 /// remains. `holds_s` are further times in seconds for which turns are held.
 pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
-    let m = model.turns;
-    let rate = |k: usize| match 2.0 * k as f64 / (m - 1) as f64 - 1.0 {
-        // The middle rate is exactly 0, free of rounding.
-        _ if 2 * k + 1 == m => 0.0,
-        part => part * model.omega_max_rad_s,
-    };
     let mut all = Vec::new();
-    for omega_rad_s in (0..m).map(rate) {
+    for k in 0..model.turns {
+        let omega_rad_s = turn_rate_rad_s(model, k);
         if legs.is_empty() || omega_rad_s == 0.0 {
             all.push(Action::Hold { omega_rad_s });
         }
@@ -127,6 +137,17 @@ pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Ac
     }
     all.push(Action::Proceed);
     all
+}
+
+/// Returns the `k`-th of a model's turn rates, from the fastest right turn to the fastest left turn.
+fn turn_rate_rad_s(model: &Model, k: usize) -> f64 {
+    let m = model.turns;
+    // The middle rate is exactly 0, free of rounding: straight flight is recognized by that.
+    if 2 * k + 1 == m {
+        return 0.0;
+    }
+    let fraction = 2.0 * k as f64 / (m - 1) as f64 - 1.0;
+    fraction * model.omega_max_rad_s
 }
 
 #[cfg(test)]

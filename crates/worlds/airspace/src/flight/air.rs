@@ -8,7 +8,8 @@ use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 use super::motion::{Model, Point, Pose2, Timing, distance_m};
 use sidestep_kernel::{interrupt, math};
 
-/// Difference of heading and bearing in radians below which an airplane no longer turns.
+/// Difference of heading and bearing in radians below which an airplane no longer turns: in an hour at 250 m/s it
+/// leads 0.1 mm astray.
 const ALIGNED_RAD: f64 = 1e-10;
 
 /// The air: everything that is the same for all airplanes.
@@ -39,45 +40,49 @@ impl Air {
     }
 
     /// Returns the turn rate that leads to way-point `next` on the ground, corrected for the wind.
-    pub fn steer(&self, pilot: &Autopilot<'_>, pose: Pose2, next: usize) -> f64 {
-        let Some(&goal) = pilot.mission.get(next) else { return 0.0 };
-        let omega_max = pilot.model.omega_max_rad_s;
-        pose.steer(self.aim_point(pose.at, goal, pilot.model.v_m_s), omega_max, pilot.dtau_s)
+    pub fn steer(&self, autopilot: &Autopilot<'_>, pose: Pose2, next: usize) -> f64 {
+        let Some(&goal) = autopilot.mission.get(next) else { return 0.0 };
+        let Model { v_m_s, omega_max_rad_s, .. } = *autopilot.model;
+        pose.steer(self.aim_point(pose.at, goal, v_m_s), omega_max_rad_s, autopilot.dtau_s)
     }
 
     /// Returns the point to head for from `at` in order to reach `goal` on the ground: turned into
-    /// the wind by the angle at which the airspeed cancels the wind's part across the way.
+    /// the wind by the angle at which the airspeed cancels the crosswind.
     pub fn aim_point(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
         if self.is_still() {
             return goal;
         }
         let [wx, wy] = self.wind_m_s;
-        let (dx, dy) = (goal[0] - at[0], goal[1] - at[1]);
+        let dx = goal[0] - at[0];
+        let dy = goal[1] - at[1];
         let length_m = math::hypot(dx, dy).max(1e-9);
-        let (ux, uy) = (dx / length_m, dy / length_m);
-        let across = (wx * uy - wy * ux).clamp(-v_m_s, v_m_s);
-        let along = (v_m_s * v_m_s - across * across).sqrt();
-        // Along the way by `along`, against the crosswind by `across`.
-        let heading = [ux * along - uy * across, uy * along + ux * across];
-        [at[0] + heading[0], at[1] + heading[1]]
+        let ux = dx / length_m;
+        let uy = dy / length_m;
+        let crosswind_m_s = (wx * uy - wy * ux).clamp(-v_m_s, v_m_s);
+        let along_m_s = (v_m_s * v_m_s - crosswind_m_s * crosswind_m_s).sqrt();
+        // The velocity through the air: along the course, and against the crosswind.
+        let velocity = [ux * along_m_s - uy * crosswind_m_s, uy * along_m_s + ux * crosswind_m_s];
+        [at[0] + velocity[0], at[1] + velocity[1]]
     }
 
     /// Returns a number of steps in which an airplane certainly flies straight on to way-point `next`
     /// without reaching it: none while it still turns there, or is near.
-    pub fn straight_steps(&self, pilot: &Autopilot<'_>, pose: Pose2, next: usize) -> usize {
-        let Some(&goal) = pilot.mission.get(next) else { return 0 };
-        let [x, y] = self.aim_point(pose.at, goal, pilot.model.v_m_s);
+    pub fn straight_steps(&self, autopilot: &Autopilot<'_>, pose: Pose2, next: usize) -> usize {
+        let Some(&goal) = autopilot.mission.get(next) else { return 0 };
+        let model = autopilot.model;
+        let [x, y] = self.aim_point(pose.at, goal, model.v_m_s);
         let bearing_rad = math::atan2(y - pose.at[1], x - pose.at[0]);
         if math::wrap_angle(bearing_rad - pose.heading_rad).abs() > ALIGNED_RAD {
             return 0;
         }
-        let step_m = distance_m(pose.at, self.after_straight_steps(pose, pilot.model.v_m_s, 1).at);
-        let near_m = self.passing.tolerance_m.max(2.0 * pilot.model.turn_radius_m()) + step_m;
+        let step_m = distance_m(pose.at, self.after_straight_steps(pose, model.v_m_s, 1).at);
+        // Nearer than a turning circle's diameter, the way-point may count as passed.
+        let near_m = self.passing.tolerance_m.max(2.0 * model.turn_radius_m()) + step_m;
         // Where the wind holds it in place, a step may be lost in rounding.
         if step_m <= 0.0 {
             return 0;
         }
-        // The conversion saturates, also where the distance is nearer than that.
+        // The conversion makes a negative number 0.
         ((distance_m(pose.at, goal) - near_m) / step_m) as usize
     }
 
@@ -85,8 +90,8 @@ impl Air {
     pub fn after_straight_steps(&self, pose: Pose2, v_m_s: f64, steps: usize) -> Pose2 {
         let flown_s = steps as f64 * self.timing.dtau_s;
         let [wx, wy] = self.wind_m_s;
-        let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
-        let [vx, vy] = [v_m_s * along[0] + wx, v_m_s * along[1] + wy];
+        let vx = v_m_s * math::cos(pose.heading_rad) + wx;
+        let vy = v_m_s * math::sin(pose.heading_rad) + wy;
         Pose2 { at: [pose.at[0] + vx * flown_s, pose.at[1] + vy * flown_s], ..pose }
     }
 
@@ -97,9 +102,10 @@ impl Air {
         Pose2 { at, ..pose }
     }
 
-    /// Returns where each action leads an airplane on its way to way-point `next`.
+    /// Returns where each action leads an airplane that flies to way-point `next`.
     ///
-    /// Over one horizon, way-points are taken where they will be met on a straight way.
+    /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
+    /// be when the airplane, flying straight, reaches it.
     pub fn predictions(
         &self,
         model: &Model,
@@ -110,18 +116,20 @@ impl Air {
     ) -> Vec<Prediction> {
         interrupt::check();
         let mission = self.mission_in_air(mission, pose.at, next, model.v_m_s);
-        let pilot = self.autopilot(model, &mission);
-        actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()
+        let autopilot = self.autopilot(model, &mission);
+        actions.iter().map(|action| autopilot.predict(*action, pose, next, &self.timing)).collect()
     }
 
-    /// Returns the seconds of the straight way over the ground to `goal`.
+    /// Returns the seconds of a straight flight over the ground to `goal`.
     pub fn straight_s(&self, at: Point, goal: Point, v_m_s: f64) -> f64 {
         if self.is_still() {
             return distance_m(at, goal) / v_m_s;
         }
-        let ([wx, wy], heading) = (self.wind_m_s, self.aim_point(at, goal, v_m_s));
-        let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
-        let speed_m_s = math::hypot(ground[0], ground[1]).max(1e-3);
+        let [wx, wy] = self.wind_m_s;
+        let aim = self.aim_point(at, goal, v_m_s);
+        let ground_velocity = [aim[0] - at[0] + wx, aim[1] - at[1] + wy];
+        // Against a wind of its own speed it would never arrive.
+        let speed_m_s = math::hypot(ground_velocity[0], ground_velocity[1]).max(1e-3);
         distance_m(at, goal) / speed_m_s
     }
 

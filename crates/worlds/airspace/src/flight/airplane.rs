@@ -22,27 +22,24 @@ pub struct Airplane {
     pub appears_s: f64,
     /// Time at which it vanishes, in seconds after the start of the run; infinite for never.
     pub leaves_s: f64,
-    /// Orders on its way, by rising time.
+    /// Orders in flight, by rising time.
     pub orders: Vec<FlightOrder>,
-    /// Its recorded way, which it follows until the method takes it over.
+    /// Its recorded track, which it follows until the method takes it over.
     pub track: Option<Track>,
-    /// Whether it minds no other airplane: it flies its recorded way to the end, or straight from
-    /// way-point to way-point.
-    pub is_intruder: bool,
+    /// Whether it avoids nobody: it flies its recorded track to the end, or straight from way-point to way-point.
+    pub is_non_cooperative: bool,
 }
 
 impl Airplane {
-    /// Returns whether, of its first `done` orders, the last one about its way leads to no
-    /// way-point.
+    /// Returns whether it keeps a heading, and flies to no way-point, after its first `done` orders.
     pub(crate) fn has_fixed_heading(&self, done: usize) -> bool {
-        let is_about_the_way = |order: &&FlightOrder| {
+        let last_direction = self.orders.iter().take(done).rev().find(|order| {
             matches!(
                 order.task,
                 FlightTask::Heading(_) | FlightTask::Proceed | FlightTask::WayPoints(_)
             )
-        };
-        let last = self.orders.iter().take(done).rev().find(is_about_the_way);
-        last.is_some_and(|order| matches!(order.task, FlightTask::Heading(_)))
+        });
+        last_direction.is_some_and(|order| matches!(order.task, FlightTask::Heading(_)))
     }
 
     /// Returns the order after the first `done` ones, if its time has come.

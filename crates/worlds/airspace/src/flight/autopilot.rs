@@ -1,4 +1,4 @@
-//! Predictions: a pilot flies actions and missions step by step, and returns the way.
+//! Predictions: an autopilot flies actions and missions step by step, and returns the path.
 
 use super::action::Action;
 use super::motion::{Model, Point, Pose2, Timing, distance_m, sinc};
@@ -24,9 +24,9 @@ pub enum AfterLastWaypoint {
 /// within one turn round the circle, and there the airplane is as near as it can be without flying
 /// away first.
 ///
-/// An airplane that turns by more than a radian in a step looks too rarely for that: it flies over a way-point, or
-/// past where it is abeam, between two looks. It passes a way-point in the step in which it comes nearest to it, if
-/// it is less than a step's way from it at either end.
+/// An airplane that turns by more than a radian in a step is checked too rarely for that: it flies over a way-point,
+/// or past where it is abeam, between two checks. It passes a way-point in the step in which it comes nearest to it,
+/// if it is less than a step's length from it at either end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WaypointRule {
     /// Distance in meters below which a way-point is reached.
@@ -37,8 +37,8 @@ pub struct WaypointRule {
 
 impl WaypointRule {
     /// Returns whether an airplane at `pose`, and at `before` one step earlier, is done with the way-point `goal`;
-    /// its tightest turn has this radius, and it flies `step_m` meters from one look to the next.
-    // Asked in every step of every prediction: a call in its place takes a tenth of an optimization's time.
+    /// its tightest turn has this radius, and it flies `step_m` meters in a step.
+    // Called in every step of every prediction: not inlined, it takes a tenth of an optimization's time.
     #[inline(always)]
     pub fn is_done(
         &self,
@@ -47,14 +47,15 @@ impl WaypointRule {
         radius_m: f64,
         step_m: f64,
     ) -> bool {
-        let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
-        let square = dx * dx + dy * dy;
-        if square < self.tolerance_m * self.tolerance_m {
+        let dx = goal[0] - pose.at[0];
+        let dy = goal[1] - pose.at[1];
+        let square_m2 = dx * dx + dy * dy;
+        if square_m2 < self.tolerance_m * self.tolerance_m {
             return true;
         }
-        // No point farther than a diameter lies in a turning circle. Nearly always it is farther, and predictions
-        // ask in every step: the rest stands elsewhere, so that only this much is inlined.
-        let is_far = step_m <= radius_m && square >= 4.0 * radius_m * radius_m;
+        // No point farther than a diameter lies in a turning circle. Nearly always it is farther, so only this much
+        // is inlined, and the rest is a function.
+        let is_far = step_m <= radius_m && square_m2 >= 4.0 * radius_m * radius_m;
         self.passes && !is_far && is_passed((before, pose), goal, radius_m, step_m)
     }
 }
@@ -63,27 +64,30 @@ impl WaypointRule {
 /// turning circle.
 #[inline(never)]
 fn is_passed((before, pose): (Pose2, Pose2), goal: Point, radius_m: f64, step_m: f64) -> bool {
-    let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
-    let square = dx * dx + dy * dy;
+    let dx = goal[0] - pose.at[0];
+    let dy = goal[1] - pose.at[1];
+    let square_m2 = dx * dx + dy * dy;
     if step_m > radius_m && is_flown_over((before, pose), goal, step_m) {
         return true;
     }
-    if square >= 4.0 * radius_m * radius_m {
+    if square_m2 >= 4.0 * radius_m * radius_m {
         return false;
     }
     // The circles' centers are a radius to the left and right: the goal is inside when its
     // distance to the nearer center is below the radius.
     let [ahead, left] = relative_position(pose, goal);
-    let is_inside = square < 2.0 * radius_m * left.abs();
-    // Abeam since the last look: on a circle, ahead changes by less than a step per step.
+    let is_inside = square_m2 < 2.0 * radius_m * left.abs();
+    // Abeam since the last step: on a circle, `ahead` changes by less than a step per step.
     is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
 }
 
 /// Returns how far ahead of an airplane a place is, and how far to its left.
 #[inline]
 fn relative_position(pose: Pose2, place: Point) -> Point {
-    let (dx, dy) = (place[0] - pose.at[0], place[1] - pose.at[1]);
-    let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
+    let dx = place[0] - pose.at[0];
+    let dy = place[1] - pose.at[1];
+    let sin = math::sin(pose.heading_rad);
+    let cos = math::cos(pose.heading_rad);
     [cos * dx + sin * dy, cos * dy - sin * dx]
 }
 
@@ -95,7 +99,7 @@ fn is_flown_over((before, pose): (Pose2, Pose2), place: Point, step_m: f64) -> b
     comes_nearest && distance_m(before.at, place).min(distance_m(pose.at, place)) < step_m
 }
 
-/// The way that an action leads.
+/// The path along which an action leads.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Prediction {
     /// Positions in meters after 1, 2, ... steps of `dtau`.
@@ -104,7 +108,7 @@ pub struct Prediction {
     pub counted: usize,
 }
 
-/// An airplane on a predicted way: a pose, and values that save computing its sine and cosine anew
+/// An airplane on a predicted path: a pose, and values that save computing its sine and cosine anew
 /// in every step. Equal to [`Pose2::step`] except for rounding (a test compares them).
 #[derive(Debug, Clone, Copy)]
 struct PredictionState {
@@ -128,25 +132,27 @@ impl PredictionState {
     fn is_heading_for(&self, goal: Point) -> bool {
         let [dx, dy] = [goal[0] - self.pose.at[0], goal[1] - self.pose.at[1]];
         let [c, s] = self.along;
-        let (ahead, across) = (dx * c + dy * s, dy * c - dx * s);
+        let ahead = dx * c + dy * s;
+        let across = dy * c - dx * s;
         ahead > 0.0 && across.abs() <= 1e-12 * ahead
     }
 
     #[inline]
     fn step(&mut self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) {
         if omega_rad_s != self.omega_rad_s {
-            let half = 0.5 * omega_rad_s * dtau_s;
+            let half_turn_rad = 0.5 * omega_rad_s * dtau_s;
             self.omega_rad_s = omega_rad_s;
-            self.half_turn = match omega_rad_s {
-                0.0 => [1.0, 0.0, 1.0],
-                _ => [math::cos(half), math::sin(half), sinc(half)],
+            self.half_turn = if omega_rad_s == 0.0 {
+                [1.0, 0.0, 1.0]
+            } else {
+                [math::cos(half_turn_rad), math::sin(half_turn_rad), sinc(half_turn_rad)]
             };
         }
-        let [c, s, sinc] = self.half_turn;
-        let turned = |[x, y]: Point| [x * c - y * s, x * s + y * c];
+        let [cos, sin, sinc] = self.half_turn;
+        let rotate = |[x, y]: Point| [x * cos - y * sin, x * sin + y * cos];
         let chord_m = v_m_s * dtau_s * sinc;
-        let middle = turned(self.along);
-        self.along = turned(middle);
+        let middle = rotate(self.along);
+        self.along = rotate(middle);
         self.pose = Pose2 {
             at: [self.pose.at[0] + chord_m * middle[0], self.pose.at[1] + chord_m * middle[1]],
             heading_rad: self.pose.heading_rad + omega_rad_s * dtau_s,
@@ -187,10 +193,11 @@ impl Autopilot<'_> {
     }
 
     /// Returns the way-point after those that are done with at a pose, which is one step after the pose `before`.
-    // For the reason of `is_done`.
+    // Inlined for the same reason as `is_done`.
     #[inline(always)]
     pub fn next_way_point(&self, (before, pose): (Pose2, Pose2), mut next: usize) -> usize {
-        let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
+        let radius_m = self.model.turn_radius_m();
+        let step_m = self.model.v_m_s * self.dtau_s;
         while let Some(&goal) = self.mission.get(next) {
             if !self.passing.is_done((before, pose), goal, radius_m, step_m) {
                 break;
@@ -203,10 +210,12 @@ impl Autopilot<'_> {
     /// Predicts `timing.horizon` points of an action from `pose` toward way-point `next`.
     pub fn predict(&self, action: Action, pose: Pose2, next: usize, timing: &Timing) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
-        let (mut flight, mut next, mut counted) =
-            (PredictionState::new(pose), next, timing.horizon);
+        let mut flight = PredictionState::new(pose);
+        let mut next = next;
+        let mut counted = timing.horizon;
         for k in 0..timing.horizon {
-            let (flown_s, before) = (k as f64 * self.dtau_s, flight.pose);
+            let flown_s = k as f64 * self.dtau_s;
+            let before = flight.pose;
             let goal = self.mission.get(next).filter(|_| action.turn_rate_rad_s(flown_s).is_none());
             if self.after == AfterLastWaypoint::Pursue {
                 // An airplane that returns to its last way-point turns to the side that rounding

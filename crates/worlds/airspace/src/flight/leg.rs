@@ -4,9 +4,9 @@
 //! The square of the distance of two legs is a smooth function of time, with bounds on how fast its
 //! second derivative changes. Where these show that the first derivative only rises or only falls,
 //! it has at most one zero, which is found to rounding; else the interval is halved. So no approach
-//! is missed, however short. Two straight legs need neither halving nor a second guess: the zero of
-//! a linear function has a closed form. The same holds for two legs of one turn rate, which need
-//! it: the distance in a formation never changes, so that no halving would show which way it turns.
+//! is missed, however short. Two straight legs take one Newton step: the first derivative is linear.
+//! Two legs of one turn rate have a closed form, and need it: the distance in a formation never
+//! changes, so that halving would not end.
 
 use super::motion::{Point, Pose2, sinc};
 use sidestep_kernel::geometry::{dot, sub};
@@ -15,17 +15,20 @@ use sidestep_kernel::math;
 /// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
 /// turn by less than a tenth of a microradian.
 const MIN_TURN_RAD_S: f64 = 1e-12;
-/// Difference of headings in radians below which they count as the same.
+/// Difference of headings in radians below which they count as the same: headings at the start of a step are rounded
+/// anew in each step.
 const HEADING_TOLERANCE_RAD: f64 = 1e-9;
-/// Length in seconds below which an interval is no longer halved.
+/// Length in seconds below which an interval is no longer halved: at 1000 m/s no distance changes by more than 0.2 mm
+/// in it.
 const MIN_INTERVAL_S: f64 = 1e-7;
 /// Length in seconds below which an interval may be given up because the distance hardly varies in it.
 const MAX_FLAT_INTERVAL_S: f64 = 0.05;
 /// Meters by which the distance may vary in such an interval.
 const FLAT_TOLERANCE_M: f64 = 1e-7;
-/// Difference in seconds below which a moment is found.
+/// Difference in seconds between two Newton steps at which a zero counts as found.
 const ROOT_TOLERANCE_S: f64 = 1e-11;
-/// Meters by which two airplanes may seem too near because of rounding.
+/// Meters by which two airplanes may seem too near because of rounding: the shield keeps pairs apart by exactly their
+/// separation.
 const ROUNDING_M: f64 = 1e-6;
 
 /// A stretch of flight at one turn rate, airspeed and rate of climb.
@@ -71,8 +74,17 @@ impl Leg {
     pub fn new(from_s: f64, until_s: f64, pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Self {
         let omega_rad_s = if omega_rad_s.abs() < MIN_TURN_RAD_S { 0.0 } else { omega_rad_s };
         let along = [math::cos(pose.heading_rad), math::sin(pose.heading_rad)];
-        let (altitude_m, climb_m_s, drift_m_s) = (0.0, 0.0, [0.0; 2]);
-        Self { from_s, until_s, pose, along, altitude_m, v_m_s, omega_rad_s, climb_m_s, drift_m_s }
+        Self {
+            from_s,
+            until_s,
+            pose,
+            along,
+            altitude_m: 0.0,
+            v_m_s,
+            omega_rad_s,
+            climb_m_s: 0.0,
+            drift_m_s: [0.0; 2],
+        }
     }
 
     /// Returns the leg with another altitude and rate of climb.
@@ -100,10 +112,13 @@ impl Leg {
 
     /// Returns whether a leg that starts at the end of this one continues it without any change.
     pub fn is_continued_by(&self, next: &Self) -> bool {
-        let rates = |leg: &Self| (leg.v_m_s, leg.omega_rad_s, leg.climb_m_s, leg.drift_m_s);
+        let has_same_rates = self.v_m_s == next.v_m_s
+            && self.omega_rad_s == next.omega_rad_s
+            && self.climb_m_s == next.climb_m_s
+            && self.drift_m_s == next.drift_m_s;
         let turned_rad = self.omega_rad_s * (next.from_s - self.from_s);
-        let off_rad = next.pose.heading_rad - self.pose.heading_rad - turned_rad;
-        rates(self) == rates(next) && math::wrap_angle(off_rad).abs() < HEADING_TOLERANCE_RAD
+        let difference_rad = next.pose.heading_rad - self.pose.heading_rad - turned_rad;
+        has_same_rates && math::wrap_angle(difference_rad).abs() < HEADING_TOLERANCE_RAD
     }
 
     /// Returns the part of the leg from a time on.
@@ -118,24 +133,32 @@ impl Leg {
     }
 
     fn motion(&self, t_s: f64) -> Motion {
-        let s = t_s - self.from_s;
-        let half = 0.5 * self.omega_rad_s * s;
-        let (cos, sin) = match self.omega_rad_s {
-            0.0 => (1.0, 0.0),
-            _ => (math::cos(half), math::sin(half)),
+        let flown_s = t_s - self.from_s;
+        let half_turn_rad = 0.5 * self.omega_rad_s * flown_s;
+        // Most legs are straight, and the approach of a pair takes dozens of motions.
+        let half_turn = if self.omega_rad_s == 0.0 {
+            [1.0, 0.0]
+        } else {
+            [math::cos(half_turn_rad), math::sin(half_turn_rad)]
         };
-        let turned = |[x, y]: Point| [x * cos - y * sin, x * sin + y * cos];
-        let middle = turned(self.along);
-        let ahead = turned(middle);
-        let chord_m = self.v_m_s * s * sinc(half);
-        let ([wx, wy], [x, y], pull) =
-            (self.drift_m_s, self.pose.at, self.v_m_s * self.omega_rad_s);
+        // The chord of an arc points along the heading in its middle.
+        let middle = rotate(self.along, half_turn);
+        let ahead = rotate(middle, half_turn);
+        let chord_m = self.v_m_s * flown_s * sinc(half_turn_rad);
+        let centripetal_m_s2 = self.v_m_s * self.omega_rad_s;
+        let [wx, wy] = self.drift_m_s;
+        let [x, y] = self.pose.at;
         Motion {
-            at: [x + wx * s + chord_m * middle[0], y + wy * s + chord_m * middle[1]],
+            at: [x + wx * flown_s + chord_m * middle[0], y + wy * flown_s + chord_m * middle[1]],
             velocity: [wx + self.v_m_s * ahead[0], wy + self.v_m_s * ahead[1]],
-            acceleration: [-pull * ahead[1], pull * ahead[0]],
+            acceleration: [-centripetal_m_s2 * ahead[1], centripetal_m_s2 * ahead[0]],
         }
     }
+}
+
+/// Returns a vector rotated by an angle of this cosine and sine.
+fn rotate([x, y]: Point, [cos, sin]: [f64; 2]) -> Point {
+    [x * cos - y * sin, x * sin + y * cos]
 }
 
 /// The approach of two airplanes on their legs, up to some moment.
@@ -156,7 +179,7 @@ pub struct Approach {
 pub struct Zone {
     /// Separation in meters.
     pub gap_m: f64,
-    /// Difference of altitude in meters from which on they need not mind each other.
+    /// Difference of altitude in meters from which on they need not avoid each other.
     pub vertical_m: f64,
 }
 
@@ -173,22 +196,30 @@ impl Approach {
         let common = Span { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
         let Some(level) = common_level_span(a, b, common, zone.vertical_m) else { return };
         let pair = LegPair { a, b };
+        // Between two of these moments the distance only grows or only shrinks.
         let mut moments = vec![level.from_s];
         pair.find_extrema(level, &mut moments);
         moments.push(level.until_s);
-        let gap_m = zone.gap_m - ROUNDING_M;
         for ends in moments.windows(2) {
-            let (at_from, at_to) = (pair.distance_m(ends[0]), pair.distance_m(ends[1]));
-            self.nearest_m = self.nearest_m.min(at_from).min(at_to);
-            // Between turning points the distance only grows or only shrinks.
-            let between = Span { from_s: ends[0], until_s: ends[1] };
-            let edge = || pair.crossing_s(between, at_from < at_to, gap_m);
-            match (at_from < gap_m, at_to < gap_m) {
-                (true, true) => self.add_loss(ends[0], ends[1]),
-                (true, false) => self.add_loss(ends[0], edge()),
-                (false, true) => self.add_loss(edge(), ends[1]),
-                (false, false) => {}
-            }
+            self.add_monotonic(pair, Span { from_s: ends[0], until_s: ends[1] }, zone);
+        }
+    }
+
+    /// Adds an interval in which the distance only grows or only shrinks.
+    fn add_monotonic(&mut self, pair: LegPair<'_>, span: Span, zone: Zone) {
+        let Span { from_s, until_s } = span;
+        let gap_m = zone.gap_m - ROUNDING_M;
+        let start_m = pair.distance_m(from_s);
+        let end_m = pair.distance_m(until_s);
+        self.nearest_m = self.nearest_m.min(start_m).min(end_m);
+        let starts_lost = start_m < gap_m;
+        let ends_lost = end_m < gap_m;
+        if starts_lost && ends_lost {
+            self.add_loss(from_s, until_s);
+        } else if starts_lost {
+            self.add_loss(from_s, pair.crossing_s(span, start_m < end_m, gap_m));
+        } else if ends_lost {
+            self.add_loss(pair.crossing_s(span, start_m < end_m, gap_m), until_s);
         }
     }
 
@@ -210,11 +241,13 @@ fn common_level_span(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<
     let Span { from_s, until_s } = within;
     let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
     let climb_m_s = a.climb_m_s - b.climb_m_s;
-    let (mut first_s, mut last_s) = (from_s, until_s);
+    let mut first_s = from_s;
+    let mut last_s = until_s;
     if climb_m_s != 0.0 {
-        let passes = [-vertical_m, vertical_m].map(|m| from_s + (m - above_m) / climb_m_s);
-        first_s = first_s.max(passes[0].min(passes[1]));
-        last_s = last_s.min(passes[0].max(passes[1]));
+        let [low_s, high_s] =
+            [-vertical_m, vertical_m].map(|above| from_s + (above - above_m) / climb_m_s);
+        first_s = first_s.max(low_s.min(high_s));
+        last_s = last_s.min(low_s.max(high_s));
     } else if above_m.abs() >= vertical_m {
         return None;
     }
@@ -231,7 +264,8 @@ struct LegPair<'a> {
 
 impl LegPair<'_> {
     fn motion(&self, t_s: f64) -> Motion {
-        let (a, b) = (self.a.motion(t_s), self.b.motion(t_s));
+        let a = self.a.motion(t_s);
+        let b = self.b.motion(t_s);
         Motion {
             at: sub(b.at, a.at),
             velocity: sub(b.velocity, a.velocity),
@@ -244,7 +278,8 @@ impl LegPair<'_> {
         math::hypot(x, y)
     }
 
-    /// Returns half of the first and half of the second derivative of the squared distance.
+    /// Returns half of the first and half of the second derivative of the squared distance. The square has no root,
+    /// whose derivative jumps where two airplanes meet in a point.
     fn slope(&self, t_s: f64) -> (f64, f64) {
         let Motion { at, velocity, acceleration } = self.motion(t_s);
         (dot(at, velocity), dot(velocity, velocity) + dot(at, acceleration))
@@ -264,8 +299,7 @@ impl LegPair<'_> {
     /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
     fn is_corotating(&self) -> bool {
         let LegPair { a, b } = self;
-        let rates = |leg: &Leg| (leg.omega_rad_s, leg.drift_m_s);
-        rates(a) == rates(b) && a.omega_rad_s != 0.0
+        a.omega_rad_s == b.omega_rad_s && a.drift_m_s == b.drift_m_s && a.omega_rad_s != 0.0
     }
 
     /// Adds the moments at which one, on its circle about the other, is on the line through the other and the
@@ -275,33 +309,36 @@ impl LegPair<'_> {
     /// from `d` is `d·w cos(ωs) + (d×w + w²/ω) sin(ωs)` (`d×w` with the normal that `w` turns to). Its zeros are
     /// computed without the center, which is far away where both fly almost straight.
     fn find_alignments(&self, Span { from_s, until_s }: Span, found: &mut Vec<f64>) {
-        let (omega_rad_s, long_s) = (self.a.omega_rad_s, until_s - from_s);
+        let omega_rad_s = self.a.omega_rad_s;
+        let duration_s = until_s - from_s;
         let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
         let cos_part = -omega_rad_s * dot(at, [vx, vy]);
         let sin_part = omega_rad_s * dot(at, [-vy, vx]) + dot([vx, vy], [vx, vy]);
         let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
         // Half the squared distance varies by no more than this: in a formation only by rounding.
         let steepest_m2_s = math::hypot(cos_part, sin_part) / omega_rad_s.abs();
-        if is_flat(steepest_m2_s * long_s.min(half_turn_s), math::hypot(at[0], at[1])) {
+        if is_flat(steepest_m2_s * duration_s.min(half_turn_s), math::hypot(at[0], at[1])) {
             return;
         }
         let first_s = math::atan2(cos_part * sin_part.signum(), sin_part.abs()) / omega_rad_s;
-        let mut s = if first_s < 0.0 { first_s + half_turn_s } else { first_s };
-        while s < long_s {
-            found.push(from_s + s);
-            s += half_turn_s;
+        let mut after_s = if first_s < 0.0 { first_s + half_turn_s } else { first_s };
+        while after_s < duration_s {
+            found.push(from_s + after_s);
+            after_s += half_turn_s;
         }
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
     fn max_bend(&self, within: Span) -> f64 {
         let Span { from_s, until_s } = within;
-        let s = until_s - from_s;
-        let [speed_m_s, pull, jerk] = self.max_relative_motion(within);
+        let duration_s = until_s - from_s;
+        let [speed_m_s, acceleration_m_s2, jerk_m_s3] = self.max_relative_motion(within);
         let start = self.motion(from_s);
-        let speed_m_s = speed_m_s.min(math::hypot(start.velocity[0], start.velocity[1]) + pull * s);
-        let apart_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * s;
-        3.0 * speed_m_s * pull + apart_m * jerk
+        let start_speed_m_s = math::hypot(start.velocity[0], start.velocity[1]);
+        let speed_m_s = speed_m_s.min(start_speed_m_s + acceleration_m_s2 * duration_s);
+        let distance_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * duration_s;
+        // The derivative of v·v + d·a is 3 v·a + d·j.
+        3.0 * speed_m_s * acceleration_m_s2 + distance_m * jerk_m_s3
     }
 
     /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
@@ -309,21 +346,20 @@ impl LegPair<'_> {
     /// airplanes that fly almost in formation.
     fn max_relative_motion(&self, Span { from_s, until_s }: Span) -> [f64; 3] {
         let LegPair { a, b } = self;
-        let heading_rad =
-            |leg: &Leg| leg.pose.heading_rad + leg.omega_rad_s * (from_s - leg.from_s);
-        let between_rad = math::wrap_angle(heading_rad(b) - heading_rad(a)).abs()
+        let heading_a_rad = a.pose.heading_rad + a.omega_rad_s * (from_s - a.from_s);
+        let heading_b_rad = b.pose.heading_rad + b.omega_rad_s * (from_s - b.from_s);
+        let angle_rad = math::wrap_angle(heading_b_rad - heading_a_rad).abs()
             + (b.omega_rad_s - a.omega_rad_s).abs() * (until_s - from_s);
-        let bound = |length: fn(&Leg) -> f64| {
-            let (a, b) = (length(a), length(b));
-            let least = a.abs().min(b.abs());
-            (a.abs() + b.abs()).min((a - b).abs() + least * between_rad)
-        };
         let wind_m_s =
             math::hypot(b.drift_m_s[0] - a.drift_m_s[0], b.drift_m_s[1] - a.drift_m_s[1]);
+        let speeds = [a.v_m_s, b.v_m_s];
+        let accelerations = [a.v_m_s * a.omega_rad_s, b.v_m_s * b.omega_rad_s];
+        let jerks =
+            [a.v_m_s * a.omega_rad_s * a.omega_rad_s, b.v_m_s * b.omega_rad_s * b.omega_rad_s];
         [
-            wind_m_s + bound(|leg| leg.v_m_s),
-            bound(|leg| leg.v_m_s * leg.omega_rad_s),
-            bound(|leg| leg.v_m_s * leg.omega_rad_s * leg.omega_rad_s),
+            wind_m_s + max_difference(speeds, angle_rad),
+            max_difference(accelerations, angle_rad),
+            max_difference(jerks, angle_rad),
         ]
     }
 
@@ -339,15 +375,15 @@ impl LegPair<'_> {
         if change.abs() >= bend * half_s {
             // The slope only rises or only falls, so it has at most one zero.
             if (ends[0] < 0.0) != (ends[1] < 0.0) {
-                let slope = |t_s: f64| self.slope(t_s);
-                found.push(zero_s(within, ends[0] < 0.0, slope));
+                found.push(zero_s(within, ends[0] < 0.0, |t_s| self.slope(t_s)));
             }
             return 1;
         }
         // Half the squared distance varies by no more than this. In a formation that is next to nothing long
         // before the interval is as short as can be.
-        let varies_m2 = 2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
-        if half_s < MAX_FLAT_INTERVAL_S && is_flat(varies_m2, self.distance_m(middle_s)) {
+        let variation_m2 =
+            2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
+        if half_s < MAX_FLAT_INTERVAL_S && is_flat(variation_m2, self.distance_m(middle_s)) {
             return 1;
         }
         let halves = [Span { from_s, until_s: middle_s }, Span { from_s: middle_s, until_s }];
@@ -365,26 +401,35 @@ impl LegPair<'_> {
     }
 }
 
+/// Returns a bound on the length of the difference of two vectors of these lengths, with at most this angle between
+/// them.
+fn max_difference([a, b]: [f64; 2], angle_rad: f64) -> f64 {
+    let shorter = a.abs().min(b.abs());
+    (a.abs() + b.abs()).min((a - b).abs() + shorter * angle_rad)
+}
+
 /// Returns whether a distance is next to constant, by how much half its square varies.
-fn is_flat(varies_m2: f64, apart_m: f64) -> bool {
-    varies_m2 < FLAT_TOLERANCE_M * apart_m.max(0.5 * FLAT_TOLERANCE_M)
+fn is_flat(variation_m2: f64, distance_m: f64) -> bool {
+    // d²/2 varies by d times the variation of d.
+    variation_m2 < FLAT_TOLERANCE_M * distance_m.max(0.5 * FLAT_TOLERANCE_M)
 }
 
 /// Returns the zero of a function that only rises, or only falls, from its values and slopes: by
 /// Newton's steps, and by halving where these lead out of the interval.
-fn zero_s(within: Span, rises: bool, of: impl Fn(f64) -> (f64, f64)) -> f64 {
+fn zero_s(within: Span, rises: bool, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
     let Span { mut from_s, mut until_s } = within;
     let mut t_s = 0.5 * (from_s + until_s);
+    // 53 halvings of a day reach the tolerance.
     for _ in 0..100 {
-        let (value, slope) = of(t_s);
+        let (value, slope) = value_and_slope(t_s);
         if (value < 0.0) == rises {
-            from_s = t_s
+            from_s = t_s;
         } else {
-            until_s = t_s
+            until_s = t_s;
         }
         let newton_s = t_s - value / slope;
-        let inside = from_s <= newton_s && newton_s <= until_s;
-        let next_s = if inside { newton_s } else { 0.5 * (from_s + until_s) };
+        let is_inside = from_s <= newton_s && newton_s <= until_s;
+        let next_s = if is_inside { newton_s } else { 0.5 * (from_s + until_s) };
         if (next_s - t_s).abs() <= ROOT_TOLERANCE_S {
             return next_s;
         }

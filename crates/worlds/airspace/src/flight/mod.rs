@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! motion.rs                          a pose, and one step of it
-//! action.rs  pilot.rs  air.rs        possible actions, where they lead, in which wind
-//! airplane.rs  order.rs  stage.rs    one airplane, its orders, and the flight between them
-//! track.rs  levels.rs                recorded ways, and heights
+//! action.rs  autopilot.rs  air.rs    possible actions, where they lead, in which wind
+//! airplane.rs  order.rs  segment.rs  one airplane, its orders, and the flight between them
+//! track.rs  levels.rs                recorded tracks, and ranges of altitude
 //! leg.rs                             stretches of flight, and how near two of them come
 //! ```
 

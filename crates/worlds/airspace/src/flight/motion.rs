@@ -50,11 +50,14 @@ impl Pose2 {
     /// form, because that form stays exact as the turn rate goes to 0.
     #[inline]
     pub fn step(self, v_m_s: f64, omega_rad_s: f64, dtau_s: f64) -> Self {
-        let half = 0.5 * omega_rad_s * dtau_s;
-        let chord = v_m_s * dtau_s * sinc(half);
-        let along = self.heading_rad + half;
+        let half_turn_rad = 0.5 * omega_rad_s * dtau_s;
+        let chord_m = v_m_s * dtau_s * sinc(half_turn_rad);
+        let chord_rad = self.heading_rad + half_turn_rad;
         Self {
-            at: [self.at[0] + chord * math::cos(along), self.at[1] + chord * math::sin(along)],
+            at: [
+                self.at[0] + chord_m * math::cos(chord_rad),
+                self.at[1] + chord_m * math::sin(chord_rad),
+            ],
             heading_rad: self.heading_rad + omega_rad_s * dtau_s,
         }
     }
@@ -62,13 +65,13 @@ impl Pose2 {
     /// Returns the turn rate that would head for `goal` after `dtau_s` seconds, within the limits.
     #[inline]
     pub fn steer(self, goal: Point, omega_max_rad_s: f64, dtau_s: f64) -> f64 {
-        let bearing = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
-        let wanted = math::wrap_angle(bearing - self.heading_rad) / dtau_s;
-        wanted.clamp(-omega_max_rad_s, omega_max_rad_s)
+        let bearing_rad = math::atan2(goal[1] - self.at[1], goal[0] - self.at[0]);
+        let desired_rad_s = math::wrap_angle(bearing_rad - self.heading_rad) / dtau_s;
+        desired_rad_s.clamp(-omega_max_rad_s, omega_max_rad_s)
     }
 }
 
-/// Returns sin(a) / a.
+/// Returns sin(a) / a. For small angles the next term of the series is below rounding.
 #[inline]
 pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }

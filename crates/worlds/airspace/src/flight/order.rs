@@ -1,14 +1,15 @@
-//! Orders that airplanes are given on their way.
+//! Orders that airplanes are given in flight.
 //!
-//! An order to keep a heading or to follow way-points changes only an airplane's wishes, so it is
+//! An order to keep a heading or to follow way-points changes only which maneuvers an airplane prefers, so it is
 //! carried out at once. A new speed changes the orbit that it has stored as its fallback, and a new
-//! level the set of airplanes that it has to mind: with the shield, such an order has to wait until
+//! level the set of airplanes that it has to avoid: with the shield, such an order has to wait until
 //! it is safe.
 
 use super::motion::Point;
 
-/// Largest number of orders for one airplane.
+/// Largest number of orders for one airplane: more are a mistake in a file.
 pub const MAX_ORDERS: usize = 10_000;
+
 /// An order and its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightOrder {

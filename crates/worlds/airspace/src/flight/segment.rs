@@ -1,4 +1,4 @@
-//! Stages of a flight: the flight between two orders.
+//! Segments of a flight: the flight between two orders.
 
 use super::airplane::Airplane;
 use super::motion::{Model, Point};
@@ -40,12 +40,12 @@ impl SegmentAfterOrder {
     }
 }
 
-/// Returns the parts of a flight after each of its orders. Parts on the same way share its way-points, because
-/// there may be ten thousand of each.
+/// Returns the segments of a flight after each of its orders. Segments along the same route share its way-points,
+/// because there may be ten thousand of each.
 pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrder> {
     let mut route: Arc<[Point]> = airplane.mission.as_slice().into();
-    let mut straight = BTreeMap::new();
-    let mut now = SegmentAfterOrder {
+    let mut straight_routes = BTreeMap::new();
+    let mut segment = SegmentAfterOrder {
         model: airplane.model.clone(),
         mission: Arc::clone(&route),
         altitude_m: airplane.altitude_m,
@@ -54,26 +54,29 @@ pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrde
     };
     let mut all = Vec::with_capacity(airplane.orders.len());
     for order in &airplane.orders {
-        now.next = None;
+        segment.next = None;
         match &order.task {
             FlightTask::Heading(heading_rad) => {
                 // As many as on the route, so that the number of those done with stays valid.
-                let of = (heading_rad.to_bits(), route.len());
-                let way =
-                    straight.entry(of).or_insert_with(|| straight_route(*heading_rad, route.len()));
-                now.mission = Arc::clone(way);
+                let key = (heading_rad.to_bits(), route.len());
+                let straight = straight_routes
+                    .entry(key)
+                    .or_insert_with(|| straight_route(*heading_rad, route.len()));
+                segment.mission = Arc::clone(straight);
             }
-            FlightTask::Speed(v_m_s) => now.model.v_m_s = *v_m_s,
+            FlightTask::Speed(v_m_s) => segment.model.v_m_s = *v_m_s,
             FlightTask::Altitude { altitude_m, climb_m_s } => {
-                (now.altitude_m, now.climb_m_s) = (*altitude_m, *climb_m_s);
+                segment.altitude_m = *altitude_m;
+                segment.climb_m_s = *climb_m_s;
             }
-            FlightTask::Proceed => now.mission = Arc::clone(&route),
+            FlightTask::Proceed => segment.mission = Arc::clone(&route),
             FlightTask::WayPoints(way_points) => {
                 route = way_points.as_slice().into();
-                (now.mission, now.next) = (Arc::clone(&route), Some(0));
+                segment.mission = Arc::clone(&route);
+                segment.next = Some(0);
             }
         }
-        all.push(now.clone());
+        all.push(segment.clone());
     }
     all
 }

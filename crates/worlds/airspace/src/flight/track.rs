@@ -1,13 +1,13 @@
-//! Recorded ways: the place of an airplane at any time, and the rest of its way.
+//! Recorded tracks: the position of an airplane at any time, and the rest of its route.
 
 use super::leg::Leg;
 use super::motion::{Point, Pose2, distance_m};
 use sidestep_kernel::math;
 
-/// Seconds between two way-points along the rest of a track.
+/// Seconds between two way-points along the rest of a track: far enough apart to leave room for avoiding others.
 const WAY_POINT_INTERVAL_S: f64 = 120.0;
 
-/// Place of an airplane at one time.
+/// Position of an airplane at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
     /// Time in seconds after the start of the scenario.
@@ -18,7 +18,7 @@ pub struct TrackPoint {
     pub altitude_m: f64,
 }
 
-/// A recorded way: straight and at constant speed between its points.
+/// A recorded track: straight and at constant speed between its points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     points: Vec<TrackPoint>,
@@ -30,11 +30,11 @@ impl Track {
     /// Returns a track of at least two points with finite numbers and rising times; `None`
     /// otherwise.
     pub fn new(points: Vec<TrackPoint>) -> Option<Self> {
-        let finite =
-            |p: &TrackPoint| [p.t_s, p.at[0], p.at[1], p.altitude_m].iter().all(|v| v.abs() <= 1e9);
-        let rises = points.windows(2).all(|pair| pair[0].t_s < pair[1].t_s);
-        let is_track = points.len() >= 2 && rises && points.iter().all(finite);
-        is_track.then(|| Self { headings_rad: headings_rad(&points), points })
+        let is_rising = points.windows(2).all(|pair| pair[0].t_s < pair[1].t_s);
+        if points.len() < 2 || !is_rising || !points.iter().all(TrackPoint::is_valid) {
+            return None;
+        }
+        Some(Self { headings_rad: headings_rad(&points), points })
     }
 
     /// Returns the time of its first point, in seconds after the start.
@@ -54,17 +54,19 @@ impl Track {
 
     /// Returns its pose at a time; before the first point and after the last one, the pose there.
     pub fn pose_at(&self, t_s: f64) -> Pose2 {
-        let (k, part) = self.locate(t_s);
-        let ([x0, y0], [x1, y1]) = (self.points[k].at, self.points[k + 1].at);
-        let at = [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
+        let (k, fraction) = self.locate(t_s);
+        let [x0, y0] = self.points[k].at;
+        let [x1, y1] = self.points[k + 1].at;
+        let at = [x0 + fraction * (x1 - x0), y0 + fraction * (y1 - y0)];
         Pose2 { at, heading_rad: self.headings_rad[k] }
     }
 
     /// Returns its altitude in meters.
     pub fn altitude_at_m(&self, t_s: f64) -> f64 {
-        let (k, part) = self.locate(t_s);
-        let (from_m, to_m) = (self.points[k].altitude_m, self.points[k + 1].altitude_m);
-        from_m + part * (to_m - from_m)
+        let (k, fraction) = self.locate(t_s);
+        let from_m = self.points[k].altitude_m;
+        let to_m = self.points[k + 1].altitude_m;
+        from_m + fraction * (to_m - from_m)
     }
 
     /// Adds the legs flown in an interval, with times after its start.
@@ -74,28 +76,30 @@ impl Track {
             if pair[0].t_s >= until_s {
                 break;
             }
-            let (begins_s, ends_s) = (pair[0].t_s.max(from_s), pair[1].t_s.min(until_s));
-            if begins_s >= ends_s {
+            let start_s = pair[0].t_s.max(from_s);
+            let end_s = pair[1].t_s.min(until_s);
+            if start_s >= end_s {
                 continue;
             }
-            let lasts_s = pair[1].t_s - pair[0].t_s;
-            let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / lasts_s;
-            let v_m_s = distance_m(pair[0].at, pair[1].at) / lasts_s;
-            let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(begins_s) };
-            let leg = Leg::new(begins_s - from_s, ends_s - from_s, pose, v_m_s, 0.0);
-            legs.push(leg.with_climb(self.altitude_at_m(begins_s), climb_m_s));
+            let duration_s = pair[1].t_s - pair[0].t_s;
+            let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / duration_s;
+            let v_m_s = distance_m(pair[0].at, pair[1].at) / duration_s;
+            let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(start_s) };
+            let leg = Leg::new(start_s - from_s, end_s - from_s, pose, v_m_s, 0.0);
+            legs.push(leg.with_climb(self.altitude_at_m(start_s), climb_m_s));
         }
     }
 
-    /// Returns the last point before a time that has a next one, and the part of the way to that.
+    /// Returns the last point before a time that has a next one, and the fraction of the time to that.
     fn locate(&self, t_s: f64) -> (usize, f64) {
         let after = self.points.partition_point(|p| p.t_s <= t_s);
         let k = after.clamp(1, self.points.len() - 1) - 1;
-        let (from_s, to_s) = (self.points[k].t_s, self.points[k + 1].t_s);
+        let from_s = self.points[k].t_s;
+        let to_s = self.points[k + 1].t_s;
         (k, ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0))
     }
 
-    /// Returns the way-points for flying on from its place at a time: one every two minutes, and
+    /// Returns the way-points for flying on from its position at a time: one every two minutes, and
     /// the last point.
     pub fn remaining_way_points(&self, from_s: f64) -> Vec<Point> {
         let mut due_s = from_s + WAY_POINT_INTERVAL_S;
@@ -126,43 +130,57 @@ impl Track {
     /// Returns its speed over the ground at a time, in meters per second.
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         let (k, _) = self.locate(t_s);
-        let (from, to) = (&self.points[k], &self.points[k + 1]);
-        distance_m(from.at, to.at) / (to.t_s - from.t_s)
+        speed_m_s(&self.points[k..k + 2])
     }
 
     /// Returns its greatest rate of climb or descent, in meters per second.
     pub fn max_climb_m_s(&self) -> f64 {
-        let climb = |pair: &[TrackPoint]| {
+        let climbs_m_s = self.points.windows(2).map(|pair| {
             (pair[1].altitude_m - pair[0].altitude_m).abs() / (pair[1].t_s - pair[0].t_s)
-        };
-        self.points.windows(2).map(climb).fold(0.0, f64::max)
+        });
+        climbs_m_s.fold(0.0, f64::max)
     }
 
     /// Returns the greatest speed over the ground, in meters per second.
     pub fn max_speed_m_s(&self) -> f64 {
-        let speed =
-            |pair: &[TrackPoint]| distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s);
-        self.points.windows(2).map(speed).fold(0.0, f64::max)
+        self.points.windows(2).map(speed_m_s).fold(0.0, f64::max)
     }
 }
 
+impl TrackPoint {
+    /// Returns whether its numbers can be computed with; comparisons with NaN are false.
+    fn is_valid(&self) -> bool {
+        let [x_m, y_m] = self.at;
+        [self.t_s, x_m, y_m, self.altitude_m].iter().all(|value| value.abs() <= 1e9)
+    }
+}
+
+/// Returns the speed over the ground between two points.
+fn speed_m_s(pair: &[TrackPoint]) -> f64 {
+    distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s)
+}
+
 /// Returns the headings. An airplane that is recorded at one place twice keeps the heading in which
-/// it flies on.
+/// it flies on, and one that ends at rest the last heading.
 fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
-    let bearing = |pair: &[TrackPoint]| {
-        let (dx, dy) = (pair[1].at[0] - pair[0].at[0], pair[1].at[1] - pair[0].at[1]);
-        (dx != 0.0 || dy != 0.0).then(|| math::atan2(dy, dx))
-    };
-    let mut known: Vec<Option<f64>> = points.windows(2).map(bearing).collect();
+    let mut known: Vec<Option<f64>> = points.windows(2).map(bearing_rad).collect();
     for k in (1..known.len()).rev() {
         known[k - 1] = known[k - 1].or(known[k]);
     }
-    let mut before = 0.0;
-    let heading = |heading_rad: Option<f64>| {
-        before = heading_rad.unwrap_or(before);
-        before
-    };
-    known.into_iter().map(heading).collect()
+    let mut headings_rad = Vec::with_capacity(known.len());
+    let mut last_rad = 0.0;
+    for heading_rad in known {
+        last_rad = heading_rad.unwrap_or(last_rad);
+        headings_rad.push(last_rad);
+    }
+    headings_rad
+}
+
+/// Returns the direction from one point to another; none if they are at one place.
+fn bearing_rad(pair: &[TrackPoint]) -> Option<f64> {
+    let dx = pair[1].at[0] - pair[0].at[0];
+    let dy = pair[1].at[1] - pair[0].at[1];
+    (dx != 0.0 || dy != 0.0).then(|| math::atan2(dy, dx))
 }
 
 #[cfg(test)]

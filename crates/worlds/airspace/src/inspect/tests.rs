@@ -17,8 +17,8 @@ fn inspect_airplane(run: &AirspaceRun, id: u32) -> Inspection {
 }
 
 /// Returns the probabilities of the actions; none of an airplane that is alone.
-fn chances(told: &Inspection) -> Option<Vec<f64>> {
-    let table = told.section("Decides").and_then(|s| s.table.as_ref())?;
+fn chances(inspection: &Inspection) -> Option<Vec<f64>> {
+    let table = inspection.section("Decides").and_then(|s| s.table.as_ref())?;
     let share = |value: &FactValue| match value {
         FactValue::Share(p) => *p,
         other => panic!("{other:?} is no probability"),
@@ -40,29 +40,31 @@ fn probabilities_of_the_actions_sum_to_1_and_the_chosen_one_is_flown_unless_the_
                 run.advance(4);
                 let all: Vec<Inspection> = (0..4).map(|id| inspect_airplane(&run, id)).collect();
                 run.advance(1);
-                for (id, told) in (0..).zip(&all) {
-                    let Some(chances) = chances(told) else { continue };
+                for (id, inspection) in (0..).zip(&all) {
+                    let Some(chances) = chances(inspection) else { continue };
                     let sum: f64 = chances.iter().sum();
                     assert!((sum - 1.0).abs() < 1e-9, "{deployment}, {preset}: {sum}");
                     assert_eq!(
-                        told.marks_with_role(MarkRole::Predicted).count() + 1,
+                        inspection.marks_with_role(MarkRole::Predicted).count() + 1,
                         chances.len()
                     );
-                    let Some(chosen) = told.marks_with_role(MarkRole::Chosen).next() else {
+                    let Some(chosen) = inspection.marks_with_role(MarkRole::Chosen).next() else {
                         panic!("none")
                     };
                     let MarkShape::Line { points_m } = &chosen.shape else { panic!("no way") };
                     let at = run.state().airplanes[id].pose().at;
                     // Chosen ways are drawn from where the airplane is, in steps of some seconds.
                     let gap_m = nearest_m(points_m, at);
-                    if told.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
+                    if inspection.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
                         assert!(
                             gap_m < 1e-3,
                             "{deployment}, {preset}: {gap_m} m from the chosen way"
                         );
                         as_wanted += 1;
                     } else {
-                        assert!(!told.section("Shield").expect("told").facts.is_empty());
+                        assert!(
+                            !inspection.section("Shield").expect("it is shown").facts.is_empty()
+                        );
                         kept += 1;
                     }
                 }
@@ -84,21 +86,21 @@ fn nearest_m(points_m: &[[f64; 3]], [x, y]: [f64; 2]) -> f64 {
 }
 
 #[test]
-fn who_is_kept_from_its_wish_is_told_because_of_whom() {
+fn who_is_kept_from_its_action_is_shown_because_of_whom() {
     let mut run = run("method = \"none\"", 5, 6);
     let mut kept = 0;
     while !run.is_over() && run.cycle() < 80 {
         for id in 0..6 {
-            let Some(told) = run.inspect(BodyId::new(BodyKind::Airplane, id, None)) else {
+            let Some(inspection) = run.inspect(BodyId::new(BodyKind::Airplane, id, None)) else {
                 continue;
             };
             assert_eq!(
-                told.marks_with_role(MarkRole::Orbit).count(),
+                inspection.marks_with_role(MarkRole::Orbit).count(),
                 1,
                 "its stored orbit is drawn"
             );
-            if told.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
-                assert_eq!(told.value("Shield", "because of"), Some(&FactValue::None));
+            if inspection.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
+                assert_eq!(inspection.value("Shield", "because of"), Some(&FactValue::None));
                 continue;
             }
             kept += 1;
@@ -106,12 +108,12 @@ fn who_is_kept_from_its_wish_is_told_because_of_whom() {
                 kind: BodyKind::Airplane,
                 number: other,
                 part: None,
-            })) = told.value("Shield", "because of")
+            })) = inspection.value("Shield", "because of")
             else {
-                panic!("nobody is the reason: {told:?}")
+                panic!("nobody is the reason: {inspection:?}")
             };
             assert!(*other != id && *other < 6);
-            assert_eq!(told.marks_with_role(MarkRole::Refused).count(), 1);
+            assert_eq!(inspection.marks_with_role(MarkRole::Refused).count(), 1);
         }
         run.advance(1);
     }
@@ -119,22 +121,23 @@ fn who_is_kept_from_its_wish_is_told_because_of_whom() {
 }
 
 #[test]
-fn on_a_bad_network_it_is_told_since_when_others_were_heard() {
+fn on_a_bad_network_it_is_shown_since_when_others_were_heard() {
     let network = "deployment = \"team\"\nnetwork = { loss = 0.3, silent = [{ airplane = 2, from_s = 80.0 }] }";
     let mut run = run(network, 1, 4);
     run.advance(20);
-    let told = inspect_airplane(&run, 0);
+    let inspection = inspect_airplane(&run, 0);
     let table =
-        told.section("Knows of others").and_then(|s| s.table.as_ref()).expect("three others");
+        inspection.section("Knows of others").and_then(|s| s.table.as_ref()).expect("three others");
     let heard: Vec<&FactValue> =
         table.column("heard or first seen in cycle").expect("a column").collect();
     assert_eq!(heard.len(), 3);
     assert_eq!(heard[1], &FactValue::number(15.0, ""), "before its radio fell silent: {heard:?}");
-    assert_eq!(told.marks_with_role(MarkRole::Known).count(), 3);
-    let Some(talk) = told.section("Talk of the group").and_then(|s| s.table.as_ref()) else {
+    assert_eq!(inspection.marks_with_role(MarkRole::Known).count(), 3);
+    let Some(conversation) = inspection.section("Talk of the group").and_then(|s| s.table.as_ref())
+    else {
         panic!()
     };
-    let messages = talk.column("messages").expect("a column").cloned().collect::<Vec<_>>();
+    let messages = conversation.column("messages").expect("a column").cloned().collect::<Vec<_>>();
     assert!(
         messages.iter().all(|n| matches!(n, FactValue::Number { value, .. } if *value > 0.0)),
         "{messages:?}"

@@ -1,4 +1,4 @@
-//! The knowledge with which an airplane goes into a talk: its perceptions, and the filed flights.
+//! The knowledge with which an airplane goes into a conversation: its perceptions, and the filed flights.
 
 use super::percept::{OwnshipState, Percept, SurveillanceReport};
 use crate::agents::exchange::{ExchangeSetup, ObservedAircraft};
@@ -11,24 +11,24 @@ use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, math};
 use std::sync::Arc;
 
-/// Returns the knowledge that all agents of a group share before they talk. The airplanes nearby that are `not_heard`
-/// differ between agents; each takes its own to fly straight on.
+/// Returns the knowledge that all agents of a group share before their conversations. The airplanes nearby that are
+/// `not_heard` differ between agents; each assumes that its own fly straight on.
 pub(super) fn common_knowledge(
     world: &AirspaceWorld,
-    sight: &Percept,
+    percept: &Percept,
     not_heard: &[SurveillanceReport],
 ) -> Arc<CommonKnowledge> {
     let straight = not_heard.iter().map(|one| unheard_aircraft(world, one));
     Arc::new(CommonKnowledge {
-        now: sight.cycle,
-        ids: sight.members().into(),
-        filed: sight.group.iter().map(|one| filed_flight(world, one.id)).collect(),
-        poses: sight.group.iter().map(|one| one.pose).collect(),
+        now: percept.cycle,
+        ids: percept.members().into(),
+        filed: percept.group.iter().map(|one| filed_flight(world, one.id)).collect(),
+        poses: percept.group.iter().map(|one| one.pose).collect(),
         air: world.air(),
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
-        intruders: sight.intruders.iter().cloned().chain(straight).collect(),
+        non_cooperative: percept.non_cooperative.iter().cloned().chain(straight).collect(),
         is_shielded: world.shield,
     })
 }
@@ -36,48 +36,51 @@ pub(super) fn common_knowledge(
 /// Returns the knowledge of an airplane's agent; `contacts` hold its knowledge of others from earlier cycles.
 pub(super) fn ownship(
     world: &AirspaceWorld,
-    sight: &Percept,
+    percept: &Percept,
     unheard: &[SurveillanceReport],
     contacts: &TrafficPicture,
 ) -> Ownship {
-    let (briefing, known) = (common_knowledge(world, sight, unheard), sight.own.known_aircraft());
-    let (beacon, mission) = (beacon(world, known), world.segment(known.slot, known.orders).mission);
-    let me = sight.own_place();
+    let common = common_knowledge(world, percept, unheard);
+    let known = percept.own.known_aircraft();
+    let beacon = beacon(world, known);
+    let mission = world.segment(known.slot, known.orders).mission;
+    let me = percept.own_place();
     Ownship {
         me,
         known,
-        options: briefing.action_predictions(me, &beacon, mission, known.next),
+        options: common.action_predictions(me, &beacon, mission, known.next),
         beacon,
         mission: mission.to_vec(),
         contacts: contacts.clone(),
-        briefing,
+        common,
     }
 }
 
 /// Returns a flight as it was filed.
 pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
     let orders = world.airplanes[id as usize].orders.len();
-    let way_points = |done: usize| world.segment(id, done as u32).mission.len();
+    let max_way_points =
+        (0..=orders).map(|done| world.segment(id, done as u32).mission.len()).max().unwrap_or(0);
     FiledFlight {
         model: world.airplanes[id as usize].model.clone(),
         actions: world.actions(id).to_vec(),
         contact: presumed_state(world, id),
         max_speed_m_s: world.top_m_s[id as usize],
-        max_way_points: (0..=orders).map(way_points).max().unwrap_or(0),
+        max_way_points,
         orders,
     }
 }
 
 /// Returns the message in which an airplane describes itself.
 fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
-    let stage = world.segment(known.slot, known.orders);
+    let segment = world.segment(known.slot, known.orders);
     StateBeacon {
         pose: known.pose,
-        goal: stage.mission.get(known.next).copied(),
-        v_m_s: stage.model.v_m_s,
-        omega_max_rad_s: stage.model.omega_max_rad_s,
+        goal: segment.mission.get(known.next).copied(),
+        v_m_s: segment.model.v_m_s,
+        omega_max_rad_s: segment.model.omega_max_rad_s,
         orbit_rad_s: world.orbit_rad_s[known.slot as usize],
-        separation_m: stage.model.separation_m,
+        separation_m: segment.model.separation_m,
         levels: world.levels(known),
     }
 }
@@ -104,34 +107,38 @@ pub(super) fn plan_certainty(world: &AirspaceWorld) -> PlanCertainty {
     }
 }
 
-/// Returns the scene of the shield's exchange, as an airplane sees it: its group, and those nearby that are
+/// Returns the setup of the shield's exchange, as an airplane sees it: its group, and those nearby that are
 /// `unheard`.
 pub(super) fn exchange_setup(
     world: &AirspaceWorld,
-    sight: &Percept,
+    percept: &Percept,
     unheard: &[SurveillanceReport],
 ) -> ExchangeSetup {
-    let seen = |(one, takes_part): (&SurveillanceReport, bool)| ObservedAircraft {
-        aircraft: match one.id == sight.own.id {
-            true => sight.own.shielded_aircraft(world),
-            false => other_aircraft(world, &sight.own, one),
-        },
-        is_on_orbit: one.orbit.is_some(),
-        takes_part,
-        max_speed_m_s: world.top_m_s[one.id as usize],
-        // A way that was found by other means comes before those of its actions.
-        max_profiles: world.actions(one.id).len() + 1,
-    };
-    let present = sight.group.iter().map(|one| (one, true));
+    let present = percept.group.iter().map(|one| (one, true));
     let mut all: Vec<_> = present.chain(unheard.iter().map(|one| (one, false))).collect();
     all.sort_unstable_by_key(|(one, _)| one.id);
+    let mut aircraft = Vec::with_capacity(all.len());
+    for (one, takes_part) in all {
+        aircraft.push(ObservedAircraft {
+            aircraft: if one.id == percept.own.id {
+                percept.own.shielded_aircraft(world)
+            } else {
+                other_aircraft(world, &percept.own, one)
+            },
+            is_on_orbit: one.orbit.is_some(),
+            takes_part,
+            max_speed_m_s: world.top_m_s[one.id as usize],
+            // A profile that was found by other means comes before those of its actions.
+            max_profiles: world.actions(one.id).len() + 1,
+        });
+    }
     ExchangeSetup {
         air: world.air(),
         vertical_m: world.vertical_m,
-        now: sight.cycle,
+        now: percept.cycle,
         certainty: plan_certainty(world),
         airplanes: world.airplanes.len(),
-        aircraft: all.into_iter().map(seen).collect(),
+        aircraft,
     }
 }
 
@@ -142,38 +149,39 @@ fn other_aircraft(
     own: &OwnshipState,
     one: &SurveillanceReport,
 ) -> ShieldedAircraft {
-    let stage = world.segment(one.id, 0);
-    let named = own.named.binary_search(&one.id).map_or(&[][..], |_| std::slice::from_ref(&own.id));
+    let segment = world.segment(one.id, 0);
+    let exempt =
+        own.exempt.binary_search(&one.id).map_or(&[][..], |_| std::slice::from_ref(&own.id));
     ShieldedAircraft {
         id: one.id,
         pose: one.pose,
         orbit_pose: one.pose,
-        v_m_s: stage.model.v_m_s,
-        omega_max_rad_s: stage.model.omega_max_rad_s,
+        v_m_s: segment.model.v_m_s,
+        omega_max_rad_s: segment.model.omega_max_rad_s,
         orbit_rad_s: world.orbit_rad_s[one.id as usize],
-        separation_m: stage.model.separation_m,
+        separation_m: segment.model.separation_m,
         error_m: world.error_m(one.id as usize),
-        levels: Levels::between(one.altitude_m, stage.altitude_m),
+        levels: Levels::between(one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
         fallback: one.orbit.unwrap_or(Side::Left),
-        exempt: named.into(),
+        exempt: exempt.into(),
         rank: 0,
     }
 }
 
 /// Returns an airplane that was not heard as one that flies straight on, for methods that need no more than that.
 pub(super) fn unheard_aircraft(world: &AirspaceWorld, one: &SurveillanceReport) -> NonCooperative {
-    let stage = world.segment(one.id, 0);
-    let v_m_s = stage.model.v_m_s;
+    let segment = world.segment(one.id, 0);
+    let v_m_s = segment.model.v_m_s;
     let Pose2 { at, heading_rad } = one.pose;
     NonCooperative {
         slot: one.id,
         at,
         velocity_m_s: [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)],
         top_m_s: world.top_m_s[one.id as usize],
-        separation_m: stage.model.separation_m,
+        separation_m: segment.model.separation_m,
         error_m: world.bounds.position_m,
-        levels: Levels::between(one.altitude_m, stage.altitude_m),
+        levels: Levels::between(one.altitude_m, segment.altitude_m),
         dt_s: world.timing.dt_s,
     }
 }

@@ -1,9 +1,10 @@
-//! Controls: the motion of an airplane in a cycle, and the outcome of its talks.
+//! Controls: the maneuver of an airplane in a cycle, and the outcome of its conversations.
 
 use crate::agents::ActionChoice;
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
+use crate::decide::ManeuverCandidates;
 use crate::events::Event;
 use crate::shield::{ShieldDecision, Side, TurnProfile};
 use serde::{Deserialize, Serialize};
@@ -16,13 +17,13 @@ pub struct Control {
     pub id: EntityId,
     /// The cycle in which it flies so.
     pub cycle: Cycle,
-    /// Its course.
-    pub course: Maneuver,
+    /// Its maneuver.
+    pub maneuver: Maneuver,
     /// Outcome of the optimization; none where there was nothing to optimize.
     pub optimized: Option<OptimizerStats>,
-    /// Packets of the talk that finds the group; none where groups are announced.
+    /// Packets of the conversation that finds the group; none where groups are announced.
     pub grouping: NetworkTraffic,
-    /// Packets of the talk about the wishes of each.
+    /// Packets of the conversation in which candidates are chosen.
     pub deciding: NetworkTraffic,
     /// Packets of the shield's exchange.
     pub shielding: NetworkTraffic,
@@ -32,16 +33,16 @@ pub struct Control {
     pub memory: Memory,
 }
 
-/// The course of an airplane for one `dt`.
+/// What an airplane flies for one `dt`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Maneuver {
-    /// A way of its choice.
-    Way {
-        /// Number of the way among its wishes: 0 for the wanted one.
-        wish: u32,
+    /// A profile of its choice, and a fallback after it.
+    Profile {
+        /// Number of the profile among its candidates: 0 for the preferred one.
+        candidate: u32,
         /// Turn rate in each step.
-        way: TurnProfile,
-        /// Side of the fallback that it stores for the end of the way.
+        profile: TurnProfile,
+        /// Side of the fallback that it stores for the end of the profile.
         side: Side,
     },
     /// Its stored orbit.
@@ -69,11 +70,27 @@ pub struct Memory {
 }
 
 impl Maneuver {
-    /// Returns the course as a decision of the shield; `fallback` is the side of the stored orbit.
+    /// Returns the maneuver that follows from the shield's decision about those of the candidates that were `allowed`.
+    pub(crate) fn from_decision(
+        decision: ShieldDecision,
+        allowed: &[usize],
+        candidates: &ManeuverCandidates,
+    ) -> Self {
+        match decision.candidate.map(|k| allowed[k]) {
+            Some(candidate) => Self::Profile {
+                candidate: candidate as u32,
+                profile: candidates.profiles[candidate].clone(),
+                side: decision.fallback,
+            },
+            None => Self::Orbit,
+        }
+    }
+
+    /// Returns the maneuver as a decision of the shield; `fallback` is the side of the stored orbit.
     pub(crate) fn shield_decision(&self, fallback: Side) -> ShieldDecision {
         match *self {
-            Self::Way { wish, side, .. } => {
-                ShieldDecision { candidate: Some(wish as usize), fallback: side }
+            Self::Profile { candidate, side, .. } => {
+                ShieldDecision { candidate: Some(candidate as usize), fallback: side }
             }
             Self::Orbit => ShieldDecision { candidate: None, fallback },
         }
@@ -83,12 +100,12 @@ impl Maneuver {
 impl OptimizerStats {
     /// Returns the outcome with a decision, or without one.
     pub(crate) fn from_choice(decided: Option<&ActionChoice>) -> Self {
-        let of = |decided: &ActionChoice| Self {
-            is_decided: true,
-            rounds: decided.rounds,
-            converged: decided.converged,
-        };
-        decided.map_or_else(Self::default, of)
+        match decided {
+            Some(ActionChoice { rounds, converged, .. }) => {
+                Self { is_decided: true, rounds: *rounds, converged: *converged }
+            }
+            None => Self::default(),
+        }
     }
 }
 
@@ -98,7 +115,7 @@ impl Control {
         Self {
             id,
             cycle,
-            course: Maneuver::Orbit,
+            maneuver: Maneuver::Orbit,
             optimized: None,
             grouping: NetworkTraffic::default(),
             deciding: NetworkTraffic::default(),

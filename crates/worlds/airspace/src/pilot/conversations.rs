@@ -1,4 +1,4 @@
-//! The talks of a cycle: the parties to them, by deployment and method, and their outcomes.
+//! The conversations of a cycle: the participants of them, by deployment and method, and their outcomes.
 
 use super::common_knowledge::{exchange_setup, filed_flight, ownship, plan_certainty};
 use super::percept::Percept;
@@ -12,14 +12,14 @@ use crate::agents::{
     OptimizingAgent, OutgoingMessage, Participant, Progress, WithOutcome, informed, sampling,
 };
 use crate::baseline::mvp::ActiveResolutions;
-use crate::deploy::Deployment;
+use crate::settings::Deployment;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::Estimator;
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// The outcome of a talk.
+/// The outcome of a conversation.
 pub(super) enum ConversationOutcome {
     /// The airplanes that decide together.
     Grouping(GroupingResult),
@@ -55,10 +55,10 @@ impl From<ExchangeResult> for ConversationOutcome {
     }
 }
 
-/// A party to a talk of any subject.
+/// A participant of a conversation of any subject.
 pub(super) type DynParticipant = dyn WithOutcome<Outcome = ConversationOutcome>;
 
-/// A wrapper that turns the outcome of any party into [`ConversationOutcome`].
+/// A wrapper that turns the outcome of any participant into [`ConversationOutcome`].
 struct ErasedParticipant<P>(P);
 
 impl<P: Participant> Participant for ErasedParticipant<P> {
@@ -109,97 +109,108 @@ impl<P: WithOutcome<Outcome: Into<ConversationOutcome>>> WithOutcome for ErasedP
     }
 }
 
-fn endpoint<A>(agent: A, radio: EndpointConfig) -> Box<DynParticipant>
+/// What an airplane knows at the start of a conversation.
+#[derive(Clone, Copy)]
+pub(super) struct Knowledge<'a> {
+    pub(super) world: &'a AirspaceWorld,
+    pub(super) percept: &'a Percept,
+    /// Airplanes nearby that are not in its group.
+    pub(super) unheard: &'a [SurveillanceReport],
+    /// Its knowledge of others from earlier cycles.
+    pub(super) contacts: &'a TrafficPicture,
+}
+
+fn endpoint<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
 where
     A: Agent<Outcome: Into<ConversationOutcome>> + Send + 'static,
 {
-    Box::new(ErasedParticipant(Endpoint::new(agent, radio)))
+    Box::new(ErasedParticipant(Endpoint::new(agent, config)))
 }
 
-/// Returns the party to a talk that finds the group.
+/// Returns the participant of a conversation that finds the group.
 pub(super) fn grouping_participant(
     world: &AirspaceWorld,
-    sight: &Percept,
+    percept: &Percept,
     contacts: &TrafficPicture,
-    radio: EndpointConfig,
+    config: EndpointConfig,
 ) -> Box<DynParticipant> {
     let network = world.network.as_ref();
     let start = grouping::GroupingInput {
-        me: radio.me,
-        near: sight.group.clone(),
-        intruders: sight.intruders.clone(),
-        expected: expected_members(sight, contacts),
+        me: config.me,
+        near: percept.group.clone(),
+        non_cooperative: percept.non_cooperative.clone(),
+        expected: expected_members(percept, contacts),
         airplanes: world.airplanes.len(),
         range_m: network.map_or(f64::INFINITY, |network| network.range_m),
         certainty: plan_certainty(world),
     };
-    endpoint(grouping::GroupingAgent::new(start), radio)
+    endpoint(grouping::GroupingAgent::new(start), config)
 }
 
 /// Returns whether each one of a group was heard lately, or is met for the first time.
-fn expected_members(sight: &Percept, contacts: &TrafficPicture) -> Vec<bool> {
-    let is_expected =
-        |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
-    sight.group.iter().map(|one| is_expected(one.id)).collect()
+fn expected_members(percept: &Percept, contacts: &TrafficPicture) -> Vec<bool> {
+    percept
+        .group
+        .iter()
+        .map(|one| {
+            contacts.get(&one.id).is_none_or(|contact| contact.heard_in + 1 >= percept.cycle)
+        })
+        .collect()
 }
 
-/// Returns the deployment's party to an optimization, among airplanes nearby that are `unheard`.
+/// Returns the deployment's participant of an optimization.
 pub(super) fn optimization_participant(
-    world: &AirspaceWorld,
-    sight: &Percept,
-    unheard: &[SurveillanceReport],
-    contacts: &TrafficPicture,
-    radio: EndpointConfig,
+    knowledge: Knowledge<'_>,
+    config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let own = ownship(world, sight, unheard, contacts);
+    let Knowledge { world, percept, unheard, contacts } = knowledge;
+    let own = ownship(world, percept, unheard, contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
-            Box::new(ErasedParticipant(HostParticipant::new(own, is_hierarchy, radio)))
+            Box::new(ErasedParticipant(HostParticipant::new(own, is_hierarchy, config)))
         }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
-            endpoint(OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)), radio)
+            endpoint(OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)), config)
         }
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint(OptimizingAgent::new(informed::InformedAgent::new(own, by_model)), radio)
+            endpoint(OptimizingAgent::new(informed::InformedAgent::new(own, by_model)), config)
         }
     }
 }
 
-/// Returns the party to a talk in which all tell where they intend to fly.
+/// Returns the participant of a conversation in which all tell where they intend to fly.
 pub(super) fn intent_participant(
     world: &AirspaceWorld,
-    sight: &Percept,
+    percept: &Percept,
     contacts: &TrafficPicture,
     resolving: &ActiveResolutions,
-    radio: EndpointConfig,
+    config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let own = &sight.own;
+    let own = &percept.own;
     let start = intent::IntentInput {
-        me: radio.me,
+        me: config.me,
         own: Intent {
             next: own.next,
             orders: own.orders,
             altitude_m: own.altitude_m,
             resolving: resolving.clone(),
         },
-        filed: sight.group.iter().map(|one| filed_flight(world, one.id)).collect(),
+        filed: percept.group.iter().map(|one| filed_flight(world, one.id)).collect(),
         airplanes: world.airplanes.len(),
-        expected: expected_members(sight, contacts),
+        expected: expected_members(percept, contacts),
     };
-    endpoint(intent::IntentAgent::new(start), radio)
+    endpoint(intent::IntentAgent::new(start), config)
 }
 
-/// Returns the party to the shield's exchange of an airplane that may fly some ways.
+/// Returns the participant of the shield's exchange for an airplane that may fly some profiles.
 pub(super) fn exchange_participant(
-    world: &AirspaceWorld,
-    sight: &Percept,
-    unheard: &[SurveillanceReport],
-    contacts: &TrafficPicture,
-    ways: &[TurnProfile],
-    radio: EndpointConfig,
+    knowledge: Knowledge<'_>,
+    profiles: &[TurnProfile],
+    config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let scene = Arc::new(exchange_setup(world, sight, unheard));
-    endpoint(exchange::ExchangeAgent::new(scene, radio.me, ways, contacts.clone()), radio)
+    let Knowledge { world, percept, unheard, contacts } = knowledge;
+    let scene = Arc::new(exchange_setup(world, percept, unheard));
+    endpoint(exchange::ExchangeAgent::new(scene, config.me, profiles, contacts.clone()), config)
 }

@@ -1,4 +1,4 @@
-//! Packets of talks that an airplane has not come to yet: a faster neighbor is already there.
+//! Packets of conversations that an airplane has not come to yet: a faster neighbor is already there.
 
 use crate::agents::packet::ConversationId;
 use sidestep_kernel::EntityId;
@@ -7,7 +7,7 @@ use sidestep_kernel::network::DropReason;
 /// Largest number of packets of one sender that are kept: an agent that has not heard another one sends only a few
 /// messages, and asks for missing ones.
 const MAX_PACKETS_PER_SENDER: usize = 16;
-/// Largest number of bytes that are kept.
+/// Largest number of bytes that are kept, so that no sender fills the memory.
 const MAX_BYTES: usize = 64 << 20;
 
 /// Packets that came early, in the order in which they came.
@@ -17,22 +17,33 @@ pub(super) struct EarlyPackets {
     bytes: usize,
 }
 
+/// The packets that no longer wait once a conversation starts.
+#[derive(Debug, Default)]
+pub(super) struct TakenPackets {
+    /// Senders and messages of the conversation, in the order in which they came.
+    pub(super) messages: Vec<(EntityId, Vec<u8>)>,
+    /// Number of dropped packets of earlier conversations.
+    pub(super) stale: u64,
+    /// Number of dropped packets of conversations of other members.
+    pub(super) of_other_groups: u64,
+}
+
 /// One packet.
 #[derive(Debug)]
 struct EarlyPacket {
-    talk: ConversationId,
+    conversation: ConversationId,
     from: EntityId,
     message: Vec<u8>,
 }
 
 impl EarlyPackets {
-    /// Keeps a message for a talk.
+    /// Keeps a message for a conversation.
     ///
     /// # Errors
     /// When there is no room for more.
     pub(super) fn push(
         &mut self,
-        talk: ConversationId,
+        conversation: ConversationId,
         from: EntityId,
         message: &[u8],
     ) -> Result<(), DropReason> {
@@ -41,25 +52,28 @@ impl EarlyPackets {
             return Err(DropReason::NoRoom);
         }
         self.bytes += message.len();
-        self.kept.push(EarlyPacket { talk, from, message: message.to_vec() });
+        self.kept.push(EarlyPacket { conversation, from, message: message.to_vec() });
         Ok(())
     }
 
-    /// Takes out the messages of a talk that starts now. Returns them, and the number of those that are dropped:
-    /// of talks before it, and of talks of other members beside it.
-    pub(super) fn take(&mut self, talk: &ConversationId) -> (Vec<(EntityId, Vec<u8>)>, [u64; 2]) {
-        let (mut taken, mut later, mut dropped) = (Vec::new(), Vec::new(), [0; 2]);
+    /// Takes out the messages of a conversation that starts now, and drops those of conversations before it, and of
+    /// conversations of other members at its time.
+    pub(super) fn take(&mut self, conversation: &ConversationId) -> TakenPackets {
+        let mut taken = TakenPackets::default();
+        let mut later = Vec::new();
         for kept in std::mem::take(&mut self.kept) {
-            if kept.talk == *talk {
-                taken.push((kept.from, kept.message));
-            } else if talk.is_before(&kept.talk) {
+            if kept.conversation == *conversation {
+                taken.messages.push((kept.from, kept.message));
+            } else if conversation.is_before(&kept.conversation) {
                 later.push(kept);
+            } else if kept.conversation.is_before(conversation) {
+                taken.stale += 1;
             } else {
-                dropped[usize::from(!kept.talk.is_before(talk))] += 1;
+                taken.of_other_groups += 1;
             }
         }
         self.bytes = later.iter().map(|kept| kept.message.len()).sum();
         self.kept = later;
-        (taken, dropped)
+        taken
     }
 }

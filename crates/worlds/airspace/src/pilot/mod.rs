@@ -1,42 +1,40 @@
 //! The pilot: the program aboard one airplane, as it flies in the simulator and in the field.
 //!
 //! ```text
-//!            Sight ──> Pilot ──> Control           one of each per airplane and cycle
+//!          Percept ──> Pilot ──> Control           one of each per airplane and cycle
 //!                      │   ^
-//!              Packet  v   │  Packet               to and from the others of its group
+//!             packets  v   │  packets              to and from the others of its group
 //! ```
 //!
 //! A [`Pilot`] knows the filed flights (the world), perceives a [`Percept`], finds its group where that is not
-//! announced, talks with the others of its group first about the wishes of each and then about whether those are
-//! safe, and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator runs
+//! announced, agrees with the others of its group first on what each prefers to fly and then on whether that is safe,
+//! and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator runs
 //! a group of them over a network in memory (`deploy/`); a process on a network runs one.
 //!
-//! No process sees when all are done, so each ends by its own outcome or its deadline, and goes on to answer the
-//! others' questions about talks that it has ended. One that is ahead may already be in the next talk: such packets
-//! are kept until that starts, as many as there is room for.
+//! No process sees when all are done, so each ends by its own outcome or its deadline, and continues to answer the
+//! others' requests about conversations that it has ended. One that is ahead may already be in the next conversation:
+//! such packets are kept until that starts, up to a bound.
 //!
 //! ```text
-//! sight.rs  control.rs    the input of a cycle, and its output
-//! aboard.rs               the state machine
-//! schedule.rs  early.rs   when talks start and end; packets of talks to come
-//! briefing.rs  talks.rs   the knowledge with which it goes into a talk; the parties to the talks
-//! fleet.rs                runs whose pilots are elsewhere
+//! percept.rs, control.rs           the input of a cycle, and its output
+//! program.rs                       the state machine
+//! schedule.rs, early_packets.rs    when conversations start and end; packets of conversations to come
+//! common_knowledge.rs              the knowledge with which it goes into a conversation
+//! conversations.rs                 the participants of the conversations
 //! ```
 
 mod common_knowledge;
 mod control;
 mod conversations;
 mod early_packets;
-mod fleet;
 mod percept;
 mod program;
 mod schedule;
 #[cfg(test)]
 mod tests;
 
-pub use crate::agents::packet::{ConversationId, Packet, Protocol};
+pub use crate::agents::packet::{ConversationId, Protocol};
 pub use control::{Control, Maneuver, Memory, OptimizerStats};
-pub use fleet::Fleet;
 pub use percept::{OwnshipState, Percept, SurveillanceReport};
 pub use program::Pilot;
 pub(crate) use schedule::Schedule;

@@ -1,22 +1,19 @@
-//! Sights: all that an airplane perceives at the start of a cycle.
+//! Percepts: all that an airplane perceives at the start of a cycle.
 
-use crate::PhaseContext;
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
 use crate::flight::{FlightSegment, KnownAircraft, Levels, Pose2, distance_m};
-use crate::join::ControlledGroup;
 use crate::non_cooperative::NonCooperative;
-use crate::perceive::observed_pose;
 use crate::shield::{OrbitTracker, ShieldedAircraft, Side, TurnProfile};
 use crate::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId};
 
 /// Distance in meters beyond which all goals rank alike.
 const MAX_RANKED_DISTANCE_M: f64 = 2e9;
-/// Part of a `dt`'s way by which a refusal brings an airplane forward in rank, so that it does not
-/// wait forever.
+/// Fraction of the distance flown in a `dt` by which a refusal brings an airplane forward in rank, so that it does
+/// not wait forever.
 const REFUSAL_FRACTION: f64 = 0.125;
 
 /// Everything that an airplane perceives at the start of a cycle: one message. All its other knowledge it has heard,
@@ -30,8 +27,8 @@ pub struct Percept {
     /// The airplanes that decide together in this cycle, itself among them, by rising id, as all see them. Where
     /// groups are heard rather than announced, those near it.
     pub group: Vec<SurveillanceReport>,
-    /// Airplanes near these that mind no other, as all see them.
-    pub intruders: Vec<NonCooperative>,
+    /// Non-cooperative airplanes near these, as all see them.
+    pub non_cooperative: Vec<NonCooperative>,
 }
 
 /// An airplane as those aboard know it.
@@ -42,49 +39,28 @@ pub struct OwnshipState {
     /// Its pose by its own instruments, by which it keeps to its orbit.
     pub pose: Pose2,
     /// The pose that it would have on its stored orbit without errors of heading.
-    pub held: Pose2,
+    pub orbit_pose: Pose2,
     /// Its pose as all see it, from which it plans.
     pub seen: Pose2,
     /// Its pose on the stored orbit, as all see it.
-    pub seen_held: Pose2,
+    pub seen_orbit_pose: Pose2,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// Number of way-points done with.
     pub next: u32,
-    /// Number of orders carried out.
+    /// Number of orders executed.
     pub orders: u32,
     /// Side of its stored fallback.
     pub fallback: Side,
-    /// Number of times that its wish was refused so far.
+    /// Number of times that the shield has refused its preferred action.
     pub refusals: u32,
-    /// The others with which it is named, by rising id: the shield promises nothing for these pairs.
-    pub named: Vec<EntityId>,
-    /// The wish that was ordered for it, if it is decided from outside.
-    pub wish: Option<ExternalAction>,
+    /// The others with which it is an exempt pair, by rising id: the shield guarantees nothing for these pairs.
+    pub exempt: Vec<EntityId>,
+    /// The action that a caller has ordered for it.
+    pub external_action: Option<ExternalAction>,
 }
 
 impl OwnshipState {
-    /// Returns an airplane as those aboard know it.
-    pub(crate) fn from_state(turn: &PhaseContext<'_>, slot: Slot) -> Self {
-        let PhaseContext { world, state, now, .. } = *turn;
-        let cell = &state.airplanes[slot as usize];
-        let (pose, held) = (cell.pose(), state.orbit_pose(slot));
-        Self {
-            id: slot,
-            pose,
-            held,
-            seen: observed_pose(world, slot, now, pose),
-            seen_held: observed_pose(world, slot, now, held),
-            altitude_m: cell.altitude_m.get(),
-            next: cell.next.get(),
-            orders: cell.orders.get().into(),
-            fallback: cell.fallback.get(),
-            refusals: cell.overrides.get(),
-            named: state.exempt_with(slot).to_vec(),
-            wish: state.external_action(slot),
-        }
-    }
-
     /// Returns the state that its group knows once it has sent it.
     pub(crate) fn known_aircraft(&self) -> KnownAircraft {
         let &Self { id, seen, next, orders, altitude_m, .. } = self;
@@ -93,105 +69,67 @@ impl OwnshipState {
 
     /// Returns the airplane as the shield knows it: where all see it.
     pub(crate) fn shielded_aircraft(&self, world: &AirspaceWorld) -> ShieldedAircraft {
-        let stage = world.segment(self.id, self.orders);
+        let segment = world.segment(self.id, self.orders);
         ShieldedAircraft {
             id: self.id,
             pose: self.seen,
-            orbit_pose: self.seen_held,
-            v_m_s: stage.model.v_m_s,
-            omega_max_rad_s: stage.model.omega_max_rad_s,
+            orbit_pose: self.seen_orbit_pose,
+            v_m_s: segment.model.v_m_s,
+            omega_max_rad_s: segment.model.omega_max_rad_s,
             orbit_rad_s: world.orbit_rad_s[self.id as usize],
-            separation_m: stage.model.separation_m,
+            separation_m: segment.model.separation_m,
             error_m: world.error_m(self.id as usize),
-            levels: Levels::between(self.altitude_m, stage.altitude_m),
+            levels: Levels::between(self.altitude_m, segment.altitude_m),
             vertical_m: world.vertical_m,
             fallback: self.fallback,
-            exempt: self.named.as_slice().into(),
-            rank: self.rank(world.timing.dt_s, &stage),
+            exempt: self.exempt.as_slice().into(),
+            rank: self.rank(world.timing.dt_s, &segment),
         }
     }
 
-    /// Returns its rank. It is higher the nearer its goal is, so that it is soon out of the others' way, and the more
-    /// often its wish was refused, so that no airplane waits forever. Whole meters in the upper half; the id in the
+    /// Returns its rank. It is higher the nearer its goal is, so that it is soon gone, and the more
+    /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
     /// lower half makes it unique.
-    fn rank(&self, dt_s: f64, stage: &FlightSegment<'_>) -> u64 {
-        let ahead = &stage.mission[(self.next as usize).min(stage.mission.len())..];
+    fn rank(&self, dt_s: f64, segment: &FlightSegment<'_>) -> u64 {
+        let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
         let legs = ahead
             .iter()
             .scan(self.pose.at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
-        let refused_m = f64::from(self.refusals) * stage.model.v_m_s * dt_s;
+        let refused_m = f64::from(self.refusals) * segment.model.v_m_s * dt_s;
         // The conversion saturates at the ends of the range.
         let first =
             (MAX_RANKED_DISTANCE_M + REFUSAL_FRACTION * refused_m - legs.sum::<f64>()) as u32;
         u64::from(first) << 32 | u64::from(!self.id)
     }
 
-    /// Returns the way by which it keeps to its stored orbit for one `dt`.
+    /// Returns the turn profile by which it keeps to its stored orbit for one `dt`.
     pub(crate) fn orbit_profile(&self, world: &AirspaceWorld) -> TurnProfile {
         let rate_rad_s = world.orbit_rad_s[self.id as usize];
-        let (steps, gust_rad) = (world.timing.points_per_dt(), world.bounds.heading_rad);
+        let steps = world.timing.points_per_dt();
+        let gust_rad = world.bounds.heading_rad;
         if gust_rad == 0.0 {
             return TurnProfile { omegas_rad_s: vec![self.fallback.sign() * rate_rad_s; steps] };
         }
         let model = world.segment(self.id, self.orders).model;
-        let holding = OrbitTracker::new(self.pose, self.held, model, rate_rad_s, self.fallback);
-        TurnProfile { omegas_rad_s: holding.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
-    }
-}
-
-impl SurveillanceReport {
-    /// Returns an airplane as others see it.
-    pub(crate) fn from_state(turn: &PhaseContext<'_>, slot: Slot) -> Self {
-        let PhaseContext { world, state, now, .. } = *turn;
-        let cell = &state.airplanes[slot as usize];
-        Self {
-            id: slot,
-            pose: observed_pose(world, slot, now, cell.pose()),
-            altitude_m: cell.altitude_m.get(),
-            orbit: (cell.orbiting.get() > 0).then(|| cell.fallback.get()),
-        }
-    }
-
-    /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
-    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
-        let &Self { id, pose, altitude_m, .. } = self;
-        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+        let tracker =
+            OrbitTracker::new(self.pose, self.orbit_pose, model, rate_rad_s, self.fallback);
+        TurnProfile { omegas_rad_s: tracker.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
     }
 }
 
 impl Percept {
-    /// Returns the perceptions of each airplane of a group; `intruders` are those that mind no other.
-    pub(crate) fn from_group(
-        turn: &PhaseContext<'_>,
-        flown: &ControlledGroup,
-        intruders: &[NonCooperative],
-    ) -> Vec<Self> {
-        let group: Vec<SurveillanceReport> =
-            flown.ids.iter().map(|&slot| SurveillanceReport::from_state(turn, slot)).collect();
-        let one = |(k, &slot): (usize, &Slot)| {
-            let sees = |id: Slot| flown.can_see(k, id);
-            Self {
-                cycle: turn.now,
-                own: OwnshipState::from_state(turn, slot),
-                group: group.iter().filter(|one| sees(one.id)).copied().collect(),
-                intruders: intruders.iter().filter(|one| sees(one.slot)).cloned().collect(),
-            }
-        };
-        flown.ids.iter().enumerate().map(one).collect()
-    }
-
-    /// Checks a sight that came off a network: that it is about airplanes of the world, its own among them.
+    /// Checks a percept that came off a network: that it is about airplanes of the world, its own among them.
     ///
     /// # Errors
     /// When it is not.
     pub fn check(&self, world: &AirspaceWorld) -> Result<(), InvalidMessage> {
         let n = world.airplanes.len();
-        let OwnshipState { id, orders, ref named, .. } = self.own;
-        let others = self.intruders.iter().map(|one| one.slot).chain(named.iter().copied());
+        let OwnshipState { id, orders, ref exempt, .. } = self.own;
+        let others = self.non_cooperative.iter().map(|one| one.slot).chain(exempt.iter().copied());
         let are_known = self.members().into_iter().chain(others).all(|id| (id as usize) < n);
-        let rises = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
-        let is_among = self.group.iter().any(|one| one.id == id);
-        InvalidMessage::Airplane.unless(are_known && rises && is_among)?;
+        let is_ascending = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
+        let is_member = self.group.iter().any(|one| one.id == id);
+        InvalidMessage::Airplane.unless(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
             .unless(orders as usize <= world.airplanes[id as usize].orders.len())?;
         let seen =

@@ -5,27 +5,31 @@ mod cycle_state;
 
 use super::control::{Control, Maneuver, Memory};
 use super::conversations::{
-    DynParticipant, exchange_participant, grouping_participant, intent_participant,
+    DynParticipant, Knowledge, exchange_participant, grouping_participant, intent_participant,
     optimization_participant,
 };
 use super::early_packets::EarlyPackets;
 use super::percept::Percept;
 use super::schedule::{Schedule, retry_policy};
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::agents::packet::{ConversationId, Packet, Protocol};
+use crate::agents::packet::{ConversationId, Protocol};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{Conversation, ConversationInfo, EndpointConfig, Participant, Progress};
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
-use crate::world::{AirspaceWorld, Grouping};
+use crate::settings::Grouping;
+use crate::world::AirspaceWorld;
 use cycle_state::{ConversationTiming, CyclePhase, CycleState};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::{DropCounts, DropReason, digest, parse_packet};
+use sidestep_kernel::network::{
+    DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest, parse_packet,
+};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Number of ended talks of which questions are answered: those of two cycles.
+/// Number of ended conversations of which questions are answered: those of two cycles, because no airplane is more
+/// than one cycle behind another.
 const MAX_PAST_CONVERSATIONS: usize = 6;
 
 /// The program aboard one airplane: see the [module](super).
@@ -35,12 +39,12 @@ pub struct Pilot {
     fingerprint: u64,
     memory: Memory,
     /// The cycle that it is in, or was in last.
-    turn: Option<CycleState>,
+    state: Option<CycleState>,
     /// Talks that have ended for it.
     past: VecDeque<Conversation<dyn Participant>>,
     early: EarlyPackets,
-    out: Vec<Packet>,
-    refused: DropCounts,
+    out: Vec<OutgoingPacket>,
+    dropped: DropCounts,
 }
 
 impl Pilot {
@@ -63,11 +67,11 @@ impl Pilot {
             world,
             id,
             memory,
-            turn: None,
+            state: None,
             past: VecDeque::new(),
             early: EarlyPackets::default(),
             out: Vec::new(),
-            refused: DropCounts::default(),
+            dropped: DropCounts::default(),
         }
     }
 
@@ -78,23 +82,18 @@ impl Pilot {
         Self { fingerprint, ..self }
     }
 
-    /// Its airplane.
-    pub fn id(&self) -> EntityId {
-        self.id
-    }
-
-    /// Starts the talks of a cycle. Unfinished talks of an earlier one are given up.
+    /// Starts the conversations of a cycle. Unfinished conversations of an earlier one are given up.
     ///
     /// # Panics
-    /// When the sight is that of another airplane, or one that [`Percept::check`] refuses.
-    pub fn start(&mut self, sight: Percept, tick: u64) {
+    /// When the percept is that of another airplane, or one that [`Percept::check`] refuses.
+    pub fn start(&mut self, percept: Percept, tick: u64) {
         let schedule = Schedule::from_tick(tick, self.world.network.as_ref());
-        self.start_with_schedule(sight, schedule);
+        self.start_with_schedule(percept, schedule);
     }
 
-    /// Starts the talks of a cycle at ticks that all agree on.
-    pub(crate) fn start_with_schedule(&mut self, sight: Percept, schedule: Schedule) {
-        self.start_cycle(sight, schedule);
+    /// Starts the conversations of a cycle at ticks that all agree on.
+    pub(crate) fn start_with_schedule(&mut self, percept: Percept, schedule: Schedule) {
+        self.start_cycle(percept, schedule);
         match self.world.groups {
             Grouping::Announced => self.decide(schedule.begins),
             Grouping::Heard => self.start_conversation(Protocol::Group, schedule.begins),
@@ -102,123 +101,76 @@ impl Pilot {
         self.advance(schedule.begins);
     }
 
-    fn start_cycle(&mut self, sight: Percept, schedule: Schedule) {
-        assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
-        if let Some(turn) = self.turn.take()
-            && let CyclePhase::Grouping(talk)
-            | CyclePhase::Deciding(talk)
-            | CyclePhase::Shielding(talk, _) = turn.phase
+    fn start_cycle(&mut self, percept: Percept, schedule: Schedule) {
+        assert_eq!(percept.own.id, self.id, "the percept is that of another airplane");
+        if let Some(state) = self.state.take()
+            && let CyclePhase::Grouping(conversation)
+            | CyclePhase::Deciding(conversation)
+            | CyclePhase::Shielding(conversation, _) = state.phase
         {
-            self.push_past(talk);
+            self.push_past(conversation);
         }
-        let control = Control::stay_on_orbit(self.id, sight.cycle, Memory::default());
-        self.turn = Some(CycleState {
-            members: sight.members().into(),
+        let control = Control::stay_on_orbit(self.id, percept.cycle, Memory::default());
+        self.state = Some(CycleState {
+            members: percept.members().into(),
             unheard: Vec::new(),
             schedule,
             phase: CyclePhase::Decided,
             candidates: ManeuverCandidates::default(),
             control,
-            percept: sight,
+            percept,
         });
     }
 
-    /// Takes a packet that came off the network from an airplane: any bytes. Unreadable and unsound packets are
-    /// counted and dropped.
-    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        // Actions due by then are done first, because they may make it too late for the packet.
-        self.advance(tick);
-        if let Err(why) = self.receive(from, bytes, tick) {
-            self.refused.record(why);
-        }
-        self.advance(tick);
-    }
-
-    /// Performs the actions that are due by a tick.
-    pub fn on_timer(&mut self, tick: u64) {
-        self.advance(tick);
-        if let Some(talk) = self.turn.as_mut().and_then(CycleState::conversation) {
-            talk.on_timer(tick, &mut self.out);
-        }
-        // Others may still depend on it in a talk that has ended for it.
-        for talk in self.past.iter_mut().filter(|talk| tick < talk.info().end_tick) {
-            talk.on_timer(tick, &mut self.out);
-        }
-        self.advance(tick);
-    }
-
-    /// Returns the tick in which something is due, unless a packet comes before it.
-    pub fn next_timer(&self) -> Option<u64> {
-        let turn = self.turn.as_ref()?;
-        let present = match &turn.phase {
-            CyclePhase::Grouping(talk)
-            | CyclePhase::Deciding(talk)
-            | CyclePhase::Shielding(talk, _) => {
-                let ends = talk.info().end_tick;
-                Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
-            }
-            CyclePhase::Decided => Some(turn.schedule.shield_from),
-            CyclePhase::Over => None,
-        };
-        let of_cycle = self.past.iter().filter(|talk| talk.info().id.cycle == turn.percept.cycle);
-        let past =
-            of_cycle.filter_map(|talk| talk.next_timer().filter(|due| *due < talk.info().end_tick));
-        present.into_iter().chain(past).min()
-    }
-
-    /// Returns the tick in which the talks of the present cycle end at the latest.
+    /// Returns the tick in which the conversations of the present cycle end at the latest.
     pub fn deadline(&self) -> u64 {
-        self.turn.as_ref().map_or(u64::MAX, |turn| turn.schedule.ends)
-    }
-
-    /// Takes out the packets that wait to be sent.
-    pub fn take_packets(&mut self) -> Vec<Packet> {
-        std::mem::take(&mut self.out)
+        self.state.as_ref().map_or(u64::MAX, |state| state.schedule.ends)
     }
 
     /// Returns the ids of the group that it talks with, its own among them, rising.
     pub fn group(&self) -> &[EntityId] {
-        self.turn.as_ref().map_or(&[], |turn| &turn.members)
+        self.state.as_ref().map_or(&[], |state| &state.members)
     }
 
     /// Returns its control in the present cycle, once that is decided.
     pub fn control(&self) -> Option<Control> {
-        let turn = self.turn.as_ref().filter(|turn| matches!(turn.phase, CyclePhase::Over))?;
-        let mut control = turn.control.clone();
+        let state = self.state.as_ref().filter(|state| matches!(state.phase, CyclePhase::Over))?;
+        let mut control = state.control.clone();
         // Questions have been answered since.
-        for talk in self.past.iter().filter(|talk| talk.info().id.cycle == control.cycle) {
-            let traffic = match talk.info().id.topic {
+        for conversation in
+            self.past.iter().filter(|conversation| conversation.info().id.cycle == control.cycle)
+        {
+            let traffic = match conversation.info().id.topic {
                 Protocol::Group => &mut control.grouping,
                 Protocol::Decision => &mut control.deciding,
                 Protocol::Shield => &mut control.shielding,
             };
-            *traffic = NetworkTraffic { ticks: traffic.ticks, ..talk.traffic() };
+            *traffic = NetworkTraffic { ticks: traffic.ticks, ..conversation.traffic() };
         }
         Some(control)
     }
 
     /// Returns whether it knows its group in the present cycle.
     pub fn has_group(&self) -> bool {
-        self.turn.as_ref().is_some_and(|turn| !matches!(turn.phase, CyclePhase::Grouping(_)))
+        self.state.as_ref().is_some_and(|state| !matches!(state.phase, CyclePhase::Grouping(_)))
     }
 
-    /// Returns whether it has chosen its wishes in the present cycle.
+    /// Returns whether it has chosen its candidates in the present cycle.
     pub fn has_decided(&self) -> bool {
-        let is_open = |turn: &CycleState| {
-            matches!(turn.phase, CyclePhase::Grouping(_) | CyclePhase::Deciding(_))
-        };
-        self.turn.as_ref().is_some_and(|turn| !is_open(turn))
+        self.state.as_ref().is_some_and(|state| {
+            !matches!(state.phase, CyclePhase::Grouping(_) | CyclePhase::Deciding(_))
+        })
     }
 
     /// Returns whether it has come to an end in the present cycle.
     pub fn is_done(&self) -> bool {
-        self.turn.as_ref().is_some_and(|turn| matches!(turn.phase, CyclePhase::Over))
+        self.state.as_ref().is_some_and(|state| matches!(state.phase, CyclePhase::Over))
     }
 
-    /// Returns its control in the present cycle, and the ways that it has considered; `None` before that is decided.
+    /// Returns its control in the present cycle, and what it has considered; `None` before that is decided.
     pub(crate) fn into_outcome(mut self) -> Option<(Control, ManeuverCandidates)> {
         let control = self.control()?;
-        Some((control, self.turn.take()?.candidates))
+        Some((control, self.state.take()?.candidates))
     }
 
     /// Returns its control where its group does not come to an end in the present cycle: it stays on its orbit.
@@ -226,22 +178,24 @@ impl Pilot {
     /// # Panics
     /// When it has not begun a cycle.
     pub(crate) fn into_fallback(mut self) -> (Control, ManeuverCandidates) {
-        let mut turn = self.turn.take().expect("it has begun a cycle");
-        let (is_over, now) = (matches!(turn.phase, CyclePhase::Over), turn.percept.cycle);
-        turn.record_traffic(0);
-        let mut control = Control { course: Maneuver::Orbit, memory: self.memory, ..turn.control };
+        let mut state = self.state.take().expect("it has begun a cycle");
+        let is_over = matches!(state.phase, CyclePhase::Over);
+        let now = state.percept.cycle;
+        state.record_traffic(0);
+        let mut control =
+            Control { maneuver: Maneuver::Orbit, memory: self.memory, ..state.control };
         if !is_over {
             control.events.push(Event::new(now, EventKind::Deadline, self.id));
         }
         (control, ManeuverCandidates::default())
     }
 
-    /// Returns how far it has come in the talk that it is in, if it is in one.
+    /// Returns how far it has come in the conversation that it is in, if it is in one.
     pub fn progress(&self) -> Option<Progress> {
-        match &self.turn.as_ref()?.phase {
-            CyclePhase::Grouping(talk)
-            | CyclePhase::Deciding(talk)
-            | CyclePhase::Shielding(talk, _) => Some(talk.progress()),
+        match &self.state.as_ref()?.phase {
+            CyclePhase::Grouping(conversation)
+            | CyclePhase::Deciding(conversation)
+            | CyclePhase::Shielding(conversation, _) => Some(conversation.progress()),
             CyclePhase::Decided | CyclePhase::Over => None,
         }
     }
@@ -253,59 +207,63 @@ impl Pilot {
 
     /// Returns the counts of packets that were dropped.
     pub fn drop_counts(&self) -> DropCounts {
-        self.refused
+        self.dropped
     }
 
-    /// Reads a packet, and hands its message to the talk that it belongs to.
+    /// Reads a packet, and hands its message to the conversation that it belongs to.
     fn receive(&mut self, from: EntityId, bytes: &[u8], tick: u64) -> Result<(), DropReason> {
-        let (seal, message) = parse_packet(bytes, self.fingerprint)?;
+        let (header, message) = parse_packet(bytes, self.fingerprint)?;
         let is_other = from != self.id && (from as usize) < self.world.airplanes.len();
-        if seal.sender != from || !is_other {
+        if header.sender != from || !is_other {
             return Err(DropReason::Sender);
         }
-        let Self { turn, past, early, out, .. } = self;
-        if let Some(turn) = turn {
-            if self.world.is_silent(self.id, turn.percept.cycle) {
+        let Self { state, past, early, out, .. } = self;
+        if let Some(state) = state {
+            if self.world.is_silent(self.id, state.percept.cycle) {
                 return Ok(());
             }
-            if let Some(talk) = turn.conversation()
-                && talk.info().id == seal.conversation
+            if let Some(conversation) = state.conversation()
+                && conversation.info().id == header.conversation
             {
-                return talk.receive(from, message, tick, out);
+                return conversation.receive(from, message, tick, out);
             }
         }
-        if let Some(talk) = past.iter_mut().find(|talk| talk.info().id == seal.conversation) {
-            return talk.receive(from, message, tick, out);
+        if let Some(conversation) =
+            past.iter_mut().find(|conversation| conversation.info().id == header.conversation)
+        {
+            return conversation.receive(from, message, tick, out);
         }
-        match turn.as_ref().map(|turn| turn.timing_of(&seal.conversation)) {
-            None | Some(ConversationTiming::Later) => early.push(seal.conversation, from, message),
+        match state.as_ref().map(|state| state.timing_of(&header.conversation)) {
+            None | Some(ConversationTiming::Later) => {
+                early.push(header.conversation, from, message)
+            }
             Some(ConversationTiming::OtherMembers) => Err(DropReason::OtherGroup),
             Some(ConversationTiming::Past) => Err(DropReason::Stale),
             Some(ConversationTiming::TooFarAhead) => Err(DropReason::NoRoom),
         }
     }
 
-    /// Continues as far as the talks and the time have come.
+    /// Continues as far as the conversations and the time have come.
     fn advance(&mut self, tick: u64) {
-        while let Some(turn) = &mut self.turn {
-            match &mut turn.phase {
-                CyclePhase::Grouping(talk)
-                | CyclePhase::Deciding(talk)
-                | CyclePhase::Shielding(talk, _)
-                    if talk.is_done() || tick >= talk.info().end_tick =>
+        while let Some(state) = &mut self.state {
+            match &mut state.phase {
+                CyclePhase::Grouping(conversation)
+                | CyclePhase::Deciding(conversation)
+                | CyclePhase::Shielding(conversation, _)
+                    if conversation.is_done() || tick >= conversation.info().end_tick =>
                 {
-                    let ended = talk.finish();
+                    let ended = conversation.finish();
                     // Where nothing is lost, messages take no time that counts.
                     let ticks = match self.world.network {
-                        Some(_) => {
-                            tick.min(talk.info().end_tick).saturating_sub(talk.info().start_tick)
-                        }
+                        Some(_) => tick
+                            .min(conversation.info().end_tick)
+                            .saturating_sub(conversation.info().start_tick),
                         None => 0,
                     };
-                    turn.record_traffic(ticks);
+                    state.record_traffic(ticks);
                     self.on_conversation_end(ended, tick);
                 }
-                CyclePhase::Decided if tick >= turn.schedule.shield_from => {
+                CyclePhase::Decided if tick >= state.schedule.shield_from => {
                     self.start_conversation(Protocol::Shield, tick);
                 }
                 _ => return,
@@ -313,95 +271,157 @@ impl Pilot {
         }
     }
 
-    /// Starts a talk with the others of the group.
+    /// Starts a conversation with the others of the group.
     fn start_conversation(&mut self, topic: Protocol, tick: u64) {
-        let Some(turn) = &mut self.turn else { return };
+        let Some(state) = &mut self.state else { return };
         let world = &*self.world;
-        let known = turn.members_of(topic);
-        let CycleState {
-            percept: sight, schedule, members, unheard, candidates: considered, ..
-        } = turn;
-        let (begins, ends) = schedule.conversation_ticks(topic, tick);
+        let known = state.members_of(topic);
+        let CycleState { percept, schedule, members, unheard, candidates, .. } = state;
+        let (start_tick, end_tick) = schedule.conversation_ticks(topic, tick);
         let id = match topic {
             // Its members are not known yet.
-            Protocol::Group => ConversationId::new(sight.cycle, topic, &[]),
+            Protocol::Group => ConversationId::new(percept.cycle, topic, &[]),
             Protocol::Decision | Protocol::Shield => {
-                ConversationId::new(sight.cycle, topic, members)
+                ConversationId::new(percept.cycle, topic, members)
             }
         };
-        let is_silent = world.is_silent(self.id, sight.cycle);
-        let radio = EndpointConfig {
+        let is_silent = world.is_silent(self.id, percept.cycle);
+        let config = EndpointConfig {
             me: known.binary_search(&self.id).expect("an airplane knows itself"),
             group: known,
             patience: retry_policy(world.network.as_ref(), topic),
             // A clock that has jumped may leave no time for it.
-            ticks: ends.saturating_sub(begins),
+            ticks: end_tick.saturating_sub(start_tick),
             is_silent,
         };
-        let (me, members, fingerprint) = (self.id, members.clone(), self.fingerprint);
-        let frame = ConversationInfo {
+        let info = ConversationInfo {
             id,
-            members,
-            me,
-            fingerprint,
-            start_tick: begins,
-            end_tick: ends,
+            members: members.clone(),
+            me: self.id,
+            fingerprint: self.fingerprint,
+            start_tick,
+            end_tick,
             is_silent,
         };
         let Memory { contacts, resolving } = &self.memory;
-        turn.phase = match topic {
+        state.phase = match topic {
             Protocol::Shield => {
-                let allowed = allowed_profiles(world, sight, considered);
-                let ways: Vec<_> = allowed.iter().map(|&k| considered.ways[k].clone()).collect();
-                let party = exchange_participant(world, sight, unheard, contacts, &ways, radio);
-                CyclePhase::Shielding(Conversation::new(frame, party), allowed)
+                let allowed = allowed_profiles(world, percept, candidates);
+                let profiles: Vec<_> =
+                    allowed.iter().map(|&k| candidates.profiles[k].clone()).collect();
+                let knowledge = Knowledge { world, percept, unheard, contacts };
+                let participant = exchange_participant(knowledge, &profiles, config);
+                CyclePhase::Shielding(Conversation::new(info, participant), allowed)
             }
             Protocol::Group => CyclePhase::Grouping(Conversation::new(
-                frame,
-                grouping_participant(world, sight, contacts, radio),
+                info,
+                grouping_participant(world, percept, contacts, config),
             )),
             Protocol::Decision if DecisionStrategy::is_reactive(world) => {
-                let party = intent_participant(world, sight, contacts, resolving, radio);
-                CyclePhase::Deciding(Conversation::new(frame, party))
+                let participant = intent_participant(world, percept, contacts, resolving, config);
+                CyclePhase::Deciding(Conversation::new(info, participant))
             }
             Protocol::Decision => {
-                let party = optimization_participant(world, sight, unheard, contacts, radio);
-                CyclePhase::Deciding(Conversation::new(frame, party))
+                let knowledge = Knowledge { world, percept, unheard, contacts };
+                let participant = optimization_participant(knowledge, config);
+                CyclePhase::Deciding(Conversation::new(info, participant))
             }
         };
         self.deliver_early_packets(id, tick);
     }
 
-    /// Starts the talk that it is in, and hands over earlier messages of others in it.
+    /// Starts the conversation that it is in, and hands over earlier messages of others in it.
     fn deliver_early_packets(&mut self, id: ConversationId, tick: u64) {
-        let Some(talk) = self.turn.as_mut().and_then(CycleState::conversation) else { return };
-        talk.start(tick, &mut self.out);
-        let (early, [stale, other_group]) = self.early.take(&id);
-        (0..stale).for_each(|_| self.refused.record(DropReason::Stale));
-        (0..other_group).for_each(|_| self.refused.record(DropReason::OtherGroup));
-        for (from, message) in early {
-            if let Err(why) = talk.receive(from, &message, tick, &mut self.out) {
-                self.refused.record(why);
+        let Some(conversation) = self.state.as_mut().and_then(CycleState::conversation) else {
+            return;
+        };
+        conversation.start(tick, &mut self.out);
+        let early = self.early.take(&id);
+        for _ in 0..early.stale {
+            self.dropped.record(DropReason::Stale);
+        }
+        for _ in 0..early.of_other_groups {
+            self.dropped.record(DropReason::OtherGroup);
+        }
+        for (from, message) in early.messages {
+            if let Err(why) = conversation.receive(from, &message, tick, &mut self.out) {
+                self.dropped.record(why);
             }
         }
     }
 
-    /// Keeps a talk that has ended here, to answer questions about it.
-    fn push_past(&mut self, talk: Conversation<DynParticipant>) {
+    /// Keeps a conversation that has ended here, to answer questions about it.
+    fn push_past(&mut self, conversation: Conversation<DynParticipant>) {
         if self.past.len() == MAX_PAST_CONVERSATIONS {
             self.past.pop_front();
         }
-        self.past.push_back(talk.into_past());
+        self.past.push_back(conversation.into_past());
     }
 }
 
-/// Returns the places of the ways that intruders leave to an airplane, among all that it considers.
+impl NetworkAgent for Pilot {
+    fn id(&self) -> EntityId {
+        self.id
+    }
+
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        // Actions due by then are done first, because they may make it too late for the packet.
+        self.advance(tick);
+        if let Err(why) = self.receive(from, bytes, tick) {
+            self.dropped.record(why);
+        }
+        self.advance(tick);
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        self.advance(tick);
+        if let Some(conversation) = self.state.as_mut().and_then(CycleState::conversation) {
+            conversation.on_timer(tick, &mut self.out);
+        }
+        // Others may still depend on it in a conversation that has ended for it.
+        for conversation in
+            self.past.iter_mut().filter(|conversation| tick < conversation.info().end_tick)
+        {
+            conversation.on_timer(tick, &mut self.out);
+        }
+        self.advance(tick);
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        let state = self.state.as_ref()?;
+        let present = match &state.phase {
+            CyclePhase::Grouping(conversation)
+            | CyclePhase::Deciding(conversation)
+            | CyclePhase::Shielding(conversation, _) => {
+                let end_tick = conversation.info().end_tick;
+                Some(conversation.next_timer().map_or(end_tick, |due| due.min(end_tick)))
+            }
+            CyclePhase::Decided => Some(state.schedule.shield_from),
+            CyclePhase::Over => None,
+        };
+        let of_cycle = self
+            .past
+            .iter()
+            .filter(|conversation| conversation.info().id.cycle == state.percept.cycle);
+        let past = of_cycle.filter_map(|conversation| {
+            conversation.next_timer().filter(|due| *due < conversation.info().end_tick)
+        });
+        present.into_iter().chain(past).min()
+    }
+
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+        std::mem::take(&mut self.out)
+    }
+}
+
+/// Returns the places of the candidates that non-cooperative aircraft leave to an airplane.
 fn allowed_profiles(
     world: &AirspaceWorld,
-    sight: &Percept,
-    considered: &ManeuverCandidates,
+    percept: &Percept,
+    candidates: &ManeuverCandidates,
 ) -> Vec<usize> {
-    let flyer = sight.own.shielded_aircraft(world);
-    let beset = NonCooperativeAvoidance::new(&flyer, &sight.intruders, world.timing.dtau_s);
-    beset.allowed_profiles(&considered.ways, || sight.own.orbit_profile(world))
+    let aircraft = percept.own.shielded_aircraft(world);
+    let avoidance =
+        NonCooperativeAvoidance::new(&aircraft, &percept.non_cooperative, world.timing.dtau_s);
+    avoidance.allowed_profiles(&candidates.profiles, || percept.own.orbit_profile(world))
 }

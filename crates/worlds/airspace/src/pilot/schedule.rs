@@ -1,4 +1,4 @@
-//! The ticks in which the talks of a cycle start and end.
+//! The ticks in which the conversations of a cycle start and end.
 
 use crate::agents::packet::Protocol;
 use sidestep_kernel::Cycle;
@@ -8,28 +8,33 @@ use sidestep_kernel::network::{Network, RetryPolicy};
 const NO_TIMEOUT: RetryPolicy =
     RetryPolicy { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
 
-/// The ticks of a cycle's talks.
+/// The ticks of a cycle's conversations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Schedule {
     /// Start of the first one.
     pub(crate) begins: u64,
-    /// Latest end of the talk that finds the group, where there is one.
+    /// Latest end of the conversation that finds the group, where there is one.
     pub(crate) grouped_by: u64,
-    /// Latest end of the talk about the wishes of each.
+    /// Latest end of the conversation about the actions that each proposes.
     pub(crate) decided_by: u64,
-    /// Start of the shield's exchange, unless the first talk takes longer.
+    /// Start of the shield's exchange, unless the first conversation takes longer.
     pub(crate) shield_from: u64,
     /// Its latest end.
     pub(crate) ends: u64,
 }
 
 impl Schedule {
-    /// Returns the ticks of talks that start in a tick: over a network that loses messages each has its time;
+    /// Returns the ticks of conversations that start in a tick: over a network that loses messages each has its time;
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
     pub(crate) fn from_tick(tick: u64, network: Option<&Network>) -> Self {
         let Some(network) = network else {
-            let (grouped_by, decided_by, ends) = (u64::MAX, u64::MAX, u64::MAX);
-            return Self { begins: tick, grouped_by, decided_by, shield_from: tick, ends };
+            return Self {
+                begins: tick,
+                grouped_by: u64::MAX,
+                decided_by: u64::MAX,
+                shield_from: tick,
+                ends: u64::MAX,
+            };
         };
         let long = network.deadline_ticks();
         Self {
@@ -42,7 +47,7 @@ impl Schedule {
         }
     }
 
-    /// Returns the ticks of a cycle where all cycles follow on each other without a gap, and no second talk starts
+    /// Returns the ticks of a cycle where all cycles follow on each other without a gap, and no second conversation starts
     /// before all have ended the first.
     pub(crate) fn for_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
         let Some(network) = network else {
@@ -51,7 +56,7 @@ impl Schedule {
         Self::from_tick(2 * cycle * (network.deadline_ticks() + 1), Some(network))
     }
 
-    /// Returns the first and the last tick of a talk that starts in `tick`.
+    /// Returns the first and the last tick of a conversation that starts in `tick`.
     pub(crate) fn conversation_ticks(&self, topic: Protocol, tick: u64) -> (u64, u64) {
         match topic {
             Protocol::Group => (tick, self.grouped_by),

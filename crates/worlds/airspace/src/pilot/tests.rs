@@ -7,8 +7,8 @@ mod order;
 use super::*;
 use crate::deploy::run_pilots;
 use crate::world::AirspaceWorld;
-use crate::{AirspaceRun, airspace_run};
-use sidestep_kernel::network::Network;
+use crate::{AirspaceRun, Fleet, airspace_run};
+use sidestep_kernel::network::{Network, NetworkAgent, OutgoingPacket};
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -49,12 +49,12 @@ impl TestPilots {
         let network: Option<&Network> = self.world.network.as_ref();
         let (now, schedule) = (run.cycle(), Schedule::for_cycle(run.cycle(), network));
         // As they come off a network.
-        let sights: Vec<Percept> = run.percepts().iter().map(over_the_wire).collect();
-        let is_due = |pilot: &Pilot| sights.iter().any(|sight| sight.own.id == pilot.id());
+        let percepts: Vec<Percept> = run.percepts().iter().map(over_the_wire).collect();
+        let is_due = |pilot: &Pilot| percepts.iter().any(|percept| percept.own.id == pilot.id());
         let (mut due, rest): (Vec<Pilot>, Vec<Pilot>) =
             std::mem::take(&mut self.pilots).into_iter().partition(is_due);
-        for (pilot, sight) in due.iter_mut().zip(sights) {
-            pilot.start_with_schedule(sight, schedule);
+        for (pilot, percept) in due.iter_mut().zip(percepts) {
+            pilot.start_with_schedule(percept, schedule);
         }
         run_pilots(&self.world, run.state(), (now, schedule), &mut due);
         let controls = due.iter().map(|pilot| pilot.control().expect("all end")).collect();
@@ -69,7 +69,7 @@ fn over_the_wire<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -
     postcard::from_bytes(&bytes).expect("what was written")
 }
 
-/// Everything that others cannot see of an airplane changes, and the sights of the others stay the same.
+/// Everything that others cannot see of an airplane changes, and the percepts of the others stay the same.
 #[test]
 fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     let mut run = run(
@@ -78,17 +78,17 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     );
     run.advance(8);
     let (world, now) = (run.world().clone(), run.cycle());
-    let sights = run.percepts();
-    assert_eq!(sights.len(), 5);
-    assert!(sights.iter().all(|sight| sight.check(&world).is_ok()));
-    let lost = Percept { group: sights[0].group[1..].to_vec(), ..sights[0].clone() };
+    let percepts = run.percepts();
+    assert_eq!(percepts.len(), 5);
+    assert!(percepts.iter().all(|percept| percept.check(&world).is_ok()));
+    let lost = Percept { group: percepts[0].group[1..].to_vec(), ..percepts[0].clone() };
     assert_eq!(
         lost.check(&world),
         Err(crate::agents::InvalidMessage::Airplane),
         "it is not in its group"
     );
     let mut hidden = 0;
-    for (own, sight) in sights.iter().enumerate() {
+    for (own, percept) in percepts.iter().enumerate() {
         let mut snapshot = run.state().snapshot(now);
         for (id, airplane) in snapshot.airplanes.iter_mut().enumerate().filter(|(id, _)| *id != own)
         {
@@ -102,7 +102,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
             snapshot.resolving[id] = crate::baseline::mvp::ActiveResolutions::default();
         }
         let changed = crate::state::AirspaceState::restore(&world, &snapshot);
-        assert_eq!(world.percepts(&changed, now)[own], *sight, "airplane {own}");
+        assert_eq!(world.percepts(&changed, now)[own], *percept, "airplane {own}");
     }
     assert!(hidden > 10, "{hidden}");
 }

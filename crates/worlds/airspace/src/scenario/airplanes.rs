@@ -1,18 +1,25 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use super::values::{SeparationM, Speed, TurnRate, Turns};
-use crate::flight::Airplane;
-use crate::flight::{Model, Pose2, Timing, Track};
+use crate::flight::{Airplane, Model, Pose2, Timing, Track};
 use crate::flight_plan::AirplaneSection;
-use crate::generate::GeneratorKind;
-use crate::generate::{GeneratorParams, generate};
+use crate::generate::{GeneratorKind, GeneratorParams, generate};
+use crate::settings::{SeparationM, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
 use sidestep_scenario::{Integer, Number, Open, RightOpen, Spanned};
+
+/// The paper's airplane, for keys that a scenario leaves out.
+const PAPER_MODEL: Model =
+    Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 };
+/// Radius in meters of the paper's circle.
+const PAPER_RADIUS_M: f64 = 6_500.0;
+/// Default of the random displacement of generated starts: as much as breaks all symmetries, and far less than the
+/// separation.
+const DEFAULT_JITTER_M: f64 = 20.0;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -38,21 +45,23 @@ pub(super) struct ModelSection {
 
 impl ModelSection {
     /// Returns the values of one airplane, completed with those for all.
-    fn with_own(&self, s: &AirplaneSection) -> Self {
+    fn with_own(&self, own: &AirplaneSection) -> Self {
         Self {
-            v_m_s: s.v_m_s.or(self.v_m_s),
-            omega_max_deg_s: s.omega_max_deg_s.or(self.omega_max_deg_s),
-            separation_m: s.separation_m.or(self.separation_m),
-            turns: s.turns.or(self.turns),
+            v_m_s: own.v_m_s.or(self.v_m_s),
+            omega_max_deg_s: own.omega_max_deg_s.or(self.omega_max_deg_s),
+            separation_m: own.separation_m.or(self.separation_m),
+            turns: own.turns.or(self.turns),
         }
     }
 
     fn model(&self) -> Model {
         Model {
-            v_m_s: self.v_m_s.map_or(35.0, f64::from),
-            omega_max_rad_s: self.omega_max_deg_s.map_or(4.0, f64::from).to_radians(),
-            separation_m: self.separation_m.map_or(500.0, f64::from),
-            turns: self.turns.map_or(5, |turns| turns.0),
+            v_m_s: self.v_m_s.map_or(PAPER_MODEL.v_m_s, f64::from),
+            omega_max_rad_s: self
+                .omega_max_deg_s
+                .map_or(PAPER_MODEL.omega_max_rad_s, |given| given.get().to_radians()),
+            separation_m: self.separation_m.map_or(PAPER_MODEL.separation_m, f64::from),
+            turns: self.turns.map_or(PAPER_MODEL.turns, |turns| turns.0),
         }
     }
 }
@@ -108,29 +117,29 @@ impl Compiler<'_> {
             return Err(self.source.unused_key("airspace.generator.jitter_m", because));
         }
         let n = s.n.get() as usize;
-        // By default, random traffic is as dense as ten airplanes in the paper's circle, for any
-        // number.
-        let usual_m = match s.kind {
-            GeneratorKind::Random => 6_500.0 * (n as f64 / 5.0).max(1.0).sqrt(),
-            _ => 6_500.0,
+        let default_radius_m = match s.kind {
+            // With five or more as dense as five airplanes in the paper's circle.
+            GeneratorKind::Random => PAPER_RADIUS_M * (n as f64 / 5.0).max(1.0).sqrt(),
+            _ => PAPER_RADIUS_M,
         };
-        let radius_m = s.radius_m.map_or(usual_m, f64::from);
-        let jitter_m = s.jitter_m.map_or(20.0, f64::from);
+        let radius_m = s.radius_m.map_or(default_radius_m, f64::from);
+        let jitter_m = s.jitter_m.map_or(DEFAULT_JITTER_M, f64::from);
         let errors_m = self.error_margin_m(model);
-        let order = GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
-        generate(&order, streams).map_err(|placed| {
+        let params = GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
+        generate(&params, streams).map_err(|placed| {
             let cause = format!("no place is left after {placed} of {n} airplanes");
             self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
         })
     }
 
-    /// Returns how much farther from each other two airplanes of a model have to start, because of
-    /// errors: they are seen elsewhere, and their orbits are wider.
+    /// Returns how much farther from each other two airplanes of a model have to start, because of errors: they are
+    /// perceived at other places, and their orbits are wider.
     fn error_margin_m(&self, model: &Model) -> f64 {
         let bounds = self.bounds();
         let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let Some(rate_rad_s) = bounds.max_orbit_rate_rad_s(model, dt_s) else { return 0.0 };
         let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();
+        // Two orbits, each with a diameter that grows by twice the radius.
         4.0 * wider_m + 2.0 * bounds.position_m + 2.0 * bounds.error_m(model.v_m_s, dt_s)
     }
 
@@ -164,12 +173,12 @@ impl Compiler<'_> {
             leaves_s,
             orders,
             track: None,
-            is_intruder: s.is_non_cooperative(self.source)?,
+            is_non_cooperative: s.is_non_cooperative(self.source)?,
         })
     }
 
-    /// Returns an airplane that follows its track, and then flies on along the rest of it, with the
-    /// recorded speed unless another one is given.
+    /// Returns an airplane that follows its track, and then flies along the rest of it, with the recorded speed unless
+    /// another one is given.
     fn recorded_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
@@ -203,12 +212,18 @@ impl Compiler<'_> {
     }
 }
 
-fn replayed_airplane(track: Track, model: Model, replay: Replay, is_intruder: bool) -> Airplane {
+fn replayed_airplane(
+    track: Track,
+    model: Model,
+    replay: Replay,
+    is_non_cooperative: bool,
+) -> Airplane {
     let begins_s = track.start_s();
-    // An airplane that appears later comes in at the start of a cycle.
-    let appears_s = if is_intruder || (begins_s / replay.dt_s).floor() < replay.cycles as f64 {
+    let is_replayed_at_start = (begins_s / replay.dt_s).floor() < replay.cycles as f64;
+    let appears_s = if is_non_cooperative || is_replayed_at_start {
         begins_s
     } else {
+        // The method flies whole cycles only, and so the airplane enters at the start of one.
         (begins_s / replay.dt_s).ceil() * replay.dt_s
     };
     let joins_s = replay.until_s.max(appears_s);
@@ -222,6 +237,6 @@ fn replayed_airplane(track: Track, model: Model, replay: Replay, is_intruder: bo
         leaves_s: f64::INFINITY,
         orders: Vec::new(),
         track: Some(track),
-        is_intruder,
+        is_non_cooperative,
     }
 }

@@ -1,16 +1,15 @@
 //! Compilation of a scenario's sections to an immutable world.
 
+use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
-use crate::baseline::ReactiveSettings;
-use crate::deploy::{Deployment, unsupported_reason};
 use crate::flight::Levels;
 use crate::flight::{Airplane, FlightTask};
 use crate::flight::{Timing, WaypointRule};
-use crate::memory::largest_start_group;
 use crate::perceive::observed_pose;
+use crate::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
 use crate::shield::{ErrorBounds, ExemptIds, ShieldedAircraft, Side, first_fallbacks};
 use crate::state::AirspaceState;
-use crate::world::{AirspaceWorld, Disturbance, Grouping, Method};
+use crate::world::AirspaceWorld;
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -21,8 +20,8 @@ use std::sync::Arc;
 const ROUNDING_M: f64 = 1e-6;
 /// Smallest limit on the cycles of a run, unless its length is given.
 const MIN_CYCLE_LIMIT: u64 = 400;
-/// Factor on the time that the last airplane to come in would need alone, which gives a larger
-/// limit: there is room for detours and orbits.
+/// Factor on the time that the last airplane to enter would need alone, for a larger limit: it leaves room for detours
+/// and orbits.
 const CYCLE_LIMIT_FACTOR: f64 = 3.0;
 /// Largest number of steps of a horizon.
 const MAX_HORIZON_STEPS: f64 = 10_000.0;
@@ -37,7 +36,8 @@ const MAX_PAIR_STEPS: usize = 100_000_000;
 const MVP: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.05 };
 /// Settings with which ORCA loses no separation there, at the smallest delay.
 const ORCA: ReactiveSettings = ReactiveSettings { look_ahead_s: 45.0, margin: 1.05 };
-/// Standard deviations of errors for which the shield allows, unless told otherwise.
+/// Standard deviations of errors for which the shield allows, unless the scenario gives a number: of normal errors one
+/// in 1.7 million is larger.
 const DEFAULT_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
@@ -71,9 +71,10 @@ impl<'a> Compiler<'a> {
         self.check_deployment(&world)?;
         self.check_pair_steps(&world)?;
         self.check_errors(&world)?;
-        let (fallbacks, too_close) = match world.shield {
-            true => first_fallbacks_of(&world),
-            false => (vec![Side::default(); world.airplanes.len()], Vec::new()),
+        let (fallbacks, too_close) = if world.shield {
+            first_fallbacks_of(&world)
+        } else {
+            (vec![Side::default(); world.airplanes.len()], Vec::new())
         };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
@@ -102,12 +103,12 @@ impl<'a> Compiler<'a> {
             || position_m > 0.0
             || heading_rad > 0.0
             || world.network.is_some();
-        match (is_drawn, world.method) {
-            (true, _) => SeedEffect::Decide,
-            (false, Method::Pc) => SeedEffect::Perhaps,
-            (false, Method::Mvp | Method::Orca | Method::None | Method::External) => {
-                SeedEffect::Nothing
-            }
+        if is_drawn {
+            return SeedEffect::Decide;
+        }
+        match world.method {
+            Method::Pc => SeedEffect::Perhaps,
+            Method::Mvp | Method::Orca | Method::None | Method::External => SeedEffect::Nothing,
         }
     }
 
@@ -151,7 +152,13 @@ impl<'a> Compiler<'a> {
             first_fallbacks: Arc::default(),
             teams: Arc::default(),
         };
-        Ok(world.with_derived_fields(self.known))
+        let mut world = world.with_derived_fields(self.known);
+        world.teams = match self.known {
+            // Teams follow from models alone, which no seed draws.
+            Some(known) => Arc::clone(&known.teams),
+            None => Arc::new(world.find_teams()),
+        };
+        Ok(world)
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
@@ -179,12 +186,8 @@ impl<'a> Compiler<'a> {
 
     /// Refuses errors of heading against which an airplane could not hold an orbit.
     fn check_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
-        let turned_rad = world.bounds.heading_rad;
-        let holds = |a: &Airplane| {
-            a.is_intruder
-                || world.bounds.max_orbit_rate_rad_s(&a.model, world.timing.dt_s).is_some()
-        };
-        if !world.shield || turned_rad == 0.0 {
+        let gust_rad = world.bounds.heading_rad;
+        if !world.shield || gust_rad == 0.0 {
             return Ok(());
         }
         let error = |cause: &str, remedy: &str| Err(self.source.error(None, cause, remedy));
@@ -194,11 +197,15 @@ impl<'a> Compiler<'a> {
                           heading_noise_deg or [airspace.network], or set shield = \"off\"";
             return error(cause, remedy);
         }
-        let Some(weak) = world.airplanes.iter().find(|a| !holds(a)) else { return Ok(()) };
+        let weak = world.airplanes.iter().find(|a| {
+            let rate_rad_s = world.bounds.max_orbit_rate_rad_s(&a.model, world.timing.dt_s);
+            !a.is_non_cooperative && rate_rad_s.is_none()
+        });
+        let Some(weak) = weak else { return Ok(()) };
         let cause = format!(
             "gusts turn airplanes by up to {:.2} deg per dt_s (error_sigmas times \
              heading_noise_deg), and one of {:.2} deg/s cannot hold an orbit against them",
-            turned_rad.to_degrees(),
+            gust_rad.to_degrees(),
             weak.model.omega_max_rad_s.to_degrees()
         );
         let remedy = "give a smaller heading_noise_deg or error_sigmas, or set shield = \"off\"";
@@ -209,12 +216,12 @@ impl<'a> Compiler<'a> {
     fn wind_m_s(&self, airplanes: &[Airplane]) -> Result<[f64; 2], InputError> {
         let given = self.file.airspace.wind_m_s.as_ref();
         let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
-        let slowest = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
-        let wind = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
-        if wind < slowest {
+        let min_speed_m_s = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
+        let wind_speed_m_s = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
+        if wind_speed_m_s < min_speed_m_s {
             return Ok(wind_m_s);
         }
-        let cause = format!("a wind of {wind} m/s, and airplanes of {slowest} m/s");
+        let cause = format!("a wind of {wind_speed_m_s} m/s, and airplanes of {min_speed_m_s} m/s");
         let remedy = "give a wind that all airplanes can fly against";
         Err(self.source.error(given.map(Spanned::span), cause, remedy))
     }
@@ -230,13 +237,14 @@ impl<'a> Compiler<'a> {
                           groups out";
             return Err(self.source.error(given.span(), cause, remedy));
         }
-        if let Some(reason) = unsupported_reason(world.deployment, &world.settings) {
+        if let Some(reason) = world.deployment.unsupported_reason(&world.settings) {
             let cause = format!("deployment {}: {reason}", world.deployment.name());
             let remedy = "set order = \"parallel\" and utility = \"joint\", or \
                           estimator = { kind = \"exact\" }";
             return Err(self.source.error(None, cause, remedy));
         }
-        if world.max_samples().is_none_or(|most| most > u64::from(u16::MAX) * 4) {
+        // A stream has that many blocks of four words.
+        if world.max_samples().is_none_or(|samples| samples > u64::from(u16::MAX) * 4) {
             let cause = "more samples than a random stream holds";
             let remedy = "give smaller blocks or fewer rounds, or order = \"parallel\": in \
                           sequence each airplane draws a block anew after every other";
@@ -276,18 +284,19 @@ impl<'a> Compiler<'a> {
         let section = &self.file.airspace;
         let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
-        let span = || section.dtau_s.as_ref().map(Spanned::span);
-        let span = || span().or_else(|| section.dt_s.as_ref().map(Spanned::span));
-        let parts = dt_s / dtau_s;
-        if (parts - parts.round()).abs() > 1e-9 || parts < 1.0 {
+        let dtau_span = section.dtau_s.as_ref().map(Spanned::span);
+        let span = dtau_span.or_else(|| section.dt_s.as_ref().map(Spanned::span));
+        let steps = dt_s / dtau_s;
+        // Decimal fractions are rounded, so that 0.3 / 0.1 is not 3.
+        if (steps - steps.round()).abs() > 1e-9 || steps < 1.0 {
             let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
-            return Err(self.source.error(span(), cause, "give a dtau_s that divides dt_s"));
+            return Err(self.source.error(span, cause, "give a dtau_s that divides dt_s"));
         }
-        if parts > MAX_STEPS_PER_DT {
-            let cause = format!("{parts} steps of dtau_s in each dt_s");
+        if steps > MAX_STEPS_PER_DT {
+            let cause = format!("{steps} steps of dtau_s in each dt_s");
             let remedy =
                 format!("give up to {MAX_STEPS_PER_DT}: each is flown and watched by itself");
-            return Err(self.source.error(span(), cause, remedy));
+            return Err(self.source.error(span, cause, remedy));
         }
         Ok(Timing { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
     }
@@ -339,12 +348,13 @@ impl<'a> Compiler<'a> {
 /// Returns a number of cycles in which all should arrive. Of flights that never end it counts their start and their
 /// last order.
 fn cycle_limit(world: &AirspaceWorld) -> u64 {
-    let ends_s = |i: usize| match world.solo_end_s(i) {
-        s if s.is_finite() => s,
-        _ => last_change_s(world, i),
-    };
-    let longest_s = (0..world.airplanes.len()).map(ends_s).fold(0.0, f64::max);
-    MIN_CYCLE_LIMIT.max((CYCLE_LIMIT_FACTOR * longest_s / world.timing.dt_s).ceil() as u64)
+    let mut max_end_s: f64 = 0.0;
+    for i in 0..world.airplanes.len() {
+        let solo_end_s = world.solo_end_s(i);
+        let end_s = if solo_end_s.is_finite() { solo_end_s } else { last_change_s(world, i) };
+        max_end_s = max_end_s.max(end_s);
+    }
+    MIN_CYCLE_LIMIT.max((CYCLE_LIMIT_FACTOR * max_end_s / world.timing.dt_s).ceil() as u64)
 }
 
 /// Returns the time of the last known change of an airplane that flies on forever.
@@ -357,13 +367,14 @@ fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
 fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     let mut sides = vec![Side::default(); world.airplanes.len()];
-    // Airplanes that come in at other times do not meet at the start.
-    let flown =
-        |&i: &usize| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0);
-    let starts: Vec<usize> = (0..sides.len()).filter(flown).collect();
-    let flyer = |(rank, &i): (usize, &usize)| {
+    // Airplanes that enter at other times do not meet at the start.
+    let starts: Vec<usize> = (0..sides.len())
+        .filter(|&i| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0))
+        .collect();
+    let mut group = Vec::with_capacity(starts.len());
+    for (rank, &i) in starts.iter().enumerate() {
         let airplane = &world.airplanes[i];
-        ShieldedAircraft {
+        group.push(ShieldedAircraft {
             pose: observed_pose(world, i as u32, 0, airplane.start),
             orbit_pose: observed_pose(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,
@@ -377,19 +388,20 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
             exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,
-        }
-    };
-    let flyers: Vec<ShieldedAircraft> = starts.iter().enumerate().map(flyer).collect();
-    let (chosen, pairs) = first_fallbacks(&flyers);
-    starts.iter().zip(chosen).for_each(|(&i, side)| sides[i] = side);
+        });
+    }
+    let (chosen, pairs) = first_fallbacks(&group);
+    for (&i, side) in starts.iter().zip(chosen) {
+        sides[i] = side;
+    }
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
 }
 
 /// All speeds that an airplane is to fly with.
 fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
-    let told = airplane.orders.iter().filter_map(|order| match order.task {
+    let ordered = airplane.orders.iter().filter_map(|order| match order.task {
         FlightTask::Speed(v_m_s) => Some(v_m_s),
         _ => None,
     });
-    told.chain([airplane.model.v_m_s])
+    ordered.chain([airplane.model.v_m_s])
 }

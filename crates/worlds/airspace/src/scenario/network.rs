@@ -1,10 +1,8 @@
 //! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
-use crate::deploy::Deployment;
-use crate::flight::Airplane;
-use crate::flight::Timing;
-use crate::flight::{FlightOrder, FlightTask};
+use crate::flight::{Airplane, FlightTask, Timing};
+use crate::settings::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::network::{self, Network};
@@ -128,10 +126,11 @@ impl Compiler<'_> {
                           or leave [airspace.network] out";
             return error(cause, remedy);
         }
-        let changes = |order: &FlightOrder| {
-            matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. })
-        };
-        let orders_change_safety = airplanes.iter().any(|a| a.orders.iter().any(changes));
+        // The stored orbits of others depend on speed and level.
+        let orders_change_safety = airplanes
+            .iter()
+            .flat_map(|airplane| &airplane.orders)
+            .any(|order| matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. }));
         if self.file.airspace.shield.0 && orders_change_safety {
             let cause = "orders of speed or level, over a network that is not to be relied on";
             let remedy = "nobody could be sure who knows of them: leave them out, or \

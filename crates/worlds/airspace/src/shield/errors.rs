@@ -1,27 +1,27 @@
-//! Errors of place and heading, as far as the shield allows for them.
+//! Errors of position and heading, as far as the shield allows for them.
 //!
-//! All see an airplane up to `position_m` from its place, and at the end of each `dt` a gust turns
+//! All see an airplane up to `position_m` from its position, and at the end of each `dt` a gust turns
 //! it by up to `heading_rad`; no airplane knows the error, all know these bounds. Airplanes that
-//! exceed them are named (`act/errors.rs`).
+//! exceed them are reported (`act/errors.rs`).
 //!
-//! **Places.** Let all be seen within `E` of their places. A plan is computed from where the
+//! **Positions.** Let all be seen within `E` of their positions. A plan is computed from where the
 //! airplane is seen, so the motion flown is the plan, moved by at most `E`. Plans that keep
 //! `R + 2 E` as they are seen keep `R` as they are flown. The invariant of the shield speaks of
 //! orbits as they are flown: two airplanes that stay on theirs need not be seen apart anew, and the
 //! search never asks it of them. So the induction holds with this wider gap on new plans.
 //!
-//! **Headings.** A way is flown for one `dt` from a heading that is seen, so no gust disturbs it.
+//! **Headings.** A turn profile is flown for one `dt` from a heading that is seen, so no gust disturbs it.
 //! An orbit is flown forever. Airplanes orbit at less than their largest turn rate and have the
-//! rest, `a`, to correct ([`turn_rates_rad_s`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
+//! rest, `a`, to correct ([`OrbitTracker::turn_rates_rad_s`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
 //! on the orbit that was stored, moved along it. At the start of each `dt` on it
 //!
-//! - the airplane heads within `2 D` of `held`: at the end of a way by at most one gust of `D`;
-//!   later because `hold` steers for headings within `D`, never away from them, and has
+//! - the airplane heads within `2 D` of `held`: at the end of a profile by at most one gust of `D`;
+//!   later because the tracker steers for headings within `D`, never away from them, and has
 //!   `a dt >= 2 D` to get there, and then comes one gust;
-//! - it is within `4 v dt D` of `held`. At the end of a way it is at `held`. Later `hold` leads it
-//!   back; that is checked in each `dt`, and an airplane that is farther away is named.
+//! - it is within `4 v dt D` of `held`. At the end of a profile it is at `held`. Later the tracker leads it
+//!   back; that is checked in each `dt`, and an airplane that is farther away is reported.
 //!
-//! During `dt` it heads within `2 D` of `held` all the time, so its place relative to `held`
+//! During `dt` it heads within `2 D` of `held` all the time, so its position relative to `held`
 //! changes by at most `2 v sin(D) dt <= 2 v dt D`. So it is within `W = 6 v dt D` of its orbit, and
 //! gaps wider by `W` on either side keep `R`.
 
@@ -30,13 +30,13 @@ use crate::flight::{Model, Pose2};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// Part of the largest turn rate below which no airplane orbits.
+/// Fraction of the largest turn rate below which no airplane orbits.
 const MIN_RATE_FRACTION: f64 = 0.45;
 /// Airplanes orbit at one rate if none of them could turn this many times as fast as another. Were
 /// there no limit, a single airplane that hardly turns would put all others on circles that fill
 /// the sky.
 const MAX_RATE_RATIO: f64 = 10.0;
-/// Part of its sideways distance that an airplane aims to make good within a step.
+/// Fraction of its lateral offset that an airplane aims to correct within a step.
 const GAIN: f64 = 0.5;
 
 /// Bounds on errors.
@@ -62,8 +62,9 @@ impl ErrorBounds {
 
     /// Returns the largest turn rate at which an airplane can hold an orbit, if there is one.
     pub(crate) fn max_orbit_rate_rad_s(&self, model: &Model, dt_s: f64) -> Option<f64> {
-        let part = 1.0 - 2.0 * self.heading_rad / (model.omega_max_rad_s * dt_s);
-        (part >= MIN_RATE_FRACTION).then_some(part * model.omega_max_rad_s)
+        // The rest of the turn rate has to correct two gusts within a `dt`: `a dt >= 2 D`.
+        let fraction = 1.0 - 2.0 * self.heading_rad / (model.omega_max_rad_s * dt_s);
+        (fraction >= MIN_RATE_FRACTION).then_some(fraction * model.omega_max_rad_s)
     }
 }
 
@@ -71,8 +72,8 @@ impl ErrorBounds {
 /// of one rate the distance of two airplanes has a closed form, and those that fly side by side stay
 /// so; on orbits of other rates they sooner or later come to be wherever their circles come
 /// nearest. So airplanes share the rate of the slowest of them, which all can fly.
-pub(crate) fn common_rates(largest_rad_s: &[f64]) -> Vec<f64> {
-    let mut rising = largest_rad_s.to_vec();
+pub(crate) fn common_rates(max_rates_rad_s: &[f64]) -> Vec<f64> {
+    let mut rising = max_rates_rad_s.to_vec();
     rising.sort_unstable_by(f64::total_cmp);
     let mut shared: Vec<f64> = Vec::new();
     for rate in rising {
@@ -80,8 +81,10 @@ pub(crate) fn common_rates(largest_rad_s: &[f64]) -> Vec<f64> {
             shared.push(rate);
         }
     }
-    let of = |rate: &f64| shared[shared.partition_point(|slowest| slowest <= rate) - 1];
-    largest_rad_s.iter().map(of).collect()
+    max_rates_rad_s
+        .iter()
+        .map(|rate| shared[shared.partition_point(|slowest| slowest <= rate) - 1])
+        .collect()
 }
 
 /// An airplane on its orbit.
@@ -90,7 +93,7 @@ pub(crate) struct OrbitTracker {
     /// Its pose.
     pub(crate) pose: Pose2,
     /// Its pose on the orbit, if it had made no errors.
-    pub(crate) held: Pose2,
+    pub(crate) orbit_pose: Pose2,
     pub(crate) v_m_s: f64,
     pub(crate) omega_max_rad_s: f64,
     /// Turn rate of the orbit, positive to the left.
@@ -101,36 +104,38 @@ impl OrbitTracker {
     /// Returns the orbiting airplane that flies with these abilities to a side.
     pub(crate) fn new(
         pose: Pose2,
-        held: Pose2,
+        orbit_pose: Pose2,
         model: &Model,
         rate_rad_s: f64,
         side: Side,
     ) -> Self {
         let Model { v_m_s, omega_max_rad_s, .. } = *model;
-        Self { pose, held, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
+        Self { pose, orbit_pose, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
     }
 
     /// Returns the turn rates by which it keeps to its orbit for some steps, in spite of gusts that
     /// turn it by up to `gust_rad`.
     pub(crate) fn turn_rates_rad_s(mut self, steps: usize, dtau_s: f64, gust_rad: f64) -> Vec<f64> {
-        let step = |_| {
-            let off_rad = math::wrap_angle(self.pose.heading_rad - self.held.heading_rad);
+        let mut rates_rad_s = Vec::with_capacity(steps);
+        for _ in 0..steps {
+            let error_rad = math::wrap_angle(self.pose.heading_rad - self.orbit_pose.heading_rad);
             let left = GAIN * self.lateral_offset_m() / (self.v_m_s * dtau_s);
-            let wanted_rad = (-left).clamp(-gust_rad, gust_rad);
-            let omega = self.orbit_rad_s + (wanted_rad - off_rad) / dtau_s;
+            let desired_rad = (-left).clamp(-gust_rad, gust_rad);
+            let omega = self.orbit_rad_s + (desired_rad - error_rad) / dtau_s;
             let omega = omega.clamp(-self.omega_max_rad_s, self.omega_max_rad_s);
             self.pose = self.pose.step(self.v_m_s, omega, dtau_s);
-            self.held = self.held.step(self.v_m_s, self.orbit_rad_s, dtau_s);
-            omega
-        };
-        (0..steps).map(step).collect()
+            self.orbit_pose = self.orbit_pose.step(self.v_m_s, self.orbit_rad_s, dtau_s);
+            rates_rad_s.push(omega);
+        }
+        rates_rad_s
     }
 
     /// Returns how far to the left of its orbit it is, in meters.
     fn lateral_offset_m(&self) -> f64 {
-        let [x, y] = [self.pose.at[0] - self.held.at[0], self.pose.at[1] - self.held.at[1]];
-        let heading = self.held.heading_rad;
-        y * math::cos(heading) - x * math::sin(heading)
+        let x = self.pose.at[0] - self.orbit_pose.at[0];
+        let y = self.pose.at[1] - self.orbit_pose.at[1];
+        let heading_rad = self.orbit_pose.heading_rad;
+        y * math::cos(heading_rad) - x * math::sin(heading_rad)
     }
 }
 
@@ -172,15 +177,15 @@ mod tests {
                     _ => *gust,
                 };
                 now.pose.heading_rad += gust_rad * gust;
-                let off_rad = math::wrap_angle(now.pose.heading_rad - now.held.heading_rad);
+                let off_rad = math::wrap_angle(now.pose.heading_rad - now.orbit_pose.heading_rad);
                 prop_assert!(off_rad.abs() <= 2.0 * gust_rad + 1e-9, "{off_rad}");
-                let strays_m = distance_m(now.pose.at, now.held.at);
+                let strays_m = distance_m(now.pose.at, now.orbit_pose.at);
                 prop_assert!(strays_m <= bounds.max_deviation_m(v_m_s, dt_s), "{strays_m} after {k}");
                 for omega in now.turn_rates_rad_s(steps, dtau, gust_rad) {
                     prop_assert!(omega.abs() <= omega_max_rad_s);
                     now.pose = now.pose.step(v_m_s, omega, dtau);
-                    now.held = now.held.step(v_m_s, now.orbit_rad_s, dtau);
-                    let strays_m = distance_m(now.pose.at, now.held.at);
+                    now.orbit_pose = now.orbit_pose.step(v_m_s, now.orbit_rad_s, dtau);
+                    let strays_m = distance_m(now.pose.at, now.orbit_pose.at);
                     prop_assert!(strays_m <= bounds.error_m(v_m_s, dt_s), "{strays_m} in {k}");
                 }
             }

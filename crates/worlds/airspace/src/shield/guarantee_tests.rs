@@ -25,11 +25,11 @@ pub(crate) type Pairs = BTreeSet<(u32, u32)>;
 
 /// Returns the pairs that lost separation, and those that were named, also for their errors.
 pub(crate) fn lost_and_named(run: &AirspaceRun) -> (Pairs, Pairs) {
-    let ledger = &run.collector().counters;
-    let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
-    let errs = |id: &u32| ledger.beyond_bound.contains_key(id);
-    let named = ledger.too_close.keys().copied();
-    let beyond = ledger.pairs.keys().copied().filter(|(a, b)| errs(a) || errs(b));
+    let counters = &run.collector().counters;
+    let lost = counters.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
+    let errs = |id: &u32| counters.beyond_bound.contains_key(id);
+    let named = counters.too_close.keys().copied();
+    let beyond = counters.pairs.keys().copied().filter(|(a, b)| errs(a) || errs(b));
     (lost.collect(), named.chain(beyond).collect())
 }
 
@@ -105,7 +105,7 @@ fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCase
     // Losses among intruders do not count.
     let is_flown = |id: u32| {
         let airplane = &run.world().airplanes[id as usize];
-        airplane.track.is_none() && !airplane.is_intruder
+        airplane.track.is_none() && !airplane.is_non_cooperative
     };
     lost.retain(|&(a, b)| is_flown(a) || is_flown(b));
     prop_assert!(lost.is_subset(&named), "{lost:?} but only {named:?} were named\n{airplanes}");
@@ -169,9 +169,11 @@ fn gusts_against_which_no_orbit_can_be_held_are_refused() {
                 [airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
     let error = airspace_run(&Source::new("g", text, ""), 1).expect_err("refused").to_string();
     assert!(error.contains("15.00 deg per dt_s") && error.contains("error_sigmas"), "{error}");
-    let talks = format!("{text}[airspace.network]\n").replace("3.0", "0.5");
-    let talks = talks.replace("[airspace]\n", "[airspace]\ndeployment = \"team\"\n");
-    let error = airspace_run(&Source::new("g", talks, ""), 1).expect_err("refused").to_string();
+    let conversations = format!("{text}[airspace.network]\n").replace("3.0", "0.5");
+    let conversations =
+        conversations.replace("[airspace]\n", "[airspace]\ndeployment = \"team\"\n");
+    let error =
+        airspace_run(&Source::new("g", conversations, ""), 1).expect_err("refused").to_string();
     assert!(error.contains("which orbit another one holds"), "{error}");
 }
 
@@ -247,7 +249,7 @@ fn every_deployment_minds_intruders_alike() {
 }
 
 /// Some recorded and silent airplanes that cross the traffic, with kinks and climbs.
-fn intruders() -> impl Strategy<Value = String> {
+fn non_cooperative() -> impl Strategy<Value = String> {
     let coordinate = || -7000.0f64..7000.0;
     let one = ([coordinate(), coordinate(), coordinate(), coordinate()], 20.0f64..90.0, 0u8..3);
     let one = one.prop_map(|([x, y, to_x, to_y], v_m_s, kind)| match kind {
@@ -263,16 +265,16 @@ proptest! {
 
     #[test]
     fn only_pairs_that_are_named_lose_separation_from_intruders(
-        airplanes in crowd(), intruders in intruders(),
+        airplanes in crowd(), non_cooperative in non_cooperative(),
         method in prop::sample::select(vec!["none", "mvp"]),
         noise in prop::sample::select(vec!["", "position_noise_m = 10.0"]),
         until_s in prop::sample::select(vec!["inf", "150.0"]),
     ) {
         let mut airspace = format!("method = \"{method}\"\n{noise}\n");
-        if intruders.contains("track = ") {
+        if non_cooperative.contains("track = ") {
             airspace += &format!("replay_until_s = {until_s}\n");
         }
-        only_named_pairs_lose(&airspace, &format!("{airplanes}{intruders}"))?;
+        only_named_pairs_lose(&airspace, &format!("{airplanes}{non_cooperative}"))?;
     }
 
     #[test]
@@ -310,10 +312,10 @@ proptest! {
     #[test]
     #[ignore = "ten thousand runs: minutes"]
     fn no_pair_that_is_not_named_loses_separation_with_errors_and_intruders_in_ten_thousand_runs(
-        airplanes in crowd(), intruders in intruders(),
+        airplanes in crowd(), non_cooperative in non_cooperative(),
         sigma_m in 0.0f64..20.0, sigma_deg in 0.0f64..1.0,
     ) {
-        let airplanes = format!("{airplanes}{intruders}");
+        let airplanes = format!("{airplanes}{non_cooperative}");
         only_named_pairs_lose(&erring(sigma_m, sigma_deg, ""), &airplanes)?;
     }
 }

@@ -3,13 +3,13 @@
 //! It stands between any method and the airplanes. Every airplane stores a *fallback* that it can
 //! fly forever: an orbit to the left or to the right.
 //!
-//! **Invariant.** The stored fallbacks of any two airplanes that are not *named* as a pair are at
+//! **Invariant.** The stored fallbacks of any two airplanes that are not *exempt* as a pair are at
 //! least `R` apart, from now on and for all time, unless the two are on levels that do not meet.
 //!
-//! Each `dt` every airplane is given a *plan*: some way for `dt`, and then an orbit from where that
-//! ends. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits forever
-//! after it, or when the pair need not be kept apart: it is named, or the levels that the two keep
-//! or pass do not meet. [`filter`] hands out plans that are pairwise compatible:
+//! Each `dt` every airplane is given a *plan*: some turn rates for `dt`, and then an orbit from where those
+//! end. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits forever
+//! after it, or when the pair need not be kept apart: it is exempt, or the levels that the two keep
+//! or pass do not meet. [`filter`] assigns plans that are pairwise compatible:
 //!
 //! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and forever after is a plan for
 //!    each, and these plans are pairwise compatible: they are the motions of which the invariant
@@ -27,23 +27,23 @@
 //!    compatible, so no two came nearer than `R` during `dt`, and the stored orbits keep the
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
-//!    orbits that are apart: one of the two comes in, and chooses an orbit apart from the other's,
-//!    or else the pair is named (`entry_fallbacks`); one is ordered to a level or a speed, which is carried out only
-//!    with an orbit apart from those of all that it then minds, regardless of the other pairs that are named
-//!    (`side_apart`); or the name of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
+//!    orbits that are apart: one of the two enters, and chooses an orbit apart from the other's,
+//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a level or a speed, which is executed only
+//!    with an orbit apart from those of all that it then has to avoid, regardless of other exempt pairs
+//!    (`safe_side`); or the exemption of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
 //!    airplane that leaves the world keeps every other pair as it was.
 //!
-//! By induction over `dt` no pair that is not named ever loses separation. A wind that all know
-//! moves all alike and changes no distance. `errors.rs` has the margin that errors of place and
-//! heading add to `R`, and `avoid.rs` the promise beside airplanes that mind no other. Each step is
-//! a property test in `tests.rs`, the whole one in `promise.rs`.
+//! By induction over `dt` no pair that is not exempt ever loses separation. A wind that all know
+//! moves all alike and changes no distance. `errors.rs` has the margin that errors of position and
+//! heading add to `R`, and `avoid.rs` the guarantee beside non-cooperative aircraft. Each step is
+//! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`.
 //!
 //! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_rates`).
 //! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs
-//! little (`price.rs`).
+//! little (`delay_tests.rs`).
 //!
 //! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
-//! more than `R` (by `SLACK_M`), so that rounding never adds up to a loss.
+//! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
 
 #[cfg(test)]
 mod delay_tests;

@@ -1,6 +1,6 @@
 //! Orbits, which are the shield's fallbacks, and a test of whether motions stay apart.
 //!
-//! Ways are compared with a safe bound on how fast two airplanes can close in, halving intervals
+//! Paths are compared with a safe bound on how fast two airplanes can close in, halving intervals
 //! until the bound decides ([`stays_apart_for`]); orbits of one turn rate have a closed form, of
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
@@ -12,8 +12,8 @@ use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
 const MIN_INTERVAL_S: f64 = 1e-4;
-/// The same as a part of the whole interval, so that slow orbits, with periods of days, take no
-/// longer to compare: the number of distances looked at is at most twice its inverse.
+/// The same as a fraction of the whole interval, so that slow orbits, with periods of days, take no
+/// longer to compare: the number of distances computed is at most twice its inverse.
 const MIN_INTERVAL_FRACTION: f64 = 1e-6;
 
 /// The direction of an orbit.
@@ -70,20 +70,20 @@ impl Orbit {
     pub(crate) fn from_pose(pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Self {
         let radius_m = v_m_s / omega_rad_s.abs();
         // The center is at a right angle to the heading, on the side of the turn.
-        let to_center = pose.heading_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
+        let to_center_rad = pose.heading_rad + omega_rad_s.signum() * std::f64::consts::FRAC_PI_2;
         let center = [
-            pose.at[0] + radius_m * math::cos(to_center),
-            pose.at[1] + radius_m * math::sin(to_center),
+            pose.at[0] + radius_m * math::cos(to_center_rad),
+            pose.at[1] + radius_m * math::sin(to_center_rad),
         ];
-        Self { center, radius_m, omega_rad_s, phase_rad: to_center + std::f64::consts::PI }
+        Self { center, radius_m, omega_rad_s, phase_rad: to_center_rad + std::f64::consts::PI }
     }
 
-    /// Returns the airplane's place on it.
+    /// Returns the airplane's position on it.
     pub(crate) fn at(&self, t_s: f64) -> Point {
-        let angle = self.phase_rad + self.omega_rad_s * t_s;
+        let angle_rad = self.phase_rad + self.omega_rad_s * t_s;
         [
-            self.center[0] + self.radius_m * math::cos(angle),
-            self.center[1] + self.radius_m * math::sin(angle),
+            self.center[0] + self.radius_m * math::cos(angle_rad),
+            self.center[1] + self.radius_m * math::sin(angle_rad),
         ]
     }
 
@@ -92,9 +92,9 @@ impl Orbit {
         self.center
     }
 
-    /// Returns whether all of it is at least `apart_m` from a point, which is not inside of it.
-    pub(crate) fn is_outside(&self, point: Point, apart_m: f64) -> bool {
-        distance_m(self.center, point) >= self.radius_m + apart_m
+    /// Returns whether all of it is at least `gap_m` from a point, which is not inside of it.
+    pub(crate) fn is_outside(&self, point: Point, gap_m: f64) -> bool {
+        distance_m(self.center, point) >= self.radius_m + gap_m
     }
 
     fn speed_m_s(&self) -> f64 {
@@ -103,29 +103,35 @@ impl Orbit {
 
     /// Returns whether two orbits stay `gap_m` meters apart for all time.
     pub(crate) fn stays_apart(&self, other: &Self, gap_m: f64) -> bool {
-        let between = distance_m(self.center, other.center);
-        let (ra, rb) = (self.radius_m, other.radius_m);
+        let between_m = distance_m(self.center, other.center);
+        let ra = self.radius_m;
+        let rb = other.radius_m;
         // Apart as whole circles: side by side, or one inside the other.
-        if between - ra - rb >= gap_m || (ra - rb).abs() - between >= gap_m {
+        if between_m - ra - rb >= gap_m || (ra - rb).abs() - between_m >= gap_m {
             return true;
         }
-        let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs();
-        if same(self.omega_rad_s, other.omega_rad_s) {
+        if is_same_rate(self.omega_rad_s, other.omega_rad_s) {
             // The offset within the circles is a vector of constant length that rotates.
-            let offset = math::hypot(
+            let offset_m = math::hypot(
                 ra * math::cos(self.phase_rad) - rb * math::cos(other.phase_rad),
                 ra * math::sin(self.phase_rad) - rb * math::sin(other.phase_rad),
             );
-            return (between - offset).abs() >= gap_m;
+            return (between_m - offset_m).abs() >= gap_m;
         }
-        if same(self.omega_rad_s, -other.omega_rad_s) {
+        if is_same_rate(self.omega_rad_s, -other.omega_rad_s) {
             let period_s = std::f64::consts::TAU / self.omega_rad_s.abs();
             let closing_m_s = self.speed_m_s() + other.speed_m_s();
-            let apart = |t_s: f64| distance_m(self.at(t_s), other.at(t_s));
-            return stays_apart_for(&apart, period_s, closing_m_s, gap_m);
+            let apart_m = |t_s: f64| distance_m(self.at(t_s), other.at(t_s));
+            return stays_apart_for(&apart_m, period_s, closing_m_s, gap_m);
         }
+        // Orbits of two rates sooner or later come as near as their circles do.
         false
     }
+}
+
+/// Returns whether two turn rates are the same except for rounding.
+fn is_same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-12 * a.abs()
 }
 
 /// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
@@ -136,10 +142,11 @@ pub(crate) fn stays_apart_for(
     closing_m_s: f64,
     gap_m: f64,
 ) -> bool {
-    let finest_s = MIN_INTERVAL_S.max(MIN_INTERVAL_FRACTION * seconds);
-    let halving = Bisection { distance_m, closing_m_s, finest_s, gap_m };
-    let (from, to) = (halving.sample(0.0), halving.sample(seconds));
-    from.far_m >= gap_m && to.far_m >= gap_m && halving.stays_apart(from, to)
+    let min_interval_s = MIN_INTERVAL_S.max(MIN_INTERVAL_FRACTION * seconds);
+    let bisection = Bisection { distance_m, closing_m_s, min_interval_s, gap_m };
+    let from = bisection.sample(0.0);
+    let to = bisection.sample(seconds);
+    from.distance_m >= gap_m && to.distance_m >= gap_m && bisection.stays_apart(from, to)
 }
 
 /// A search for a moment at which a distance is less than `gap_m`.
@@ -147,7 +154,7 @@ struct Bisection<'a, F> {
     distance_m: &'a F,
     closing_m_s: f64,
     /// Length in seconds below which an interval is no longer halved.
-    finest_s: f64,
+    min_interval_s: f64,
     gap_m: f64,
 }
 
@@ -155,27 +162,29 @@ struct Bisection<'a, F> {
 #[derive(Clone, Copy)]
 struct DistanceSample {
     t_s: f64,
-    far_m: f64,
+    distance_m: f64,
 }
 
 impl<F: Fn(f64) -> f64> Bisection<'_, F> {
     fn sample(&self, t_s: f64) -> DistanceSample {
-        DistanceSample { t_s, far_m: (self.distance_m)(t_s) }
+        DistanceSample { t_s, distance_m: (self.distance_m)(t_s) }
     }
 
-    /// Returns whether the distance is large enough between two looks, at which it is.
+    /// Returns whether the distance is large enough between two samples, at which it is.
     fn stays_apart(&self, from: DistanceSample, to: DistanceSample) -> bool {
-        let long_s = to.t_s - from.t_s;
-        // The smallest distance possible between the two ends.
-        let nearest = 0.5 * (from.far_m + to.far_m - self.closing_m_s * long_s);
-        if nearest >= self.gap_m {
+        let duration_s = to.t_s - from.t_s;
+        // The smallest distance possible between the two: closing in all the time, and then drawing away.
+        let min_m = 0.5 * (from.distance_m + to.distance_m - self.closing_m_s * duration_s);
+        if min_m >= self.gap_m {
             return true;
         }
-        if long_s < self.finest_s {
+        if duration_s < self.min_interval_s {
             return false;
         }
         let middle = self.sample(0.5 * (from.t_s + to.t_s));
-        middle.far_m >= self.gap_m && self.stays_apart(from, middle) && self.stays_apart(middle, to)
+        middle.distance_m >= self.gap_m
+            && self.stays_apart(from, middle)
+            && self.stays_apart(middle, to)
     }
 }
 

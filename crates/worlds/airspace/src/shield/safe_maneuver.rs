@@ -1,8 +1,8 @@
-//! Plans: a way for one `dt`, and then an orbit forever.
+//! Plans: turn rates for one `dt`, and then an orbit forever.
 
 use super::orbit::{Orbit, Side, stays_apart_for};
 use super::shielded_aircraft::ShieldedAircraft;
-use crate::flight::{Pose2, distance_m};
+use crate::flight::{Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
 
@@ -13,7 +13,7 @@ pub struct TurnProfile {
     pub omegas_rad_s: Vec<f64>,
 }
 
-/// A way, and an orbit on which the airplane waits after that.
+/// The motion of one `dt`, and an orbit on which the airplane waits after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SafeManeuver {
     aircraft: ShieldedAircraft,
@@ -28,21 +28,31 @@ pub(crate) struct SafeManeuver {
 }
 
 impl SafeManeuver {
-    /// Returns a plan: a way, and then an orbit to a side.
-    pub(crate) fn new(flyer: ShieldedAircraft, way: &TurnProfile, dtau_s: f64, side: Side) -> Self {
-        Self::from_candidate(flyer, way, dtau_s, None, side)
+    /// Returns a plan: a turn profile, and then an orbit to a side.
+    pub(crate) fn new(
+        aircraft: ShieldedAircraft,
+        profile: &TurnProfile,
+        dtau_s: f64,
+        side: Side,
+    ) -> Self {
+        Self::from_candidate(aircraft, profile, dtau_s, None, side)
     }
 
     /// Returns the same for a candidate, by its number.
     pub(super) fn from_candidate(
-        flyer: ShieldedAircraft,
-        way: &TurnProfile,
+        aircraft: ShieldedAircraft,
+        profile: &TurnProfile,
         dtau_s: f64,
         candidate: Option<usize>,
         side: Side,
     ) -> Self {
-        let flown =
-            Self::from_turn_rates(flyer.pose, flyer, way.omegas_rad_s.clone(), dtau_s, side);
+        let flown = Self::from_turn_rates(
+            aircraft.pose,
+            aircraft,
+            profile.omegas_rad_s.clone(),
+            dtau_s,
+            side,
+        );
         Self { candidate, ..flown }
     }
 
@@ -55,7 +65,7 @@ impl SafeManeuver {
 
     fn from_turn_rates(
         start: Pose2,
-        flyer: ShieldedAircraft,
+        aircraft: ShieldedAircraft,
         omegas_rad_s: Vec<f64>,
         dtau_s: f64,
         side: Side,
@@ -63,18 +73,18 @@ impl SafeManeuver {
         let mut poses = vec![start];
         for &omega in &omegas_rad_s {
             let last = poses[poses.len() - 1];
-            poses.push(last.step(flyer.v_m_s, omega, dtau_s));
+            poses.push(last.step(aircraft.v_m_s, omega, dtau_s));
         }
         let end = poses[poses.len() - 1];
-        let orbit = Orbit::from_pose(end, flyer.v_m_s, side.sign() * flyer.orbit_rad_s);
-        Self { aircraft: flyer, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
+        let orbit = Orbit::from_pose(end, aircraft.v_m_s, side.sign() * aircraft.orbit_rad_s);
+        Self { aircraft, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
     }
 
     /// Returns the stored fallback as a plan, for some steps and forever after them.
-    pub(crate) fn fallback(flyer: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
-        let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
-        let side = flyer.fallback;
-        Self::from_turn_rates(flyer.orbit_pose, flyer, vec![omega; steps], dtau_s, side)
+    pub(crate) fn fallback(aircraft: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
+        let omega = aircraft.fallback.sign() * aircraft.orbit_rad_s;
+        let side = aircraft.fallback;
+        Self::from_turn_rates(aircraft.orbit_pose, aircraft, vec![omega; steps], dtau_s, side)
     }
 
     /// Returns the pose at the end of `dt`.
@@ -89,10 +99,9 @@ impl SafeManeuver {
 
     /// Returns whether two plans stay apart during `dt` and on the orbits forever after it.
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
-        if !self.aircraft.is_protected_from(&other.aircraft) {
-            return true;
-        }
-        if !self.aircraft.is_in_reach(&other.aircraft, self.dtau_s * self.omegas_rad_s.len() as f64)
+        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
+        if !self.aircraft.is_protected_from(&other.aircraft)
+            || !self.aircraft.is_in_reach(&other.aircraft, dt_s)
         {
             return true;
         }
@@ -104,12 +113,16 @@ impl SafeManeuver {
     fn profiles_stay_apart(&self, other: &Self, gap_m: f64) -> bool {
         let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s;
         (0..self.omegas_rad_s.len()).all(|k| {
-            let at = |plan: &Self, t_s: f64| {
-                plan.poses[k].step(plan.aircraft.v_m_s, plan.omegas_rad_s[k], t_s).at
+            let apart_m = |t_s: f64| {
+                distance_m(self.position_in_step(k, t_s), other.position_in_step(k, t_s))
             };
-            let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
-            stays_apart_for(&apart, self.dtau_s, closing_m_s, gap_m)
+            stays_apart_for(&apart_m, self.dtau_s, closing_m_s, gap_m)
         })
+    }
+
+    /// Returns its position some seconds after the start of a step.
+    fn position_in_step(&self, step: usize, t_s: f64) -> Point {
+        self.poses[step].step(self.aircraft.v_m_s, self.omegas_rad_s[step], t_s).at
     }
 
     /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
@@ -117,12 +130,12 @@ impl SafeManeuver {
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
         let (centers, radius_m) = other.reach(dt_s);
-        let apart_m = radius_m + self.aircraft.gap_m(other);
+        let gap_m = radius_m + self.aircraft.gap_m(other);
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
         centers.iter().all(|&center| {
-            let is_far = |pose: &Pose2| distance_m(pose.at, center) >= apart_m + half_step_m;
-            self.poses.iter().all(is_far) && self.orbit.is_outside(center, apart_m)
+            self.poses.iter().all(|pose| distance_m(pose.at, center) >= gap_m + half_step_m)
+                && self.orbit.is_outside(center, gap_m)
         })
     }
 

@@ -25,16 +25,16 @@ pub enum PlanCertainty {
 }
 
 /// Decides for airplanes with stored fallbacks that are pairwise apart. `candidates[i]` are the
-/// ways that airplane `i` may fly, the wanted one first, each of `steps` steps of `dtau_s` seconds;
+/// turn profiles that airplane `i` may fly, the preferred one first, each of `steps` steps of `dtau_s` seconds;
 /// without any it stays on its fallback.
 pub fn filter(
-    flyers: &[ShieldedAircraft],
+    group: &[ShieldedAircraft],
     candidates: &[Vec<TurnProfile>],
     steps: usize,
     dtau_s: f64,
     certainty: PlanCertainty,
 ) -> Vec<ShieldDecision> {
-    let mut search = Search::new(flyers, candidates, steps, dtau_s, certainty);
+    let mut search = Search::new(group, candidates, steps, dtau_s, certainty);
     search.resolve_conflicts();
     search.retry_fallbacks();
     search
@@ -45,7 +45,7 @@ pub fn filter(
 }
 
 struct Search<'a> {
-    flyers: &'a [ShieldedAircraft],
+    group: &'a [ShieldedAircraft],
     candidates: &'a [Vec<TurnProfile>],
     dtau_s: f64,
     certainty: PlanCertainty,
@@ -57,33 +57,27 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(
-        flyers: &'a [ShieldedAircraft],
+        group: &'a [ShieldedAircraft],
         candidates: &'a [Vec<TurnProfile>],
         steps: usize,
         dtau_s: f64,
         certainty: PlanCertainty,
     ) -> Self {
-        let fallbacks: Vec<SafeManeuver> = flyers
+        let fallbacks: Vec<SafeManeuver> = group
             .iter()
-            .map(|flyer| SafeManeuver::fallback(flyer.clone(), steps, dtau_s))
+            .map(|aircraft| SafeManeuver::fallback(aircraft.clone(), steps, dtau_s))
             .collect();
-        let first =
-            |((flyer, ways), fallback): ((&ShieldedAircraft, &Vec<TurnProfile>), &SafeManeuver)| {
-                match ways.first() {
-                    Some(way) => SafeManeuver::from_candidate(
-                        flyer.clone(),
-                        way,
-                        dtau_s,
-                        Some(0),
-                        flyer.fallback,
-                    ),
-                    None => fallback.clone(),
-                }
-            };
-        let plans = flyers.iter().zip(candidates).zip(&fallbacks).map(first).collect();
-        let mut by_rank: Vec<usize> = (0..flyers.len()).collect();
-        by_rank.sort_unstable_by_key(|&i| flyers[i].rank);
-        Self { flyers, candidates, dtau_s, certainty, plans, fallbacks, by_rank }
+        let mut plans = fallbacks.clone();
+        for ((aircraft, profiles), plan) in group.iter().zip(candidates).zip(&mut plans) {
+            if let Some(first) = profiles.first() {
+                let side = aircraft.fallback;
+                *plan =
+                    SafeManeuver::from_candidate(aircraft.clone(), first, dtau_s, Some(0), side);
+            }
+        }
+        let mut by_rank: Vec<usize> = (0..group.len()).collect();
+        by_rank.sort_unstable_by_key(|&i| group[i].rank);
+        Self { group, candidates, dtau_s, certainty, plans, fallbacks, by_rank }
     }
 
     /// Returns whether a plan of airplane `i` is compatible with everything that `j` may fly.
@@ -111,8 +105,10 @@ impl<'a> Search<'a> {
         while let Some(loser) = self.lowest_rank(&pairs) {
             let other = self.alternative_plan(loser);
             let present = self.plans[loser].candidate;
-            let keeps_way = other.as_ref().is_some_and(|plan| plan.candidate == present);
-            if !keeps_way && let Some(turned) = self.turn_jointly(loser, &pairs) {
+            // Another side of its candidate costs nothing. Before it takes another candidate, which costs delay, it
+            // and those with which it is not compatible try to turn to one side together.
+            let keeps_candidate = other.as_ref().is_some_and(|plan| plan.candidate == present);
+            if !keeps_candidate && let Some(turned) = self.turn_jointly(loser, &pairs) {
                 pairs.retain(|&(i, j)| i != loser && j != loser);
                 turned.into_iter().for_each(|(k, plan)| self.plans[k] = plan);
                 continue;
@@ -125,16 +121,19 @@ impl<'a> Search<'a> {
 
     /// Returns the airplane of lowest rank that has to give way in some pair.
     fn lowest_rank(&self, pairs: &[(usize, usize)]) -> Option<usize> {
-        let gives_way = |i: usize| {
-            !self.plans[i].is_fallback()
-                && pairs.iter().any(|&(a, b)| {
-                    let other = if a == i { b } else { a };
-                    (a == i || b == i)
-                        && (self.plans[other].is_fallback()
-                            || self.flyers[other].rank > self.flyers[i].rank)
-                })
+        self.by_rank.iter().copied().find(|&i| self.has_to_give_way(i, pairs))
+    }
+
+    /// Returns whether an airplane has to give way in some pair: to one of a higher rank, or to one on its fallback,
+    /// which never leaves it.
+    fn has_to_give_way(&self, i: usize, pairs: &[(usize, usize)]) -> bool {
+        let gives_way_to = |other: usize| {
+            self.plans[other].is_fallback() || self.group[other].rank > self.group[i].rank
         };
-        self.by_rank.iter().copied().find(|&i| gives_way(i))
+        !self.plans[i].is_fallback()
+            && pairs
+                .iter()
+                .any(|&(a, b)| (a == i && gives_way_to(b)) || (b == i && gives_way_to(a)))
     }
 
     /// Returns the present plans of an airplane and of all with which it is not compatible, with
@@ -152,20 +151,22 @@ impl<'a> Search<'a> {
         if all.iter().any(|&k| self.plans[k].is_fallback()) {
             return None;
         }
-        Side::BOTH.into_iter().find_map(|side| {
+        for side in Side::BOTH {
             let turned: BTreeMap<usize, SafeManeuver> =
                 all.iter().map(|&k| (k, self.plans[k].with_side(side))).collect();
-            let fits = |(&k, plan): (&usize, &SafeManeuver)| {
-                (0..self.plans.len()).filter(|&j| j != k).all(|j| {
-                    self.is_compatible_with_plan(
-                        k,
-                        plan,
-                        j,
-                        turned.get(&j).unwrap_or(&self.plans[j]),
-                    )
-                })
-            };
-            turned.iter().all(fits).then_some(turned)
+            if turned.keys().all(|&k| self.is_compatible_when_turned(k, &turned)) {
+                return Some(turned);
+            }
+        }
+        None
+    }
+
+    /// Returns whether the plan of an airplane among some that have turned is compatible with theirs and all others.
+    fn is_compatible_when_turned(&self, k: usize, turned: &BTreeMap<usize, SafeManeuver>) -> bool {
+        let mut others = (0..self.plans.len()).filter(|&j| j != k);
+        others.all(|j| {
+            let other = turned.get(&j).unwrap_or(&self.plans[j]);
+            self.is_compatible_with_plan(k, &turned[&k], j, other)
         })
     }
 
@@ -182,36 +183,40 @@ impl<'a> Search<'a> {
 
     /// Returns the first plan of an airplane that is compatible with all present ones.
     fn alternative_plan(&self, i: usize) -> Option<SafeManeuver> {
-        let others: Vec<usize> = (0..self.plans.len()).filter(|&j| j != i).collect();
-        let fits = |plan: &SafeManeuver| others.iter().all(|&j| self.is_compatible(i, plan, j));
-        self.candidates[i].iter().enumerate().find_map(|(k, way)| {
-            Side::BOTH
-                .into_iter()
-                .map(|side| {
-                    SafeManeuver::from_candidate(
-                        self.flyers[i].clone(),
-                        way,
-                        self.dtau_s,
-                        Some(k),
-                        side,
-                    )
-                })
-                .find(|plan| fits(plan))
-        })
+        let aircraft = &self.group[i];
+        for (k, profile) in self.candidates[i].iter().enumerate() {
+            for side in Side::BOTH {
+                let plan = SafeManeuver::from_candidate(
+                    aircraft.clone(),
+                    profile,
+                    self.dtau_s,
+                    Some(k),
+                    side,
+                );
+                if self.is_compatible_with_all(i, &plan) {
+                    return Some(plan);
+                }
+            }
+        }
+        None
+    }
+
+    fn is_compatible_with_all(&self, i: usize, plan: &SafeManeuver) -> bool {
+        (0..self.plans.len()).filter(|&j| j != i).all(|j| self.is_compatible(i, plan, j))
     }
 
     /// Lets those that have fallen back try once more, by falling rank, as long as that helps any.
     fn retry_fallbacks(&mut self) {
-        let mut helped = true;
-        while helped {
-            helped = false;
+        let mut has_changed = true;
+        while has_changed {
+            has_changed = false;
             for k in (0..self.by_rank.len()).rev() {
                 let i = self.by_rank[k];
                 if self.plans[i].is_fallback()
                     && let Some(plan) = self.alternative_plan(i)
                 {
                     self.plans[i] = plan;
-                    helped = true;
+                    has_changed = true;
                 }
             }
         }

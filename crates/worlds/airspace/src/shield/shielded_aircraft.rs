@@ -5,11 +5,10 @@ use crate::flight::{Levels, Point, Pose2, distance_m};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// Meters that new plans keep in addition to the separation.
+/// Meters that new plans keep in addition to the separation, so that rounding never adds up to a loss.
 pub(super) const MARGIN_M: f64 = 0.01;
 
-/// The others with which an airplane is named, by rising id: pairs for which the shield promises
-/// nothing.
+/// Aircraft, by ascending id, with which the shield does not guarantee separation.
 pub(crate) type ExemptIds = Arc<[EntityId]>;
 
 /// An airplane as the shield knows it.
@@ -24,7 +23,7 @@ pub struct ShieldedAircraft {
     pub orbit_pose: Pose2,
     /// Airspeed in meters per second.
     pub v_m_s: f64,
-    /// Largest turn rate of its ways in radians per second.
+    /// Largest turn rate of its plans in radians per second.
     pub omega_max_rad_s: f64,
     /// Turn rate of its orbits in radians per second, at most the largest one.
     pub orbit_rad_s: f64,
@@ -34,19 +33,19 @@ pub struct ShieldedAircraft {
     pub error_m: f64,
     /// The levels it keeps or passes in the next `dt`.
     pub levels: Levels,
-    /// Height in meters above which airplanes need not mind each other.
+    /// Difference of altitude in meters from which on airplanes need not avoid each other.
     pub vertical_m: f64,
     /// Its stored fallback.
     pub fallback: Side,
-    /// The others with which it came in too close: with each of them it is left to the method
-    /// until their fallbacks are apart.
+    /// The others with which it entered too close: with each of them it is left to the method until their fallbacks
+    /// are apart.
     pub exempt: Arc<[EntityId]>,
-    /// Rank, unique; airplanes of higher rank keep their wishes.
+    /// Rank, unique; airplanes of higher rank keep their preferred plans.
     pub rank: u64,
 }
 
 impl ShieldedAircraft {
-    /// Returns whether two airplanes are named as a pair. They are left to the method, because
+    /// Returns whether two airplanes are an exempt pair. They are left to the method, because
     /// falling back would bring these two together. For all other pairs the invariant holds, also
     /// for those that one of the two forms with others.
     pub(super) fn is_exempt_with(&self, other: &Self) -> bool {
@@ -54,10 +53,15 @@ impl ShieldedAircraft {
     }
 
     /// Returns whether two airplanes are on levels that do not meet, or have fallbacks that stay
-    /// apart: the pair no longer needs a name.
+    /// apart: the pair need no longer be exempt.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
-        let fallback = |flyer: &Self| flyer.orbit(flyer.fallback);
-        !self.is_on_level(other) || fallback(self).stays_apart(&fallback(other), self.gap_m(other))
+        !self.is_on_level(other)
+            || self.fallback_orbit().stays_apart(&other.fallback_orbit(), self.gap_m(other))
+    }
+
+    /// Returns the orbit of its stored fallback.
+    pub(super) fn fallback_orbit(&self) -> Orbit {
+        self.orbit(self.fallback)
     }
 
     /// Returns the orbit to a side that it holds, or that it enters where it is.
@@ -71,15 +75,19 @@ impl ShieldedAircraft {
         self.separation_m.max(other.separation_m) + self.error_m + other.error_m + MARGIN_M
     }
 
-    /// Returns whether some ways of `dt_s` seconds, and orbits after them, could bring two airplanes
+    /// Returns whether some plans of `dt_s` seconds, and orbits after them, could bring two airplanes
     /// too near each other.
     pub(super) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
-        let reach_m = |f: &Self| f.v_m_s * dt_s + 2.0 * (f.v_m_s / f.orbit_rad_s);
         let apart_m = distance_m(self.pose.at, other.pose.at);
-        apart_m < self.gap_m(other) + reach_m(self) + reach_m(other)
+        apart_m < self.gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s)
     }
 
-    /// Returns two discs that it cannot leave, whichever way it flies for `dt_s` seconds and to
+    /// Returns how far it can get from where it is in `dt_s` seconds and on an orbit after them, in meters.
+    fn reach_m(&self, dt_s: f64) -> f64 {
+        self.v_m_s * dt_s + 2.0 * (self.v_m_s / self.orbit_rad_s)
+    }
+
+    /// Returns two discs that it cannot leave, however it flies for `dt_s` seconds and to
     /// whichever side it turns forever after that: their centers, and their radius in meters.
     ///
     /// At any time it is on the circle to its left that it would fly from there, whose center is at
@@ -92,7 +100,8 @@ impl ShieldedAircraft {
         let orbit =
             |side: Side| Orbit::from_pose(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
         let centers = Side::BOTH.map(|side| orbit(side).center());
-        let (turn_rad, radius_m) = (self.omega_max_rad_s * dt_s, orbit(Side::Left).radius_m);
+        let turn_rad = self.omega_max_rad_s * dt_s;
+        let radius_m = orbit(Side::Left).radius_m;
         let shift_m = 0.5 * self.v_m_s * dt_s * turn_rad;
         (centers, radius_m * (1.0 + turn_rad) + shift_m)
     }

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 const DTAU_S: f64 = 1.0;
 const STEPS: usize = 5;
 
-fn flyer(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
+fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
     let pose = Pose2 { at: [x, y], heading_rad };
     ShieldedAircraft {
         id: rank as u32,
@@ -32,37 +32,37 @@ fn some_flyers() -> impl Strategy<Value = Vec<ShieldedAircraft>> {
         .prop_map(|all| {
             let build = |(i, (x, y, psi, slow)): (usize, (f64, f64, f64, f64))| {
                 // Every other airplane has a speed and turn rate of its own.
-                let mut flyer = flyer(x, y, psi, (i * 7 % 11) as u64);
+                let mut aircraft = aircraft(x, y, psi, (i * 7 % 11) as u64);
                 if i % 3 == 2 {
-                    flyer.v_m_s *= slow;
-                    flyer.orbit_rad_s *= 1.0 + slow;
+                    aircraft.v_m_s *= slow;
+                    aircraft.orbit_rad_s *= 1.0 + slow;
                 }
-                flyer
+                aircraft
             };
             all.into_iter().enumerate().map(build).collect()
         })
 }
 
 /// Airplanes with fallbacks that are apart; those that clash are left out.
-fn with_fallbacks(mut flyers: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
+fn with_fallbacks(mut group: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
     loop {
-        let (sides, clashes) = first_fallbacks(&flyers);
+        let (sides, clashes) = first_fallbacks(&group);
         match clashes.first() {
-            Some(&(i, _)) => drop(flyers.remove(i)),
+            Some(&(i, _)) => drop(group.remove(i)),
             None => {
-                flyers.iter_mut().zip(sides).for_each(|(f, side)| f.fallback = side);
-                return flyers;
+                group.iter_mut().zip(sides).for_each(|(f, side)| f.fallback = side);
+                return group;
             }
         }
     }
 }
 
-fn orbit_of(flyer: &ShieldedAircraft) -> Orbit {
-    Orbit::from_pose(flyer.pose, flyer.v_m_s, flyer.fallback.sign() * flyer.orbit_rad_s)
+fn orbit_of(aircraft: &ShieldedAircraft) -> Orbit {
+    Orbit::from_pose(aircraft.pose, aircraft.v_m_s, aircraft.fallback.sign() * aircraft.orbit_rad_s)
 }
 
-fn nearest_on_orbits(flyers: &[ShieldedAircraft], seconds: usize) -> f64 {
-    let orbits: Vec<Orbit> = flyers.iter().map(orbit_of).collect();
+fn nearest_on_orbits(group: &[ShieldedAircraft], seconds: usize) -> f64 {
+    let orbits: Vec<Orbit> = group.iter().map(orbit_of).collect();
     let mut nearest = f64::INFINITY;
     for t in 0..seconds * 4 {
         for (i, a) in orbits.iter().enumerate() {
@@ -78,39 +78,39 @@ fn nearest_on_orbits(flyers: &[ShieldedAircraft], seconds: usize) -> f64 {
 proptest! {
     /// Step 1 of the proof: first fallbacks without clashes stay apart forever.
     #[test]
-    fn first_fallbacks_stay_apart(flyers in some_flyers()) {
-        let flyers = with_fallbacks(flyers);
-        prop_assert!(nearest_on_orbits(&flyers, 400) >= 500.0);
+    fn first_fallbacks_stay_apart(group in some_flyers()) {
+        let group = with_fallbacks(group);
+        prop_assert!(nearest_on_orbits(&group, 400) >= 500.0);
     }
 
     /// Steps 2 to 4: for any wishes, the motions flown keep apart, and the stored orbits keep the
     /// invariant. Mixable plans do in every mixture with fallbacks.
     #[test]
     fn a_filtered_step_keeps_separation_and_the_invariant(
-        flyers in some_flyers(),
+        group in some_flyers(),
         wishes in prop::collection::vec(prop::collection::vec(-1.0f64..1.0, 0..4), 9),
         follow in prop::collection::vec(any::<bool>(), 9),
         mixable in any::<bool>(),
     ) {
-        let flyers = with_fallbacks(flyers);
-        let candidates: Vec<Vec<TurnProfile>> = flyers.iter().zip(&wishes).map(|(f, wishes)| {
-            let way = |part: &f64| TurnProfile { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
-            wishes.iter().map(way).collect()
+        let group = with_fallbacks(group);
+        let candidates: Vec<Vec<TurnProfile>> = group.iter().zip(&wishes).map(|(f, wishes)| {
+            let profile = |part: &f64| TurnProfile { omegas_rad_s: vec![part * f.orbit_rad_s; STEPS] };
+            wishes.iter().map(profile).collect()
         }).collect();
         let certainty = if mixable { PlanCertainty::Mixable } else { PlanCertainty::Sure };
-        let mut decisions = filter(&flyers, &candidates, STEPS, DTAU_S, certainty);
+        let mut decisions = filter(&group, &candidates, STEPS, DTAU_S, certainty);
         if mixable {
-            for ((decision, follows), flyer) in decisions.iter_mut().zip(follow).zip(&flyers) {
+            for ((decision, follows), aircraft) in decisions.iter_mut().zip(follow).zip(&group) {
                 if !follows {
-                    *decision = ShieldDecision { candidate: None, fallback: flyer.fallback };
+                    *decision = ShieldDecision { candidate: None, fallback: aircraft.fallback };
                 }
             }
         }
         let omega = |i: usize, k: usize| match decisions[i].candidate {
             Some(c) => candidates[i][c].omegas_rad_s[k],
-            None => flyers[i].fallback.sign() * flyers[i].orbit_rad_s,
+            None => group[i].fallback.sign() * group[i].orbit_rad_s,
         };
-        let mut now = flyers.clone();
+        let mut now = group.clone();
         for k in 0..STEPS {
             for part in 1..=20 {
                 let t_s = DTAU_S * f64::from(part) / 20.0;
@@ -139,9 +139,9 @@ proptest! {
         part in -1.0f64..1.0, others in prop::collection::vec(-1.0f64..1.0, STEPS),
         slow in 0.5f64..1.0, left in any::<bool>(), own_left in any::<bool>(),
     ) {
-        let own = flyer(0.0, 0.0, 0.0, 0);
+        let own = aircraft(0.0, 0.0, 0.0, 0);
         let at = Pose2 { at: [0.0; 2], heading_rad: bearing }.step(x, 0.0, 1.0).at;
-        let other = ShieldedAircraft { orbit_rad_s: slow * own.omega_max_rad_s, ..flyer(at[0], at[1], psi, 1) };
+        let other = ShieldedAircraft { orbit_rad_s: slow * own.omega_max_rad_s, ..aircraft(at[0], at[1], psi, 1) };
         let plan = |of: &ShieldedAircraft, parts: &[f64], left: bool| {
             let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
             SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
@@ -155,10 +155,10 @@ proptest! {
     /// An airplane that is far from all others flies its wish.
     #[test]
     fn nobody_falls_back_without_need(x in 20_000.0f64..1e6, part in -1.0f64..1.0) {
-        let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
-        let way = || TurnProfile { omegas_rad_s: vec![part * flyers[0].orbit_rad_s; STEPS] };
-        let wishes = [vec![way()], vec![way()]];
-        let decisions = filter(&flyers, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+        let group = [aircraft(0.0, 0.0, 0.0, 0), aircraft(x, 0.0, 3.0, 1)];
+        let profile = || TurnProfile { omegas_rad_s: vec![part * group[0].orbit_rad_s; STEPS] };
+        let wishes = [vec![profile()], vec![profile()]];
+        let decisions = filter(&group, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }
 }
@@ -166,11 +166,11 @@ proptest! {
 #[test]
 fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
     // On its left the newcomer would orbit over the other, on its right it would not.
-    let stored = flyer(0.0, 2002.0, std::f64::consts::PI, 0);
-    let flyers = [stored.clone(), flyer(0.0, 0.0, 0.0, 1)];
-    let (sides, too_close) = entry_fallbacks(&flyers, |i| i == 1);
+    let stored = aircraft(0.0, 2002.0, std::f64::consts::PI, 0);
+    let group = [stored.clone(), aircraft(0.0, 0.0, 0.0, 1)];
+    let (sides, too_close) = entry_fallbacks(&group, |i| i == 1);
     assert_eq!((sides, too_close), (vec![Side::Left, Side::Right], vec![]));
-    let near = [stored.clone(), flyer(100.0, 2002.0, 0.0, 1), flyer(50.0, 2030.0, 0.0, 2)];
+    let near = [stored.clone(), aircraft(100.0, 2002.0, 0.0, 1), aircraft(50.0, 2030.0, 0.0, 2)];
     let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
     assert_eq!(sides[..2], [Side::Left; 2]);
     assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
@@ -180,7 +180,7 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
 fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     let close = |x: f64, rank: u64, named: u32| ShieldedAircraft {
         exempt: [named].into(),
-        ..flyer(x, 0.0, 0.0, rank)
+        ..aircraft(x, 0.0, 0.0, rank)
     };
     let straight = || vec![TurnProfile { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
@@ -201,8 +201,8 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
 #[test]
 fn a_change_is_refused_when_neither_orbit_is_apart() {
     let quick_turns = 6f64.to_radians();
-    let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..flyer(1500.0, -100.0, 0.0, 0) };
-    let slow = flyer(0.0, 0.0, 0.0, 1);
+    let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..aircraft(1500.0, -100.0, 0.0, 0) };
+    let slow = aircraft(0.0, 0.0, 0.0, 1);
     let beside = |changed: &ShieldedAircraft| safe_side(changed, [other.clone()].into_iter());
     let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
     assert_eq!((beside(&slow), beside(&fast)), (Some(Side::Left), None));
@@ -217,6 +217,7 @@ fn a_change_is_refused_when_neither_orbit_is_apart() {
 
 #[test]
 fn airplanes_that_start_too_close_are_named() {
-    let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(5e4, 0.0, 0.0, 1), flyer(100.0, 0.0, 0.0, 2)];
-    assert_eq!(first_fallbacks(&flyers).1, [(0, 2)]);
+    let group =
+        [aircraft(0.0, 0.0, 0.0, 0), aircraft(5e4, 0.0, 0.0, 1), aircraft(100.0, 0.0, 0.0, 2)];
+    assert_eq!(first_fallbacks(&group).1, [(0, 2)]);
 }

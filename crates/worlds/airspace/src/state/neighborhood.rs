@@ -8,7 +8,7 @@ const NO_SLOT: u32 = u32::MAX;
 
 /// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
 #[derive(Debug)]
-pub(in super::super) struct Neighborhood {
+pub(crate) struct Neighborhood {
     side_m: f64,
     /// Cycle (upper half) and last airplane listed (lower half) of each bucket.
     first: Box<[AtomicU64]>,
@@ -17,7 +17,7 @@ pub(in super::super) struct Neighborhood {
 }
 
 impl Neighborhood {
-    /// Returns lists for `n` airplanes that mind each other up to `side_m` meters away.
+    /// Returns lists for `n` airplanes that consider each other up to `side_m` meters away.
     pub(super) fn new(n: usize, side_m: f64) -> Self {
         let buckets = (2 * n).next_power_of_two();
         Self {
@@ -38,7 +38,7 @@ impl Neighborhood {
     }
 
     /// Lists an airplane for this cycle.
-    pub(in super::super) fn insert(&self, slot: Slot, at: Point, now: Cycle) {
+    pub(crate) fn insert(&self, slot: Slot, at: Point, now: Cycle) {
         let stamp = u64::from(now as u32) << 32;
         let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
         let listed = before >> 32 == stamp >> 32;
@@ -47,12 +47,7 @@ impl Neighborhood {
 
     /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
     /// possibly for others.
-    pub(in super::super) fn for_each_near(
-        &self,
-        at: Point,
-        now: Cycle,
-        mut meet: impl FnMut(Slot),
-    ) {
+    pub(crate) fn for_each_near(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
         let [x, y] = self.square(at);
         for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
             let first = self.bucket(square).load(Relaxed);

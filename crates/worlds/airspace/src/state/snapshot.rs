@@ -63,14 +63,14 @@ pub struct Snapshot {
     pub contacts: Vec<TrafficPicture>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
     pub resolving: Vec<ActiveResolutions>,
-    /// The pairs for which the shield promises nothing now, by ids.
-    pub named: Vec<(EntityId, EntityId)>,
+    /// The pairs whose separation the shield does not guarantee now, by ids.
+    pub exempt: Vec<(EntityId, EntityId)>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
-    pub held: Vec<Pose2>,
-    /// The wish that was ordered for each airplane; empty unless airplanes are decided from outside.
-    pub wishes: Vec<Option<ExternalAction>>,
-    /// Controls of airplanes for the next cycle, if pilots outside of the run have handed them over.
-    pub handed: Option<Vec<Control>>,
+    pub orbit_poses: Vec<Pose2>,
+    /// The action that a caller has ordered for each airplane; empty unless callers decide.
+    pub external_actions: Vec<Option<ExternalAction>>,
+    /// Controls of airplanes for the next cycle, if pilots outside of the run have submitted them.
+    pub controls: Option<Vec<Control>>,
 }
 
 impl Snapshot {
@@ -79,7 +79,9 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         hasher.write_u64(self.cycle);
         hasher.write_u64(self.airplanes.len() as u64);
-        self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
+        for pose in &self.orbit_poses {
+            hash_pose(&mut hasher, pose);
+        }
         for airplane in &self.airplanes {
             hash_pose(&mut hasher, &airplane.pose);
             hasher.write_u64(airplane.ended.to_bits());
@@ -93,7 +95,7 @@ impl Snapshot {
                 hasher.write_u32(u32::from(orders) << 16 | u32::from(waits));
             }
         }
-        for &(a, b) in &self.named {
+        for &(a, b) in &self.exempt {
             hasher.write_u32(a);
             hasher.write_u32(b);
         }
@@ -104,12 +106,12 @@ impl Snapshot {
             hash_data(&mut hasher, &self.resolving);
         }
         // Turn rates do not affect the future, unless a caller outside decides by them.
-        if !self.wishes.is_empty() {
+        if !self.external_actions.is_empty() {
             self.airplanes.iter().for_each(|a| hasher.write_u64(a.turn_rate_rad_s.to_bits()));
-            hash_data(&mut hasher, &self.wishes);
+            hash_data(&mut hasher, &self.external_actions);
         }
-        if let Some(handed) = &self.handed {
-            hash_data(&mut hasher, handed);
+        if let Some(controls) = &self.controls {
+            hash_data(&mut hasher, controls);
         }
         hasher.finish()
     }

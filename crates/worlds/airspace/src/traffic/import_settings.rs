@@ -19,7 +19,7 @@ pub(crate) struct ImportSettings {
     pub(crate) refused: Vec<InputError>,
 }
 
-/// Returns the rules of a file, which `place` names in errors; a decision is made every `dt_s`.
+/// Returns the rules of a file, which is `place` in errors; a decision is made every `dt_s`.
 pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportSettings {
     let mut rules = ImportSettings::default();
     let mut refuse = |command: &str, cause: String, remedy: &str| {
@@ -40,15 +40,19 @@ pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportS
         refuse("WIND", cause, "give one wind below the speed of all aircraft");
         None
     });
-    let given_s = file.commands.contains_key("DTLOOK").then_some(traffic.lookahead_s);
-    if let Some(s) = given_s.filter(|s| !(dt_s..=MAX_LOOK_AHEAD_S).contains(s)) {
+    let mut look_ahead_s = file.commands.contains_key("DTLOOK").then_some(traffic.lookahead_s);
+    if let Some(s) = look_ahead_s
+        && !(dt_s..=MAX_LOOK_AHEAD_S).contains(&s)
+    {
         let cause = format!("a look-ahead of {s} s");
         refuse("DTLOOK", cause, &format!("give {dt_s} to {MAX_LOOK_AHEAD_S} s"));
+        look_ahead_s = None;
     }
     let (method, is_bare) = resolution(traffic);
-    let given_s = given_s.filter(|s| (dt_s..=MAX_LOOK_AHEAD_S).contains(s));
-    let usual_s = (method == Some("mvp")).then(|| Traffic::default().lookahead_s);
-    ImportSettings { method, is_bare, look_ahead_s: given_s.or(usual_s), wind_m_s, ..rules }
+    if look_ahead_s.is_none() && method == Some("mvp") {
+        look_ahead_s = Some(Traffic::default().lookahead_s);
+    }
+    ImportSettings { method, is_bare, look_ahead_s, wind_m_s, ..rules }
 }
 
 /// Longest look-ahead of a scenario in seconds.
@@ -70,11 +74,15 @@ fn resolution(traffic: &Traffic) -> (Option<&'static str>, bool) {
 /// The cause, when winds differ from place to place, or no aircraft could fly against it.
 fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
     let Some(first) = traffic.wind.first() else { return Ok(None) };
-    let alike = |other: &Wind| (other.from_deg, other.speed_kt) == (first.from_deg, first.speed_kt);
-    if !traffic.wind.iter().all(alike) {
+    let is_uniform = traffic
+        .wind
+        .iter()
+        .all(|other: &Wind| other.from_deg == first.from_deg && other.speed_kt == first.speed_kt);
+    if !is_uniform {
         return Err(format!("{} winds that differ; none blows", traffic.wind.len()));
     }
-    let (from_rad, speed_m_s) = (first.from_deg.to_radians(), first.speed_kt * KNOT_M_S);
+    let from_rad = first.from_deg.to_radians();
+    let speed_m_s = first.speed_kt * KNOT_M_S;
     if let Some(slow) = traffic.aircraft.iter().find(|one| min_speed_m_s(one) <= speed_m_s) {
         return Err(format!("{speed_m_s:.1} m/s, and {} is slower; it does not blow", slow.id));
     }
@@ -82,7 +90,7 @@ fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
     Ok(Some([-speed_m_s * math::sin(from_rad), -speed_m_s * math::cos(from_rad)]))
 }
 
-/// Returns the least speed of an aircraft once it moves.
+/// Returns the smallest speed of an aircraft once it moves.
 fn min_speed_m_s(aircraft: &ScnAircraft) -> f64 {
     moving_aircraft(aircraft).map_or(f64::INFINITY, |one| one.min_speed_m_s())
 }
@@ -98,8 +106,8 @@ mod tests {
             .map(|line| format!("00:00:00.00>{line}\n"))
             .collect();
         let rules = import_settings("a.scn", &parse(&"a.scn", &text), 10.0);
-        let told = rules.refused.iter().map(ToString::to_string).collect();
-        (rules, told)
+        let refused = rules.refused.iter().map(ToString::to_string).collect();
+        (rules, refused)
     }
 
     #[test]
@@ -111,9 +119,9 @@ mod tests {
             ("ASAS ON\nRESO OFF", Some("none"), true),
             ("CDMETHOD STATEBASED\nRESO MVP", Some("mvp"), false),
         ] {
-            let (rules, told) = found(commands);
+            let (rules, refused) = found(commands);
             assert_eq!((rules.method, rules.is_bare), (method, is_bare), "{commands}");
-            assert_eq!(told, [""; 0], "{commands}");
+            assert_eq!(refused, [""; 0], "{commands}");
         }
         let (rules, _) = found("DTLOOK 120\nWIND 0,1,,270,36");
         assert_eq!(rules.look_ahead_s, Some(120.0));
@@ -131,8 +139,8 @@ mod tests {
             ("WIND 0,1,,270,36\nWIND 0,2,,90,36", "WIND", 3),
             ("WIND 0,1,,270,600", "WIND", 2),
         ] {
-            let (rules, told) = found(commands);
-            let [one] = &told[..] else { panic!("{commands}: {told:?}") };
+            let (rules, refused) = found(commands);
+            let [one] = &refused[..] else { panic!("{commands}: {refused:?}") };
             assert!(one.contains(&format!("{name}: ")), "{one}");
             assert_eq!(rules.refused[0].position(), Some((line, 1)), "{commands}");
             assert_eq!((rules.look_ahead_s, rules.wind_m_s), (None, None), "{commands}");

@@ -1,13 +1,14 @@
-//! Flights alone: how long each airplane would fly if there were no other.
+//! Solo flights: how long each airplane would fly if there were no other.
 
 use super::AirspaceWorld;
-use crate::flight::{Airplane, FlightSegment, Pose2, Track};
+use crate::flight::{Airplane, FlightSegment, Pose2};
 use sidestep_kernel::{Slot, interrupt};
 
-/// Seconds, or steps where these are longer, after which a flight is taken to be endless.
+/// Seconds, or steps where these are longer, after which a flight counts as endless: no flight of a scenario is as
+/// long as 11 days.
 const MAX_FLIGHT_S: f64 = 1e6;
 /// Most steps computed singly, enough for 1e6 s in steps of 0.1 s; beyond it a flight also counts as endless. Long
-/// stretches straight on are flown at once, and cost one.
+/// straight stretches are flown at once, and cost one.
 const MAX_COMPUTED_STEPS: usize = 10_000_000;
 
 /// An airplane on its flight alone.
@@ -20,10 +21,10 @@ struct SoloFlight<'a> {
     pose: Pose2,
     orders: u32,
     next: usize,
-    /// Number of steps flown, those at once among them.
+    /// Number of steps flown, those of straight stretches among them.
     steps: usize,
     /// Whether it flies on forever after its last order.
-    keeps_a_heading: bool,
+    ends_on_heading: bool,
 }
 
 impl SoloFlight<'_> {
@@ -31,7 +32,7 @@ impl SoloFlight<'_> {
         self.steps as f64 * self.world.timing.dtau_s
     }
 
-    /// Carries out the orders that are due.
+    /// Executes the orders that are due, at the start of a cycle, as in a run.
     fn apply_orders(&mut self) {
         let Self { world, slot, orders, next, .. } = *self;
         if self.steps.is_multiple_of(world.timing.points_per_dt()) {
@@ -42,25 +43,27 @@ impl SoloFlight<'_> {
 
     /// Returns the seconds of the flight if it is over, infinite if it never will be.
     fn end_s(&self) -> Option<f64> {
-        let (flown_s, airplane) = (self.elapsed_s(), self.airplane);
+        let flown_s = self.elapsed_s();
+        let airplane = self.airplane;
         let way_points = self.world.segment(self.slot, self.orders).mission.len();
         if self.next == way_points || self.joins_s + flown_s >= airplane.leaves_s {
             return Some(flown_s);
         }
         // Endless only after the last order, because the flight may end before that one.
-        let is_endless = self.keeps_a_heading && self.orders as usize == airplane.orders.len();
+        let is_endless = self.ends_on_heading && self.orders as usize == airplane.orders.len();
         let most_s = MAX_FLIGHT_S * self.world.timing.dtau_s.max(1.0);
         (is_endless || flown_s >= most_s).then_some(f64::INFINITY)
     }
 
     /// Flies a step, and all those before it in which it certainly flies straight on, at once.
     fn step(&mut self) {
-        let (world, air) = (self.world, self.world.air());
+        let world = self.world;
+        let air = world.air();
         let FlightSegment { model, mission, .. } = world.segment(self.slot, self.orders);
         let pilot = air.autopilot(model, mission);
-        let is_told_nothing =
+        let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
-        if is_told_nothing {
+        if has_no_orders {
             let straight = air.straight_steps(&pilot, self.pose, self.next);
             self.pose = air.after_straight_steps(self.pose, model.v_m_s, straight);
             self.steps = self.steps.saturating_add(straight);
@@ -69,8 +72,8 @@ impl SoloFlight<'_> {
         let before = self.pose;
         self.pose = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
         let next = pilot.next_way_point((before, self.pose), self.next);
-        // Where rounding swallows a step, it swallows all later ones.
-        let is_stuck = is_told_nothing && self.pose == before && self.next == next;
+        // Far from the origin a step may be lost to rounding, and then all later ones are too: the flight is endless.
+        let is_stuck = has_no_orders && self.pose == before && self.next == next;
         self.next = next;
         self.steps = if is_stuck { usize::MAX } else { self.steps.saturating_add(1) };
     }
@@ -85,19 +88,18 @@ impl AirspaceWorld {
         if airplane.track.as_ref().is_some_and(|track| track.end_s() <= joins_s) {
             return 0.0;
         }
-        let start = |track: &Track| track.pose_at(joins_s);
-        let keeps_a_heading =
+        let ends_on_heading =
             airplane.has_fixed_heading(airplane.orders.len()) && airplane.leaves_s == f64::INFINITY;
         let mut flight = SoloFlight {
             world: self,
             airplane,
             slot: i as Slot,
             joins_s,
-            pose: airplane.track.as_ref().map_or(airplane.start, start),
+            pose: airplane.track.as_ref().map_or(airplane.start, |track| track.pose_at(joins_s)),
             orders: 0,
             next: 0,
             steps: 0,
-            keeps_a_heading,
+            ends_on_heading,
         };
         for _ in 0..MAX_COMPUTED_STEPS {
             interrupt::check();

@@ -59,10 +59,10 @@ fn alone_s(airspace: &str, airplanes: &str) -> f64 {
 fn a_long_flight_in_small_steps_is_not_endless() {
     let far = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[200000, 0]]\n";
     for (dtau_s, more) in [(0.005, ""), (0.005, "leaves_s"), (1.0, "")] {
-        let told =
+        let orders =
             if more.is_empty() { "" } else { "orders = [{ at_s = 9000.0, leaves = true }]\n" };
         let found_s =
-            alone_s(&format!("dtau_s = {dtau_s:?}\nhorizon_s = 50.0"), &format!("{far}{told}"));
+            alone_s(&format!("dtau_s = {dtau_s:?}\nhorizon_s = 50.0"), &format!("{far}{orders}"));
         assert!((found_s - 199_900.0 / 35.0).abs() <= 1.0, "{dtau_s} {more}: {found_s}");
     }
 }

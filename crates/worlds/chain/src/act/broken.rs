@@ -12,26 +12,26 @@ use sidestep_rods::geometry::{Point, add, distance};
 use sidestep_rods::rebuild::{MovableEnd, ReformResult, reform};
 use std::ops::RangeInclusive;
 
-/// Attempts to find a free place where a part may fall.
+/// Attempts to find a free position where a part may fall; without one it stays.
 const MAX_PLACEMENT_TRIES: usize = 100;
 
 /// Applies the changes at the start of a cycle.
 pub(super) fn apply_changes<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
 ) {
-    let ChainContext { spec, now, .. } = setting;
+    let ChainContext { spec, now, .. } = context;
     for change in spec.changes.iter().filter(|change| change.cycle == now) {
-        apply(change, setting, body, told);
+        apply(change, context, body, sink);
     }
 }
 
 fn apply<const D: usize>(
     change: &Change<D>,
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
 ) {
     body.catch_up();
     body.plan = None;
@@ -40,18 +40,18 @@ fn apply<const D: usize>(
         ChangeKind::Failed { connector, .. }
         | ChangeKind::Mobility { connector, .. }
         | ChangeKind::MaxBend { connector, .. } => {
-            told.record(&body.chain, EventKind::Changed, *connector, 0.0);
+            sink.record(&body.chain, EventKind::Changed, *connector, 0.0);
         }
         ChangeKind::Scatter { connectors, by_m, apart_m } => {
-            scatter(setting, body, connectors, *by_m);
+            scatter(context, body, connectors, *by_m);
             for point in &mut body.chain.points_mut()[connectors.end() + 1..] {
                 *point = add(*point, *apart_m);
             }
             let n = connectors.clone().count() as f64;
-            told.record(&body.chain, EventKind::Broken, *connectors.start(), n);
+            sink.record(&body.chain, EventKind::Broken, *connectors.start(), n);
         }
         ChangeKind::Reform { may_come, speed_m_s } => {
-            start_reform(body, told, *may_come, *speed_m_s)
+            start_reform(body, sink, *may_come, *speed_m_s)
         }
     }
 }
@@ -59,21 +59,22 @@ fn apply<const D: usize>(
 /// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
 /// or have failed stay.
 fn scatter<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &mut Body<D>,
     connectors: &RangeInclusive<usize>,
     by_m: f64,
 ) {
-    let draws = &mut setting.draws(purpose::SCATTER);
+    let draws = &mut context.draws(purpose::SCATTER);
     let chain = &mut body.chain;
     for k in connectors.clone() {
         if chain.connectors()[k].is_still() {
             continue;
         }
-        let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
+        let at = chain.points()[k];
+        let radius_m = chain.connectors()[k].radius_m;
         let mut throw = || normal(draws).clamp(-MAX_THROW_SIGMAS, MAX_THROW_SIGMAS);
         let mut place = || at.map(|x| x + by_m * throw());
-        let is_free = |p: &Point<D>| setting.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
+        let is_free = |p: &Point<D>| context.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
         let free = (0..MAX_PLACEMENT_TRIES).map(|_| place()).find(is_free);
         chain.points_mut()[k] = free.unwrap_or(at);
     }
@@ -89,32 +90,34 @@ fn scatter<const D: usize>(
 /// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
 fn start_reform<const D: usize>(
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
     may_come: MovableEnd,
     speed_m_s: f64,
 ) {
     let Some(scattered) = &mut body.scattered else { return };
-    let (first, last) = (scattered.first as usize, scattered.last as usize);
-    let (whole, came) = reform_goals(&body.chain, first..=last, may_come);
-    let (kind, value) = match came {
+    let first = scattered.first as usize;
+    let last = scattered.last as usize;
+    let (whole, result) = reform_goals(&body.chain, first..=last, may_come);
+    let (kind, value) = match result {
         ReformResult::Whole { double_passes } => {
-            (scattered.goals_m, scattered.speed_m_s) = (flatten(&whole), speed_m_s);
+            scattered.goals_m = flatten(&whole);
+            scattered.speed_m_s = speed_m_s;
             scattered.waited = 0;
             (EventKind::Reforming, double_passes as f64)
         }
         ReformResult::GapTooLong { have_m, need_m, missing } => {
-            return report_gap(body, told, first, need_m - have_m, missing);
+            return report_gap(body, sink, first, need_m - have_m, missing);
         }
         ReformResult::NotReached { off_m } => (EventKind::NotReformed, off_m),
     };
     body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
-    told.record(&body.chain, kind, first, value);
+    sink.record(&body.chain, kind, first, value);
 }
 
-/// Tells the length and the number of parts that are wanting.
+/// Reports the length and the number of parts that are missing.
 fn report_gap<const D: usize>(
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
     first: usize,
     wanting_m: f64,
     missing: usize,
@@ -122,8 +125,8 @@ fn report_gap<const D: usize>(
     let tally = &mut body.tally;
     tally.not_reformed += 1;
     tally.missing_parts = tally.missing_parts.max(missing as u64);
-    let event = told.event(&body.chain, EventKind::GapTooLong, first, wanting_m);
-    told.events.push(Event { missing: missing as u32, ..event });
+    let event = sink.event(&body.chain, EventKind::GapTooLong, first, wanting_m);
+    sink.events.push(Event { missing: missing as u32, ..event });
 }
 
 /// Returns where the connectors would be if the chain were whole, and whether it can be.
@@ -134,17 +137,17 @@ fn reform_goals<const D: usize>(
     may_come: MovableEnd,
 ) -> (Vec<Point<D>>, ReformResult) {
     let mut whole = chain.clone();
-    // An end cannot come from outside the range of coordinates.
-    let came = reform(&mut whole, scattered, may_come)
+    // Beyond the range of coordinates nothing is joined.
+    let result = reform(&mut whole, scattered, may_come)
         .unwrap_or(ReformResult::NotReached { off_m: chain.max_rod_violation_m() });
     let stays = |k: &usize| chain.connectors()[*k].is_still();
     let would_move = |k: usize| whole.points()[k] != chain.points()[k];
-    let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
-        None => came,
+    let result = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
+        None => result,
         Some(k) => {
             let off_m = distance(whole.points()[k], chain.points()[k]);
             ReformResult::NotReached { off_m }
         }
     };
-    (whole.points().to_vec(), came)
+    (whole.points().to_vec(), result)
 }

@@ -10,17 +10,17 @@ use sidestep_rods::{Chain, CompletedMotion, MAX_COORDINATE_M};
 
 /// Returns whether the chain may follow the initiator's motion of this cycle later. The first cycle
 /// measures all rods, so that later only those count that move.
-pub(super) fn may_defer<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> bool {
-    let world = setting.world;
+pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> bool {
+    let world = context.world;
     let leads_in_range = |task: &Task<D>| leads_in_range(task, &body.chain, world.dt_s);
     world.is_open()
         && world.rules.step_m.is_none()
-        && setting.spec.robots.is_none()
+        && context.spec.robots.is_none()
         && body.scattered.is_none()
         && body.chain.is_plain()
         && body.tally.steps > 0
         && !body.driving.ladder.is_pulling_back()
-        && setting.task(body).is_some_and(leads_in_range)
+        && context.task(body).is_some_and(leads_in_range)
 }
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
@@ -33,18 +33,18 @@ fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -
 
 /// Moves the initiator alone.
 pub(super) fn move_initiator_only<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     to: Point<D>,
 ) -> RecoveryOutcome<D> {
-    let world = who.setting.world;
-    let goal_m = goal_distance_m(who.task, body);
-    body.driving.ladder.record_free_motion(who.task.source(), goal_m, &world.rungs);
+    let world = initiator.context.world;
+    let goal_m = goal_distance_m(initiator.task, body);
+    body.driving.ladder.record_free_motion(initiator.task.source(), goal_m, &world.rungs);
     let way_m = distance(body.chain.points()[0], to);
     if way_m > body.chain.min_move_m() {
         let dt_s = world.dt_s;
         body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(way_m / dt_s);
-        if body.put_off.move_initiator(&mut body.chain, to, dt_s) {
+        if body.deferred.move_initiator(&mut body.chain, to, dt_s) {
             body.catch_up();
         }
     }

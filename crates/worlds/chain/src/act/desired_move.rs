@@ -1,4 +1,4 @@
-//! The wish of a chain's driver in a cycle.
+//! The move that a chain's driver wants in a cycle.
 
 use super::bounds::EscapeContext;
 use super::joints::arrival_tolerance_m;
@@ -16,69 +16,69 @@ use crate::swarm::leader::Decision;
 use crate::world::purpose;
 use sidestep_rods::geometry::{Point, add_scaled, distance, move_toward, with_dimensions};
 
-/// A driver's wish in a cycle.
+/// The move that a driver wants in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum DesiredMove<const D: usize> {
-    /// Nothing.
+    /// None.
     Rest,
-    /// The initiator at another place.
+    /// The initiator to another position.
     Go(Point<D>),
-    /// The whole chain farther along its plan.
+    /// The whole chain along its plan.
     Follow,
-    /// A robot on wheels at another pose.
+    /// A robot on wheels to another pose.
     Steer(WheelStep),
     /// The connector of a robot on wheels back toward its robot.
     Return(Point<D>),
-    /// A robot on wheels with another heading, where it is.
+    /// A robot on wheels to another heading, on the spot.
     Face(f64),
-    /// The order of a caller.
+    /// As an external caller orders.
     Obey(StepMotion<D>),
-    /// Its task is done.
+    /// None: the task is done.
     Done,
 }
 
-/// The decisions on a chain that are made before it acts.
+/// The decisions on a chain that were made before it acts.
 #[derive(Clone, Copy)]
 pub(super) struct CycleInputs {
     /// Decision of its navigator.
     pub(super) decision: Option<Decision>,
-    /// Orders from outside.
+    /// Orders of an external caller.
     pub(super) orders: Orders,
 }
 
 /// The circumstances of an initiator, beside its task.
 #[derive(Clone, Copy)]
 pub(super) struct InitiatorContext<'a, const D: usize> {
-    pub(super) heard: CycleInputs,
+    pub(super) inputs: CycleInputs,
     pub(super) follows: FollowMode,
     pub(super) escaping: &'a EscapeContext<'a, D>,
-    /// Whether it gives way to parts that get out of something's way.
+    /// Whether it waits, because parts of the chain escape from an obstacle.
     pub(super) is_pressed: bool,
 }
 
 /// Returns where the initiator wants to be at the end of the cycle.
 pub(super) fn desired_move<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
-    guide: &InitiatorContext<'_, D>,
+    lead_context: &InitiatorContext<'_, D>,
 ) -> DesiredMove<D> {
-    let CycleInputs { decision, orders } = guide.heard;
-    match &who.task.driver {
+    let CycleInputs { decision, orders } = lead_context.inputs;
+    match &initiator.task.driver {
         TaskKind::Rest => DesiredMove::Rest,
-        TaskKind::External => step_from_orders(who, &acting.body.chain, orders)
+        TaskKind::External => step_from_orders(initiator, &acting.body.chain, orders)
             .map_or(DesiredMove::Rest, DesiredMove::Obey),
         TaskKind::Navigate(navigator) => {
-            let has_fled = guide.escaping.has_escaped(who.task.agent, acting.before);
-            let wheeled = NavigatorContext { who, navigator, body: acting.body };
+            let has_fled = lead_context.escaping.has_escaped(initiator.task.agent, acting.before);
+            let wheeled = NavigatorContext { initiator, navigator, body: acting.body };
             navigator_move(wheeled, decision, has_fled)
         }
-        TaskKind::Wander(rule) => wander_move(who, acting.body, rule),
-        TaskKind::Script(_) => script_move(who, acting.body),
-        TaskKind::Targets(targets) => step_to_target(who, acting, targets),
+        TaskKind::Wander(rule) => wander_move(initiator, acting.body, rule),
+        TaskKind::Script(_) => script_move(initiator, acting.body),
+        TaskKind::Targets(targets) => step_to_target(initiator, acting, targets),
     }
 }
 
-/// Returns the wish of a navigator that has made its decision.
+/// Returns the move of a navigator that has made its decision.
 fn navigator_move<const D: usize>(
     mut wheeled: NavigatorContext<'_, D>,
     decision: Option<Decision>,
@@ -97,12 +97,13 @@ fn navigator_move<const D: usize>(
 }
 
 fn wander_move<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     rule: &Wander<D>,
 ) -> DesiredMove<D> {
-    let (at, step_m) = (who.position(body), who.step_m());
-    let draws = &mut who.setting.draws(purpose::WANDER);
+    let at = initiator.position(body);
+    let step_m = initiator.step_m();
+    let draws = &mut initiator.context.draws(purpose::WANDER);
     let was = with_dimensions(body.driving.ahead);
     let ahead = wander_direction(rule, at, was, step_m, draws);
     body.driving.ahead = with_dimensions(ahead);
@@ -112,48 +113,45 @@ fn wander_move<const D: usize>(
 /// Returns a step to the next target. In the cycle in which a target is reached, the initiator
 /// rests.
 fn step_to_target<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     targets: &Targets<D>,
 ) -> DesiredMove<D> {
-    let at = who.position(acting.body);
+    let at = initiator.position(acting.body);
     let driving = &mut acting.body.driving;
     let Some(&target) = targets.places.get(driving.next as usize) else {
         return DesiredMove::Done;
     };
     let left_m = distance(at, target);
-    driving.late = match left_m < driving.nearest_m {
-        true => 0,
-        false => driving.late.saturating_add(1),
-    };
+    driving.late = if left_m < driving.nearest_m { 0 } else { driving.late.saturating_add(1) };
     driving.nearest_m = driving.nearest_m.min(left_m);
     if left_m > targets.tolerance_m {
-        plan_if_stuck(who, acting, targets);
+        plan_if_stuck(initiator, acting, targets);
         return match acting.body.plan {
             Some(_) => DesiredMove::Follow,
-            None => DesiredMove::Go(move_toward(at, target, who.step_m())),
+            None => DesiredMove::Go(move_toward(at, target, initiator.step_m())),
         };
     }
     let body = &mut *acting.body;
     body.plan = None;
     let number = f64::from(body.driving.next);
-    acting.told.record(&body.chain, EventKind::Target, who.task.agent, number);
+    acting.sink.record(&body.chain, EventKind::Target, initiator.task.agent, number);
     body.tally.done += 1;
     body.driving.advance_part();
     DesiredMove::Rest
 }
 
-/// Returns the wish of a script. Turning takes no time.
-fn script_move<const D: usize>(who: Initiator<'_, D>, body: &mut Body<D>) -> DesiredMove<D> {
-    let at = who.position(body);
-    let there_m = arrival_tolerance_m(who.setting, &body.chain);
+/// Returns the next move of a script. Turning takes no time.
+fn script_move<const D: usize>(initiator: Initiator<'_, D>, body: &mut Body<D>) -> DesiredMove<D> {
+    let at = initiator.position(body);
+    let there_m = arrival_tolerance_m(initiator.context, &body.chain);
     let driving = &mut body.driving;
     loop {
         match body.motions.get(driving.next as usize) {
             None => return DesiredMove::Done,
             Some(ScriptMotion::Face { ahead }) => driving.ahead = *ahead,
             Some(ScriptMotion::Wait { duration_s }) => {
-                if who.setting.world.start_time_s(u64::from(driving.rested)) < *duration_s {
+                if initiator.context.world.start_time_s(u64::from(driving.rested)) < *duration_s {
                     driving.rested += 1;
                     return DesiredMove::Rest;
                 }
@@ -163,7 +161,7 @@ fn script_move<const D: usize>(who: Initiator<'_, D>, body: &mut Body<D>) -> Des
                 let left_m = distance(at, to);
                 driving.nearest_m = driving.nearest_m.min(left_m);
                 if left_m > there_m {
-                    return DesiredMove::Go(move_toward(at, to, who.step_m()));
+                    return DesiredMove::Go(move_toward(at, to, initiator.step_m()));
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! The books of a cycle.
+//! The sink of a cycle's events.
 
 use crate::events::{Event, EventKind};
 use crate::trace::InspectionTrace;
@@ -6,20 +6,20 @@ use sidestep_kernel::{Cycle, Slot};
 use sidestep_rods::Chain;
 use sidestep_rods::geometry::with_dimensions;
 
-/// The books of a chain's cycle: its events, and notes.
+/// The sink of what happens to a chain in a cycle.
 pub(super) struct EventSink<'a, const D: usize> {
     pub(super) slot: Slot,
     pub(super) now: Cycle,
     pub(super) events: &'a mut Vec<Event>,
-    /// Notes for somebody who asks about this chain.
-    pub(super) notes: Option<&'a mut InspectionTrace<D>>,
+    /// The record of an inspection, if one of this chain is under way.
+    pub(super) trace: Option<&'a mut InspectionTrace<D>>,
 }
 
 impl<const D: usize> EventSink<'_, D> {
-    /// Notes something for somebody who asks about this chain.
-    pub(super) fn trace(&mut self, note: impl FnOnce(&mut InspectionTrace<D>)) {
-        if let Some(notes) = self.notes.as_deref_mut() {
-            note(notes);
+    /// Records something if this chain is inspected.
+    pub(super) fn trace(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
+        if let Some(trace) = self.trace.as_deref_mut() {
+            record(trace);
         }
     }
 

@@ -8,7 +8,7 @@ use crate::formation::{Robot, Robots};
 use crate::state::Body;
 use crate::swarm::drive::Pose2;
 use crate::swarm::follower::{Follower, TrackingTarget};
-use crate::swarm::laser::RobotBody as Seen;
+use crate::swarm::laser::RobotBody;
 use sidestep_kernel::math::{atan2, wrap_angle};
 use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
@@ -16,28 +16,28 @@ use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions
 /// The circumstances in which the robots of a chain follow.
 #[derive(Clone, Copy)]
 struct FollowContext<'a, const D: usize> {
-    setting: ChainContext<'a, D>,
+    context: ChainContext<'a, D>,
     follower: &'a Follower,
     /// Obstacles that are solid to robots.
     solid: &'a Obstacles<D>,
     /// The robots of the chain as they were before the cycle.
-    robots: &'a [Seen],
+    robots: &'a [RobotBody],
 }
 
-/// Moves the robots of a swarm toward their connectors. All perceive each other as they were
-/// before. Returns the least gap around a robot, meters. `seen` is a buffer.
+/// Moves the robots of a swarm toward their connectors. All perceive each other as they were before the cycle, so
+/// that their order does not matter. Returns the least gap around a robot, meters; `robot_bodies` is a buffer.
 pub(super) fn follow<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
     solid: &Obstacles<D>,
-    seen: &mut Vec<Seen>,
+    robot_bodies: &mut Vec<RobotBody>,
 ) -> f64 {
     let mut gap_m = f64::INFINITY;
-    let Some(Robots { follower, .. }) = &setting.spec.robots else { return gap_m };
-    let leader = wheeled_leader(setting, acting.body);
-    seen.clear();
-    seen.extend(acting.body.solids().map(|(_, solid)| solid.to_robot_body()));
-    let following = FollowContext { setting, follower, solid, robots: seen };
+    let Some(Robots { follower, .. }) = &context.spec.robots else { return gap_m };
+    let leader = wheeled_leader(context, acting.body);
+    robot_bodies.clear();
+    robot_bodies.extend(acting.body.solids().map(|(_, solid)| solid.robot_body()));
+    let following = FollowContext { context, follower, solid, robots: robot_bodies };
     for k in 0..acting.body.robots.len() {
         if Some(k) == leader {
             place_robot(acting.body, k);
@@ -45,22 +45,23 @@ pub(super) fn follow<const D: usize>(
             gap_m = gap_m.min(following.follow(acting, k));
         }
     }
-    lead_from_robot(setting, acting.body);
+    lead_from_robot(context, acting.body);
     gap_m
 }
 
-/// Returns the connector of a navigator that its own wheels have taken to where it is, or that stands.
-/// Whatever else moves a connector, its robot follows.
-fn wheeled_leader<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> Option<usize> {
-    let agent = setting.task(body)?.agent;
+/// Returns the connector of a navigator that its own wheels have moved, or that stands. Where anything else moves
+/// the connector, its robot follows like the others.
+fn wheeled_leader<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> Option<usize> {
+    let agent = context.task(body)?.agent;
     let leader = body.driving.leader.as_ref()?;
     (with_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
 }
 
 /// Lets a navigator whose robot follows its connector go on from where the robot is.
-fn lead_from_robot<const D: usize>(setting: ChainContext<'_, D>, body: &mut Body<D>) {
-    let Some(agent) = setting.task(body).map(|task| task.agent) else { return };
-    let (at, robot) = (body.chain.points()[agent], &body.robots[agent]);
+fn lead_from_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut Body<D>) {
+    let Some(agent) = context.task(body).map(|task| task.agent) else { return };
+    let at = body.chain.points()[agent];
+    let robot = &body.robots[agent];
     if let Some(leader) = &mut body.driving.leader
         && with_dimensions(at) != leader.pose.at
     {
@@ -68,7 +69,7 @@ fn lead_from_robot<const D: usize>(setting: ChainContext<'_, D>, body: &mut Body
     }
 }
 
-/// Puts the robot of a navigator where its wheels have taken it.
+/// Moves the robot of a navigator to where its wheels have taken it.
 fn place_robot<const D: usize>(body: &mut Body<D>, k: usize) {
     let Some(leader) = body.driving.leader else { return };
     let [x, y, _] = body.driving.ahead;
@@ -83,14 +84,14 @@ impl<const D: usize> FollowContext<'_, D> {
     /// Moves one robot; returns the gap around it, meters.
     fn follow(self, acting: &mut ActState<'_, D>, k: usize) -> f64 {
         let Some(solid) = self.solid.in_plane() else { return f64::INFINITY };
-        let ActState { body, before, told, .. } = acting;
-        let dt_s = self.setting.world.dt_s;
+        let ActState { body, before, sink, .. } = acting;
+        let dt_s = self.context.world.dt_s;
         let was: Point<2> = with_dimensions(before.points[k]);
         let at: Point<2> = with_dimensions(body.chain.points()[k]);
         let mut velocity_m_s = scaled(sub(at, was), 1.0 / dt_s);
-        let leads = self.setting.task(body).is_some_and(|task| task.agent == k);
-        if leads && dot(velocity_m_s, sub(at, body.robots[k].pose.at)) < 0.0 {
-            // A connector that comes back to its robot finds it waiting.
+        let is_leader = self.context.task(body).is_some_and(|task| task.agent == k);
+        if is_leader && dot(velocity_m_s, sub(at, body.robots[k].pose.at)) < 0.0 {
+            // A connector that comes back is waited for: by its velocity the robot would drive away from it.
             velocity_m_s = [0.0; 2];
         }
         let others = self.robots.iter().enumerate().filter(move |(i, _)| *i != k).map(|(_, o)| *o);
@@ -100,7 +101,7 @@ impl<const D: usize> FollowContext<'_, D> {
         body.tally.robots.record(&followed, lag_m);
         if followed.is_bumped && !body.robots[k].is_bumped {
             body.tally.robots.bumper_events += 1;
-            told.record(&body.chain, EventKind::Bumper, k, lag_m);
+            sink.record(&body.chain, EventKind::Bumper, k, lag_m);
         }
         body.robots[k] = Robot { pose: followed.pose, is_bumped: followed.is_bumped };
         followed.gap_m

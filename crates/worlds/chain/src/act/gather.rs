@@ -1,125 +1,132 @@
-//! Scattered parts of a broken chain on their way to the places where they are joined again (slide F3).
+//! Scattered parts of a broken chain that return to the positions where they are joined again (slide F3).
 
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::state::{Body, ScatterState};
+use crate::state::{Body, unflatten};
 use sidestep_rods::geometry::{Point, move_toward};
 use sidestep_rods::{Chain, Obstacles, Sweep, TOLERANCE_M, blocking_obstacle};
 use std::ops::Range;
 
-/// Parts of a step that are tried one after the other where something is in the way.
+/// Fractions of a step that are tried one after the other where something is in the way.
 const STEP_FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// Time for which parts wait for what is in their way, s.
+/// Time for which parts wait for an obstacle before they give up, s: a mover may pass, a wall does not.
 const GATHER_TIMEOUT_S: f64 = 10.0;
 
-/// A try to go on.
+/// The result of an attempt to move parts.
 #[derive(Debug, Default)]
 struct GatherAttempt {
     has_moved: bool,
-    /// The obstacle that keeps a part from going on.
+    /// The first obstacle that blocks a part.
     blocked_by: Option<u32>,
 }
 
-/// The connectors of a broken chain, and the places where they are joined again.
+/// The connectors of a broken chain, and the positions where they are joined again.
 struct ScatteredParts<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     goals: Vec<Point<D>>,
     obstacles: &'a Obstacles<D>,
-    /// Longest way of a part in a cycle, meters.
+    /// Longest motion of a part in a cycle, meters.
     step_m: f64,
 }
 
-/// Moves scattered parts straight to the places where they are joined again, as far as nothing is in their way; the
-/// chain is whole when all are there and there is room for their rods.
+/// Moves scattered parts straight to the positions where they are joined again, as far as nothing blocks them; the
+/// chain is whole when all are there and nothing is where their rods will be.
 pub(super) fn gather_parts<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
 ) {
-    let going = |s: &&ScatterState| !s.goals_m.is_empty();
-    let Some(scattered) = body.scattered.as_ref().filter(going) else { return };
-    let (first, last) = (scattered.first as usize, scattered.last as usize);
-    let step_m = scattered.speed_m_s * setting.world.dt_s;
-    let goals = scattered.goals_m.chunks_exact(D);
-    let goals: Vec<Point<D>> = goals.map(|at| std::array::from_fn(|i| at[i])).collect();
-    let obstacles = setting.obstacles;
-    let mut parts = ScatteredParts { chain: &mut body.chain, goals, obstacles, step_m };
-    let tried = parts.advance(first, last);
-    if !parts.have_arrived() {
-        return wait_or_give_up(setting, body, told, &tried);
-    }
-    match parts.obstacle_in_new_rod(first - 1..last + 1) {
-        None => mark_whole(body, told, first),
-        blocked_by => wait_or_give_up(setting, body, told, &GatherAttempt { blocked_by, ..tried }),
-    }
-}
-
-/// Ends the state of being broken.
-fn mark_whole<const D: usize>(body: &mut Body<D>, told: &mut EventSink<'_, D>, first: usize) {
-    body.scattered = None;
-    body.tally.reformed += 1;
-    told.record(&body.chain, EventKind::Reformed, first, 0.0);
-}
-
-/// Counts the time in which nothing went on, and gives up after too much of it.
-fn wait_or_give_up<const D: usize>(
-    setting: ChainContext<'_, D>,
-    body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
-    tried: &GatherAttempt,
-) {
-    let Some(scattered) = &mut body.scattered else { return };
-    scattered.waited = if tried.has_moved { 0 } else { scattered.waited.saturating_add(1) };
-    if setting.world.start_time_s(scattered.waited) <= GATHER_TIMEOUT_S {
+    let Some(scattered) = &body.scattered else { return };
+    if scattered.goals_m.is_empty() {
         return;
     }
-    (scattered.speed_m_s, scattered.goals_m, scattered.waited) = (0.0, Vec::new(), 0);
+    let first = scattered.first as usize;
+    let last = scattered.last as usize;
+    let step_m = scattered.speed_m_s * context.world.dt_s;
+    let goals = unflatten(&scattered.goals_m);
+    let obstacles = context.obstacles;
+    let mut parts = ScatteredParts { chain: &mut body.chain, goals, obstacles, step_m };
+    let attempt = parts.advance(first, last);
+    if !parts.have_arrived() {
+        return wait_or_give_up(context, body, sink, &attempt);
+    }
+    match parts.obstacle_in_new_rod(first - 1..last + 1) {
+        None => mark_whole(body, sink, first),
+        blocked_by => {
+            wait_or_give_up(context, body, sink, &GatherAttempt { blocked_by, ..attempt })
+        }
+    }
+}
+
+/// Marks a chain as whole again.
+fn mark_whole<const D: usize>(body: &mut Body<D>, sink: &mut EventSink<'_, D>, first: usize) {
+    body.scattered = None;
+    body.tally.reformed += 1;
+    sink.record(&body.chain, EventKind::Reformed, first, 0.0);
+}
+
+/// Counts the time in which no part moved, and gives up after [`GATHER_TIMEOUT_S`].
+fn wait_or_give_up<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &mut Body<D>,
+    sink: &mut EventSink<'_, D>,
+    attempt: &GatherAttempt,
+) {
+    let Some(scattered) = &mut body.scattered else { return };
+    scattered.waited = if attempt.has_moved { 0 } else { scattered.waited.saturating_add(1) };
+    if context.world.start_time_s(scattered.waited) <= GATHER_TIMEOUT_S {
+        return;
+    }
+    scattered.speed_m_s = 0.0;
+    scattered.goals_m = Vec::new();
+    scattered.waited = 0;
     let first = scattered.first as usize;
     body.tally.not_reformed += 1;
     let off_m = body.chain.max_rod_violation_m();
-    let event = told.event(&body.chain, EventKind::NotReformed, first, off_m);
-    told.events.push(Event { obstacle: tried.blocked_by, ..event });
+    let event = sink.event(&body.chain, EventKind::NotReformed, first, off_m);
+    sink.events.push(Event { obstacle: attempt.blocked_by, ..event });
 }
 
 impl<const D: usize> ScatteredParts<'_, D> {
     /// Moves the scattered connectors, from the first to the last, and the ends beside them.
     fn advance(&mut self, first: usize, last: usize) -> GatherAttempt {
-        let mut tried = GatherAttempt::default();
-        // A whole end that comes along goes as one, because its rods hold.
+        let mut attempt = GatherAttempt::default();
+        // Each end is still whole, so it moves as one: its rods keep their lengths.
         let ends = [0..first, last + 1..self.goals.len()];
         for part in (first..=last).map(|k| k..k + 1).chain(ends) {
             let one = self.gather(part);
-            tried.has_moved |= one.has_moved;
-            tried.blocked_by = tried.blocked_by.or(one.blocked_by);
+            attempt.has_moved |= one.has_moved;
+            attempt.blocked_by = attempt.blocked_by.or(one.blocked_by);
         }
-        tried
+        attempt
     }
 
     fn have_arrived(&self) -> bool {
         self.chain.points() == self.goals
     }
 
-    /// Moves connectors and the rods between them toward their places.
+    /// Moves connectors and the rods between them toward their positions.
     fn gather(&mut self, part: Range<usize>) -> GatherAttempt {
         let from = self.chain.points()[part.clone()].to_vec();
         let goals = &self.goals[part.clone()];
-        let mut tried = GatherAttempt::default();
+        let mut attempt = GatherAttempt::default();
         if from == goals {
-            return tried;
+            return attempt;
         }
         for shorter in STEP_FRACTIONS {
-            let (ways, step_m) = (from.iter().zip(goals), shorter * self.step_m);
-            let to: Vec<_> = ways.map(|(p, goal)| move_toward(*p, *goal, step_m)).collect();
+            let step_m = shorter * self.step_m;
+            let pairs = from.iter().zip(goals);
+            let to: Vec<_> = pairs.map(|(p, goal)| move_toward(*p, *goal, step_m)).collect();
             match self.blocking_obstacle(part.start, &from, &to) {
                 None => {
                     self.chain.points_mut()[part].copy_from_slice(&to);
-                    return GatherAttempt { has_moved: true, ..tried };
+                    return GatherAttempt { has_moved: true, ..attempt };
                 }
-                by => tried.blocked_by = tried.blocked_by.or(by),
+                by => attempt.blocked_by = attempt.blocked_by.or(by),
             }
         }
-        tried
+        attempt
     }
 
     /// Returns the obstacle in the way of connectors, the first of which is `k`, and of the rods between them.

@@ -1,5 +1,5 @@
-//! Arms of joints: the chain goes ahead as a guide, and the joints follow it inside their limits and at their speeds.
-//! The connectors are where the joints put them, so an arm is never where its joints cannot be.
+//! Arms: the chain moves first as a guide, and the joints follow it within their limits and speeds. Forward
+//! kinematics then places the connectors, so an arm is never where its joints cannot be.
 
 #[cfg(test)]
 mod tests;
@@ -20,13 +20,14 @@ use sidestep_rods::{
     Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
 };
 
-/// Parts of a motion that are tried, each half of the one before.
+/// Fractions of a motion that are tried, each half of the one before.
 const MAX_TRIES: usize = 6;
-/// Parts of a motion out of the way that are tried.
+/// Fractions of an escape that are tried; fewer, because escapes come in every cycle.
 const MAX_ESCAPE_TRIES: usize = 3;
-/// Part of its way that an initiator which only comes nearer must make good.
+/// Fraction of the distance to its target by which an initiator that only approaches must come nearer; less is not
+/// worth the joints' motion.
 const MIN_APPROACH_FRACTION: f64 = 0.25;
-/// Relative tolerance for ways at exactly the greatest speed.
+/// Relative tolerance for motions at exactly the maximum speed.
 const ROUNDING: f64 = 1e-9;
 
 /// A connector that leads, and where to.
@@ -53,7 +54,7 @@ struct ReferenceMotion<'b, const D: usize> {
 
 /// An arm whose joints come along with its chain.
 pub(super) struct ArmFollower<'a, const D: usize> {
-    setting: ChainContext<'a, D>,
+    context: ChainContext<'a, D>,
     before: &'a PositionBuffer<D>,
     arm: &'a Arm,
     chain: &'a mut Chain<D>,
@@ -63,10 +64,10 @@ pub(super) struct ArmFollower<'a, const D: usize> {
 /// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
 /// passes bring it only so near.
 pub(super) fn arrival_tolerance_m<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     chain: &Chain<D>,
 ) -> f64 {
-    match setting.spec.arm.as_deref() {
+    match context.spec.arm.as_deref() {
         Some(arm) => arm.follower.arrival_tolerance_m(),
         None if !chain.is_plain() && is_held(chain) => TOLERANCE_M,
         None => chain.min_move_m(),
@@ -75,15 +76,16 @@ pub(super) fn arrival_tolerance_m<const D: usize>(
 
 /// Lets the joints come along with an initiator's motion; what they cannot do is vetoed.
 pub(super) fn follow_initiator<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     to: Point<D>,
     climbed: RecoveryOutcome<D>,
 ) -> RecoveryOutcome<D> {
-    let Some(mut arm) = ArmFollower::from_body(who.setting, acting.before, acting.body) else {
+    let Some(mut arm) = ArmFollower::from_body(initiator.context, acting.before, acting.body)
+    else {
         return climbed;
     };
-    let k = who.task.agent;
+    let k = initiator.task.agent;
     let (has_moved, at) = match climbed {
         // The chain reaches a place to some tolerance, the joints exactly.
         RecoveryOutcome::Straight(_) => (true, to),
@@ -93,7 +95,7 @@ pub(super) fn follow_initiator<const D: usize>(
         _ => (false, to),
     };
     let followed = arm.follow(&[LeadTarget { k, to: at }], MAX_TRIES).or_else(|veto| {
-        let decides = who.task.source() == RequestSource::Autonomous;
+        let decides = initiator.task.source() == RequestSource::Autonomous;
         if decides && arm.approach(LeadTarget { k, to }) { Ok(()) } else { Err(veto) }
     });
     match followed {
@@ -109,31 +111,32 @@ pub(super) fn follow_initiator<const D: usize>(
 impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the arm that a chain represents, if it does.
     pub(super) fn from_body(
-        setting: ChainContext<'a, D>,
+        context: ChainContext<'a, D>,
         before: &'a PositionBuffer<D>,
         body: &'a mut Body<D>,
     ) -> Option<Self> {
-        let (arm, joints) = (setting.spec.arm.as_deref()?, body.joints.as_mut()?);
-        Some(Self { setting, before, arm, chain: &mut body.chain, joints })
+        let arm = context.spec.arm.as_deref()?;
+        let joints = body.joints.as_mut()?;
+        Some(Self { context, before, arm, chain: &mut body.chain, joints })
     }
 
     /// Lets the joints carry out an order: all of it, or nothing.
     pub(super) fn execute_order(
         &mut self,
-        errand: &StepMotion<D>,
+        step: &StepMotion<D>,
         part: f64,
         outcome: Outcome<D>,
     ) -> Outcome<D> {
-        let followed = match errand.motion(part) {
+        let followed = match step.motion(part) {
             Motion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
             Motion::Rod { i, to: [to, next] } => {
                 self.follow(&[LeadTarget { k: i, to }, LeadTarget { k: i + 1, to: next }], 1)
             }
         };
         match (followed, outcome) {
-            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(errand.first)),
+            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(step.first)),
             (Ok(()), moved) => moved,
-            // Where the chain itself objects, it says more than its joints do.
+            // The veto of the chain itself says more than that of its joints.
             (Err(_), vetoed @ Outcome::Vetoed(_)) => vetoed,
             (Err(veto), Outcome::Moved(_)) => Outcome::Vetoed(veto),
         }
@@ -183,8 +186,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         comes
     }
 
-    /// Brings the joints along a motion of the chain out of the way: to where nothing objects or, where parts are
-    /// in something already, to where they are in it least.
+    /// Brings the joints along an escape of the chain: to where nothing vetoes or, where parts are inside an obstacle
+    /// already, to where they are least deep in it.
     pub(super) fn escape(&mut self) {
         let (from, guide) = self.reset_to_joints();
         if guide == from {
@@ -192,7 +195,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         }
         let wanted = ReferenceMotion { from: &from, guide: Some(&guide), led: &[] };
         let mut best: Option<ArmPosture<D>> = None;
-        let (mut least_m, mut part) = (self.clearance_m(&from), 1.0);
+        let mut least_m = self.clearance_m(&from);
+        let mut part = 1.0;
         for _ in 0..MAX_ESCAPE_TRIES {
             let posed = self.solve_posture(&wanted, part);
             let Some(veto) = self.find_veto(&from, &posed) else {
@@ -201,7 +205,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
             };
             let clearance_m = self.clearance_m(&posed.points);
             if veto.reason == VetoReason::BothSidesBlocked && clearance_m > least_m {
-                (least_m, best) = (clearance_m, Some(posed));
+                least_m = clearance_m;
+                best = Some(posed);
             }
             part *= 0.5;
         }
@@ -221,9 +226,9 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the posture in which the joints follow a part of a motion.
     fn solve_posture(&self, wanted: &ReferenceMotion<'_, D>, part: f64) -> ArmPosture<D> {
         let arm = self.arm;
-        let on_the_way = |k: usize, to: Point<D>| match part < 1.0 {
-            true => lerp(wanted.from[k], to, part),
-            false => to,
+        let on_the_way = |k: usize, to: Point<D>| {
+            // An interpolation to the end would differ from it by rounding.
+            if part < 1.0 { lerp(wanted.from[k], to, part) } else { to }
         };
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();
@@ -235,14 +240,14 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         let aim =
             |led: &LeadTarget<D>| ConnectorTarget { connector: led.k, at_m: arm.to_base(led.to) };
         let aims: Vec<ConnectorTarget> = led.iter().map(aim).collect();
-        let room = arm.follower.reachable_ranges(&self.before.joints, self.setting.world.dt_s);
+        let room = arm.follower.reachable_ranges(&self.before.joints, self.context.world.dt_s);
         let joints = arm.follower.track(self.joints, &room, guide.as_deref(), &aims);
         let points = arm.connector_positions(&joints);
         ArmPosture { joints, points, led }
     }
 
-    /// Returns the objection to a posture: of the joints, that do not take a connector to where it is led; of speeds;
-    /// of the chain and all that is around it.
+    /// Returns the veto of a posture: by the joints, which do not take a connector to where it is led; by speeds; by
+    /// the chain and the obstacles around it.
     fn find_veto(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<Veto<D>> {
         let follower = &self.arm.follower;
         let k = posed.led.first().map_or(0, |led| led.k);
@@ -261,7 +266,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         if let Some(by) = (0..from.len()).find(is_fast) {
             return Some(veto(by, VetoReason::StepLimit));
         }
-        let ChainContext { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.context;
         let is_solid = world.rules.self_collision;
         let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
         let objection = space.find_veto(&posed.points);
@@ -269,10 +274,10 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         objection.or_else(|| self.find_tunneling(from, posed).map(tunnels))
     }
 
-    /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
+    /// Returns whether a connector moves farther than it may: at the speed of led joints from where it was before this
     /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
-        let world = self.setting.world;
+        let world = self.context.world;
         let escape_m = world.escape.as_ref().map(|e| e.speed_max_m_s * world.dt_s);
         let is_beyond = |from, most_m: f64| distance(from, to) > most_m * (1.0 + ROUNDING);
         is_beyond(from, world.rules.joint_step_max_m)
@@ -282,14 +287,14 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the rod's outer connector and the obstacle that it would pass through on the way to a posture, if any.
     fn find_tunneling(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<(usize, u32)> {
         self.chain.points_mut().copy_from_slice(&posed.points);
-        let passed = find_tunneling(self.chain, from, self.setting.obstacles, 0.0);
+        let passed = find_tunneling(self.chain, from, self.context.obstacles, 0.0);
         self.chain.points_mut().copy_from_slice(from);
         passed.map(|passed| (passed.rod + 1, passed.obstacle))
     }
 
     /// Returns the least clearance that the chain has, or would have, at some places.
     fn clearance_m(&mut self, points: &[Point<D>]) -> f64 {
-        let ChainContext { world, obstacles, .. } = self.setting;
+        let ChainContext { world, obstacles, .. } = self.context;
         let was = self.chain.points().to_vec();
         self.chain.points_mut().copy_from_slice(points);
         let (least_m, _) = min_clearance(self.chain, obstacles, world.look_m, true);

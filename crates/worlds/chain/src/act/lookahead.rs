@@ -1,4 +1,4 @@
-//! The choice of an initiator that decides for itself, while something approaches: to go as it wants, or to rest.
+//! The choice of an autonomous initiator, while something approaches: to move as it wants, or to rest.
 
 use super::Initiator;
 use super::desired_move::DesiredMove;
@@ -9,39 +9,41 @@ use crate::state::Body;
 use sidestep_rods::geometry::{sub, with_dimensions};
 use sidestep_rods::{Chain, RequestSource};
 
-/// Returns whether an initiator gives way to what approaches, because roll-outs tell that the chain is then inside
+/// Returns whether an initiator rests for what approaches, because rollouts show that the chain is then inside it
 /// for less time.
 pub(super) fn should_yield<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     escaper: Option<&Escaper<D>>,
-    wish: DesiredMove<D>,
+    desired: DesiredMove<D>,
 ) -> bool {
     let Some(escaper) = escaper else { return false };
     let Some(every) = escaper.choice_interval_ticks() else { return false };
-    let setting = who.setting;
-    match desired_lead(who.task, &body.chain, wish) {
-        None => body.way_out.set_resting(false),
-        Some(lead) if (setting.now + u64::from(setting.slot)).is_multiple_of(every) => {
-            let (rules, way_out) = (&setting.world.rules, &mut body.way_out);
-            escaper.choose_leader_action(&body.chain, setting.obstacles, rules, &lead, way_out);
+    let context = initiator.context;
+    match desired_lead(initiator.task, &body.chain, desired) {
+        None => body.escape_plan.set_resting(false),
+        // By slot, so that not all chains make their rollouts in the same cycle.
+        Some(lead) if (context.now + u64::from(context.slot)).is_multiple_of(every) => {
+            let rules = &context.world.rules;
+            let escape_plan = &mut body.escape_plan;
+            escaper.choose_leader_action(&body.chain, context.obstacles, rules, &lead, escape_plan);
         }
         Some(_) => {}
     }
-    body.way_out.is_resting()
+    body.escape_plan.is_resting()
 }
 
-/// Returns an initiator's wish to lead; none if it has none, or no choice: operators are obeyed, and chains that are
-/// held somewhere move by return passes, which cost too much to be rolled out.
+/// Returns the motion that an initiator wants to lead; none if it wants none, or has no choice: operators are obeyed,
+/// and chains that are held somewhere move by return passes, which cost too much to be rolled out.
 fn desired_lead<const D: usize>(
     task: &Task<D>,
     chain: &Chain<D>,
-    wish: DesiredMove<D>,
+    desired: DesiredMove<D>,
 ) -> Option<LeadMotion<D>> {
     if task.source() != RequestSource::Autonomous || is_held(chain) {
         return None;
     }
-    let to = match wish {
+    let to = match desired {
         DesiredMove::Go(to) => to,
         DesiredMove::Steer(steered) => with_dimensions(steered.pose.at),
         _ => return None,

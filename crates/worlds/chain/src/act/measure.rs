@@ -7,34 +7,36 @@ use crate::metrics::PENETRATION_THRESHOLD_M;
 use sidestep_rods::RodBvh;
 use sidestep_rods::geometry::distance;
 
-/// Most rods of a chain whose own parts are measured in each cycle.
+/// Number of rods up to which a chain's gap to itself is measured in each cycle: the measurement takes time that
+/// grows faster than the chain.
 const MAX_MEASURED_RODS: usize = 32;
-/// Number of cycles between two measurements of longer ones.
+/// Number of cycles between two measurements of longer chains.
 const MEASURE_INTERVAL_CYCLES: u64 = 16;
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
 pub(super) fn measure<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
     own: &mut RodBvh<D>,
     robots_gap_m: f64,
 ) {
-    let ChainContext { world, now, obstacles, .. } = setting;
-    let (look_m, dt_s) = (world.look_m, world.dt_s);
-    let (chain, tally) = (&acting.body.chain, &mut acting.body.tally);
+    let ChainContext { world, now, obstacles, .. } = context;
+    let look_m = world.look_m;
+    let chain = &acting.body.chain;
+    let tally = &mut acting.body.tally;
     tally.steps += 1;
-    let ways = acting.before.points.iter().zip(chain.points());
-    let longest_m = ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
-    tally.max_speed_m_s = tally.max_speed_m_s.max(longest_m / dt_s);
+    let moves = acting.before.points.iter().zip(chain.points());
+    let longest_m = moves.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
+    tally.max_speed_m_s = tally.max_speed_m_s.max(longest_m / world.dt_s);
     // In a broken chain only the parts count, because its rods hold nothing.
     let is_whole = acting.body.scattered.is_none();
     if is_whole {
         tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
     }
-    // Parts that cross stay so for long, so a long chain need not look every time.
-    let looks =
+    // Parts that cross stay crossed for many cycles, so rare measurements of a long chain find them, too.
+    let is_due =
         chain.rods().len() <= MAX_MEASURED_RODS || now.is_multiple_of(MEASURE_INTERVAL_CYCLES);
-    if is_whole && looks && world.rules.self_collision {
+    if is_whole && is_due && world.rules.self_collision {
         let within_m = tally.min_own_gap_m.min(look_m);
         let gap_m = self_gap_m(chain, own, within_m);
         tally.min_own_gap_m = if gap_m < within_m { gap_m } else { tally.min_own_gap_m };
@@ -46,6 +48,6 @@ pub(super) fn measure<const D: usize>(
     let is_inside = least_m.min(robots_gap_m) < -PENETRATION_THRESHOLD_M;
     if tally.record_inside(is_inside) {
         let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
-        acting.told.record(chain, kind, part, (-least_m).max(0.0));
+        acting.sink.record(chain, kind, part, (-least_m).max(0.0));
     }
 }

@@ -1,21 +1,21 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
-//! Its inputs are in a [`ChainContext`], a small context that is copied and that nothing changes: the world, the chain's
-//! share of it, the cycle and the obstacles around. Everything that it changes is in [`ActState`]: the chain's body,
-//! beside the places from which it set out, and the books of events and notes. The parts are functions over these
-//! two, or over less where they need less; joints, robots on wheels, agents and escapes have small structs of their
-//! own. Decisions go one way, as values: an escape says whether the chain is pressed, a driver has a
-//! [`Wish`](wish::Wish), which has an outcome, and the bounds, the answer and the measures go on from there. A part
-//! calls only parts to the right of it or below it.
+//! Its inputs are in a [`ChainContext`], which is copied and never changes: the world, the chain's share of it, the
+//! cycle and the nearby obstacles. Everything that it changes is in [`ActState`]: the chain's body, beside the
+//! positions before the cycle, and the sink of events. The parts are functions over these two, or over less where
+//! they need less; joints, robots on wheels, agents and escapes have small structs of their own. Decisions are
+//! values that are passed on in one direction: an escape returns whether the chain is pressed, a driver returns a
+//! [`DesiredMove`](desired_move::DesiredMove), whose outcome the claim, the result of orders and the measures use.
+//! A part calls only parts to the right of it or below it.
 //!
 //! ```text
-//! broken.rs, gather.rs -> bounds.rs (out of the way) -> drive.rs -> bounds.rs (back into the claim) -> obey.rs
+//! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
 //!                      -> follow.rs -> measure.rs
-//! drive.rs -> wish.rs -> wheels.rs, plan.rs, obey.rs     what the initiator wants
-//!          -> foresee.rs                                 whether it rests instead
-//!          -> wheels.rs -> go.rs -> joints.rs, outcome.rs -> tasks.rs
-//! go.rs    -> later.rs                                   where nothing can object
-//!          -> talk.rs                                    where each connector has an agent
+//! drive.rs     -> desired_move.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
+//!              -> lookahead.rs                                       whether it rests instead
+//!              -> wheels.rs -> initiator.rs -> joints.rs, outcome.rs -> tasks.rs
+//! initiator.rs -> defer.rs                                           where nothing can veto
+//!              -> negotiation.rs                                     where each connector has an agent
 //! ```
 
 mod bounds;
@@ -55,7 +55,7 @@ use sidestep_kernel::{Cycle, PhaseContext, Slot};
 use sidestep_rods::geometry::{Bounds, Point, distance};
 use sidestep_rods::{Obstacles, Propagator, Veto};
 
-/// The setting in which a chain acts: nothing changes it during the cycle.
+/// The circumstances in which a chain acts, constant during the cycle.
 #[derive(Clone, Copy)]
 struct ChainContext<'a, const D: usize> {
     world: &'a ChainWorld<D>,
@@ -68,119 +68,127 @@ struct ChainContext<'a, const D: usize> {
 /// The initiator of a chain in a cycle.
 #[derive(Clone, Copy)]
 struct Initiator<'a, const D: usize> {
-    setting: ChainContext<'a, D>,
+    context: ChainContext<'a, D>,
     task: &'a Task<D>,
     follows: FollowMode,
 }
 
-/// Ways in which the rest of a chain follows its initiator.
+/// How the rest of a chain follows its initiator.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FollowMode {
     /// At once, moved by one process.
     AtOnce,
     /// At once, each connector moved by its agent.
     AsTeam,
-    /// Later, because nothing can object: only the initiator moves for now.
+    /// Later, because nothing can veto: only the initiator moves for now.
     Deferred,
 }
 
 /// A chain as it acts: what its cycle changes.
 struct ActState<'a, const D: usize> {
     body: &'a mut Body<D>,
-    /// The places where it was before the cycle.
+    /// Its positions before the cycle.
     before: &'a PositionBuffer<D>,
     propagator: &'a mut Propagator<D>,
-    talk: Negotiation<'a, D>,
-    told: EventSink<'a, D>,
+    negotiation: Negotiation<'a, D>,
+    sink: EventSink<'a, D>,
 }
 
 /// Lets the chains of one conflict group act, one after the other.
-pub(crate) fn act<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, group: &mut [Slot]) {
+pub(crate) fn act<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, group: &mut [Slot]) {
+    // The order of a group depends on the workers that joined it; results must not.
     group.sort_unstable();
     for &slot in &*group {
-        act_one(turn, group, slot);
+        act_one(phase, group, slot);
     }
 }
 
 /// Lets one chain of a conflict group act.
 pub(crate) fn act_one<const D: usize>(
-    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
     group: &[Slot],
     slot: Slot,
 ) {
-    let &mut PhaseContext { world, state, now, .. } = turn;
+    let &mut PhaseContext { world, state, now, .. } = phase;
     let claim = state.claim(slot as usize);
-    let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
-    turn.scratch.around.gather(world, state, now + 1, group.iter().copied().filter(meets));
-    run_cycle(turn, slot, claim);
+    let others = group.iter().copied();
+    let others = others.filter(|s| *s != slot && state.claim(*s as usize).meets(&claim));
+    // Movers stand where they will be at the end of the cycle, because that is where the chain's motions lead.
+    phase.scratch.nearby.gather(world, state, now + 1, others);
+    run_cycle(phase, slot, claim);
 }
 
-/// Makes one cycle of a chain, which stays in its claim.
+/// Runs one cycle of a chain, which stays in its claim.
 fn run_cycle<const D: usize>(
-    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
     slot: Slot,
     claim: Bounds<D>,
 ) {
-    let &mut PhaseContext { world, state, now, .. } = turn;
-    let scratch = &mut *turn.scratch;
+    let &mut PhaseContext { world, state, now, .. } = phase;
+    let scratch = &mut *phase.scratch;
     let spec = &world.chains[slot as usize];
-    let setting = ChainContext { world, spec, slot, now, obstacles: &scratch.around.all };
-    let notes = scratch.notes.as_deref_mut().filter(|notes| notes.slot == slot);
-    let mut told = EventSink { slot, now, events: &mut scratch.events, notes };
+    let context = ChainContext { world, spec, slot, now, obstacles: &scratch.nearby.all };
+    let trace = scratch.trace.as_deref_mut().filter(|trace| trace.slot == slot);
+    let mut sink = EventSink { slot, now, events: &mut scratch.events, trace };
     let mut body = state.body_mut(slot as usize);
     let body = &mut *body;
-    broken::apply_changes(setting, body, &mut told);
-    let heard =
+    broken::apply_changes(context, body, &mut sink);
+    let inputs =
         CycleInputs { decision: state.decision(slot as usize), orders: orders::take_orders(body) };
-    let follows = FollowMode::choose(setting, body);
+    let follows = FollowMode::choose(context, body);
     if follows != FollowMode::Deferred {
         body.catch_up();
         scratch.before.record(body);
         scratch.escaped.record(body);
     }
-    let (escaper, escaped) = (scratch.escaper.as_mut(), &mut scratch.escaped);
-    let mut escaping = EscapeContext { escaper, escaped, claim };
-    let (before, propagator) = (&scratch.before, &mut scratch.propagator);
-    let talk = Negotiation::new(scratch.shown.as_mut());
-    let mut acting = ActState { body, before, propagator, talk, told };
+    let mut escaping =
+        EscapeContext { escaper: scratch.escaper.as_mut(), escaped: &mut scratch.escaped, claim };
+    let before = &scratch.before;
+    let propagator = &mut scratch.propagator;
+    let negotiation = Negotiation::new(scratch.percept_log.as_mut());
+    let mut acting = ActState { body, before, propagator, negotiation, sink };
     if follows == FollowMode::Deferred {
-        let guide = InitiatorContext { heard, follows, escaping: &escaping, is_pressed: false };
-        drive::run_task(setting, &mut acting, &guide);
+        let lead_context =
+            InitiatorContext { inputs, follows, escaping: &escaping, is_pressed: false };
+        drive::run_task(context, &mut acting, &lead_context);
+        // Its measures are taken when the chain follows: no obstacle is there to measure a distance to.
         acting.body.tally.steps += 1;
         return;
     }
-    match acting.body.scattered {
-        Some(_) => gather::gather_parts(setting, acting.body, &mut acting.told),
-        None => act_whole_chain(setting, &mut acting, &mut escaping, heard, follows),
+    if acting.body.scattered.is_some() {
+        gather::gather_parts(context, acting.body, &mut acting.sink);
+    } else {
+        act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }
-    let (solid, seen) = (scratch.around.solid(), &mut scratch.seen);
-    let robots_gap_m = follow::follow(setting, &mut acting, solid, seen);
-    measure::measure(setting, &mut acting, &mut scratch.own, robots_gap_m);
+    let solid = scratch.nearby.solid();
+    let robots_gap_m = follow::follow(context, &mut acting, solid, &mut scratch.robot_bodies);
+    measure::measure(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
 }
 
-/// Lets a whole chain get out of the way, carry out its task, and stay in its claim.
+/// Lets a whole chain escape from obstacles, carry out its task, and stay in its claim. Escapes come first, because they
+/// may use up the speed that the task would need.
 fn act_whole_chain<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
     escaping: &mut EscapeContext<'_, D>,
-    heard: CycleInputs,
+    inputs: CycleInputs,
     follows: FollowMode,
 ) {
-    let is_pressed = escaping.escape(setting, acting);
-    let guide = InitiatorContext { heard, follows, escaping, is_pressed };
-    let driven = drive::run_task(setting, acting, &guide);
+    let is_pressed = escaping.escape(context, acting);
+    let lead_context = InitiatorContext { inputs, follows, escaping, is_pressed };
+    let outcome = drive::run_task(context, acting, &lead_context);
     if follows == FollowMode::AsTeam {
-        negotiation::negotiate_rest(setting, acting);
+        negotiation::negotiate_rest(context, acting);
     }
-    let veto = escaping.enforce_claim(setting, acting.body, acting.before);
+    let veto = escaping.enforce_claim(context, acting.body, acting.before);
     if let Some(veto) = &veto {
         acting.record_veto(veto);
     }
-    let Some(errand) = driven.errand else { return };
+    let Some(step) = outcome.step else { return };
     if let Some(veto) = &veto {
         orders::record_result_veto(acting.body, veto);
     }
-    orders::complete_result(acting.body, &errand, driven.gives_way);
+    orders::complete_result(acting.body, &step, outcome.gives_way);
 }
 
 impl<'a, const D: usize> ChainContext<'a, D> {
@@ -196,23 +204,23 @@ impl<'a, const D: usize> ChainContext<'a, D> {
 }
 
 impl<const D: usize> Initiator<'_, D> {
-    /// Returns the place of the initiator.
+    /// Returns the position of the initiator.
     fn position(self, body: &Body<D>) -> Point<D> {
         body.chain.points()[self.task.agent]
     }
 
-    /// Returns the way that it goes in a cycle at its speed, meters.
+    /// Returns the distance that it travels in a cycle at its speed, meters.
     fn step_m(self) -> f64 {
-        self.task.speed_m_s * self.setting.world.dt_s
+        self.task.speed_m_s * self.context.world.dt_s
     }
 }
 
 impl FollowMode {
     /// Returns how a chain follows its initiator in this cycle.
-    fn choose<const D: usize>(setting: ChainContext<'_, D>, body: &Body<D>) -> Self {
-        match setting.world.deployment {
+    fn choose<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> Self {
+        match context.world.deployment {
             Deployment::Team => Self::AsTeam,
-            Deployment::Direct if defer::may_defer(setting, body) => Self::Deferred,
+            Deployment::Direct if defer::may_defer(context, body) => Self::Deferred,
             Deployment::Direct => Self::AtOnce,
         }
     }
@@ -220,19 +228,18 @@ impl FollowMode {
 
 impl<const D: usize> ActState<'_, D> {
     /// Counts a veto; of several in a row by one connector for one reason only the first is an
-    /// event.
+    /// event, because a chain that is blocked meets the same veto in every cycle.
     fn record_veto(&mut self, veto: &Veto<D>) {
-        let Self { body, before, told, .. } = self;
+        let Self { body, before, sink, .. } = self;
         body.tally.add_veto(veto.reason);
-        told.trace(|notes| notes.vetoes.push(*veto));
+        sink.trace(|trace| trace.vetoes.push(*veto));
         let objection = Some(VetoRecord { by: veto.by as u32, reason: veto.reason });
         let driving = &mut body.driving;
-        if driving.told.is_none() || driving.objection != objection {
-            let way_m = distance(veto.reached, before.points[veto.from]);
-            let event = told.event(&body.chain, EventKind::Veto, veto.by, way_m);
-            let (reason, obstacle) = (Some(veto.reason), veto.obstacle);
-            told.events.push(Event { reason, obstacle, ..event });
-            driving.told = driving.told.or(Some(EventKind::Veto));
+        if driving.last_event.is_none() || driving.objection != objection {
+            let traveled_m = distance(veto.reached, before.points[veto.from]);
+            let event = sink.event(&body.chain, EventKind::Veto, veto.by, traveled_m);
+            sink.events.push(Event { reason: Some(veto.reason), obstacle: veto.obstacle, ..event });
+            driving.last_event = driving.last_event.or(Some(EventKind::Veto));
         }
         driving.objection = objection;
     }

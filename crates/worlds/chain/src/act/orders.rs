@@ -1,4 +1,4 @@
-//! Orders from outside, for one cycle, and the answer to them.
+//! Orders of an external caller for one cycle, and their result.
 
 use super::joints::ArmFollower;
 use super::situation::out_of_range_veto;
@@ -11,30 +11,31 @@ use crate::state::Body;
 use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
 use sidestep_rods::{Chain, Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
 
-/// Number of times that the way is halved to find how far it goes: to 1/256 of it.
+/// Number of bisections to find how far a motion can go: to 1/256 of it.
 const BISECTIONS: usize = 8;
 
-/// Takes the orders for this cycle. They are gone after it, whether anybody heeds them or not.
+/// Takes the orders for this cycle. They end with it, whether the task follows them or not.
 pub(super) fn take_orders<const D: usize>(body: &mut Body<D>) -> Orders {
     let orders = std::mem::take(&mut body.external).orders;
     if orders.target.is_some() {
-        body.external.answer.came = OrderOutcome::Unheard;
+        body.external.answer.outcome = OrderOutcome::Unheard;
     }
     orders
 }
 
-/// Returns the errand on which orders send a chain in this cycle, if they have a target.
+/// Returns the motion that orders ask for in this cycle, if they have a target.
 pub(super) fn step_from_orders<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     chain: &Chain<D>,
     orders: Orders,
 ) -> Option<StepMotion<D>> {
     let Orders { connector, rod, target, goes_far } = orders;
-    let agent = who.task.agent;
+    let agent = initiator.task.agent;
     let motion = match target? {
         Target::Connector(to) => {
             let k = connector.map_or(agent, |k| k as usize);
-            let (to, at) = (with_dimensions(to), chain.points()[k]);
+            let to = with_dimensions(to);
+            let at = chain.points()[k];
             let connector = &chain.connectors()[k];
             let mobility = &connector.mobility;
             let is_there = !goes_far || connector.is_still() || mobility.allows(to, at);
@@ -46,65 +47,69 @@ pub(super) fn step_from_orders<const D: usize>(
             Motion::Rod { i, to: to.map(with_dimensions) }
         }
     };
-    Some(StepMotion::new(chain, &motion, who.step_m()))
+    Some(StepMotion::new(chain, &motion, initiator.step_m()))
 }
 
-/// The manner of going on an errand.
+/// Options of an ordered motion.
 #[derive(Clone, Copy)]
 pub(super) struct StepOptions {
-    /// Whether the chain waits, because parts have to get out of the way.
+    /// Whether the chain waits, because parts of it have to escape.
     pub(super) gives_way: bool,
-    /// Whether it goes as far as it can where it cannot go all the way.
+    /// Whether it moves as far as it can where it cannot reach the target.
     pub(super) goes_far: bool,
 }
 
-/// Goes on an errand, unless parts have to get out of the way.
+/// Carries out an ordered motion, unless parts have to escape.
 pub(super) fn execute_step<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
-    manner: StepOptions,
+    step: &StepMotion<D>,
+    options: StepOptions,
 ) {
-    let at = acting.body.chain.points()[errand.first];
-    acting.body.driving.way_m.wanted += norm(sub(errand.to[0], at));
-    let climbed = match manner.gives_way {
-        true => RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) },
-        false => request_or_bisect(who.setting, acting, errand, manner.goes_far),
+    let at = acting.body.chain.points()[step.first];
+    acting.body.driving.way_m.wanted += norm(sub(step.to[0], at));
+    let climbed = if options.gives_way {
+        RecoveryOutcome::Waiting { n: acting.body.driving.idle.saturating_add(1) }
+    } else {
+        request_or_bisect(initiator.context, acting, step, options.goes_far)
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
-    acting.told.trace(|notes| notes.climbed = Some(climbed));
-    let way = sub(body.chain.points()[errand.first], at);
+    acting.sink.trace(|trace| trace.climbed = Some(climbed));
+    let displacement = sub(body.chain.points()[step.first], at);
     let driving = &mut body.driving;
-    driving.way_m.gone += norm(way);
-    driving.idle = if way == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
-    if let Some(ahead) = normalized(way).filter(|_| errand.first == who.task.agent) {
+    driving.way_m.gone += norm(displacement);
+    driving.idle = if displacement == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
+    if let Some(ahead) = normalized(displacement).filter(|_| step.first == initiator.task.agent) {
         driving.ahead = with_dimensions(ahead);
     }
-    body.tally.way_m += norm(way);
+    body.tally.way_m += norm(displacement);
 }
 
-/// Requests all of the way and, where that is vetoed and as much as goes is wanted, halves of what is
-/// left; tells the objection to the rest.
+/// Requests the whole motion and, where that is vetoed and as much as possible is wanted, bisects; records the veto
+/// of the rest.
 fn request_or_bisect<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     goes_far: bool,
 ) -> RecoveryOutcome<D> {
-    let mut veto = match request_fraction(setting, acting, errand, 1.0) {
+    let mut veto = match request_fraction(context, acting, step, 1.0) {
         Outcome::Moved(moved) => {
             match &moved.cut_short {
                 Some(veto) => record_veto(acting, veto),
-                None => acting.body.driving.told = None,
+                None => acting.body.driving.last_event = None,
             }
             return RecoveryOutcome::Straight(moved);
         }
         Outcome::Vetoed(veto) => veto,
     };
-    let (mut done, mut half, mut last) = (0.0, 0.5, None);
-    for _ in 0..if goes_far { BISECTIONS } else { 0 } {
-        match request_fraction(setting, acting, errand, done + half) {
+    let mut done = 0.0;
+    let mut half = 0.5;
+    let mut last = None;
+    let bisections = if goes_far { BISECTIONS } else { 0 };
+    for _ in 0..bisections {
+        match request_fraction(context, acting, step, done + half) {
             Outcome::Moved(moved) => {
                 done += half;
                 last = Some(moved);
@@ -120,21 +125,21 @@ fn request_or_bisect<const D: usize>(
     }
 }
 
-/// Requests a part of an errand's way, counted from its start: all of that part, or nothing.
+/// Requests a fraction of a motion, counted from its start: all of that fraction, or nothing.
 fn request_fraction<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     part: f64,
 ) -> Outcome<D> {
-    let motion = errand.motion(part);
+    let motion = step.motion(part);
     let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let ActState { body, before, propagator, .. } = acting;
-    let outcome = execute_request(propagator, &mut body.chain, setting.obstacles, &request);
+    let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
     let outcome =
-        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, errand.first)));
-    let outcome = match ArmFollower::from_body(setting, before, body) {
-        Some(mut arm) => arm.execute_order(errand, part, outcome),
+        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
+    let outcome = match ArmFollower::from_body(context, before, body) {
+        Some(mut arm) => arm.execute_order(step, part, outcome),
         None => outcome,
     };
     if let Outcome::Moved(moved) = &outcome {
@@ -143,38 +148,39 @@ fn request_fraction<const D: usize>(
     outcome
 }
 
-/// Counts a veto to an errand, and notes it in the answer.
+/// Counts a veto of an ordered motion, and records it in the result.
 fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
     acting.record_veto(veto);
     record_result_veto(acting.body, veto);
 }
 
-/// Notes in the answer who objects.
+/// Records a veto in the result.
 pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto<D>) {
     let answer = &mut body.external.answer;
-    (answer.veto, answer.obstacle) = (body.driving.objection, veto.obstacle);
+    answer.veto = body.driving.objection;
+    answer.obstacle = veto.obstacle;
     answer.reached_m = with_dimensions(veto.reached);
 }
 
-/// Completes the answer at the end of the chain's motions.
+/// Completes the result at the end of the chain's motions.
 pub(super) fn complete_result<const D: usize>(
     body: &mut Body<D>,
-    errand: &StepMotion<D>,
+    step: &StepMotion<D>,
     gives_way: bool,
 ) {
     let chain = &body.chain;
-    let done_share = errand.done_fraction(chain);
-    let reached = chain.points()[errand.first];
+    let done_share = step.done_fraction(chain);
+    let reached = chain.points()[step.first];
     let answer = &mut body.external.answer;
-    answer.wish_m = errand.to.map(with_dimensions);
-    answer.came = match answer.veto {
+    answer.target_m = step.to.map(with_dimensions);
+    answer.outcome = match answer.veto {
         None if gives_way => OrderOutcome::Waited,
         None => OrderOutcome::Moved,
         Some(_) if done_share > 0.0 => OrderOutcome::CutShort,
         Some(_) => OrderOutcome::Vetoed,
     };
-    answer.done_share = if answer.came == OrderOutcome::Moved { 1.0 } else { done_share };
-    if answer.came != OrderOutcome::Vetoed {
+    answer.done_share = if answer.outcome == OrderOutcome::Moved { 1.0 } else { done_share };
+    if answer.outcome != OrderOutcome::Vetoed {
         answer.reached_m = with_dimensions(reached);
     }
 }

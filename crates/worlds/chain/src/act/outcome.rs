@@ -11,7 +11,7 @@ use sidestep_kernel::distr::normal;
 use sidestep_rods::CompletedMotion;
 use sidestep_rods::geometry::{Point, first_axis, normalized, with_dimensions};
 
-/// Whether an initiator went where it wanted, or near it.
+/// Whether an initiator moved where it wanted, or near it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MoveResult {
     Ahead,
@@ -20,26 +20,27 @@ pub(super) enum MoveResult {
 
 /// Counts the result of a motion; returns whether the initiator moved.
 pub(super) fn record_result<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     climbed: &RecoveryOutcome<D>,
-    way: Point<D>,
+    displacement: Point<D>,
 ) -> MoveResult {
     acting.body.tally.rungs.record(climbed);
-    let agent = who.task.agent;
+    let agent = initiator.task.agent;
     let went = match climbed {
         RecoveryOutcome::Straight(moved) => {
-            (acting.body.driving.idle, acting.body.driving.told) = (0, None);
-            record_motion(acting.body, moved, way);
+            acting.body.driving.idle = 0;
+            acting.body.driving.last_event = None;
+            record_motion(acting.body, moved, displacement);
             return MoveResult::Ahead;
         }
         RecoveryOutcome::Shorter { moved, .. } => {
-            record_motion(acting.body, moved, way);
+            record_motion(acting.body, moved, displacement);
             MoveResult::Ahead
         }
         RecoveryOutcome::Sideways { moved, turn_rad, .. } => {
             report_once(acting, EventKind::Sideways, agent, *turn_rad);
-            record_motion(acting.body, moved, way);
+            record_motion(acting.body, moved, displacement);
             MoveResult::Ahead
         }
         RecoveryOutcome::PulledBack { by, moved } => {
@@ -49,7 +50,7 @@ pub(super) fn record_result<const D: usize>(
         }
         RecoveryOutcome::Stuck { .. } => {
             report_once(acting, EventKind::Stuck, agent, 0.0);
-            turn_away(who, acting.body);
+            turn_away(initiator, acting.body);
             MoveResult::Nowhere
         }
         RecoveryOutcome::TurnOnTheSpot { .. }
@@ -60,36 +61,39 @@ pub(super) fn record_result<const D: usize>(
         MoveResult::Ahead => 0,
         MoveResult::Nowhere => acting.body.driving.idle.saturating_add(1),
     };
-    give_up_if_stuck(who, acting.body, &mut acting.told);
+    give_up_if_stuck(initiator, acting.body, &mut acting.sink);
     went
 }
 
-/// Reports only the first of several events of one kind between two motions that went as
-/// wanted.
+/// Reports only the first of several events of one kind between two motions that succeeded at the first try.
 fn report_once<const D: usize>(
     acting: &mut ActState<'_, D>,
     kind: EventKind,
     connector: usize,
     value: f64,
 ) {
-    if acting.body.driving.told != Some(kind) {
-        acting.body.driving.told = Some(kind);
-        acting.told.record(&acting.body.chain, kind, connector, value);
+    if acting.body.driving.last_event != Some(kind) {
+        acting.body.driving.last_event = Some(kind);
+        acting.sink.record(&acting.body.chain, kind, connector, value);
     }
 }
 
-/// Lets a wandering initiator that is stuck go on in any direction.
-fn turn_away<const D: usize>(who: Initiator<'_, D>, body: &mut Body<D>) {
-    if matches!(who.task.driver, TaskKind::Wander(_)) {
-        let draws = &mut who.setting.draws(purpose::TURN_AWAY);
+/// Turns a wandering initiator that is stuck to a random direction.
+fn turn_away<const D: usize>(initiator: Initiator<'_, D>, body: &mut Body<D>) {
+    if matches!(initiator.task.driver, TaskKind::Wander(_)) {
+        let draws = &mut initiator.context.draws(purpose::TURN_AWAY);
         let any: Point<D> = std::array::from_fn(|_| normal(draws));
         let ahead: Point<D> = normalized(any).unwrap_or(first_axis());
         body.driving.ahead = with_dimensions(ahead);
     }
 }
 
-fn record_motion<const D: usize>(body: &mut Body<D>, moved: &CompletedMotion<D>, way: Point<D>) {
-    if let Some(ahead) = normalized(way) {
+fn record_motion<const D: usize>(
+    body: &mut Body<D>,
+    moved: &CompletedMotion<D>,
+    displacement: Point<D>,
+) {
+    if let Some(ahead) = normalized(displacement) {
         body.driving.ahead = with_dimensions(ahead);
     }
     body.tally.add_motion(moved);

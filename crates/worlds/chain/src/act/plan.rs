@@ -1,4 +1,4 @@
-//! Ways that are planned once local rules come no nearer to a target.
+//! Paths that are planned once local rules come no nearer to a target.
 
 use super::{ActState, ChainContext, Initiator};
 use crate::driver::Targets;
@@ -14,33 +14,34 @@ use sidestep_rods::find_tunneling;
 use sidestep_rods::geometry::{Point, distance};
 use std::collections::VecDeque;
 
-/// Least part of a piece of the way that a cycle is worth.
+/// Least fraction of a segment of the path that a cycle is worth.
 const MIN_FRACTION: f64 = 1e-6;
-/// Part of the limit that a step along a plan aims at.
+/// Fraction of the speed limit that a shortened step aims at: by exactly the limit, rounding could exceed it again.
 const STEP_LIMIT_FRACTION: f64 = 0.99;
 
-/// Plans a way to the next target if local rules have come no nearer for long enough; if there
-/// was none, again after twice that time, because the search takes long where there is no way.
+/// Plans a path to the next target if local rules have come no nearer for long enough; if there was none, again
+/// after twice that time, because the search takes long where no path exists.
 pub(super) fn plan_if_stuck<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     targets: &Targets<D>,
 ) {
-    let Initiator { setting, task, .. } = who;
+    let Initiator { context, task, .. } = initiator;
     let body = &mut *acting.body;
     let Some(after_s) = task.plans_after_s.filter(|_| body.plan.is_none()) else { return };
-    let after = ((after_s / setting.world.dt_s).ceil() as u32).max(1);
+    let after = ((after_s / context.world.dt_s).ceil() as u32).max(1);
     let late = body.driving.late;
     if !late.is_multiple_of(after) || !(late / after).is_power_of_two() {
         return;
     }
     let next = body.driving.next;
-    let (k, target) = (task.agent, targets.places[next as usize]);
-    let errand = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
+    let k = task.agent;
+    let target = targets.places[next as usize];
+    let query = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
     // A chain without a base, or a target out of range, has no plan.
-    let found = find_path(setting, body, &errand).ok().flatten();
+    let plan_found = find_path(context, body, &query).ok().flatten();
     let rungs = &mut body.tally.rungs;
-    let (kind, value) = match &found {
+    let (kind, value) = match &plan_found {
         Some(plan) => {
             rungs.planned += 1;
             (EventKind::Planned, plan.len() as f64)
@@ -50,129 +51,139 @@ pub(super) fn plan_if_stuck<const D: usize>(
             (EventKind::NotPlanned, f64::from(next))
         }
     };
-    acting.told.record(&body.chain, kind, k, value);
-    body.plan = found;
+    acting.sink.record(&body.chain, kind, k, value);
+    body.plan = plan_found;
 }
 
-/// Searches a way: of an arm's joints, else of rods.
+/// Searches for a path: of an arm's joints, otherwise of rods.
 fn find_path<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &Body<D>,
-    errand: &PlanningQuery<D>,
+    query: &PlanningQuery<D>,
 ) -> Result<Option<MotionPlan<D>>, InputError> {
-    let draws = &mut setting.draws(purpose::PLAN);
-    let ChainContext { world, spec, obstacles, .. } = setting;
-    let (chain, rules) = (&body.chain, world.rules);
-    if let (Some(arm), Some(joints)) = (spec.arm.as_deref(), &body.joints) {
-        let solid = rules.self_collision;
-        let space = JointSpace::new(arm, joints, chain, obstacles, solid, errand.k);
-        let way = plan_joints(&space, errand, draws)?;
-        return Ok(way.map(|way| MotionPlan::Joints(way.into())));
+    let draws = &mut context.draws(purpose::PLAN);
+    let ChainContext { world, spec, obstacles, .. } = context;
+    let chain = &body.chain;
+    let rules = world.rules;
+    if let Some(arm) = spec.arm.as_deref()
+        && let Some(joints) = &body.joints
+    {
+        let self_collision = rules.self_collision;
+        let space = JointSpace::new(arm, joints, chain, obstacles, self_collision, query.k);
+        let path = plan_joints(&space, query, draws)?;
+        return Ok(path.map(|path| MotionPlan::Joints(path.into())));
     }
-    let way = plan(chain, obstacles, rules, errand, draws)?;
-    Ok(way.map(|way| MotionPlan::Rods(way.into())))
+    let path = plan(chain, obstacles, rules, query, draws)?;
+    Ok(path.map(|path| MotionPlan::Rods(path.into())))
 }
 
-/// Returns the next place of the initiator on its planned way.
+/// Returns the next position of the initiator on its planned path.
 pub(super) fn next_waypoint<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &Body<D>,
 ) -> Option<Point<D>> {
     match body.plan.as_ref()? {
-        MotionPlan::Rods(way) => Some(way.front()?[who.task.agent]),
-        MotionPlan::Joints(way) => {
-            let places = who.setting.spec.arm.as_ref()?.connector_positions(way.front()?);
-            places.get(who.task.agent).copied()
+        MotionPlan::Rods(path) => Some(path.front()?[initiator.task.agent]),
+        MotionPlan::Joints(path) => {
+            let places = initiator.context.spec.arm.as_ref()?.connector_positions(path.front()?);
+            places.get(initiator.task.agent).copied()
         }
     }
 }
 
-/// Goes on along the planned way: the initiator at its speed at most, no joint faster than it
-/// may be. A plan in whose way something has come is dropped.
+/// Follows the planned path: the initiator at its speed at most, no joint faster than it may be. A plan that has
+/// become blocked is dropped.
 pub(super) fn follow_plan<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     before: &PositionBuffer<D>,
 ) {
     body.plan = match body.plan.take() {
-        Some(MotionPlan::Rods(way)) => follow_rods(who, body, way).map(MotionPlan::Rods),
-        Some(MotionPlan::Joints(way)) => {
-            follow_joints(who, body, &before.joints, way).map(MotionPlan::Joints)
+        Some(MotionPlan::Rods(path)) => follow_rods(initiator, body, path).map(MotionPlan::Rods),
+        Some(MotionPlan::Joints(path)) => {
+            follow_joints(initiator, body, &before.joints, path).map(MotionPlan::Joints)
         }
         None => None,
     };
 }
 
-/// Goes on along a way of rods; returns what is left of it.
+/// Follows a path of rods; returns the rest of it.
 fn follow_rods<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
-    mut way: VecDeque<ChainPosture<D>>,
+    mut path: VecDeque<ChainPosture<D>>,
 ) -> Option<VecDeque<ChainPosture<D>>> {
-    let ChainContext { world, obstacles, .. } = who.setting;
-    let solid = world.rules.self_collision;
-    let space = RodSpace::new(&body.chain, obstacles, solid, who.task.agent).ok()?;
-    let (from, to) = (space.present(), way.front()?);
-    let at = |posture: &ChainPosture<D>| posture.clone();
-    let (next, is_there) = StepLimits::from_initiator(who).step(&space, &from, to, 1.0, at);
-    if !space.is_path_free(&from, &next) || !move_along(who, body, &from, &next) {
+    let ChainContext { world, obstacles, .. } = initiator.context;
+    let self_collision = world.rules.self_collision;
+    let space = RodSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent).ok()?;
+    let from = space.present();
+    let to = path.front()?;
+    let limits = StepLimits::from_initiator(initiator);
+    let (next, is_there) = limits.step(&space, &from, to, 1.0, ChainPosture::clone);
+    if !space.is_path_free(&from, &next) || !move_along(initiator, body, &from, &next) {
         return None;
     }
     if is_there {
-        way.pop_front();
+        path.pop_front();
     }
-    (!way.is_empty()).then_some(way)
+    (!path.is_empty()).then_some(path)
 }
 
-/// Goes on along a way of an arm's joints; returns what is left of it. In a cycle in which the arm got out of the
-/// way, its joints have no speed left for it.
+/// Follows a path of an arm's joints; returns the rest of it. In a cycle in which the arm escaped from something its
+/// joints have no speed left for the plan.
 fn follow_joints<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     joints_before: &[f64],
-    mut way: VecDeque<Vec<f64>>,
+    mut path: VecDeque<Vec<f64>>,
 ) -> Option<VecDeque<Vec<f64>>> {
-    let ChainContext { world, spec, obstacles, .. } = who.setting;
-    let (arm, joints) = (spec.arm.as_deref()?, body.joints.clone()?);
+    let ChainContext { world, spec, obstacles, .. } = initiator.context;
+    let arm = spec.arm.as_deref()?;
+    let joints = body.joints.clone()?;
     if joints != joints_before {
-        return Some(way);
+        return Some(path);
     }
-    let (chain, solid) = (&body.chain, world.rules.self_collision);
-    let space = JointSpace::new(arm, &joints, chain, obstacles, solid, who.task.agent);
-    let (dt_s, to, mut most_m) = (world.dt_s, way.front()?, StepLimits::from_initiator(who));
+    let chain = &body.chain;
+    let self_collision = world.rules.self_collision;
+    let space =
+        JointSpace::new(arm, &joints, chain, obstacles, self_collision, initiator.task.agent);
+    let dt_s = world.dt_s;
+    let to = path.front()?;
+    let mut limits = StepLimits::from_initiator(initiator);
     if let Some(escape) = &world.escape {
-        most_m.joint = most_m.joint.min(escape.speed_max_m_s * dt_s);
+        limits.joint = limits.joint.min(escape.speed_max_m_s * dt_s);
     }
-    let part = arm.follower.reachable_fraction(&joints, to, dt_s);
-    let at = |values: &Vec<f64>| -> ChainPosture<D> { arm.connector_positions(values) };
-    let (mut next, is_there) = most_m.step(&space, &joints, to, part, at);
-    // Ways of exactly the greatest speed are not longer by rounding.
+    let fraction = arm.follower.reachable_fraction(&joints, to, dt_s);
+    let positions = |values: &Vec<f64>| arm.connector_positions::<D>(values);
+    let (mut next, is_there) = limits.step(&space, &joints, to, fraction, positions);
+    // Rounding must not make a motion at exactly the maximum speed faster.
     for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.reachable_ranges(&joints, dt_s)) {
         *x = x.clamp(lower, upper);
     }
     let from = chain.points().to_vec();
     if !space.is_path_free(&joints, &next)
-        || !move_along(who, body, &from, &arm.connector_positions(&next))
+        || !move_along(initiator, body, &from, &arm.connector_positions(&next))
     {
         return None;
     }
     body.joints = Some(next);
     if is_there {
-        way.pop_front();
+        path.pop_front();
     }
-    (!way.is_empty()).then_some(way)
+    (!path.is_empty()).then_some(path)
 }
 
-/// Moves the chain to the next places on a planned way, unless it would pass through something.
+/// Moves the chain to the next posture of a planned path, unless it would tunnel through something.
 fn move_along<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
     from: &[Point<D>],
     next: &[Point<D>],
 ) -> bool {
-    let (chain, agent) = (&mut body.chain, who.task.agent);
+    let chain = &mut body.chain;
+    let agent = initiator.task.agent;
     chain.points_mut().copy_from_slice(next);
-    if find_tunneling(chain, from, who.setting.obstacles, 0.0).is_some() {
+    if find_tunneling(chain, from, initiator.context.obstacles, 0.0).is_some() {
         chain.points_mut().copy_from_slice(from);
         return false;
     }
@@ -181,44 +192,44 @@ fn move_along<const D: usize>(
     true
 }
 
-/// Longest ways in a cycle, meters.
+/// Longest motions in a cycle, meters.
 struct StepLimits {
     agent: usize,
-    /// Longest way of the initiator.
+    /// Longest motion of the initiator.
     led: f64,
-    /// Longest way of any connector.
+    /// Longest motion of any connector.
     joint: f64,
 }
 
 impl StepLimits {
-    fn from_initiator<const D: usize>(who: Initiator<'_, D>) -> Self {
-        let joint = who.setting.world.rules.joint_step_max_m;
-        Self { agent: who.task.agent, led: who.step_m(), joint }
+    fn from_initiator<const D: usize>(initiator: Initiator<'_, D>) -> Self {
+        let joint = initiator.context.world.rules.joint_step_max_m;
+        Self { agent: initiator.task.agent, led: initiator.step_m(), joint }
     }
 
-    /// Returns the posture on the way from one to another that a cycle is enough for, at most a `part` of it, and
-    /// whether it is that one. `at` tells where the connectors of a posture are.
+    /// Returns the posture between two that is reached in one cycle, at most a `fraction` of the motion, and whether
+    /// it is the second one. `positions` returns where the connectors of a posture are.
     fn step<const D: usize, S: ConfigurationSpace>(
         &self,
         space: &S,
         from: &S::Posture,
         to: &S::Posture,
-        mut part: f64,
-        at: impl Fn(&S::Posture) -> ChainPosture<D>,
+        mut fraction: f64,
+        positions: impl Fn(&S::Posture) -> ChainPosture<D>,
     ) -> (S::Posture, bool) {
-        let start = at(from);
-        let mut next = space.interpolate(from, to, part);
-        while part >= MIN_FRACTION {
-            let points = at(&next);
-            let ways_m = start.iter().zip(&points).map(|(a, b)| distance(*a, *b));
+        let start = positions(from);
+        let mut next = space.interpolate(from, to, fraction);
+        while fraction >= MIN_FRACTION {
+            let points = positions(&next);
+            let moves_m = start.iter().zip(&points).map(|(a, b)| distance(*a, *b));
             let led = distance(start[self.agent], points[self.agent]) / self.led;
-            let excess = led.max(ways_m.fold(0.0, f64::max) / self.joint);
+            let excess = led.max(moves_m.fold(0.0, f64::max) / self.joint);
             if excess <= 1.0 {
                 break;
             }
-            part *= STEP_LIMIT_FRACTION / excess;
-            next = space.interpolate(from, to, part);
+            fraction *= STEP_LIMIT_FRACTION / excess;
+            next = space.interpolate(from, to, fraction);
         }
-        (next, part >= 1.0)
+        (next, fraction >= 1.0)
     }
 }

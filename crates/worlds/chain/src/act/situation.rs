@@ -12,16 +12,16 @@ use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Veto, VetoReason};
 const MOVER_NEAR_M: f64 = 1.0;
 
 /// Returns an initiator's knowledge beside its neighborhood.
-pub(super) fn situation<const D: usize>(who: Initiator<'_, D>, body: &Body<D>) -> Situation {
-    let at = who.position(body);
-    let near_m = who.setting.world.look_m + MOVER_NEAR_M;
+pub(super) fn situation<const D: usize>(initiator: Initiator<'_, D>, body: &Body<D>) -> Situation {
+    let at = initiator.position(body);
+    let near_m = initiator.context.world.look_m + MOVER_NEAR_M;
     let is_near = |o: &Obstacle<D>| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m;
-    let goal_distance_m = goal_distance_m(who.task, body);
-    let (can_turn, keeps_heading) = match &who.task.driver {
+    let goal_distance_m = goal_distance_m(initiator.task, body);
+    let (can_turn, keeps_heading) = match &initiator.task.driver {
         TaskKind::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
         _ => (false, false),
     };
-    let movers_near = who.setting.obstacles.moving().iter().any(is_near);
+    let movers_near = initiator.context.obstacles.moving().iter().any(is_near);
     Situation { goal_distance_m, movers_near, can_turn, keeps_heading }
 }
 

@@ -5,57 +5,57 @@ use super::{ChainContext, Initiator};
 use crate::driver::{Task, TaskKind};
 use crate::events::{Event, EventKind};
 use crate::metrics::AbandonedPart;
-use crate::state::Body;
+use crate::state::{Body, Standstill};
 
-/// Returns how a task ends that has come to its end: a list of targets none of which was reached is not done.
+/// Returns how a task ends: a list of targets none of which was reached is not done.
 pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &Body<D>) -> EventKind {
     if !matches!(task.driver, TaskKind::Targets(_)) {
         return EventKind::Done;
     }
     let driving = &body.driving;
-    let is_of_now = |what: &&AbandonedPart| what.task == driving.task;
-    let given_up = body.tally.given_up.iter().filter(is_of_now).count();
-    // Targets that time has cut off are neither.
+    let given_up = body.tally.given_up.iter().filter(|part| part.task == driving.task).count();
+    // Targets that the time limit cut off are neither.
     if driving.next as usize > given_up { EventKind::Done } else { EventKind::GivenUp }
 }
 
 /// Ends the present task, done or given up, and starts the next.
 pub(super) fn start_next_task<const D: usize>(
-    setting: ChainContext<'_, D>,
+    context: ChainContext<'_, D>,
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
     how: EventKind,
 ) {
-    let Some(task) = setting.task(body) else { return };
+    let Some(task) = context.task(body) else { return };
     body.catch_up();
-    (body.plan, body.stood) = (None, 0);
+    body.plan = None;
+    body.standstill = Standstill::default();
     let driving = &mut body.driving;
-    let next = setting.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
+    let next = context.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
     let ended = f64::from(driving.task);
     driving.start_next_task(next.agent, body.chain.points());
     body.tally.done += u64::from(how == EventKind::Done);
     body.motions =
-        setting.spec.motions(&body.driving).expect("scripts are tried when they are compiled");
-    told.record(&body.chain, how, task.agent, ended);
+        context.spec.motions(&body.driving).expect("scripts are tried when they are compiled");
+    sink.record(&body.chain, how, task.agent, ended);
 }
 
-/// Gives up a task that made no progress for too long. Around a target there is always some way
-/// to go, so there the time counts in which none of them led nearer.
+/// Gives up a task that made no progress for too long. Around a target the initiator can always move somewhere, so
+/// there the time without coming nearer counts, too.
 pub(super) fn give_up_if_stuck<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     body: &mut Body<D>,
-    told: &mut EventSink<'_, D>,
+    sink: &mut EventSink<'_, D>,
 ) {
-    let Initiator { setting, task, .. } = who;
-    let tried = body.driving.idle.max(body.driving.late);
-    if setting.world.start_time_s(u64::from(tried)) <= task.patience_s {
+    let Initiator { context, task, .. } = initiator;
+    let cycles_tried = body.driving.idle.max(body.driving.late);
+    if context.world.start_time_s(u64::from(cycles_tried)) <= task.patience_s {
         return;
     }
     let objection = body.driving.objection;
     let reason = objection.map(|objection| objection.reason);
     let undone = match &task.driver {
         TaskKind::Targets(targets) => 1.0 / targets.places.len() as f64,
-        _ => 1.0 - setting.world.fraction_done(body, task),
+        _ => 1.0 - context.world.fraction_done(body, task),
     };
     body.tally.given_up.push(AbandonedPart {
         task: body.driving.task,
@@ -66,14 +66,15 @@ pub(super) fn give_up_if_stuck<const D: usize>(
         reason: reason.map(|reason| reason.name().into()),
     });
     match task.driver {
+        // Only this target: the next one may be reachable.
         TaskKind::Targets(_) => {
             let by = objection.map_or(task.agent, |objection| objection.by as usize);
             let target = f64::from(body.driving.next);
-            let event = told.event(&body.chain, EventKind::TargetGivenUp, by, target);
-            told.events.push(Event { reason, ..event });
+            let event = sink.event(&body.chain, EventKind::TargetGivenUp, by, target);
+            sink.events.push(Event { reason, ..event });
             body.plan = None;
             body.driving.advance_part();
         }
-        _ => start_next_task(setting, body, told, EventKind::GivenUp),
+        _ => start_next_task(context, body, sink, EventKind::GivenUp),
     }
 }

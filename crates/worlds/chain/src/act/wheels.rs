@@ -15,13 +15,14 @@ use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
 
 /// Time for which a leader stands and waits for a robot that is late, s.
 const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;
-/// Part of its speed at which it goes on after that, because a robot that is blocked by another one may get
-/// free only once their connectors are elsewhere.
+/// Fraction of its speed at which it continues after that, because a robot that is blocked by another one may get
+/// free only once their connectors have moved.
 const RESUME_SPEED_FRACTION: f64 = 0.25;
-/// Part of the gap to another robot that a leader leaves in a cycle: the other one may take a fifth of it.
+/// Fraction of the gap to another robot that a leader leaves in a cycle, because the other one may take a fifth of
+/// it in the same cycle.
 const SHARED_GAP_FRACTION: f64 = 0.25;
 
-/// Angle between two headings that differ by rounding at most.
+/// Largest angle between two headings that differ by rounding only.
 pub(super) const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 
 /// A step on wheels.
@@ -29,36 +30,37 @@ pub(super) const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 pub(super) struct WheelStep {
     /// The pose to which it leads.
     pub(super) pose: Pose2,
-    /// The navigator's decision on it, at full speed.
+    /// The navigator's decision, at full speed.
     wheels: Wheels,
 }
 
 /// A navigator and the chain that it leads.
 pub(super) struct NavigatorContext<'a, const D: usize> {
-    pub(super) who: Initiator<'a, D>,
+    pub(super) initiator: Initiator<'a, D>,
     pub(super) navigator: &'a Navigator,
     pub(super) body: &'a mut Body<D>,
 }
 
-/// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
+/// Moves an initiator on wheels; one that is blocked may turn on the spot.
 pub(super) fn drive_on_wheels<const D: usize>(
-    who: Initiator<'_, D>,
+    initiator: Initiator<'_, D>,
     acting: &mut ActState<'_, D>,
     steered: WheelStep,
 ) {
-    let TaskKind::Navigate(navigator) = &who.task.driver else { return };
+    let TaskKind::Navigate(navigator) = &initiator.task.driver else { return };
     let WheelStep { pose, wheels } = steered;
-    if comes_too_near(acting.body, who.task.agent, pose.at) {
-        wait_for_escape(who, acting);
-        return NavigatorContext { who, navigator, body: acting.body }.turn_if_blocked(wheels);
+    if comes_too_near(acting.body, initiator.task.agent, pose.at) {
+        wait_for_escape(initiator, acting);
+        return NavigatorContext { initiator, navigator, body: acting.body }
+            .turn_if_blocked(wheels);
     }
-    let was = who.position(acting.body);
-    let went = move_initiator(who, acting, with_dimensions(pose.at));
-    let mut wheeled = NavigatorContext { who, navigator, body: acting.body };
+    let was = initiator.position(acting.body);
+    let went = move_initiator(initiator, acting, with_dimensions(pose.at));
+    let mut wheeled = NavigatorContext { initiator, navigator, body: acting.body };
     match went {
         MoveResult::Ahead => wheeled.update_heading(pose.heading_rad),
         // A robot whose connector was pulled away follows it on its wheels.
-        MoveResult::Nowhere if wheeled.has_robots() && who.position(wheeled.body) != was => {}
+        MoveResult::Nowhere if wheeled.has_robots() && initiator.position(wheeled.body) != was => {}
         MoveResult::Nowhere => wheeled.turn_if_blocked(wheels),
     }
 }
@@ -77,8 +79,8 @@ fn comes_too_near<const D: usize>(body: &Body<D>, agent: usize, to: Point<2>) ->
     let Some(robot) = robots.get(agent) else { return false };
     let apart_m = 2.0 * body.robot_radius_m;
     let others = robots.iter().enumerate().filter(|(k, _)| *k != agent);
-    let mut others = others.map(|(_, other)| other.pose.at);
-    others.any(|other| {
+    let mut positions = others.map(|(_, other)| other.pose.at);
+    positions.any(|other| {
         let was_m = distance(robot.pose.at, other) - apart_m;
         let gap_m = distance(to, other) - apart_m;
         gap_m < was_m && gap_m < SHARED_GAP_FRACTION * was_m.max(0.0)
@@ -87,31 +89,32 @@ fn comes_too_near<const D: usize>(body: &Body<D>, agent: usize, to: Point<2>) ->
 
 impl<const D: usize> NavigatorContext<'_, D> {
     fn has_robots(&self) -> bool {
-        self.who.setting.spec.robots.is_some()
+        self.initiator.context.spec.robots.is_some()
     }
 
     /// Returns whether a navigator has reached its goal.
     pub(super) fn has_arrived(&self) -> bool {
-        let at = with_dimensions(self.who.position(self.body));
+        let at = with_dimensions(self.initiator.position(self.body));
         let index = self.body.driving.next as usize;
         self.navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
     }
 
-    /// Returns the step that a navigator's wheels would make as it has decided.
+    /// Returns the step that a navigator's wheels make by its decision.
     pub(super) fn steer(&mut self, decision: Decision) -> WheelStep {
-        let world = self.who.setting.world;
+        let world = self.initiator.context.world;
         self.locate();
         let pace = self.speed_fraction();
         let body = &mut *self.body;
         let driving = &mut body.driving;
         driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
-        body.stood = match decision.wheels == Wheels::default() {
-            true => body.stood.saturating_add(1),
-            // Whose patience has ended does not lose it again at once.
-            false if decision.is_mover_ahead => body.stood,
-            false => 0,
-        };
-        let mut leader = body.leader_state(self.who.task);
+        if decision.wheels == Wheels::default() {
+            body.standstill.cycles = body.standstill.cycles.saturating_add(1);
+        } else if !decision.is_mover_ahead {
+            // While a mover is ahead the count stays: otherwise a navigator that has stopped waiting for it
+            // would wait again after one step.
+            body.standstill.cycles = 0;
+        }
+        let mut leader = body.leader_state(self.initiator.task);
         leader.followed = decision.followed;
         body.driving.leader = Some(leader);
         body.tally.layers[decision.layer as usize - 1] += 1;
@@ -122,30 +125,39 @@ impl<const D: usize> NavigatorContext<'_, D> {
         WheelStep { pose, wheels: decision.wheels }
     }
 
-    /// Finds the place of a navigator whose task begins on the line to its goal.
+    /// Finds where on the line to its goal a navigator begins its task.
     fn locate(&mut self) {
-        if let (None, Some(goal)) = (&self.body.driving.leader, &self.navigator.goal) {
-            let at = with_dimensions(self.who.position(self.body));
+        // A task without a leader's memory has not taken its first step yet.
+        if self.body.driving.leader.is_some() {
+            return;
+        }
+        if let Some(goal) = &self.navigator.goal {
+            let at = with_dimensions(self.initiator.position(self.body));
             self.body.driving.next = goal.start_index(at) as u32;
         }
     }
 
-    /// Returns where the connector of a navigator has to go to be at its robot again, from which escapes or
-    /// a pull by the other end have taken it; none while it is there. Where an escape has just moved it, it
-    /// stays.
+    /// Returns where the connector of a navigator goes to be at its robot again after an escape or a pull by the
+    /// other end has moved it; none while it is there. One that an escape has just moved stays: on the way back it
+    /// would meet the same obstacle.
     pub(super) fn robot_return_target(&self, has_fled: bool) -> Option<Point<D>> {
         let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
-        let (at, robot) = (self.who.position(self.body), with_dimensions(leader.pose.at));
-        (at != robot).then(|| if has_fled { at } else { move_toward(at, robot, self.who.step_m()) })
+        let at = self.initiator.position(self.body);
+        let robot = with_dimensions(leader.pose.at);
+        if at == robot {
+            return None;
+        }
+        Some(if has_fled { at } else { move_toward(at, robot, self.initiator.step_m()) })
     }
 
-    /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
-    /// its own wheels led, because it followed its connector since.
+    /// Returns the heading to turn to in this cycle where a navigator's robot, which has followed its connector, no
+    /// longer has the heading that it had when its own wheels led.
     pub(super) fn turn_target_rad(&self) -> Option<f64> {
         let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
         let [x, y, _] = self.body.driving.ahead;
         let off_rad = wrap_angle(atan2(y, x) - leader.pose.heading_rad);
-        let (drive, dt_s) = (&self.navigator.drive, self.who.setting.world.dt_s);
+        let drive = &self.navigator.drive;
+        let dt_s = self.initiator.context.world.dt_s;
         let most = drive.max_wheel_m_s();
         let most_rad = drive.turn_rad_s(Wheels::new(-most, most)) * dt_s;
         let turn_rad = off_rad.clamp(-most_rad, most_rad);
@@ -153,9 +165,9 @@ impl<const D: usize> NavigatorContext<'_, D> {
             .then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
     }
 
-    /// Updates a navigator that has moved, by a heading that the chain did not object to.
+    /// Updates a navigator that has moved, with a heading that the chain did not veto.
     fn update_heading(&mut self, heading_rad: f64) {
-        let at: Point<2> = with_dimensions(self.who.position(self.body));
+        let at: Point<2> = with_dimensions(self.initiator.position(self.body));
         let driving = &mut self.body.driving;
         let Some(leader) = &mut driving.leader else { return };
         leader.pose = Pose2 { at, heading_rad };
@@ -168,17 +180,18 @@ impl<const D: usize> NavigatorContext<'_, D> {
         }
     }
 
-    /// Turns a navigator whose way is blocked on the spot, if it can.
+    /// Turns a navigator that is blocked on the spot, if it can.
     fn turn_if_blocked(&mut self, wheels: Wheels) {
         let Some(leader) = self.body.driving.leader else { return };
         let wheels = self.navigator.leader.blocked_wheels(wheels);
-        let turned = self.navigator.drive.step(leader.pose, wheels, self.who.setting.world.dt_s);
+        let turned =
+            self.navigator.drive.step(leader.pose, wheels, self.initiator.context.world.dt_s);
         self.update_heading(turned.heading_rad);
     }
 
-    /// Returns the part of its speed at which a leader may go, so that the latest robot keeps up.
+    /// Returns the fraction of its speed at which a leader may drive, so that the robot that lags most keeps up.
     fn speed_fraction(&self) -> f64 {
-        let Some(robots) = &self.who.setting.spec.robots else { return 1.0 };
+        let Some(robots) = &self.initiator.context.spec.robots else { return 1.0 };
         let lag_m =
             |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, with_dimensions(*at));
         let lags_m = self.body.robots.iter().zip(self.body.chain.points()).map(lag_m);

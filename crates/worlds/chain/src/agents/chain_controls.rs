@@ -44,8 +44,8 @@ impl<const D: usize> ChainControls<D> {
                 return Err((cause, "give them by connector, of the cycle to come"));
             }
             if !is_valid(control, n) {
-                let cause = format!("that of connector {k} names connectors that do not exist");
-                return Err((cause, "hand over what agents of this chain have decided"));
+                let cause = format!("that of connector {k} refers to connectors that do not exist");
+                return Err((cause, "submit what agents of this chain have decided"));
             }
         }
         Ok(())

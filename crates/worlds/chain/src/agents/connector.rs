@@ -1,4 +1,4 @@
-//! The agent of one connector: its identity, its links, and the part it plays in a cycle.
+//! The agent of one connector: its identity, its links, and its role in a cycle.
 
 mod climb;
 mod clock;
@@ -24,40 +24,43 @@ use sidestep_rods::geometry::Point;
 use sidestep_rods::local_solver::LocalSolver;
 use sidestep_rods::{Chain, Obstacles, Rod, Rules};
 
-/// Most packets that wait for the beginning of their cycle.
+/// Most packets that wait for the beginning of their cycle: a neighbor is at most one cycle ahead.
 const MAX_HELD_PACKETS: usize = 64;
 
-/// The program aboard one connector of a chain.
+/// The program of one connector of a chain.
 ///
 /// Packets and ticks go in, packets come out; [`Self::control`] is there when its cycle is over. It
-/// never panics on anything from the network. It keeps nothing from one cycle to the next that a result
-/// depends on, so a killed agent may be started anew.
+/// never panics on anything from the network. Results depend on nothing that it keeps from one cycle to the next, so a
+/// killed agent may be started again.
 #[derive(Debug, Clone)]
 pub struct ConnectorAgent<const D: usize> {
-    /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
+    /// Number of its connector.
     me: u32,
+    /// Number of connectors of its chain.
     n: u32,
+    /// Id of connector 0 on the network.
     first_id: EntityId,
-    /// Digests of scenario and build, and of the ids of its chain's connectors.
+    /// Digest of scenario and build.
     fingerprint: u64,
+    /// Digest of the ids of its chain's connectors.
     members: u64,
     radio: Option<RadioTimeouts>,
     rungs: RecoveryLimits,
     /// The rods to its neighbors.
     rods: PerSide<Option<Rod>>,
-    alone: LocalSolver<D>,
+    solver: LocalSolver<D>,
     /// Obstacles that its sensors see in this cycle.
     obstacles: Obstacles<D>,
     /// The cycle; none before the first.
     cycle: Option<Cycle>,
     began: u64,
     now: u64,
-    place: TentativePosition<D>,
+    position: TentativePosition<D>,
     beside: PerSide<Option<TentativePosition<D>>>,
     links: PerSide<Option<Link<Message<D>>>>,
     missing: PerSide<Option<u32>>,
     /// Packets of a cycle that has not begun here yet.
-    held: Vec<(Side, Cycle, Packet<D>)>,
+    early_packets: Vec<(Side, Cycle, Packet<D>)>,
     following: Option<SlaveMotion>,
     leading: Option<LeadState<D>>,
     climbing: Option<RecoveryProgress<D>>,
@@ -66,48 +69,38 @@ pub struct ConnectorAgent<const D: usize> {
     led: Option<ExecutedMotion>,
     ended: Option<LeaderOutcome<D>>,
     is_silent: bool,
-    /// Whether the leader has finished, and whether time is up.
+    /// Whether the leader has finished.
     is_over: bool,
+    /// Whether the deadline has passed.
     is_closed: bool,
     is_late: bool,
     traffic: Traffic,
     /// Packets that it has dropped since it was started.
-    refused: DropCounts,
+    dropped: DropCounts,
 }
 
-/// The time for which it waits for others, where messages may get lost.
+/// The times for which it waits for others, where messages may get lost.
 #[derive(Debug, Clone, Copy)]
 struct RadioTimeouts {
-    patience: RetryPolicy,
-    /// Number of ticks after which the talk of a cycle ends.
+    retry: RetryPolicy,
+    /// Number of ticks after which the negotiation of a cycle ends.
     ticks: u64,
 }
 
-/// A packet on its way out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutgoingPacket {
-    /// Id of the neighbor that it is for.
-    pub to: EntityId,
-    /// Its number among the sender's of the cycle.
-    pub sequence: u32,
-    /// Its bytes.
-    pub payload: Vec<u8>,
-}
-
-/// A place while a motion is prepared.
+/// A position while a motion is prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TentativePosition<const D: usize> {
-    /// The place outside of motions,
+    /// The position before the motion.
     settled: Point<D>,
-    /// after the sub-steps that are accepted,
+    /// The position after the accepted sub-steps.
     base: Point<D>,
-    /// and after the present one.
+    /// The position after the present sub-step.
     now: Point<D>,
 }
 
 impl<const D: usize> TentativePosition<D> {
-    fn new(place: Point<D>) -> Self {
-        Self { settled: place, base: place, now: place }
+    fn new(position: Point<D>) -> Self {
+        Self { settled: position, base: position, now: position }
     }
 
     /// Begins another motion.
@@ -120,7 +113,7 @@ impl<const D: usize> TentativePosition<D> {
         self.base = self.now;
     }
 
-    /// Takes the present sub-step back.
+    /// Undoes the present sub-step.
     fn revert(&mut self) {
         self.now = self.base;
     }
@@ -144,7 +137,7 @@ impl<const D: usize> ConnectorAgent<D> {
         agent.fingerprint = world.fingerprint;
         agent.members = member_digest(agent.first_id, agent.n);
         agent.radio = world.network.as_ref().map(|network| RadioTimeouts {
-            patience: network.retry_policy(),
+            retry: network.retry_policy(),
             ticks: network.deadline_ticks(),
         });
         agent
@@ -176,16 +169,16 @@ impl<const D: usize> ConnectorAgent<D> {
             radio: None,
             rungs,
             rods: PerSide::from_fn(rod),
-            alone: LocalSolver::new(chain, k as usize, rules),
+            solver: LocalSolver::new(chain, k as usize, rules),
             obstacles: Obstacles::default(),
             cycle: None,
             began: 0,
             now: 0,
-            place: TentativePosition::new(chain.points()[k as usize]),
+            position: TentativePosition::new(chain.points()[k as usize]),
             beside: PerSide::default(),
             links: PerSide::default(),
             missing: PerSide::default(),
-            held: Vec::new(),
+            early_packets: Vec::new(),
             following: None,
             leading: None,
             climbing: None,
@@ -197,7 +190,7 @@ impl<const D: usize> ConnectorAgent<D> {
             is_closed: false,
             is_late: false,
             traffic: Traffic::default(),
-            refused: DropCounts::default(),
+            dropped: DropCounts::default(),
         }
     }
 
@@ -205,109 +198,108 @@ impl<const D: usize> ConnectorAgent<D> {
     #[cfg(test)]
     pub(crate) fn with_network(self, network: Option<&sidestep_kernel::network::Network>) -> Self {
         let radio = network.map(|network| RadioTimeouts {
-            patience: network.retry_policy(),
+            retry: network.retry_policy(),
             ticks: network.deadline_ticks(),
         });
         Self { radio, ..self }
     }
 
-    /// Returns its id on the network.
-    pub fn id(&self) -> EntityId {
-        self.first_id + self.me
-    }
-
-    /// Returns a word for its part in the present cycle, for people.
+    /// Returns the name of its role in the present cycle, for display.
     pub fn role_name(&self) -> &'static str {
-        match () {
-            () if self.is_done() => "done",
-            () if self.climbing.is_some() || self.leading.is_some() => "lead",
-            () if self.following.is_some() => "follow",
-            () => "wait",
+        if self.is_done() {
+            "done"
+        } else if self.climbing.is_some() || self.leading.is_some() {
+            "lead"
+        } else if self.following.is_some() {
+            "follow"
+        } else {
+            "wait"
         }
     }
 
-    /// Begins a cycle, whose talk starts in a tick. Packets are to be taken after it.
+    /// Begins a cycle whose negotiation starts in a tick. Packets are accepted after it.
     ///
     /// # Errors
-    /// When a number of the sight makes no sense; then the agent is as before.
-    pub fn start(&mut self, sight: ConnectorPercept<D>, tick: u64) -> Result<(), InputError> {
-        self.obstacles.set_moving(&sight.validated_obstacles(self.me, self.n)?)?;
-        self.alone.set_max_bend_rad(sight.max_bend_rad)?;
-        (self.cycle, self.began, self.now) = (Some(sight.cycle), tick, tick);
-        self.place = TentativePosition::new(sight.at.0);
-        let [below, above] = sight.neighbors;
+    /// When a number of the percept is invalid; then the agent is as before.
+    pub fn start(&mut self, percept: ConnectorPercept<D>, tick: u64) -> Result<(), InputError> {
+        self.obstacles.set_moving(&percept.validated_obstacles(self.me, self.n)?)?;
+        self.solver.set_max_bend_rad(percept.max_bend_rad)?;
+        self.cycle = Some(percept.cycle);
+        self.began = tick;
+        self.now = tick;
+        self.position = TentativePosition::new(percept.at.0);
+        let [below, above] = percept.neighbors;
         let track = |side| if side == Side::Below { below } else { above };
         self.beside =
-            PerSide::from_fn(|side| track(side).map(|place| TentativePosition::new(place.0)));
-        // Where messages never get lost no agent finds out that another is back: those that were gone are
-        // there again.
-        let [below, above] = self.radio.map_or([None; 2], |_| sight.missing);
+            PerSide::from_fn(|side| track(side).map(|position| TentativePosition::new(position.0)));
+        // Where messages never get lost no message would report that an agent is back, so those that were lost count
+        // as back.
+        let [below, above] = self.radio.map_or([None; 2], |_| percept.missing);
         self.missing = PerSide::from_fn(|side| if side == Side::Below { below } else { above });
-        (self.following, self.leading, self.climbing) = (None, None, None);
-        (self.goes_in, self.led, self.ended) = (None, None, None);
-        self.is_silent = sight.is_silent;
-        (self.is_over, self.is_closed, self.is_late) = (false, sight.is_silent, false);
+        self.following = None;
+        self.leading = None;
+        self.climbing = None;
+        self.goes_in = None;
+        self.led = None;
+        self.ended = None;
+        self.is_silent = percept.is_silent;
+        self.is_over = false;
+        self.is_closed = percept.is_silent;
+        self.is_late = false;
         self.traffic = Traffic::default();
         self.start_links();
-        self.start_role(sight.role);
-        self.receive_held(sight.cycle);
+        self.start_role(percept.role);
+        self.receive_held(percept.cycle);
         Ok(())
     }
 
     fn start_links(&mut self) {
-        let (me, n, missing) = (self.me, self.n, self.missing);
-        let patience = self.radio.map(|radio| radio.patience);
+        let me = self.me;
+        let n = self.n;
+        let missing = self.missing;
+        let retry = self.radio.map(|radio| radio.retry);
         self.links = PerSide::from_fn(|side| {
             let neighbor = side.neighbor(me, n)?;
-            let mut link = Link::new(patience, missing[side] == Some(neighbor));
+            let mut link = Link::new(retry, missing[side] == Some(neighbor));
             // Where messages get lost, neighbors find out in every cycle whether they are in touch.
-            if patience.is_some() {
+            if retry.is_some() {
                 link.push(Message::Here);
             }
             Some(link)
         });
     }
 
-    /// Takes up its part in this cycle.
+    /// Starts its role in this cycle.
     fn start_role(&mut self, role: Role<D>) {
         let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
         match (role, missing) {
             (Role::Follows, _) => return,
             (Role::Rests, _) => self.ended = Some(LeaderOutcome::Rested),
             (Role::Leads(_), Some(missing)) => self.ended = Some(LeaderOutcome::Stands { missing }),
-            (Role::Leads(wish), None) => {
-                self.climbing = Some(RecoveryProgress::new(wish, self.place.base));
+            (Role::Leads(intention), None) => {
+                self.climbing = Some(RecoveryProgress::new(intention, self.position.base));
                 return self.process();
             }
         }
         self.finish(None);
     }
 
-    /// Takes the packets that came before the cycle had begun here.
+    /// Accepts the packets that arrived before the cycle had begun here.
     fn receive_held(&mut self, cycle: Cycle) {
-        let held = std::mem::take(&mut self.held);
-        for (side, its, packet) in held {
+        let early_packets = std::mem::take(&mut self.early_packets);
+        for (side, its, packet) in early_packets {
             match its.checked_sub(cycle) {
                 Some(0) => self.accept_packet(side, packet),
-                Some(1) => self.held.push((side, its, packet)),
+                Some(1) => self.early_packets.push((side, its, packet)),
                 _ => {}
             }
         }
     }
 
-    /// Takes a packet. One that comes from no neighbor, cannot be read or makes no sense is counted
-    /// and dropped.
-    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        self.now = self.now.max(tick);
-        let Err(why) = self.receive(from, bytes) else { return };
-        self.refused.record(why);
-        // A packet that comes too late is of no use, and no sender's fault.
-        self.traffic.dropped += u64::from(why != DropReason::Stale);
-    }
-
     fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), DropReason> {
-        let (seal, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
-        let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } = seal;
+        let (header, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
+        let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } =
+            header;
         let neighbor = |side: &Side| side.neighbor(self.me, self.n).map(|k| self.first_id + k);
         let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
         let side = side.filter(|_| sender == from).ok_or(DropReason::Sender)?;
@@ -319,8 +311,8 @@ impl<const D: usize> ConnectorAgent<D> {
         match self.cycle.map(|now| cycle.checked_sub(now)) {
             Some(Some(0)) => self.accept_packet(side, packet),
             Some(None) => return Err(DropReason::Stale),
-            None | Some(Some(1)) if self.held.len() < MAX_HELD_PACKETS => {
-                self.held.push((side, cycle, packet));
+            None | Some(Some(1)) if self.early_packets.len() < MAX_HELD_PACKETS => {
+                self.early_packets.push((side, cycle, packet));
             }
             _ => return Err(DropReason::NoRoom),
         }
@@ -329,7 +321,7 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Returns the counts of packets that it has dropped since it was started.
     pub fn drop_counts(&self) -> DropCounts {
-        self.refused
+        self.dropped
     }
 
     fn accept_packet(&mut self, side: Side, packet: Packet<D>) {
@@ -362,7 +354,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Notes the lost connector on one side, and tells the other side if that is news. A leader stops.
+    /// Records the lost connector on one side, and sends it to the other side if it has changed. A leader stops.
     fn mark_missing(&mut self, side: Side, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
@@ -383,14 +375,14 @@ impl<const D: usize> ConnectorAgent<D> {
         both.min_by_key(|k| k.abs_diff(self.me))
     }
 
-    /// Says something to a neighbor, if there is one.
+    /// Sends a message to a neighbor, if there is one.
     fn send(&mut self, to: Side, message: Message<D>) {
         if let Some(link) = &mut self.links[to] {
             link.push(message);
         }
     }
 
-    /// Ends the cycle, as the leader does or says.
+    /// Ends the cycle, as the leader decides or as a message from the leader says.
     fn finish(&mut self, from: Option<Side>) {
         self.give_up_leading();
         self.is_over = true;
@@ -399,7 +391,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Does all that is possible before the next message.
+    /// Advances as far as possible before the next message.
     fn process(&mut self) {
         while self.advance_leading() || self.continue_climb() {}
     }

@@ -6,7 +6,7 @@
 //! hardly be alive and in touch, counts as lost, until something comes from it.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::network::RetryPolicy;
+use sidestep_kernel::network::{RetryPolicy, RetryTimer};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Most messages that are kept because an earlier one is missing.
@@ -19,7 +19,7 @@ const MAX_UNCONFIRMED_MESSAGES: usize = 4096;
 #[derive(Debug, Clone)]
 pub(super) struct Link<M> {
     /// None where nothing is ever lost: then nothing is confirmed or sent again either.
-    patience: Option<RetryPolicy>,
+    retry: Option<RetryTimer>,
     /// Repetitions until the neighbor counts as lost.
     tries: u32,
     /// Messages that are not confirmed, the first of which has the number `first`.
@@ -33,14 +33,11 @@ pub(super) struct Link<M> {
     /// Whether to confirm the messages received, and whether to send everything again.
     owes: bool,
     again: bool,
-    /// Tick since which it waits for a confirmation, and the number of repetitions since something came.
-    since: u64,
+    /// Number of repetitions since something came.
     unanswered: u32,
     is_lost: bool,
     /// Whether anything has come in this cycle.
     is_heard: bool,
-    /// Size of the largest packet that went over it, in bytes.
-    largest: usize,
 }
 
 /// Messages on their way, with a confirmation.
@@ -60,7 +57,7 @@ impl<M: Clone> Link<M> {
     pub(super) fn new(patience: Option<RetryPolicy>, was_lost: bool) -> Self {
         let tries = patience.map_or(0, |p| if was_lost { p.first_tries } else { p.tries });
         Self {
-            patience,
+            retry: patience.map(RetryTimer::new),
             tries,
             said: VecDeque::new(),
             first: 0,
@@ -69,11 +66,9 @@ impl<M: Clone> Link<M> {
             early: BTreeMap::new(),
             owes: false,
             again: false,
-            since: 0,
             unanswered: 0,
             is_lost: false,
             is_heard: false,
-            largest: 0,
         }
     }
 
@@ -108,13 +103,15 @@ impl<M: Clone> Link<M> {
 
     /// Returns the tick in which its patience ends; none while it waits for nothing.
     pub(super) fn next_retry(&self) -> Option<u64> {
-        let patience = self.patience.filter(|_| self.sent > 0 && !self.is_lost)?;
-        Some(self.since.saturating_add(patience.timeout_ticks(self.largest)))
+        let retry = self.retry.as_ref()?;
+        (self.sent > 0 && !self.is_lost).then(|| retry.due_tick())
     }
 
-    /// Notes the size of a packet that goes over it: a large one takes its time on the way.
-    pub(super) fn record_size(&mut self, bytes: usize) {
-        self.largest = self.largest.max(bytes);
+    /// Records the size of a packet that goes over it.
+    pub(super) fn record_packet(&mut self, bytes: usize) {
+        if let Some(retry) = &mut self.retry {
+            retry.record_packet(bytes);
+        }
     }
 
     /// Looks at the clock; returns whether the neighbor is lost from now on.
@@ -131,17 +128,19 @@ impl<M: Clone> Link<M> {
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
     pub(super) fn next_parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
         let from = if self.again { 0 } else { self.sent };
-        let confirms = self.owes && self.patience.is_some();
+        let confirms = self.owes && self.retry.is_some();
         if from == self.said.len() && !confirms {
             return None;
         }
         let messages: Vec<M> = self.said.range(from..).cloned().collect();
         let parcel = Parcel { first: self.first + from as u32, next: self.next, messages };
-        if self.again || self.sent == 0 {
-            self.since = tick;
+        if let Some(retry) = &mut self.retry
+            && (self.again || self.sent == 0)
+        {
+            retry.restart(tick);
         }
         (self.owes, self.again, self.sent) = (false, false, self.said.len());
-        if self.patience.is_none() {
+        if self.retry.is_none() {
             self.first += self.said.len() as u32;
             self.said.clear();
             self.sent = 0;

@@ -1,4 +1,4 @@
-//! Perception of a connector at the start of a cycle: all that its agent is given.
+//! The percept of a connector at the start of a cycle: the only input of its agent besides messages.
 
 use crate::motion::recovery::{RecoveryMemory, Situation};
 use serde::{Deserialize, Serialize};
@@ -13,9 +13,9 @@ use std::f64::consts::PI;
 pub struct ConnectorPercept<const D: usize> {
     /// The cycle.
     pub cycle: Cycle,
-    /// Its place, meters.
+    /// Its position, meters.
     pub at: WirePoint<D>,
-    /// The places of the neighbors below and above, where there is one.
+    /// The positions of the neighbors below and above, where there is one.
     pub neighbors: [Option<WirePoint<D>>; 2],
     /// Its bend limit in this cycle, rad.
     pub max_bend_rad: f64,
@@ -25,14 +25,14 @@ pub struct ConnectorPercept<const D: usize> {
     pub is_silent: bool,
     /// The nearest lost connectors below and above, as it knew at the end of the cycle before.
     pub missing: [Option<u32>; 2],
-    /// Its part in this cycle.
+    /// Its role in this cycle.
     pub role: Role<D>,
 }
 
 /// Perception of the connectors of a chain, by connector.
 pub type ChainPercepts<const D: usize> = (EntityId, Vec<ConnectorPercept<D>>);
 
-/// The part of a connector in a cycle.
+/// The role of a connector in a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Role<const D: usize> {
     /// It follows.
@@ -43,27 +43,27 @@ pub enum Role<const D: usize> {
     Leads(Intention<D>),
 }
 
-/// A leader's wish in a cycle: on its own account, or on the order of a planner or an operator.
+/// A leader's intention in a cycle: its own, or by order of a planner or an operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intention<const D: usize> {
-    /// Its target: its wished place at the end of the cycle, meters.
+    /// The position that it wants to reach by the end of the cycle, meters.
     pub to: WirePoint<D>,
-    /// The source of the wish.
+    /// The source of the intention.
     pub source: RequestSource,
     /// Its knowledge beside its neighborhood.
     pub situation: Situation,
     /// Its memory of vetoes in earlier cycles.
     pub memory: RecoveryMemory,
-    /// Whether it is known that there is no obstacle anywhere,
+    /// Whether it is known that there is no obstacle anywhere.
     pub is_empty: bool,
-    /// and that therefore nothing can object.
+    /// Whether it is known that nothing can veto.
     pub is_open: bool,
 }
 
 /// An obstacle, as sensors see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SensedObstacle {
-    /// Its name in vetoes.
+    /// Its id in vetoes.
     pub id: u32,
     /// Its reach beyond its core, meters.
     pub radius_m: f64,
@@ -111,30 +111,30 @@ impl<const D: usize> ConnectorPercept<D> {
     /// Returns the obstacles in sight.
     ///
     /// # Errors
-    /// When some number of the sight makes no sense for connector `me` of `n`.
+    /// When a number is invalid for connector `me` of `n`.
     pub(super) fn validated_obstacles(
         &self,
         me: u32,
         n: u32,
     ) -> Result<Vec<Obstacle<D>>, InputError> {
-        let wrong = |what: &str| {
+        let invalid = |what: &str| {
             let remedy = "give what its sensors have measured: finite numbers, up to 1e6 m";
             InputError::new(format!("sight of connector {me}"), what.to_string(), remedy)
         };
         let places = self.neighbors.iter().flatten().chain(std::iter::once(&self.at));
         if !places.map(|WirePoint(at)| at).all(is_in_range) {
-            return Err(wrong("a place is out of range"));
+            return Err(invalid("a place is out of range"));
         }
         if self.neighbors.map(|place| place.is_some()) != [me > 0, me + 1 < n] {
-            return Err(wrong("its neighbors are not those of its place in the chain"));
+            return Err(invalid("its neighbors are not those of its place in the chain"));
         }
         if !(self.max_bend_rad > 0.0 && self.max_bend_rad <= PI) {
-            return Err(wrong("its bend limit is not in (0, pi]"));
+            return Err(invalid("its bend limit is not in (0, pi]"));
         }
         if self.missing.iter().flatten().any(|&k| k >= n || k == me) {
-            return Err(wrong("a lost connector is none of its chain"));
+            return Err(invalid("a lost connector is none of its chain"));
         }
         let seen = self.seen.iter().map(SensedObstacle::to_obstacle);
-        seen.collect::<Option<_>>().ok_or_else(|| wrong("an obstacle has no shape"))
+        seen.collect::<Option<_>>().ok_or_else(|| invalid("an obstacle has no shape"))
     }
 }

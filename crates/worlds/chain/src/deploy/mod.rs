@@ -6,8 +6,8 @@
 //!   bit for bit, because no agent needs to know more: scenarios in which one would are refused
 //!   (`crate::scenario::deployment`).
 //!
-//! A deployment gives the connectors of a chain their perception (`sense.rs`), lets their agents talk over a network
-//! in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions out (`outcome.rs`).
+//! A deployment gives the connectors of a chain their perception (`sense.rs`), runs their negotiation over a network
+//! in memory (`negotiation.rs`) or in other processes (`remote_agents.rs` of the world), and carries their decisions out (`outcome.rs`).
 
 pub(crate) mod deployment;
 mod negotiation;

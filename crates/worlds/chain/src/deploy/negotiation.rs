@@ -3,11 +3,11 @@
 //!
 //! Its faults are those of any network ([`sidestep_kernel::network`]).
 
-use crate::agents::{ConnectorAgent, ConnectorPercept, Control, OutgoingPacket};
+use crate::agents::{ConnectorAgent, ConnectorPercept, Control};
 use crate::world::{ChainWorld, purpose};
-use sidestep_kernel::interrupt;
-use sidestep_kernel::network::{Distances, FaultInjector, FaultStreams, FaultyTransport, Network};
-use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
+use sidestep_kernel::network::{
+    AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyTiming,
+};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::geometry::distance;
@@ -73,43 +73,6 @@ impl<const D: usize> Distances for StartPositions<'_, D> {
     }
 }
 
-/// The network, and until when something may still arrive at each agent.
-struct SimulatedNetwork<'a> {
-    talk: NegotiationContext<'a>,
-    carrier: FaultyTransport<'a, MemoryTransport>,
-    longest: u64,
-    busy_until: Vec<u64>,
-}
-
-impl SimulatedNetwork<'_> {
-    /// Hands an agent's packets to the network.
-    fn send<const D: usize>(&mut self, agent: &mut ConnectorAgent<D>, tick: u64) {
-        let sender = agent.id();
-        for OutgoingPacket { to, sequence, payload } in agent.take_packets() {
-            self.busy_until[(to - self.talk.first_id) as usize] = tick.saturating_add(self.longest);
-            self.carrier.send(Envelope { cycle: tick, sender, sequence, receiver: to, payload });
-        }
-    }
-
-    /// Lets an agent take the arrived packets, look at the clock, and answer.
-    fn step<const D: usize>(&mut self, k: usize, agent: &mut ConnectorAgent<D>, tick: u64) {
-        let is_due = agent.next_timer().is_some_and(|due| due <= tick);
-        if self.busy_until[k] >= tick {
-            for envelope in self.carrier.receive(agent.id(), tick) {
-                agent.on_packet(envelope.sender, &envelope.payload, tick);
-                // Where no time is counted, a process answers each packet when it comes.
-                if self.talk.network.is_none() {
-                    self.send(agent, tick);
-                }
-            }
-        } else if !is_due {
-            return;
-        }
-        agent.on_timer(tick);
-        self.send(agent, tick);
-    }
-}
-
 /// Lets the agents of a chain talk until all are done; `sights[k]` is that of `agents[k]`. Returns their
 /// decisions in the same order.
 ///
@@ -122,26 +85,26 @@ pub(super) fn run_agents<const D: usize>(
 ) -> Vec<Option<Control<D>>> {
     let (places, begins) = (StartPositions(talk.first_id, &sights), [talk.begins]);
     let draws = draws(talk.streams);
-    let carrier = FaultyTransport::in_memory(talk.network, draws, Some(&places), &begins);
-    let longest = talk.network.map_or(1, max_ticks);
-    let mut air = SimulatedNetwork { talk, carrier, longest, busy_until: vec![0; agents.len()] };
-    let mut tick = talk.begins.0;
+    let transport = FaultyTransport::in_memory(talk.network, draws, Some(&places), &begins);
+    let (start_tick, _) = talk.begins;
     for (agent, sight) in agents.iter_mut().zip(&sights) {
-        agent.start(sight.clone(), tick).expect("a world shows its connectors what is there");
-        air.send(agent, tick);
+        agent.start(sight.clone(), start_tick).expect("a world shows its connectors what is there");
     }
-    while !agents.iter().all(ConnectorAgent::is_done) {
-        interrupt::check();
-        let timers = agents.iter().filter_map(ConnectorAgent::next_timer);
-        let next = timers.chain(air.carrier.next_arrival()).min();
-        tick = tick.max(next.expect("agents that are not done wait for something"));
-        agents.iter_mut().enumerate().for_each(|(k, agent)| air.step(k, agent, tick));
-    }
+    let mut network = AgentLoop {
+        transport,
+        replies: match talk.network {
+            Some(_) => ReplyTiming::PerTick,
+            // Where no time is counted, a process answers each packet when it comes.
+            None => ReplyTiming::PerPacket,
+        },
+        max_flight_ticks: Some(talk.network.map_or(1, max_flight_ticks)),
+    };
+    network.run(agents, start_tick, ConnectorAgent::is_done);
     agents.iter().map(ConnectorAgent::control).collect()
 }
 
 /// Returns the most ticks that a packet takes; no bound where large ones take their time on a link.
-fn max_ticks(network: &Network) -> u64 {
+fn max_flight_ticks(network: &Network) -> u64 {
     let is_narrow = network.bandwidth_bit_s < f64::INFINITY;
     if is_narrow { u64::MAX } else { 1 + u64::from(network.faults().max_delay_cycles) }
 }

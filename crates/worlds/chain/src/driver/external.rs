@@ -1,14 +1,14 @@
-//! Orders from outside, and the outcome of the last ones.
+//! Orders of an external caller, and the result of the last ones.
 
 use super::VetoRecord;
 use serde::{Deserialize, Serialize};
 
-/// The share of the state that belongs to a caller that decides from outside.
+/// The state of an external caller.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct External {
     /// Orders for the next cycle.
     pub(crate) orders: Orders,
-    /// The answer to those of the last one.
+    /// The result of those of the last one.
     pub(crate) answer: OrderResult,
 }
 
@@ -21,7 +21,7 @@ pub(crate) struct Orders {
     pub(crate) rod: Option<u32>,
     /// The last target of either sort; without one nothing moves.
     pub(crate) target: Option<Target>,
-    /// Whether the chain goes as far as possible where it cannot go all the way.
+    /// Whether the chain moves as far as possible where it cannot reach the target.
     pub(crate) goes_far: bool,
 }
 
@@ -34,16 +34,16 @@ pub(crate) enum Target {
     Rod([[f64; 3]; 2]),
 }
 
-/// The answer to orders.
+/// The result of orders.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct OrderResult {
     /// The outcome.
-    pub(crate) came: OrderOutcome,
-    /// The places that were to be reached within the cycle: of a rod's ends, or twice that of a connector.
-    pub(crate) wish_m: [[f64; 3]; 2],
+    pub(crate) outcome: OrderOutcome,
+    /// The positions that were to be reached within the cycle: of a rod's ends, or twice that of a connector.
+    pub(crate) target_m: [[f64; 3]; 2],
     /// The place that the first of them has reached, or could have reached.
     pub(crate) reached_m: [f64; 3],
-    /// The part of the cycle's way that was done.
+    /// The fraction of the cycle's motion that was made.
     pub(crate) done_share: f64,
     /// The objection, if there was one.
     pub(crate) veto: Option<VetoRecord>,
@@ -57,7 +57,7 @@ pub(crate) enum OrderOutcome {
     /// There was no order to go anywhere.
     #[default]
     NoOrder,
-    /// All of the cycle's way was done.
+    /// All of the cycle's motion was made.
     Moved,
     /// Some of it.
     CutShort,

@@ -1,4 +1,4 @@
-//! The way of a connector or a rod within one cycle.
+//! The motion of a connector or a rod within one cycle.
 
 use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::geometry::{
@@ -13,9 +13,9 @@ pub(crate) struct StepMotion<const D: usize> {
     /// The connector, or the first of a rod's two.
     pub(crate) first: usize,
     is_rod: bool,
-    /// Their places; a connector stands for both.
+    /// Their positions; a connector stands for both.
     from: [Point<D>; 2],
-    /// Their places at the end of the cycle, as wished.
+    /// Their positions at the end of the cycle, as wanted.
     pub(crate) to: [Point<D>; 2],
 }
 
@@ -37,22 +37,22 @@ impl<const D: usize> StepMotion<D> {
         }
     }
 
-    /// Returns the motion along a part of the way.
+    /// Returns a fraction of the motion.
     pub(crate) fn motion(&self, part: f64) -> Motion<D> {
         let Self { first, from, to, .. } = *self;
-        match self.is_rod {
-            true => Motion::Rod { i: first, to: interpolate(from, to, part) },
-            false if part >= 1.0 => Motion::Connector { k: first, to: to[0] },
-            false => Motion::Connector { k: first, to: lerp(from[0], to[0], part) },
+        if self.is_rod {
+            return Motion::Rod { i: first, to: interpolate(from, to, part) };
         }
+        let to = if part >= 1.0 { to[0] } else { lerp(from[0], to[0], part) };
+        Motion::Connector { k: first, to }
     }
 
-    /// Length of the way, of both ends together, meters.
+    /// Returns the distance that both ends together travel, meters.
     pub(crate) fn length_m(&self) -> f64 {
         distance(self.from[0], self.to[0]) + distance(self.from[1], self.to[1])
     }
 
-    /// Returns the part of the way that is behind a chain, from 0 to 1.
+    /// Returns the fraction of the motion that a chain has made, from 0 to 1.
     pub(crate) fn done_fraction(&self, chain: &Chain<D>) -> f64 {
         let points = chain.points();
         let second = self.first + usize::from(self.is_rod);
@@ -63,22 +63,25 @@ impl<const D: usize> StepMotion<D> {
     }
 }
 
-/// Returns a bound on the way of either end of a rod that goes from two places to two others: its
-/// middle goes straight, it turns evenly about it, and its length changes evenly.
+/// Returns a bound on the distance that either end of a rod travels from two positions to two others: its
+/// middle moves straight, it turns evenly about it, and its length changes evenly.
 fn max_travel_m<const D: usize>(from: [Point<D>; 2], to: [Point<D>; 2]) -> f64 {
-    let (was, will) = (sub(from[1], from[0]), sub(to[1], to[0]));
-    let (was_m, will_m) = (norm(was), norm(will));
+    let was = sub(from[1], from[0]);
+    let will = sub(to[1], to[0]);
+    let was_m = norm(was);
+    let will_m = norm(will);
     distance(middle(from), middle(to))
         + 0.5 * (was_m.max(will_m) * angle_rad(was, will) + (will_m - was_m).abs())
 }
 
-/// Returns the ends of a rod after a part of that way. In between it is never shorter or longer than at both
-/// ends of the way, as it would be if its ends went straight.
+/// Returns the ends of a rod after a fraction of that motion. In between it is never shorter or longer than at both
+/// ends of the motion, as it would be if its ends moved straight.
 fn interpolate<const D: usize>(from: [Point<D>; 2], to: [Point<D>; 2], part: f64) -> [Point<D>; 2] {
     if part >= 1.0 {
         return to;
     }
-    let (was, will) = (sub(from[1], from[0]), sub(to[1], to[0]));
+    let was = sub(from[1], from[0]);
+    let will = sub(to[1], to[0]);
     let u = normalized(was).or(normalized(will)).unwrap_or(first_axis());
     let aside = normalized(rejection(will, u)).unwrap_or(perpendicular(u));
     let turn_rad = part * angle_rad(was, will);

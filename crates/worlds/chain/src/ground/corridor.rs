@@ -144,9 +144,11 @@ impl Corridor {
         for leg in &self.legs {
             let (length_m, turn_rad) = leg.length_and_turn();
             let n = (length_m / step_m).ceil();
-            let (ds_m, turn_rad) = (length_m / n, turn_rad / n);
+            let ds_m = length_m / n;
+            let turn_rad = turn_rad / n;
             for _ in 0..n as usize {
                 let GroundPose { at: [x, y], heading_rad } = line[line.len() - 1];
+                // A chord has the direction of its arc's middle, so the line does not drift off the bend.
                 let middle_rad = heading_rad + 0.5 * turn_rad;
                 line.push(GroundPose {
                     at: [x + ds_m * cos(middle_rad), y + ds_m * sin(middle_rad)],

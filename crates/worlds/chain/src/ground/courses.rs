@@ -61,7 +61,7 @@ impl<const D: usize> Mover<D> {
     }
 
     fn fault(&self) -> Option<(&'static str, &'static str)> {
-        let still = ("does not move", "give it a speed, or make it an obstacle that stands still");
+        let still = ("does not move", "give it a speed, or make it a static obstacle");
         let moves = |v: &Point<D>| is_finite(v) && norm(*v) > 0.0;
         match &self.course {
             Course::Straight { velocity_m_s } => (!moves(velocity_m_s)).then_some(still),
@@ -117,10 +117,10 @@ fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str
         return Some(("has fewer than two way points", "give at least two"));
     }
     if !way_points.iter().all(is_finite) {
-        return Some(("has a way point that is no finite number", "give finite numbers"));
+        return Some(("has a way point that is not finite", "give finite numbers"));
     }
     let stays = way_points.windows(2).any(|w| w[0] == w[1]);
-    stays.then_some(("has two equal way points behind each other", "leave one of them out"))
+    stays.then_some(("has two equal consecutive way points", "leave one of them out"))
 }
 
 /// Returns a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least
@@ -161,7 +161,8 @@ fn patrol<const D: usize>(
     } else {
         shuttle(speed_m_s * t_s, length_m)
     };
-    let (mut at, mut u) = (way_points[0], [0.0; D]);
+    let mut at = way_points[0];
+    let mut u = [0.0; D];
     for (a, b) in ends() {
         let leg_m = distance(*a, *b);
         let Some(along) = normalized(sub(*b, *a)) else { continue };

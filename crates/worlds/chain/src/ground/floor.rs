@@ -121,7 +121,8 @@ impl Floor {
 
     /// Returns the box around the floor.
     pub fn bounds(&self) -> Bounds<2> {
-        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let w = f64::from(self.width);
+        let h = f64::from(self.height);
         Bounds::from_points(
             &[(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| self.pixel_position(x, y)),
         )
@@ -136,7 +137,8 @@ impl Floor {
     /// Returns the walls between free and solid pixels, numbered on from `first_id`: first those
     /// along rows, from the bottom, then those along columns, from the left.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
-        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let width = i64::from(self.width);
+        let height = i64::from(self.height);
         let mut ends = Vec::new();
         for row in 0..=height {
             let is_edge = |col| self.is_solid(col, row - 1) != self.is_solid(col, row);
@@ -156,7 +158,8 @@ impl Floor {
 
 /// Returns the unit vectors along rows and columns of a floor that is turned.
 fn axes(yaw_rad: f64) -> [Point<2>; 2] {
-    let (s, c) = (sin(yaw_rad), cos(yaw_rad));
+    let s = sin(yaw_rad);
+    let c = cos(yaw_rad);
     [[c, s], [-s, c]]
 }
 

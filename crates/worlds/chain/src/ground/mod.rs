@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! corridor.rs: winding corridors          fields.rs: balls and capsules at random
-//! pixels.rs:   floors of pixels           courses.rs: positions of movers at a time
+//! floor.rs:    floors of pixels           courses.rs: positions of movers at a time
 //! site.rs:     maps and Stage worlds       route.rs:   room for a chain
 //! ```
 

@@ -1,4 +1,4 @@
-//! Room for a chain on a floor: a start for its leader, and a free way behind it.
+//! Space for a chain on a floor: a start for its leader, and a free path behind it.
 
 use super::{GroundPose, Site, purposes};
 use sidestep_kernel::math::atan2;
@@ -8,14 +8,14 @@ use sidestep_map::planning::{Distances, FreeSpace, STEPS};
 use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
 
-/// Random places that are tried.
+/// Random positions that are tried.
 const MAX_PLACES: u64 = 20_000;
-/// Free places among them for which a way for the chain is searched.
+/// Free positions among them from which a path for the chain is searched; each search visits the whole grid.
 const MAX_STARTS: u32 = 64;
-/// Largest half side, in boxes, of the grid in which the way behind the leader is searched.
+/// Largest half side, in boxes, of the grid in which the path behind the leader is searched: some million boxes.
 const MAX_HALF_BOXES: f64 = 500.0;
 
-/// Needs of a chain.
+/// The space that a chain needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SpaceRequirement {
     /// Leader and followers.
@@ -52,8 +52,8 @@ struct PlacementFailure {
 
 /// Returns a start for a chain on a site, from the seed and the chain's `number` alone; `obstacles` are all obstacles
 /// there.
-/// Random places are tried. From a free one, a breadth-first search finds the places that are the
-/// most steps away within the chain's reach; the chain lies on the way to one of them, pulled straight.
+/// Random positions are tried. From a free one, a breadth-first search finds the positions that are the
+/// most steps away within the chain's reach; the chain lies on the path to one of them, straightened.
 ///
 /// # Errors
 /// When sizes are not positive, or there is no room, with the cause.
@@ -66,7 +66,8 @@ pub(crate) fn find_placement(
 ) -> Result<ChainPlacement, InputError> {
     wanted.check()?;
     let search = RouteSearch { site, obstacles, wanted };
-    let (streams, mut wanting) = (Streams::new(seed), PlacementFailure::default());
+    let streams = Streams::new(seed);
+    let mut failure = PlacementFailure::default();
     let bounds = wanted.within.unwrap_or_else(|| site.bounds());
     for place in 0..MAX_PLACES {
         let mut draws = streams.draws(number, place, purposes::ROUTE);
@@ -75,20 +76,20 @@ pub(crate) fn find_placement(
         if !search.is_free(leader) {
             continue;
         }
-        wanting.free_places += 1;
-        let way = search.route_from(leader, draws.next_u32());
-        wanting.longest_m = wanting.longest_m.max(length_m(&way));
-        if let Some(points) = search.lay_chain(&way) {
-            wanting.laid += 1;
+        failure.free_places += 1;
+        let path = search.route_from(leader, draws.next_u32());
+        failure.longest_m = failure.longest_m.max(length_m(&path));
+        if let Some(points) = search.lay_chain(&path) {
+            failure.laid += 1;
             if let Some(start) = search.placement(points) {
                 return Ok(start);
             }
         }
-        if wanting.free_places >= MAX_STARTS {
+        if failure.free_places >= MAX_STARTS {
             break;
         }
     }
-    Err(wanting.error(wanted))
+    Err(failure.error(wanted))
 }
 
 impl SpaceRequirement {
@@ -125,7 +126,7 @@ impl PlacementFailure {
             (cause, "make the robots smaller or the clearance less")
         } else if self.laid == 0 {
             let cause = format!(
-                "no free way for a chain of {:.1} m from {} places; the longest is {:.1} m",
+                "no free path for a chain of {:.1} m from {} places; the longest is {:.1} m",
                 wanted.length_m(),
                 self.free_places,
                 self.longest_m
@@ -154,10 +155,10 @@ impl RouteSearch<'_> {
         self.site.is_free(at) && self.is_clear([at; 2], self.wanted.clearance_m)
     }
 
-    /// Returns a long way away from a place, pulled straight.
+    /// Returns a long path away from a position, straightened.
     fn route_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
         let SpaceRequirement { spacing_m, clearance_m, .. } = *self.wanted;
-        // On 4 neighbors a way counts up to sqrt(2) times its length.
+        // On a grid of 4 neighbors a path is up to sqrt(2) times as long as in a straight line.
         let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
         let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
         let half = (reach_m / box_m).ceil() as u32;
@@ -168,39 +169,45 @@ impl RouteSearch<'_> {
         let side = 2 * half + 1;
         let free = FreeSpace::new(side, side, |col, row| self.is_free(place((col, row))));
         let steps = Distances::to_nearest(&free, 1, &[(half, half)]);
-        let way = path_back(&steps, far_box(&steps, half, choice));
-        self.straighten(way.into_iter().rev().map(place).collect())
+        let path = path_back(&steps, far_box(&steps, half, choice));
+        self.straighten(path.into_iter().rev().map(place).collect())
     }
 
-    /// Returns a way with fewer corners: from each, straight on as far as there is clearance.
-    fn straighten(&self, way: Vec<Point<2>>) -> Vec<Point<2>> {
-        let (mut pulled, mut from) = (vec![way[0]], 0);
-        while from + 1 < way.len() {
+    /// Returns a path with fewer corners: from each, straight ahead as far as there is clearance.
+    fn straighten(&self, path: Vec<Point<2>>) -> Vec<Point<2>> {
+        let mut straightened = vec![path[0]];
+        let mut from = 0;
+        while from + 1 < path.len() {
             let is_clear =
-                |to: &usize| self.is_clear([way[from], way[*to]], self.wanted.clearance_m);
-            let to = (from + 2..way.len()).take_while(is_clear).last().unwrap_or(from + 1);
-            pulled.push(way[to]);
+                |to: &usize| self.is_clear([path[from], path[*to]], self.wanted.clearance_m);
+            let to = (from + 2..path.len()).take_while(is_clear).last().unwrap_or(from + 1);
+            straightened.push(path[to]);
             from = to;
         }
-        pulled
+        straightened
     }
 
-    /// Returns connectors along a way, each at the spacing from the one before; `None` if it is too
+    /// Returns connectors along a path, each at the spacing from the one before; `None` if it is too
     /// short, or a rod would come too near to an obstacle.
-    fn lay_chain(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
+    fn lay_chain(&self, path: &[Point<2>]) -> Option<Vec<Point<2>>> {
         let SpaceRequirement { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
-        let (mut points, mut leg, mut part) = (vec![way[0]], 0, 0.0);
+        let mut points = vec![path[0]];
+        let mut leg = 0;
+        let mut part = 0.0;
         while points.len() < connectors {
             let last = points[points.len() - 1];
             loop {
-                let [a, b] = [*way.get(leg)?, *way.get(leg + 1)?];
+                let [a, b] = [*path.get(leg)?, *path.get(leg + 1)?];
                 match exit_fraction(last, spacing_m, [a, b]).filter(|&p| p >= part) {
                     Some(found) => {
                         points.push(lerp(a, b, found));
                         part = found;
                         break;
                     }
-                    None => (leg, part) = (leg + 1, 0.0),
+                    None => {
+                        leg += 1;
+                        part = 0.0;
+                    }
                 }
             }
         }
@@ -231,30 +238,32 @@ fn far_box(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
 
 /// Returns the boxes from one to that at 0 steps, each a step nearer.
 fn path_back(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
-    let mut way = vec![at];
+    let mut path = vec![at];
     while let Some(n) = steps.steps(at.0, at.1).filter(|&n| n > 0) {
         let beside = STEPS
             .map(|(east, north)| (at.0.wrapping_add_signed(east), at.1.wrapping_add_signed(north)));
         let is_nearer = |b: &&(u32, u32)| steps.steps(b.0, b.1) == Some(n - 1);
         let Some(&next) = beside.iter().find(is_nearer) else { break };
         at = next;
-        way.push(at);
+        path.push(at);
     }
-    way
+    path
 }
 
-/// Returns the part of a segment at which a way along it leaves the circle around a point, if it
+/// Returns the fraction of a segment at which a path along it leaves the circle around a point, if it
 /// does.
 fn exit_fraction(center: Point<2>, radius_m: f64, [a, b]: [Point<2>; 2]) -> Option<f64> {
-    let (d, r) = (sub(b, a), sub(a, center));
-    let (dd, dr) = (dot(d, d), dot(d, r));
+    let d = sub(b, a);
+    let r = sub(a, center);
+    let dd = dot(d, d);
+    let dr = dot(d, r);
     let root = dr * dr - dd * (dot(r, r) - radius_m * radius_m);
     let part = (-dr + root.max(0.0).sqrt()) / dd;
     (dd > 0.0 && root >= 0.0 && (0.0..=1.0).contains(&part)).then_some(part)
 }
 
-fn length_m(way: &[Point<2>]) -> f64 {
-    way.windows(2).map(|leg| distance(leg[0], leg[1])).sum()
+fn length_m(path: &[Point<2>]) -> f64 {
+    path.windows(2).map(|leg| distance(leg[0], leg[1])).sum()
 }
 
 #[cfg(test)]
@@ -345,7 +354,7 @@ mod tests {
             cause(SpaceRequirement { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m")
         );
         let too_long = cause(SpaceRequirement { connectors: 40, ..WANTED });
-        assert!(too_long.contains("no free way for a chain of 27.3"), "{too_long}");
+        assert!(too_long.contains("no free path for a chain of 27.3"), "{too_long}");
         let no_room = cause(SpaceRequirement { connectors: 3, ahead_m: 50.0, ..WANTED });
         assert!(no_room.contains("nowhere 50 m free"), "{no_room}");
         for wrong in [

@@ -76,7 +76,8 @@ impl From<stage::Pose2> for GroundPose {
 
 /// Returns a box around a pose.
 fn cuboid(pose: GroundPose, size_m: [f64; 2]) -> Cuboid<2> {
-    let (s, c) = (sin(pose.heading_rad), cos(pose.heading_rad));
+    let s = sin(pose.heading_rad);
+    let c = cos(pose.heading_rad);
     Cuboid { center: pose.at, axes: [[c, s], [-s, c]], half_m: size_m.map(|m| 0.5 * m) }
 }
 

@@ -17,7 +17,7 @@ const MAX_LISTED_CONNECTORS: usize = 64;
 impl<const D: usize> ConnectorInspection<'_, D> {
     /// Tells the rung of the ladder on which the initiator ended.
     pub(super) fn add_recovery(&self, told: &mut Inspection) {
-        let Some(climbed) = &self.notes.climbed else { return };
+        let Some(climbed) = &self.trace.climbed else { return };
         let section = FactSection::new("Ladder");
         let (rung, moved) = match climbed {
             RecoveryOutcome::Straight(moved) => ("as wanted".into(), Some(moved)),
@@ -52,9 +52,10 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 .map_or(String::new(), |id| format!(", because of {}", obstacle_body_id(id)));
             format!("by connector {}: {}{because}", veto.by, veto.reason)
         });
-        let touched = match moved.touched.is_empty() {
-            true => "none yet".into(),
-            false => format!("{} to {}", moved.touched.start, moved.touched.end - 1),
+        let touched = if moved.touched.is_empty() {
+            "none yet".into()
+        } else {
+            format!("{} to {}", moved.touched.start, moved.touched.end - 1)
         };
         section
             .fact("connectors that reacted", touched)
@@ -80,7 +81,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         told.add_section(
             FactSection::new("Moves")
                 .fact("connectors", FactValue::count(moved.len()))
-                .fact("motions out of the way", FactValue::count(self.notes.escapes))
+                .fact("motions out of the way", FactValue::count(self.trace.escapes))
                 .table(table),
         );
     }

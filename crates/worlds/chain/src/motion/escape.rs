@@ -1,14 +1,14 @@
-//! Escape: getting out of the way of moving obstacles (slides P2, R4).
+//! Escape from moving obstacles (slides P2, R4).
 //!
 //! ```text
-//! literal.rs       the slides' own way: one part after the other, the deepest first
-//! simultaneous/    all parts of a tick at once, a way out for a part that is caught, and a leader that looks ahead
+//! literal.rs       the slides' method: one part after the other, the deepest first
+//! simultaneous/    all parts of a tick at once, an exit for a part that is caught, and a leader that looks ahead
 //! threat.rs        the parts near an obstacle
 //! ```
 //!
 //! Two obstacles that close in on a chain from both sides hold it like a pair of tongs, at any
 //! speed. The literal escape leaves it there. The simultaneous one takes it through the obstacle
-//! that it is behind of soonest, by roll-outs of a few ways.
+//! that it leaves soonest, by rollouts of a few exits.
 
 mod literal;
 mod simultaneous;
@@ -27,7 +27,7 @@ pub(crate) use simultaneous::LeadMotion;
 use simultaneous::SimultaneousEscape;
 pub(crate) use threat::ChainPart;
 
-/// The method by which a chain gets out of the way.
+/// The method by which a chain escapes from moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EscapeMethod {
@@ -38,15 +38,15 @@ pub enum EscapeMethod {
     Literal,
 }
 
-/// Rules for getting out of the way.
+/// Rules of escapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EscapeRules {
     /// Length of a tick, s.
     pub dt_s: f64,
-    /// Greatest speed: no connector is farther from its place at the start of the tick than this
+    /// Maximum speed: no connector is farther from its position at the start of the tick than this
     /// times the tick; infinite for no limit.
     pub speed_max_m_s: f64,
-    /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 to give way only
+    /// Number of ticks before contact at which parts escape, with a margin of 0.05 m; 0 to escape only
     /// on contact.
     pub ticks_ahead: f64,
     /// Most violations that the literal escape handles in a tick; at least half of them are
@@ -108,8 +108,8 @@ pub struct EscapeReport<const D: usize> {
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
-    /// Whether the chain is pressed: it needs all its speed to get away, so its leader should give way.
-    /// Only the simultaneous escape tells.
+    /// Whether the chain is pressed: it needs all its speed to escape, so its leader should rest.
+    /// Only the simultaneous escape reports that.
     pub is_pressed: bool,
 }
 
@@ -124,8 +124,8 @@ pub struct TrappedPart<const D: usize> {
     pub veto: Option<Veto<D>>,
 }
 
-/// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick; a chain's
-/// memory is in its [`EscapePlan`].
+/// Escapes of chains. It owns its buffers and keeps nothing from tick to tick; a chain's memory is its
+/// [`EscapePlan`].
 #[derive(Debug, Clone)]
 pub struct Escaper<const D: usize> {
     rules: EscapeRules,
@@ -157,9 +157,9 @@ impl Margin {
     }
 }
 
-/// Gap that is kept beyond the way of the obstacle, meters.
+/// Gap that is kept beyond the distance that an obstacle travels in the look-ahead, meters.
 const MARGIN_M: f64 = 0.05;
-/// Time from one choice of a leader to the next, s.
+/// Time from one choice of a leader to the next, s. Rollouts in every tick would cost more than they gain.
 const LEADER_CHOICE_INTERVAL_S: f64 = 0.2;
 
 impl<const D: usize> Escaper<D> {
@@ -178,28 +178,28 @@ impl<const D: usize> Escaper<D> {
     }
 
     /// Returns the ticks from one choice of a leader to the next; none if leaders choose nothing, because the chain
-    /// gives way on contact or by the literal method only.
+    /// escapes on contact only, or by the literal method.
     pub(crate) fn choice_interval_ticks(&self) -> Option<u64> {
         let EscapeRules { dt_s, ticks_ahead, method, .. } = self.rules;
         let chooses = method == EscapeMethod::Simultaneous && ticks_ahead > 0.0;
         chooses.then(|| (LEADER_CHOICE_INTERVAL_S / dt_s).round().max(1.0) as u64)
     }
 
-    /// Lets the leader of a chain choose between its wish and resting, whichever keeps parts of the chain
-    /// inside moving obstacles for less time. The choice is in `way_out`.
+    /// Lets the leader of a chain choose between its motion and resting, by which of them keeps parts of the chain
+    /// inside moving obstacles for less time. The choice is stored in `escape_plan`.
     pub(crate) fn choose_leader_action(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         rules: &Rules,
         lead: &LeadMotion<D>,
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) {
-        way_out.set_resting(self.simultaneous.should_rest(chain, obstacles, rules, lead));
+        escape_plan.set_resting(self.simultaneous.should_rest(chain, obstacles, rules, lead));
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the
-    /// connectors' positions at the start of the tick, `way_out` the chain's memory: the default
+    /// connectors' positions at the start of the tick, `escape_plan` the chain's memory: the default
     /// at first, and then as the last tick left it.
     ///
     /// # Errors
@@ -210,7 +210,7 @@ impl<const D: usize> Escaper<D> {
         obstacles: &Obstacles<D>,
         propagator: &mut Propagator<D>,
         start: &[Point<D>],
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) -> Result<EscapeReport<D>, InputError> {
         self.rules.check()?;
         if start.len() != chain.points().len() {
@@ -219,7 +219,7 @@ impl<const D: usize> Escaper<D> {
         }
         if self.rules.method == EscapeMethod::Simultaneous {
             let rules = propagator.rules;
-            return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, way_out));
+            return Ok(self.simultaneous.escape(chain, obstacles, &rules, start, escape_plan));
         }
         let step_max_m = propagator.rules.slave_step_max_m;
         propagator.rules.slave_step_max_m = step_max_m.min(self.rules.max_step_m());

@@ -1,9 +1,9 @@
-//! Ways of a chain to a place, made of motions of its rods.
+//! Paths of a chain to a place, made of motions of its rods.
 //!
 //! ```text
-//! go.rs:     one motion; the objection of a fixed base is answered by a reach
-//! replan.rs: after a veto, rung by rung: shorter, sideways, pulled back, stuck
-//! escape.rs: out of the way of obstacles that come too near
+//! request.rs:  one motion; the objection of a fixed base is answered by a reach
+//! recovery.rs: after a veto, rung by rung: shorter, sideways, pulled back, stuck
+//! escape.rs:   evasion of obstacles that come too near
 //! ```
 
 pub(crate) mod escape;

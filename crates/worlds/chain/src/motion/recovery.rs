@@ -1,10 +1,10 @@
 //! Alternatives of an autonomous initiator after a veto (slides R8, R9).
 //!
 //! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, letting the
-//! other end of the chain lead for a while, and the report that it is stuck. Each rung is tried
+//! other end of the chain lead for some cycles, and the report that it is stuck. Each rung is tried
 //! once in a tick, and the first that works ends the climb. The slides leave open the reaction to a
 //! veto; the other end leads because a chain can be pulled out of a fold that it was pushed into. A
-//! planner or an operator gets the veto and no ladder.
+//! planner or an operator gets the veto and no ladder: their next request may be another one.
 
 mod memory;
 #[cfg(test)]
@@ -23,9 +23,10 @@ use sidestep_rods::{
     VetoEffect,
 };
 
-/// Parts of a step that are tried when the whole step is vetoed.
+/// Fractions of a step that are tried when the whole step is vetoed.
 const STEP_FRACTIONS: [f64; 3] = [0.5, 0.25, 0.125];
-/// Other headings that are tried, rad.
+/// Other headings that are tried, rad: up to a little more than across, because farther back lies where the chain
+/// comes from.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 
 /// Lengths of the rungs.
@@ -61,7 +62,7 @@ pub struct Situation {
     pub movers_near: bool,
     /// Whether its drive can turn on the spot.
     pub can_turn: bool,
-    /// Whether it only goes where it looks, as robots on wheels do: then no other headings are
+    /// Whether it moves only along its heading, as robots on wheels do: then no other headings are
     /// tried.
     pub keeps_heading: bool,
 }
@@ -71,9 +72,9 @@ pub struct Situation {
 pub enum RecoveryOutcome<const D: usize> {
     /// The motion as wanted.
     Straight(CompletedMotion<D>),
-    /// A part of the step.
+    /// A fraction of the step.
     Shorter {
-        /// The part.
+        /// The fraction.
         part: f64,
         /// The motion.
         moved: CompletedMotion<D>,
@@ -104,7 +105,7 @@ pub enum RecoveryOutcome<const D: usize> {
         /// The motion.
         moved: CompletedMotion<D>,
     },
-    /// Nothing moved, and no rung is left; all objections, each once.
+    /// Nothing moved, and no rung is left; all vetoes, each once.
     Stuck {
         /// Vetoes from the wanted motion to the last rung; empty if the wanted motion would now be free
         /// and only detours have led here.
@@ -128,13 +129,13 @@ pub(crate) trait ChainMover<const D: usize> {
     /// Reason for which a request has no outcome.
     type Failure;
 
-    /// Returns the place of a connector that leads.
+    /// Returns the position of a connector that leads.
     fn place(&self, k: usize) -> Point<D>;
 
-    /// Makes a motion: all of it, or nothing moves.
+    /// Carries out a motion: all of it, or nothing moves.
     fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, Self::Failure>;
 
-    /// Returns the objection to a motion, if there is one; nothing moves.
+    /// Returns the veto of a motion, if there is one; nothing moves.
     fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, Self::Failure>;
 
     /// Returns the end farther from an initiator; `None` if there is none that could lead.
@@ -146,7 +147,7 @@ pub(crate) trait ChainMover<const D: usize> {
 pub(crate) struct ChainEnd<const D: usize> {
     /// The connector.
     pub(crate) by: usize,
-    /// Its place.
+    /// Its position.
     pub(crate) at: Point<D>,
     /// The direction in which its rod points out of the chain, a unit vector.
     pub(crate) ahead: Point<D>,
@@ -171,9 +172,9 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
     }
 
     fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, InputError> {
-        let tried =
+        let attempted =
             execute_request(self.propagator, &mut self.chain.clone(), self.obstacles, request)?;
-        Ok(tried.veto().copied())
+        Ok(attempted.veto().copied())
     }
 
     fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, InputError> {
@@ -206,17 +207,19 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
     }
 
     fn record_veto(&mut self, veto: Veto<D>) {
-        let what = |v: &Veto<D>| (v.from, v.by, v.reason, v.obstacle);
-        if !self.vetoes.iter().any(|v| what(v) == what(&veto)) {
+        let is_known = self.vetoes.iter().any(|v| {
+            (v.from, v.by, v.reason, v.obstacle) == (veto.from, veto.by, veto.reason, veto.obstacle)
+        });
+        if !is_known {
             self.vetoes.push(veto);
         }
     }
 
-    /// Returns the wanted motion with another way from the initiator's place.
-    fn with_displacement(&self, way: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
+    /// Returns the wanted motion with another displacement of the initiator.
+    fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
         let to = |k: usize, to: Point<D>| {
             let at = self.by.place(k);
-            add(at, way(sub(to, at)))
+            add(at, change(sub(to, at)))
         };
         match self.wanted.motion {
             Motion::Connector { k, to: t } => Motion::Connector { k, to: to(k, t) },
@@ -224,7 +227,7 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
         }
     }
 
-    /// Returns the initiator and its wanted way.
+    /// Returns the initiator and the displacement that it wants.
     fn wanted_displacement(&self) -> (usize, Point<D>) {
         let (k, to) = moving_head(&self.wanted.motion);
         (k, sub(to, self.by.place(k)))
@@ -238,7 +241,7 @@ impl RecoveryLadder {
     }
 
     /// Moves as wanted, or as near to it as a rung allows. The wanted motion is requested exactly,
-    /// whatever its mode, because part of the way is a rung of its own.
+    /// whatever its mode, because a fraction of the step is a rung of its own.
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
@@ -250,11 +253,11 @@ impl RecoveryLadder {
         wanted: &Request<D>,
         situation: &Situation,
     ) -> Result<RecoveryOutcome<D>, InputError> {
-        let told = self.climb_with_veto(chain, obstacles, propagator, wanted, situation);
-        told.map(|(climbed, _)| climbed)
+        let climbed = self.climb_with_veto(chain, obstacles, propagator, wanted, situation);
+        climbed.map(|(climbed, _)| climbed)
     }
 
-    /// Climbs, and also returns the objection to the wanted motion itself, if there was one.
+    /// Climbs, and also returns the veto of the wanted motion itself, if there was one.
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
@@ -269,8 +272,7 @@ impl RecoveryLadder {
         self.climb_with(&mut DirectMover { chain, obstacles, propagator }, wanted, situation)
     }
 
-    /// Climbs with a chain that is moved in any way, and also returns the objection to the wanted motion itself,
-    /// if there was one.
+    /// Climbs with any kind of mover, and also returns the veto of the wanted motion itself, if there was one.
     pub(crate) fn climb_with<M: ChainMover<D>, const D: usize>(
         &mut self,
         by: &mut M,
@@ -302,12 +304,12 @@ impl RecoveryLadder {
         climb: &mut RecoveryAttempt<'_, M, D>,
         situation: &Situation,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
-        if let Some(came) = try_shorter(climb)? {
+        if let Some(recovery) = try_shorter(climb)? {
             self.memory.reset_failures();
-            return Ok(came);
+            return Ok(recovery);
         }
         match self.try_sideways(climb, situation)? {
-            Some(came) => Ok(came),
+            Some(recovery) => Ok(recovery),
             None => self.try_stationary_rungs(climb, situation),
         }
     }
@@ -353,7 +355,7 @@ impl RecoveryLadder {
         self.pull_back(climb)
     }
 
-    /// Lets the other end go on along its rod, or beside it; the initiator is dragged.
+    /// Lets the other end lead along its rod, or beside it; the initiator is dragged.
     fn pull_back<M: ChainMover<D>, const D: usize>(
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
@@ -386,7 +388,7 @@ impl RecoveryLadder {
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         self.memory.reset();
         if climb.vetoes.is_empty() {
-            // Its detours have led nowhere, and it has tried nothing since, so ask for the objection.
+            // It is stuck in detours without a veto in this tick, so the wanted motion is tried for its veto.
             let request = Request { mode: VetoEffect::Exact, ..climb.wanted };
             climb.by.find_veto(&request)?.into_iter().for_each(|veto| climb.record_veto(veto));
         }
@@ -419,7 +421,7 @@ pub(crate) fn farther_end(k: usize, n: usize) -> usize {
 
 /// Returns planes and turns in the order in which they are tried. If no side is known to be good,
 /// the least turn comes first; otherwise all of that side before the other, so that the chain does
-/// not alternate between two ways around.
+/// not alternate between two detours.
 fn fan(memory: &RecoveryMemory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
     let side = f64::from(memory.side_or_left());
     let keeps_side = memory.side != 0;
@@ -445,7 +447,7 @@ fn axes_across<const D: usize>(u: Point<D>) -> [Point<D>; 2] {
     [1, 2].map(|axis| {
         let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
         let across = add_scaled(e, u, -dot(e, u));
-        // Along an axis there is no turn toward that axis, and any other does.
+        // A direction along an axis cannot turn toward that axis; any other perpendicular does.
         if norm(across) > 1e-6 {
             normalized(across).unwrap_or(first_axis())
         } else {
@@ -461,8 +463,10 @@ fn turn_toward<const D: usize>(
     across: Point<D>,
     turn_rad: f64,
 ) -> Point<D> {
-    let (x, y) = (dot(v, u), dot(v, across));
-    let (c, s) = (cos(turn_rad), sin(turn_rad));
+    let x = dot(v, u);
+    let y = dot(v, across);
+    let c = cos(turn_rad);
+    let s = sin(turn_rad);
     let rest = add_scaled(add_scaled(v, u, -x), across, -y);
     add_scaled(add_scaled(rest, u, c * x - s * y), across, s * x + c * y)
 }

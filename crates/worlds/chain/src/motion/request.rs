@@ -1,14 +1,20 @@
-//! One motion of a chain: by propagation, or by a reach if a held connector objects.
+//! One motion of a chain: by propagation, or by a reach if a held connector vetoes it.
 
 use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Connector, Mobility, Motion, Obstacles, Outcome, Propagator,
-    ReachOutcome, ReachRequest, Request, Rules, Veto, VetoReason, find_tunneling, reach,
+    ReachOutcome, ReachRequest, Request, Veto, VetoReason, find_tunneling, reach,
 };
 
-/// Moves a chain as requested; if a connector objects that must stay at its place, or on its line, its plane
+/// What moves a chain, and what it may meet.
+struct Scene<'a, const D: usize> {
+    propagator: &'a mut Propagator<D>,
+    obstacles: &'a Obstacles<D>,
+}
+
+/// Moves a chain as requested; if a connector vetoes that must stay at its position, on its line or plane,
 /// or in its box, by [`reach`].
 ///
 /// # Errors
@@ -23,7 +29,8 @@ pub(crate) fn execute_request<const D: usize>(
         && let Some(base) = sliding_connector(chain, k)
     {
         let order = ReachRequest { k, target: to, base, tolerance_m: TOLERANCE_M };
-        return move_sliding(propagator, chain, obstacles, &order, request);
+        let scene = &mut Scene { propagator, obstacles };
+        return move_sliding(scene, chain, &order, request);
     }
     let outcome = propagator.propagate(chain, obstacles, request)?;
     let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
@@ -33,10 +40,10 @@ pub(crate) fn execute_request<const D: usize>(
         return Ok(outcome);
     }
     let order = ReachRequest { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
-    move_with_base(propagator, chain, obstacles, &order, veto)
+    move_with_base(&mut Scene { propagator, obstacles }, chain, &order, veto)
 }
 
-/// Returns whether an objection is that of a connector that is held.
+/// Returns whether a veto is that of a connector that is held.
 fn is_held_veto(reason: VetoReason) -> bool {
     matches!(reason, VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility)
 }
@@ -52,55 +59,56 @@ fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize
     if chain.is_plain() { None } else { (0..chain.connectors().len()).find(slides) }
 }
 
-/// Moves a chain one of whose connectors slides. Where that one could only come along by going much farther
-/// than the initiator, as the foot of a rod that stands across its line, or from one side of its master to
-/// the other, return passes find a place nearby.
+/// Moves a chain one of whose connectors slides. Where that one could follow only by moving much farther than the
+/// initiator, as the foot of a rod that stands across its line, or from one side of its master to the other, return
+/// passes find a position nearby.
 fn move_sliding<const D: usize>(
-    propagator: &mut Propagator<D>,
+    scene: &mut Scene<'_, D>,
     chain: &mut Chain<D>,
-    obstacles: &Obstacles<D>,
     order: &ReachRequest<D>,
     request: &Request<D>,
 ) -> Result<Outcome<D>, InputError> {
-    let (k, joints_m) = (order.k, propagator.rules.joint_step_max_m);
+    let k = order.k;
+    let joints_m = scene.propagator.rules.joint_step_max_m;
     try_slowed(chain, k, order.target, joints_m, |chain, before, to| {
         let request = Request { motion: Motion::Connector { k, to }, ..*request };
-        let veto = match propagator.propagate(chain, obstacles, &request)? {
+        let veto = match scene.propagator.propagate(chain, scene.obstacles, &request)? {
             Outcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
             Outcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
                 chain.points_mut().copy_from_slice(before);
-                let (reason, reached) = (VetoReason::Mobility, before[k]);
-                Veto { by: order.base, from: k, reason, obstacle: None, reached }
+                let reason = VetoReason::Mobility;
+                Veto { by: order.base, from: k, reason, obstacle: None, reached: before[k] }
             }
             outcome => return Ok((outcome, f64::INFINITY)),
         };
         let order = ReachRequest { target: to, base: veto.by, ..*order };
-        move_to_target(propagator, chain, before, obstacles, &order, &veto)
+        move_to_target(scene, chain, before, &order, &veto)
     })
 }
 
-/// Moves a chain whose base objects as far as the limit of its joints allows.
+/// Moves a chain whose base has vetoed, as far as the speed limit of its joints allows.
 fn move_with_base<const D: usize>(
-    propagator: &mut Propagator<D>,
+    scene: &mut Scene<'_, D>,
     chain: &mut Chain<D>,
-    obstacles: &Obstacles<D>,
     order: &ReachRequest<D>,
     objection: &Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
-    // A connector that has failed is no base of an arm: the parts that hang on it swing as they did.
-    let joints_m = match objection.reason {
-        VetoReason::Fixed => propagator.rules.joint_step_max_m,
-        _ => f64::INFINITY,
+    // Only a fixed connector is the base of an arm, whose joints have a speed limit; the parts that hang on a failed
+    // connector swing freely.
+    let joints_m = if objection.reason == VetoReason::Fixed {
+        scene.propagator.rules.joint_step_max_m
+    } else {
+        f64::INFINITY
     };
     try_slowed(chain, order.k, order.target, joints_m, |chain, before, target| {
         let order = ReachRequest { target, ..*order };
-        move_to_target(propagator, chain, before, obstacles, &order, objection)
+        move_to_target(scene, chain, before, &order, objection)
     })
 }
 
-/// Tries a motion, shortened until no connector goes farther than `joints_m`. Near a singular posture
-/// connectors go much farther than the initiator. An attempt also returns the longest way of a connector
-/// for which its outcome counts as a motion, meters.
+/// Tries a motion, shortened until no connector moves farther than `joints_m`: near a singular posture
+/// connectors move much farther than the initiator. An attempt also returns the longest displacement of a connector
+/// with which its outcome still counts as a motion, meters.
 fn try_slowed<const D: usize>(
     chain: &mut Chain<D>,
     k: usize,
@@ -121,7 +129,8 @@ fn try_slowed<const D: usize>(
         obstacle: None,
         reached,
     };
-    let (mut part, mut fastest) = (1.0, k);
+    let mut part = 1.0;
+    let mut fastest = k;
     for _ in 0..MAX_SLOWED_TRIES {
         let target = if part < 1.0 { lerp(from, to, part) } else { to };
         let (outcome, jump_m) = attempt(chain, &before, target)?;
@@ -137,57 +146,56 @@ fn try_slowed<const D: usize>(
             return Ok(Outcome::Moved(CompletedMotion { cut_short, ..moved }));
         }
         chain.points_mut().copy_from_slice(&before);
-        (part, fastest) = (part * SLOWED_FRACTION * most_m / longest_m, by);
+        part = part * SLOWED_FRACTION * most_m / longest_m;
+        fastest = by;
     }
     Ok(Outcome::Vetoed(slow(fastest, from)))
 }
 
-/// Returns the connector that has moved farthest, and its way, meters.
+/// Returns the connector that has moved farthest, and its displacement, meters.
 fn max_displacement<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, f64) {
     let ways_m = before.iter().zip(points).map(|(a, b)| distance(*a, *b)).enumerate();
     ways_m.fold((0, 0.0), |most, way| if way.1 > most.1 { way } else { most })
 }
 
-/// Moves a chain whose base objects by passes there and back, or straight to a posture; returns also
-/// the longest way of a connector for which the outcome counts as a motion, meters.
+/// Moves a chain whose base has vetoed by forward and backward passes, or straight to a posture; also returns the
+/// longest displacement of a connector with which the outcome still counts as a motion, meters.
 fn move_to_target<const D: usize>(
-    propagator: &mut Propagator<D>,
+    scene: &mut Scene<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
-    obstacles: &Obstacles<D>,
     order: &ReachRequest<D>,
     objection: &Veto<D>,
 ) -> Result<(Outcome<D>, f64), InputError> {
-    Ok(match reach(propagator, chain, obstacles, order)? {
+    Ok(match reach(scene.propagator, chain, scene.obstacles, order)? {
         ReachOutcome::There { .. } => {
             (Outcome::Moved(motion_since(before, chain, order.k)), f64::INFINITY)
         }
         ReachOutcome::Short { veto: Some(veto), .. } => (Outcome::Vetoed(veto), f64::INFINITY),
         ReachOutcome::Short { nearest, veto: None } => {
             let objection = Veto { reached: nearest, ..*objection };
-            let rules = propagator.rules;
+            let rules = scene.propagator.rules;
             let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
             let jump_m = rules.slave_step_max_m.min(MAX_JUMP * longest_m);
-            (move_to_posture(rules, chain, before, obstacles, order, objection)?, jump_m)
+            (move_to_posture(scene, chain, before, order, objection)?, jump_m)
         }
     })
 }
 
 /// Most attempts to find the distance that an initiator may go.
 const MAX_SLOWED_TRIES: usize = 16;
-/// Part of the limit that an attempt aims at, because near singular postures joints slow down less
+/// Fraction of the limit that an attempt aims at, because near singular postures joints slow down less
 /// than the initiator.
 const SLOWED_FRACTION: f64 = 0.9;
 
 /// Finds a posture, or reports that the target is out of reach. Passes converge slowly if a chain
 /// is nearly straight, and not at all along a straight line, so damped least squares find the nearest
-/// posture that gets there, and the chain goes straight to it if neither the posture nor the way to it
-/// is blocked.
+/// posture that reaches the target, and the chain moves straight to it if neither the posture nor the motion is
+/// blocked.
 fn move_to_posture<const D: usize>(
-    rules: Rules,
+    scene: &Scene<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
-    obstacles: &Obstacles<D>,
     order: &ReachRequest<D>,
     objection: Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
@@ -201,23 +209,18 @@ fn move_to_posture<const D: usize>(
         tolerance_m,
         ..ChainIkGoal::new(k, base, target)
     };
-    let answer = IkSolver::new(rules).solve(chain, obstacles, &goal)?;
+    let answer = IkSolver::new(scene.propagator.rules).solve(chain, scene.obstacles, &goal)?;
     // The solver knows of no held connector other than the base.
-    let is_held = |c: &Connector<D>, at: Point<D>, to: Point<D>| match c.is_still() {
-        true => at == to,
-        false => c.mobility.allows(to, at),
-    };
-    let mut held = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
-    if !answer.reached || !held.all(|(c, (at, to))| is_held(c, *at, *to)) {
+    let mut motions = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
+    if !answer.reached || !motions.all(|(c, (at, to))| may_move(c, *at, *to)) {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
-    if let Some(passed) = find_tunneling(chain, before, obstacles, 0.0) {
+    if let Some(passed) = find_tunneling(chain, before, scene.obstacles, 0.0) {
         chain.points_mut().copy_from_slice(before);
-        let (by, obstacle) = (passed.rod, Some(passed.obstacle));
         return Ok(Outcome::Vetoed(Veto {
-            by,
-            obstacle,
+            by: passed.rod,
+            obstacle: Some(passed.obstacle),
             reason: VetoReason::WouldTunnel,
             ..objection
         }));
@@ -225,10 +228,16 @@ fn move_to_posture<const D: usize>(
     Ok(Outcome::Moved(motion_since(before, chain, k)))
 }
 
-/// Returns the connector, if there is one, from whose places the rods do not reach the target.
+/// Returns whether a connector may move from one position to another.
+fn may_move<const D: usize>(connector: &Connector<D>, at: Point<D>, to: Point<D>) -> bool {
+    if connector.is_still() { at == to } else { connector.mobility.allows(to, at) }
+}
+
+/// Returns the connector, if there is one, from whose positions the rods do not reach the target.
 fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &ReachRequest<D>) -> Option<usize> {
     let holds_too_far = |i: &usize| {
-        let (connector, at) = (&chain.connectors()[*i], chain.points()[*i]);
+        let connector = &chain.connectors()[*i];
+        let at = chain.points()[*i];
         let [from, to] = [order.k.min(*i), order.k.max(*i)];
         let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
         // A failed connector may be repaired, so it is reported as failed.
@@ -239,8 +248,8 @@ fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &ReachRequest<D>) -> Op
     (0..chain.points().len()).filter(|i| *i != order.k).find(holds_too_far)
 }
 
-/// Longest move of a connector, as a part of the longest rod, for which a posture is accepted as a
-/// motion.
+/// Longest move of a connector, as a fraction of the longest rod, with which a posture is accepted as a
+/// motion: farther apart, two postures are not one motion of the chain.
 const MAX_JUMP: f64 = 0.5;
 
 /// Distance at which a connector's step counts as complete, meters.
@@ -266,7 +275,7 @@ fn motion_since<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_rods::{RequestSource, Rod, VetoEffect};
+    use sidestep_rods::{RequestSource, Rod, Rules, VetoEffect};
 
     /// An arm of two rods, bent a little; the base is fixed.
     fn arm() -> Chain<2> {
@@ -366,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_led_gets_wherever_a_rail_a_plane_a_box_and_two_ends_let_it() {
+    fn an_initiator_reaches_all_that_a_rail_a_plane_a_box_and_two_ends_allow() {
         let rail = Mobility::OnSegment([[0.0, 0.0], [6.0, 0.0]]);
         let upper = Mobility::OnSegment([[0.0, 1.6], [6.0, 1.6]]);
         let line = Mobility::OnPlane { normal: [0.0, 1.0], offset_m: 0.0 };
@@ -391,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_target_that_no_place_on_the_rail_reaches_is_told_as_such() {
+    fn a_target_that_no_position_on_the_rail_reaches_is_out_of_reach() {
         let mut chain = arm();
         chain.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
         let request = Request::exact(2, [1.5, 4.0]);

@@ -37,7 +37,8 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<ArmSection>,
         at_m: [f64; 3],
     ) -> Result<Arm, InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let model = self.model(s, at.clone())?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {
@@ -53,7 +54,7 @@ impl<const D: usize> Compiler<'_, D> {
         if serial.variables.is_empty() {
             let at = self.source.key_span(at, &["tip", "base", "urdf", "urdf_text"]);
             let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);
-            return Err(self.source.error(at, cause, "name another base or another tip"));
+            return Err(self.source.error(at, cause, "give another base or another tip"));
         }
         let values = self.values(s, &model, &serial, at.clone())?;
         let at = || self.source.key_span(at, &["joints", "posture"]);
@@ -109,7 +110,7 @@ impl<const D: usize> Compiler<'_, D> {
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
                 let at = self.source.key_span(at.clone(), &["posture", "srdf", "joints"]);
-                Err(self.source.error(at, "a posture given in two ways, or half", remedy))
+                Err(self.source.error(at, "a posture given twice, or by half", remedy))
             }
         }
     }

@@ -23,9 +23,10 @@ use sidestep_scenario::{NumberRange, Sections, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Room around the parts of a chain that starts anywhere, as a multiple of its radius.
+/// Free distance around the parts of a chain that starts anywhere, as a multiple of its radius: at exactly one radius
+/// its first motion would be vetoed.
 const ROOM_FACTOR: f64 = 1.2;
-/// Room for robots that follow their connectors on wheels, meters.
+/// Margin of connectors around robots that follow them on wheels, which lag behind, meters.
 const MARGIN_M: f64 = 0.08;
 /// Keys of a chain that an arm does not have, and the arm.
 const NON_ARM_KEYS: [&str; 11] = [
@@ -41,7 +42,7 @@ const NON_ARM_KEYS: [&str; 11] = [
     "count",
     "arm",
 ];
-/// Most sub-steps of an initiator in a cycle.
+/// Most sub-steps of an initiator in a cycle; more would take seconds.
 const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
@@ -162,7 +163,7 @@ impl<const D: usize> Compiler<'_, D> {
         let apart_m: Point<D> = match &s.apart_m {
             Some(given) => given.get(),
             None if s.count > 1 => {
-                let remedy = "add apart_m = [...], the way from one to the next";
+                let remedy = "add apart_m = [...], the offset from one to the next";
                 return Err(self.source.error(
                     self.source.key_span(section.span(), &["count"]),
                     format!("{} chains at one place", s.count),
@@ -185,7 +186,8 @@ impl<const D: usize> Compiler<'_, D> {
         dt_s: f64,
         around: PlacementContext<D>,
     ) -> Result<ChainSpec<D>, InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let (start, arm) = self.shape(s, around, at.clone())?;
         let tasks = self.tasks(s, &start, at.clone())?;
         if let Some(arm) = &arm {
@@ -222,14 +224,6 @@ impl<const D: usize> Compiler<'_, D> {
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;
         }
-        let is_endless = |task: &Task<D>| {
-            let has_an_end = match &task.driver {
-                TaskKind::Rest | TaskKind::Wander(_) | TaskKind::External => false,
-                TaskKind::Navigate(navigator) => navigator.goal.is_some(),
-                TaskKind::Script(_) | TaskKind::Targets(_) => true,
-            };
-            !has_an_end && task.lasts_s.is_infinite()
-        };
         if let Some(k) = tasks.iter().position(is_endless).filter(|k| k + 1 < tasks.len()) {
             let cause = "this task never ends, and others follow";
             return Err(self.source.error(s.tasks.0[k].span(), cause, "add lasts_s"));
@@ -258,7 +252,7 @@ impl<const D: usize> Compiler<'_, D> {
         let breaks =
             changes.iter().filter(|change| matches!(change.what, ChangeKind::Scatter { .. }));
         if breaks.count() > 1 {
-            let remedy = "let it break once";
+            let remedy = "break it once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
         self.check_breaks(s, dt_s)?;
@@ -297,7 +291,7 @@ impl<const D: usize> Compiler<'_, D> {
         Err(self.source.error(at, cause, remedy))
     }
 
-    /// Refuses a speed of escapes that would need too many sub-steps: the literal way out goes step by step.
+    /// Refuses a speed of escapes that would need too many sub-steps: the literal escape moves step by step.
     pub(super) fn check_escapes(
         &self,
         chains: &[ChainSpec<D>],
@@ -361,9 +355,10 @@ impl<const D: usize> Compiler<'_, D> {
                 remedy,
             ));
         }
-        let points = match s.anywhere {
-            true => self.random_start(s, &rod, radius_m, around, at.clone())?,
-            false => self.points(s, rod.max_m, at.clone())?,
+        let points = if s.anywhere {
+            self.random_start(s, &rod, radius_m, around, at.clone())?
+        } else {
+            self.points(s, rod.max_m, at.clone())?
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
         self.trim_leaders(s, &mut connectors);
@@ -460,7 +455,7 @@ impl<const D: usize> Compiler<'_, D> {
         match s.changes.0.iter().find(|change| change.get_ref().takes_apart()) {
             None => Ok(()),
             Some(change) => {
-                let remedy = "let a connector fail, or give a chain of rods in place of the arm";
+                let remedy = "make a connector fail, or give a chain of rods in place of the arm";
                 let cause =
                     "an arm is as its joints put it: it is never scattered, nor off its base";
                 Err(self.source.error(change.span(), cause, remedy))
@@ -469,7 +464,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     fn rod(&self, s: &ChainSection<D>, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
-        // Thick rods make slaves jump, and those of a swarm are virtual anyway.
+        // Thick rods make slaves jump, and the rods of a swarm are virtual.
         let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
         match s.rod_m {
             Some(NumberRange { low: least, high: greatest }) => {
@@ -492,7 +487,7 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
-            let remedy = "name a ground.map or a ground.stage, and give connectors";
+            let remedy = "give a ground.map or a ground.stage, and give connectors";
             let at = self.source.key_span(at, &["anywhere"]);
             return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };
@@ -501,7 +496,7 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "leave out at_m, points_m, along, heading_deg and folded_m";
             let keys = ["at_m", "points_m", "along", "heading_deg", "folded_m"];
             let at = self.source.key_span(at, &keys);
-            return Err(self.source.error(at, "a chain placed in two ways", remedy));
+            return Err(self.source.error(at, "a chain placed twice", remedy));
         }
         let obstacles =
             Obstacles::new(self.placement_obstacles(Some(site), placed)?, rod.max_m.max(1e-3))
@@ -513,14 +508,14 @@ impl<const D: usize> Compiler<'_, D> {
             clearance_m: ROOM_FACTOR * radius_m,
             rod_clearance_m: ROOM_FACTOR * rod.radius_m,
             ahead_m: rod.max_m,
-            within: s.within_m.as_ref().map(|within| within.get_ref().to_plane()),
+            within: s.within_m.as_ref().map(|within| within.get_ref().floor()),
         };
         let start = find_placement(site, obstacles, &wanted, Seed(self.head.seed), number)
             .map_err(|error| self.source.error_from(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
 
-    /// Returns the places of the connectors: one by one, or on a line from the first one.
+    /// Returns the positions of the connectors: one by one, or on a line from the first one.
     fn points(
         &self,
         s: &ChainSection<D>,
@@ -531,7 +526,7 @@ impl<const D: usize> Compiler<'_, D> {
             if s.connectors.is_some() || s.at_m.is_some() || s.folded_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
                 let at = self.source.key_span(at, &["points_m"]);
-                return Err(self.source.error(at, "a chain placed in two ways", remedy));
+                return Err(self.source.error(at, "a chain placed twice", remedy));
             }
             let keys = [
                 ("along", s.along.is_some(), false),
@@ -577,8 +572,7 @@ impl<const D: usize> Compiler<'_, D> {
                 self.source.error(given.span(), "along has no length", remedy)
             }),
             (Some(given), Some(_)) => {
-                let remedy =
-                    "give along, the way from the first connector to the last, or heading_deg";
+                let remedy = "give along, the direction from the first connector to the last, or heading_deg";
                 Err(self.source.error(given.span(), "two directions", remedy))
             }
         }
@@ -611,7 +605,17 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// Returns the places of connectors in legs there and back, each beside the one before: to the left in the plane. The
+/// Returns whether a task never ends.
+fn is_endless<const D: usize>(task: &Task<D>) -> bool {
+    let has_an_end = match &task.driver {
+        TaskKind::Rest | TaskKind::Wander(_) | TaskKind::External => false,
+        TaskKind::Navigate(navigator) => navigator.goal.is_some(),
+        TaskKind::Script(_) | TaskKind::Targets(_) => true,
+    };
+    !has_an_end && task.lasts_s.is_infinite()
+}
+
+/// Returns the positions of connectors in legs there and back, each beside the one before: to the left in the plane. The
 /// legs and the spans between them have as many rods as come nearest to their lengths, one at least.
 fn folded<const D: usize>(
     n: usize,
@@ -621,11 +625,15 @@ fn folded<const D: usize>(
     [leg_m, apart_m]: [f64; 2],
 ) -> Vec<Point<D>> {
     let rods = |length_m: f64| (length_m / rod_m).round().max(1.0) as usize;
-    let (leg, apart, aside) = (rods(leg_m), rods(apart_m), perpendicular(u));
+    let leg = rods(leg_m);
+    let apart = rods(apart_m);
+    let aside = perpendicular(u);
     let place = |k: usize| {
-        let (fold, rest) = (k / (leg + apart), k % (leg + apart));
-        let (on, aside_by) = (rest.min(leg), fold * apart + rest.saturating_sub(leg));
-        let along_by = if fold % 2 == 0 { on } else { leg - on };
+        let fold = k / (leg + apart);
+        let rest = k % (leg + apart);
+        let on = rest.min(leg);
+        let aside_by = fold * apart + rest.saturating_sub(leg);
+        let along_by = if fold.is_multiple_of(2) { on } else { leg - on };
         let at = add_scaled(start, u, rod_m * along_by as f64);
         add_scaled(at, aside, rod_m * aside_by as f64)
     };

@@ -78,7 +78,8 @@ impl<const D: usize> Compiler<'_, D> {
         chain: &Chain<D>,
         dt_s: f64,
     ) -> Result<Change<D>, InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         Ok(Change { cycle: s.cycle(dt_s), what: self.change_kind(s, chain, at)? })
     }
 
@@ -125,7 +126,8 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Refuses two changes at once, and keys that have no effect beside the one.
     fn check_one_change(&self, s: &ChangeSection<D>, at: Range<usize>) -> Result<(), InputError> {
-        let (throws, joins) = (s.scatter.is_some(), s.reform == Some(true));
+        let throws = s.scatter.is_some();
+        let joins = s.reform == Some(true);
         let others = [s.failed.is_some(), s.max_bend_deg.is_some(), s.mobility.is_some()];
         if others.into_iter().chain([throws, joins]).filter(|is_given| *is_given).count() != 1 {
             let remedy = "give one of failed, max_bend_deg, mobility, scatter = [first, last], \

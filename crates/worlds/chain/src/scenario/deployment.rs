@@ -40,7 +40,8 @@ impl<const D: usize> Compiler<'_, D> {
 fn non_local_rule(rules: &Rules, escapes: bool) -> Option<NonLocalKey> {
     let at = |key: &str, reason: &str, remedy| Some((key.into(), reason.into(), remedy));
     if rules.self_collision {
-        let reason = "self_collision = true: a chain in its own way has to know all its parts";
+        let reason =
+            "self_collision = true: to avoid its own parts, a chain has to know all of them";
         return at("chain.self_collision", reason, "set chain.self_collision = false");
     }
     if rules.backtracks > 0 {
@@ -51,8 +52,7 @@ fn non_local_rule(rules: &Rules, escapes: bool) -> Option<NonLocalKey> {
         return at("chain.backtracks", &reason, "set chain.backtracks = 0");
     }
     if escapes {
-        let reason =
-            "escape: which parts get out of the way first, or all at once, depends on all of them";
+        let reason = "escape: which parts escape first, or all at once, depends on all of them";
         return at("chain.escape", reason, "set chain.escape = \"off\"");
     }
     if rules.slave_step_max_m == f64::INFINITY {
@@ -73,12 +73,12 @@ fn non_local_key<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NonLoc
         spec.start.connectors().iter().position(|c| c.failed || c.mobility != Mobility::Free);
     if let Some(k) = held {
         let reason = format!("connector {k} is held: a target {passes}");
-        return Some((format!("chains.{s}.limits"), reason, "let all connectors move freely"));
+        return Some((format!("chains.{s}.limits"), reason, "make all connectors free"));
     }
     for (i, task) in spec.tasks.iter().enumerate() {
         let key = |key: &str| format!("chains.{s}.tasks.{i}.{key}");
         if task.plans_after_s.is_some() {
-            let reason = "a planner: its ways are postures of the whole chain".into();
+            let reason = "a planner: its paths are postures of the whole chain".into();
             return Some((key("planner"), reason, "set planner = \"none\""));
         }
         if matches!(task.driver, TaskKind::External) {

@@ -56,7 +56,7 @@ impl<const D: usize> Compiler<'_, D> {
                 let cause = format!("connector {} cannot reach target {i}: {reason}", task.agent);
                 let at = self.source.key_span(section.span(), &["targets_m"]);
                 let remedy =
-                    "give a target that the joints reach; `sidestep ik` tells which they do";
+                    "give a target that the joints reach; `sidestep ik` shows which they do";
                 return Err(self.source.error(at, cause, remedy));
             }
         }
@@ -71,14 +71,15 @@ impl<const D: usize> Compiler<'_, D> {
         start: &Chain<D>,
     ) -> Result<(), InputError> {
         let TaskKind::Targets(targets) = &task.driver else { return Ok(()) };
-        let (k, mobility) = (task.agent, start.connectors()[task.agent].mobility);
+        let k = task.agent;
+        let mobility = start.connectors()[k].mobility;
         let off_m = |p| distance(mobility.project(p, start.points()[k]), p);
         let is_off = |p: &_| mobility != Mobility::Free && off_m(*p) > targets.tolerance_m;
         let Some(i) = targets.places.iter().position(is_off) else { return Ok(()) };
         let off_m = off_m(targets.places[i]);
         let cause = format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
         let at = self.source.key_span(section.span(), &["targets_m"]);
-        let remedy = "give targets where its mobility allows it, or let another connector lead";
+        let remedy = "give targets where its mobility allows it, or make another connector lead";
         Err(self.source.error(at, cause, remedy))
     }
 }

@@ -186,7 +186,8 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns the floors of a map or of a Stage world, if the scenario names one.
     pub(super) fn site(&self) -> Result<Option<Site>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let given = [s.corridor.is_some(), s.map.is_some(), s.stage.is_some()]
             .iter()
             .filter(|g| **g)
@@ -270,7 +271,8 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<ObstacleSection<D>>,
         all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let id = all.next_id;
         self.check_shape_keys(s, at.clone())?;
         if let Some(corners) = &s.corners_m {
@@ -367,7 +369,7 @@ impl<const D: usize> Compiler<'_, D> {
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
                 let at = self.source.key_span(at, &["patrol_m", "bounces_m"]);
-                return Err(self.source.error(at, "an obstacle that moves in two ways", remedy));
+                return Err(self.source.error(at, "an obstacle with two motions", remedy));
             }
         };
         Ok(Some(course))
@@ -467,7 +469,8 @@ fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
 
 /// Returns the axes of a box turned in the plane of the first two.
 fn turned_axes<const D: usize>(turn_deg: f64) -> [Point<D>; D] {
-    let (s, c) = (math::sin(turn_deg.to_radians()), math::cos(turn_deg.to_radians()));
+    let s = math::sin(turn_deg.to_radians());
+    let c = math::cos(turn_deg.to_radians());
     std::array::from_fn(|i| {
         let mut axis = [0.0; D];
         match i {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 const DEFAULT_SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
 const DEFAULT_TOLERANCE_M: f64 = 1e-3;
-/// Time without coming nearer to a target after which a way is planned, s.
+/// Time without coming nearer to a target after which a path is planned, s.
 const DEFAULT_PLAN_DELAY_S: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -80,7 +80,8 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from)
     }
 
-    /// Returns whether it plans ways, on a chain with or without a fixed base.
+    /// Returns whether it plans paths, on a chain with or without a fixed base: an arm soon meets obstacles that local
+    /// rules cannot pass.
     fn has_planner(&self, has_base: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
@@ -101,7 +102,8 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<TaskSection<D>>,
         chain: &Chain<D>,
     ) -> Result<Task<D>, InputError> {
-        let (s, at) = (section.get_ref(), section.span());
+        let s = section.get_ref();
+        let at = section.span();
         let n = chain.points().len();
         let plans = s.has_planner(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
         if s.connector >= n {
@@ -138,11 +140,7 @@ impl<const D: usize> Compiler<'_, D> {
             TaskKindWord::Navigate if D != 2 => {
                 let remedy = "set chain.dimensions = 2, or give another kind";
                 let at = self.source.key_span(at, &["kind"]);
-                return Err(self.source.error(
-                    at,
-                    "only who drives in the plane navigates",
-                    remedy,
-                ));
+                return Err(self.source.error(at, "navigators drive in the plane", remedy));
             }
             TaskKindWord::Navigate => {
                 TaskKind::Navigate(Arc::new(self.navigator(s.navigator.as_ref(), s.speed_m_s())?))
@@ -183,9 +181,10 @@ impl<const D: usize> Compiler<'_, D> {
                 _ => false,
             };
             if is_far || n >= MAX_MOTIONS {
-                let cause = match is_far {
-                    true => "the script leads further than 1e6 m".into(),
-                    false => format!("the script comes to more than {MAX_MOTIONS} motions"),
+                let cause = if is_far {
+                    "the script leads further than 1e6 m".into()
+                } else {
+                    format!("the script makes more than {MAX_MOTIONS} motions")
                 };
                 let at = self.source.key_span(at, &["script", "script_file"]);
                 return Err(self.source.error(at, cause, "go less far, or repeat less often"));

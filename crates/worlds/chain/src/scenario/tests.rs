@@ -33,7 +33,7 @@ fn arm(keys: &str) -> String {
 
 #[test]
 fn an_arm_without_a_joint_that_moves_is_refused() {
-    let words = ["nothing moves between", "name another base or another tip"];
+    let words = ["nothing moves between", "give another base or another tip"];
     assert_refused(&arm("base = \"base\", tip = \"post\""), &words);
     assert_refused(&arm("base = \"hand\""), &words);
     assert_valid(&arm("base = \"base\""));

@@ -198,7 +198,7 @@ impl<'a> ScriptMotions<'a> {
     fn wait(&self, duration: &Expression) -> Result<ScriptMotion, InputError> {
         let duration_s = self.value(duration)?;
         if duration_s < 0.0 {
-            let cause = format!("nobody can wait {duration_s} s");
+            let cause = format!("a wait of {duration_s} s");
             return Err(self.script.error(duration.at, cause, "write a time from 0 on"));
         }
         Ok(ScriptMotion::Wait { duration_s })
@@ -225,7 +225,7 @@ impl<'a> ScriptMotions<'a> {
         }
         if self.frames.len() >= MAX_DEPTH {
             let cause = format!("more than {MAX_DEPTH} procedures in each other");
-            return Err(self.script.error(at, cause, "let the procedure that calls itself end"));
+            return Err(self.script.error(at, cause, "make the procedure that calls itself end"));
         }
         self.frames.push(frame);
         Ok(())

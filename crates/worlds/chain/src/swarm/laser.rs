@@ -126,9 +126,13 @@ impl Laser {
         let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
         let near = bounds_around(pose.at, self.range_m);
         let mut some_move = false;
-        obstacles.visit(&near, |o| match is_moving(o) {
-            true => some_move = true,
-            false => self.scan_core(pose, turn, &o.core, o.radius_m, scan),
+        // Movers come last, because a beam records whether a mover is what it meets first.
+        obstacles.visit(&near, |o| {
+            if is_moving(o) {
+                some_move = true;
+            } else {
+                self.scan_core(pose, turn, &o.core, o.radius_m, scan);
+            }
         });
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
             self.scan_core(pose, turn, &body.core, body.radius_m, scan);

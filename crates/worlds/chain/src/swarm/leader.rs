@@ -1,4 +1,4 @@
-//! The robot that finds the way: wall following with a target, as six layers (slides N1 to N6).
+//! The robot that navigates: wall following with a target, as six layers (slides N1 to N6).
 //!
 //! | layer | when | left, right wheel |
 //! | --- | --- | --- |
@@ -78,7 +78,7 @@ pub enum WallLossRule {
 /// The rule for when a target ends the following of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeaveRule {
-    /// Length of way to the target that must be free, meters.
+    /// Distance toward the target that must be free, meters.
     pub free_m: f64,
     /// Angle to each side of the target's bearing that must be free.
     pub half_angle_rad: f64,
@@ -105,7 +105,7 @@ impl Default for TargetSense {
     }
 }
 
-/// The way in which a leader turns.
+/// How a leader turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TurnMode {
     /// About the resting wheel, as in the slides; if that is blocked it stands.
@@ -137,10 +137,10 @@ pub struct Leader {
     pub leave_rule: Option<LeaveRule>,
     /// Detection of targets.
     pub target_sense: TargetSense,
-    /// Way in which it turns.
+    /// How it turns.
     pub turning: TurnMode,
-    /// Whether it takes no moving body for a wall, and stands while one is ahead and close. Otherwise a wall
-    /// is anything that its laser meets, as in the slides, and a robot that crosses its way turns it around.
+    /// Whether it treats no moving body as a wall, and stands while one is ahead and close. Otherwise a wall
+    /// is anything that its laser meets, as in the slides, and a robot that crosses its path turns it around.
     pub gives_way: bool,
 }
 
@@ -280,7 +280,7 @@ pub struct Decision {
 
 impl Leader {
     /// Reads the laser and the target's detector. `scan` is a buffer; its old contents are
-    /// forgotten. A leader that `is_patient` takes no moving body for a wall.
+    /// discarded. A leader that `is_patient` treats no moving body as a wall.
     pub fn perceive(
         &self,
         pose: &Pose2,
@@ -292,11 +292,15 @@ impl Leader {
         self.laser.scan(pose, around.obstacles, around.bodies.iter().copied(), noise, scan);
         let [from, to] = self.sector_rad;
         let stands_for_it = self.gives_way && is_patient;
-        let least_m = |sector| match stands_for_it {
-            true => self.laser.min_range_by_motion_m(scan, sector, false),
-            false => self.laser.min_range_m(scan, sector),
+        let least_m = |sector| {
+            // A mover for which the leader stands is no wall, or it would turn around in front of it.
+            let range_m = if stands_for_it {
+                self.laser.min_range_by_motion_m(scan, sector, false)
+            } else {
+                self.laser.min_range_m(scan, sector)
+            };
+            range_m.unwrap_or(self.laser.range_m())
         };
-        let least_m = |sector| least_m(sector).unwrap_or(self.laser.range_m());
         let walls_m = Sides { left: least_m([from, to]), right: least_m([-to, -from]) };
         let target = around.target.filter(|&target| self.detects(pose, around, target));
         let mover_m = self.laser.min_range_by_motion_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
@@ -320,7 +324,7 @@ impl Leader {
         let is_free = |rule: LeaveRule| {
             let cone = [bearing_rad - rule.half_angle_rad, bearing_rad + rule.half_angle_rad];
             let needed_m = rule.free_m.min(distance(pose.at, target));
-            // Where the laser does not look, the way is not known to be free.
+            // Where the laser has no beams nothing is known to be free.
             self.laser.min_range_m(scan, cone).is_some_and(|free_m| free_m >= needed_m)
         };
         Sighting { bearing_rad, way_is_free: self.leave_rule.is_some_and(is_free) }
@@ -332,7 +336,8 @@ impl Leader {
         let left = self.wall_view(followed.left, percept.walls_m.left, leaves_walls);
         let right = self.wall_view(followed.right, percept.walls_m.right, leaves_walls);
         let s = self.speed_m_s;
-        let (to_left, to_right) = (Wheels::new(0.0, s), Wheels::new(s, 0.0));
+        let to_left = Wheels::new(0.0, s);
+        let to_right = Wheels::new(s, 0.0);
         let (layer, wheels) = if left.is_close && !right.is_close {
             (Layer::CloseLeft, to_right)
         } else if right.is_close {
@@ -349,10 +354,8 @@ impl Leader {
         let followed = Sides { left: left.is_followed, right: right.is_followed };
         let is_mover_ahead = percept.is_mover_ahead;
         let stands = is_mover_ahead && percept.stands_for_it;
-        let (layer, wheels) = match stands {
-            true => (Layer::KeepMoving, Wheels::default()),
-            false => (layer, wheels),
-        };
+        let (layer, wheels) =
+            if stands { (Layer::KeepMoving, Wheels::default()) } else { (layer, wheels) };
         Decision { wheels, layer, followed, is_mover_ahead }
     }
 

@@ -10,7 +10,7 @@
 //! drive.rs:     wheels -> pose
 //! ```
 //!
-//! `act/` lets them act in a run; `convoy/` is a run of one swarm without a scenario.
+//! `act/` carries their decisions out in a run.
 
 pub mod drive;
 pub(crate) mod follower;
@@ -18,6 +18,8 @@ pub mod laser;
 pub mod leader;
 pub(crate) mod proximity;
 pub(crate) mod ray;
+#[cfg(test)]
+mod tests;
 
 pub use drive::{DifferentialDrive, Pose2, Wheels};
 pub use follower::Follower;

@@ -29,7 +29,8 @@ pub(crate) fn distance_m(
 
 fn to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Option<f64> {
     let to = sub(center, from);
-    let (ahead_m, aside_m) = (dot(u, to), cross_2d(u, to));
+    let ahead_m = dot(u, to);
+    let aside_m = cross_2d(u, to);
     if dot(to, to) <= radius_m * radius_m {
         return Some(0.0);
     }
@@ -57,9 +58,11 @@ fn to_sides(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> 
 }
 
 fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
-    let (d, to_a) = (sub(b, a), sub(a, from));
+    let d = sub(b, a);
+    let to_a = sub(a, from);
     // The ends lie on both sides of the ray's line, or on it.
-    let (side_a, side_b) = (cross_2d(u, to_a), cross_2d(u, sub(b, from)));
+    let side_a = cross_2d(u, to_a);
+    let side_b = cross_2d(u, sub(b, from));
     let crossing = cross_2d(u, d);
     if side_a * side_b > 0.0 || crossing == 0.0 {
         return None;

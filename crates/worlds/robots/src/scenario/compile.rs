@@ -348,7 +348,7 @@ fn add_profile(
     let file: ProfileFile = source.parse()?;
     if *file.format.get_ref() != sidestep_scenario::FORMAT {
         let cause = format!("profile format {} is not known", file.format.get_ref());
-        let remedy = "learn the profile anew, or write `format = 1`";
+        let remedy = "learn the profile again, or write `format = 1`";
         return Err(source.error(file.format.span(), cause, remedy));
     }
     add_all(&source, &file.sensors, sensors);

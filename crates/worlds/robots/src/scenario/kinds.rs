@@ -63,13 +63,13 @@ impl Kinds {
     fn own_index(&mut self, name: &Spanned<String>) -> Result<usize, InputError> {
         let error = |cause: &str, remedy: &str| Err(self.source.error(name.span(), cause, remedy));
         if name.get_ref() == BUILT_IN[0] {
-            return error("`free` is no kind", "name the kind otherwise");
+            return error("`free` is no kind", "choose another name for the kind");
         }
         if let Some(k) = self.all.iter().position(|kind| kind.name == *name.get_ref()) {
             return Ok(k);
         }
         if self.all.len() == 127 {
-            return error("more than 122 kinds of your own", "let kinds share a name");
+            return error("more than 122 kinds of your own", "give several kinds one name");
         }
         let (name, observation) = (name.get_ref().clone(), name.get_ref().clone());
         self.all.push(Kind { name, observation, ..Kind::default() });

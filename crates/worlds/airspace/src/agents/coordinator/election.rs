@@ -1,57 +1,65 @@
 //! Elections: how a missing coordinator is brought back.
 
 use super::MigratingCoordinator;
-use super::epoch::{Epoch, Version, is_majority};
+use super::epoch::{Epoch, is_majority};
 use super::messages::{CoordinatorMessage, VoteRequest};
 use super::replica::{Candidate, CoordinatorReplica, ElectionCause, ReplicaRole, StateCopy};
 use crate::agents::participant::InvalidMessage;
 
 impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Stands for election, since the coordinator is missed.
-    pub(super) fn start_election(&mut self, missed: ElectionCause, ship: &P::Services, tick: u64) {
-        let Some(patience) = self.rules.retry_policy else { return };
+    pub(super) fn start_election(
+        &mut self,
+        missed: ElectionCause,
+        services: &P::Services,
+        tick: u64,
+    ) {
+        let Some(policy) = self.rules.retry_policy else { return };
         self.candidate_number = 1 + self.promised.number.max(self.candidate_number);
         let epoch = Epoch { number: self.candidate_number, owner: self.rules.me as u16 };
         let has = self.copy.as_ref().map(|copy| copy.at);
         let was_lost = missed != ElectionCause::Unheard;
-        let asks = VoteRequest { epoch, seen: self.newest, has, was_lost };
+        let request = VoteRequest { epoch, seen: self.newest, has, was_lost };
         let mut votes = vec![false; self.rules.group];
         votes[self.rules.me] = true;
         let heard = votes.clone();
         let due = tick + self.round_trip_ticks();
-        let (tries_left, is_elected) = (patience.tries.saturating_sub(1), is_majority(&votes));
+        let tries_left = policy.tries.saturating_sub(1);
+        // A host that is alone in its group elects itself.
+        let is_elected = is_majority(&votes);
         let lost = match missed {
             ElectionCause::OnHop(to) => Some(to),
             ElectionCause::Unheard | ElectionCause::Outdated => None,
         };
-        self.role = ReplicaRole::Candidate(Candidate { asks, lost, votes, heard, tries_left, due });
+        self.role =
+            ReplicaRole::Candidate(Candidate { request, lost, votes, heard, tries_left, due });
         if is_elected {
-            return self.restore_coordinator(ship, tick);
+            return self.restore_coordinator(services, tick);
         }
-        self.broadcast(&CoordinatorMessage::Elect(asks));
+        self.broadcast(&CoordinatorMessage::Elect(request));
     }
 
     /// Returns the number of ticks that a question and its answer take, with a copy if need be.
     pub(super) fn round_trip_ticks(&self) -> u64 {
         let bytes = self.copy.as_ref().map_or(0, |copy| copy.state.len());
-        self.rules.retry_policy.map_or(u64::MAX, |patience| patience.timeout_ticks(bytes))
+        self.rules.retry_policy.map_or(u64::MAX, |policy| policy.timeout_ticks(bytes))
     }
 
     /// Takes part in an election.
     ///
     /// A host that has the coordinator in its care, or has heard of it lately, says so. After a
     /// loss on a hop only news from beyond that hop counts as having heard of it.
-    pub(super) fn on_vote_request(&mut self, from: usize, asks: VoteRequest, tick: u64) {
-        let standing = match &self.role {
-            ReplicaRole::Candidate(standing) => Some(standing.asks.epoch),
+    pub(super) fn on_vote_request(&mut self, from: usize, request: VoteRequest, tick: u64) {
+        let candidate = match &self.role {
+            ReplicaRole::Candidate(candidate) => Some(candidate.request.epoch),
             _ => None,
         };
-        let newest = standing.map_or(self.promised, |own| own.max(self.promised));
-        if asks.epoch < newest {
+        let newest = candidate.map_or(self.promised, |own| own.max(self.promised));
+        if request.epoch < newest {
             return self.send(from, &CoordinatorMessage::Stale(newest), &[]);
         }
-        let is_news = !asks.was_lost || self.newest > asks.seen;
-        let has_voted = asks.epoch == self.promised;
+        let is_news = !request.was_lost || self.newest > request.seen;
+        let has_voted = request.epoch == self.promised;
         let is_alive = match self.role {
             ReplicaRole::Hosting(_) | ReplicaRole::Sending { .. } => true,
             ReplicaRole::Candidate(_) => false,
@@ -62,19 +70,19 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             return self.send(from, &CoordinatorMessage::Alive(self.newest, ago), &[]);
         }
         // This is no sign of life: the epoch may never begin.
-        self.promised = asks.epoch;
+        self.promised = request.epoch;
         self.role = ReplicaRole::Idle;
         self.defer_election(tick);
-        let newer = self.copy.clone().filter(|copy| asks.has.is_none_or(|has| copy.at > has));
+        let newer = self.copy.clone().filter(|copy| request.has.is_none_or(|has| copy.at > has));
         match newer {
             Some(StateCopy { at, state }) => {
-                self.send(from, &CoordinatorMessage::Vote(asks.epoch, Some(at)), &state);
+                self.send(from, &CoordinatorMessage::Vote(request.epoch, Some(at)), &state);
             }
-            None => self.send(from, &CoordinatorMessage::Vote(asks.epoch, None), &[]),
+            None => self.send(from, &CoordinatorMessage::Vote(request.epoch, None), &[]),
         }
     }
 
-    /// Takes a vote, and the copy that came with it if that is the newest one.
+    /// Receives a vote, and the copy that came with it if that is the newest one.
     ///
     /// # Errors
     /// When that copy is not sound.
@@ -83,64 +91,68 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         epoch: Epoch,
         copy: Option<StateCopy>,
-        ship: &P::Services,
+        services: &P::Services,
         tick: u64,
     ) -> Result<(), InvalidMessage> {
-        let ReplicaRole::Candidate(standing) = &mut self.role else { return Ok(()) };
-        if standing.asks.epoch != epoch {
+        let ReplicaRole::Candidate(candidate) = &mut self.role else { return Ok(()) };
+        if candidate.request.epoch != epoch {
             return Ok(());
         }
-        let is_newer = |copy: &StateCopy| self.copy.as_ref().is_none_or(|own| copy.at > own.at);
-        if let Some(copy) = copy.filter(is_newer) {
-            P::decode(&copy.state, ship, self.number.into())?;
+        if let Some(copy) = copy
+            && self.copy.as_ref().is_none_or(|own| copy.at > own.at)
+        {
+            P::decode(&copy.state, services, self.number.into())?;
             self.copy = Some(copy);
             // The hop on which it was lost is not known then.
-            standing.lost = None;
+            candidate.lost = None;
         }
-        standing.votes[from] = true;
-        if is_majority(&standing.votes) {
-            self.restore_coordinator(ship, tick);
+        candidate.votes[from] = true;
+        if is_majority(&candidate.votes) {
+            self.restore_coordinator(services, tick);
         }
         Ok(())
     }
 
     /// Brings the coordinator back from the newest copy that a majority has, or else from nothing.
-    pub(super) fn restore_coordinator(&mut self, ship: &P::Services, tick: u64) {
-        let ReplicaRole::Candidate(Candidate { asks, lost, .. }) = &self.role else { return };
-        let (at, lost): (Version, _) = (asks.epoch.first_version(), *lost);
+    pub(super) fn restore_coordinator(&mut self, services: &P::Services, tick: u64) {
+        let ReplicaRole::Candidate(Candidate { request, lost, .. }) = &self.role else { return };
+        let at = request.epoch.first_version();
+        let lost = *lost;
         let number = self.number.into();
-        let copied = self.copy.as_ref().and_then(|copy| P::decode(&copy.state, ship, number).ok());
-        let mut passenger = copied.unwrap_or_else(|| P::new(ship, number));
+        let copied =
+            self.copy.as_ref().and_then(|copy| P::decode(&copy.state, services, number).ok());
+        let mut coordinator = copied.unwrap_or_else(|| P::new(services, number));
         if let Some(lost) = lost {
-            passenger.on_unreachable(lost);
+            coordinator.on_unreachable(lost);
         }
         self.record_alive(at, tick);
         self.accepted = at;
-        self.host(passenger, tick);
+        self.host(coordinator, tick);
         self.broadcast(&CoordinatorMessage::Alive(at, 0));
     }
 
     /// Again asks the hosts that have not voted, unless they have been asked often enough.
     pub(super) fn retry_vote_requests(&mut self, tick: u64) {
         let due = tick + self.round_trip_ticks();
-        let ReplicaRole::Candidate(standing) = &mut self.role else { return };
-        let Some(left) = standing.tries_left.checked_sub(1) else {
+        let ReplicaRole::Candidate(candidate) = &mut self.role else { return };
+        let Some(left) = candidate.tries_left.checked_sub(1) else {
             // Where a majority is in touch, a lack of contact is not why it was not elected.
-            if is_majority(&standing.heard) {
+            if is_majority(&candidate.heard) {
                 self.quiet_until = tick.saturating_add(self.rules.election_timeout_ticks);
             } else {
-                let heard = standing.heard.iter().enumerate();
+                let heard = candidate.heard.iter().enumerate();
                 self.unanswering = Some(heard.filter(|(_, is)| !**is).map(|(k, _)| k).collect());
             }
             self.role = ReplicaRole::Idle;
             return;
         };
-        (standing.tries_left, standing.due) = (left, due);
-        let asks = standing.asks;
+        candidate.tries_left = left;
+        candidate.due = due;
+        let request = candidate.request;
         let silent: Vec<usize> =
-            (0..standing.votes.len()).filter(|&k| !standing.votes[k]).collect();
+            (0..candidate.votes.len()).filter(|&k| !candidate.votes[k]).collect();
         for place in silent {
-            self.send(place, &CoordinatorMessage::Elect(asks), &[]);
+            self.send(place, &CoordinatorMessage::Elect(request), &[]);
         }
     }
 }

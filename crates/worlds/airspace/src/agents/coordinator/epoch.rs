@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// The largest number that an epoch or a hop may have: no talk comes near it, and a host that is
-/// told more has been told nonsense.
+/// The largest number that an epoch or a hop may have: no conversation comes near it, so a larger one in a message is
+/// refused.
 const MAX_NUMBER: u32 = 1 << 24;
 
 /// The epoch of a coordinator: the same as long as its state only moves, and a newer one whenever
@@ -47,7 +47,7 @@ impl Epoch {
     }
 }
 
-/// A point on a coordinator's journey: the epoch, and the number of hops in it.
+/// A point on a coordinator's itinerary: the epoch, and the number of hops in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(super) struct Version {
     /// Its epoch.

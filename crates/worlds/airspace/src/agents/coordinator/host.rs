@@ -11,25 +11,28 @@ use std::sync::Arc;
 /// machine without a clock or a network of its own. Others are known by their place in the group.
 #[derive(Debug, Clone)]
 pub(super) struct CoordinatorHost<P: MigratingCoordinator> {
-    pub ship: P::Services,
-    pub seats: Vec<CoordinatorReplica<P>>,
+    pub services: P::Services,
+    pub replicas: Vec<CoordinatorReplica<P>>,
     pub rules: Arc<HostConfig>,
 }
 
 impl<P: MigratingCoordinator> CoordinatorHost<P> {
     /// Returns a host of coordinators, each of which visits the hosts at some places and begins on
     /// the first of them.
-    pub(super) fn new(ship: P::Services, stops: &[Vec<usize>], rules: HostConfig) -> Self {
+    pub(super) fn new(services: P::Services, stops: &[Vec<usize>], rules: HostConfig) -> Self {
         let rules = Arc::new(rules);
-        let seat =
-            |(number, stops): (usize, &Vec<usize>)| CoordinatorReplica::new(number, stops, &rules);
-        Self { ship, seats: stops.iter().enumerate().map(seat).collect(), rules: rules.clone() }
+        let replicas = stops
+            .iter()
+            .enumerate()
+            .map(|(number, stops)| CoordinatorReplica::new(number, stops, &rules))
+            .collect();
+        Self { services, replicas, rules }
     }
 
     /// Starts: the coordinators are on their first hosts.
     pub(super) fn start(&mut self, tick: u64) {
-        for seat in &mut self.seats {
-            seat.start(&self.ship, tick);
+        for replica in &mut self.replicas {
+            replica.start(&self.services, tick);
         }
         self.run_all(tick);
     }
@@ -45,19 +48,19 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         tick: u64,
     ) -> Result<(), InvalidMessage> {
         let HostConfig { me, group, .. } = *self.rules;
-        let reader = MessageReader { me, group, seats: self.seats.len() };
-        let (seat, message, state) = messages::decode(bytes, from, reader)?;
-        let seat = &mut self.seats[usize::from(seat)];
-        seat.on_message(from, message, state, &self.ship, tick)?;
+        let reader = MessageReader { me, group, replicas: self.replicas.len() };
+        let (replica, message, state) = messages::decode(bytes, from, reader)?;
+        let replica = &mut self.replicas[usize::from(replica)];
+        replica.on_message(from, message, state, &self.services, tick)?;
         self.run_all(tick);
         Ok(())
     }
 
     /// Performs all actions that are due.
     pub(super) fn on_timer(&mut self, tick: u64) {
-        for seat in &mut self.seats {
-            let watches = self.ship.is_watching(seat.number.into());
-            seat.on_timer(watches, &self.ship, tick);
+        for replica in &mut self.replicas {
+            let watches = self.services.is_watching(replica.number.into());
+            replica.on_timer(watches, &self.services, tick);
         }
         self.run_all(tick);
     }
@@ -65,22 +68,24 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
     /// Returns the tick in which something is due, whether the host itself is done or not: others
     /// may depend on it.
     pub(super) fn next_timer(&self) -> Option<u64> {
-        let due = |seat: &CoordinatorReplica<P>| {
-            seat.next_timer(self.ship.is_watching(seat.number.into()))
-        };
-        self.seats.iter().filter_map(due).min()
+        self.replicas
+            .iter()
+            .filter_map(|replica| {
+                replica.next_timer(self.services.is_watching(replica.number.into()))
+            })
+            .min()
     }
 
     /// Runs the coordinators that are here until each has left, is over, or waits.
     fn run_all(&mut self, tick: u64) {
-        for seat in &self.seats {
-            if let Some(unanswering) = &seat.unanswering {
-                self.ship.on_no_majority(seat.number.into(), unanswering);
+        for replica in &self.replicas {
+            if let Some(unanswering) = &replica.unanswering {
+                self.services.on_no_majority(replica.number.into(), unanswering);
             }
         }
         let mut has_changed = true;
         while std::mem::take(&mut has_changed) {
-            for k in 0..self.seats.len() {
+            for k in 0..self.replicas.len() {
                 has_changed |= self.run(k, tick);
             }
         }
@@ -88,31 +93,23 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
 
     /// Runs a coordinator if it is here. Returns whether anything has changed for the others here.
     fn run(&mut self, k: usize, tick: u64) -> bool {
-        let epochs: Vec<Epoch> = self.seats.iter().map(|seat| seat.promised).collect();
-        let aboard: Vec<bool> = self.seats.iter().map(CoordinatorReplica::is_hosting).collect();
-        let seat = &mut self.seats[k];
-        let Some(HostedCoordinator {
-            coordinator: mut passenger,
-            heartbeat_at: beat_at,
-            timeout_at: impatient_at,
-        }) = seat.take_coordinator()
+        let epochs: Vec<Epoch> = self.replicas.iter().map(|replica| replica.promised).collect();
+        let is_here: Vec<bool> = self.replicas.iter().map(CoordinatorReplica::is_hosting).collect();
+        let replica = &mut self.replicas[k];
+        let Some(HostedCoordinator { mut coordinator, heartbeat_at, timeout_at }) =
+            replica.take_coordinator()
         else {
             return false;
         };
-        let is_impatient = impatient_at <= tick;
-        let here =
-            HostContext { epochs: &epochs, is_here: &aboard, has_timed_out: is_impatient, tick };
-        match passenger.advance(&mut self.ship, &here) {
-            CoordinatorStep::Hop(to) => seat.migrate(&passenger, to, tick),
+        let has_timed_out = timeout_at <= tick;
+        let context = HostContext { epochs: &epochs, is_here: &is_here, has_timed_out, tick };
+        match coordinator.advance(&mut self.services, &context) {
+            CoordinatorStep::Hop(to) => replica.migrate(&coordinator, to, tick),
             CoordinatorStep::Done => {}
-            CoordinatorStep::Stay if is_impatient => seat.host(passenger, tick),
+            CoordinatorStep::Stay if has_timed_out => replica.host(coordinator, tick),
             CoordinatorStep::Stay => {
-                seat.put_back(HostedCoordinator {
-                    coordinator: passenger,
-                    heartbeat_at: beat_at,
-                    timeout_at: impatient_at,
-                });
-                return self.ship.has_news();
+                replica.put_back(HostedCoordinator { coordinator, heartbeat_at, timeout_at });
+                return self.services.has_news();
             }
         }
         true
@@ -120,11 +117,11 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
 
     /// Returns whether no coordinator is in the care of the host, and none is missed by it.
     pub(super) fn is_idle(&self) -> bool {
-        self.seats.iter().all(CoordinatorReplica::is_idle)
+        self.replicas.iter().all(CoordinatorReplica::is_idle)
     }
 
     /// Returns the messages on their way out.
     pub(super) fn take_messages(&mut self) -> Vec<QueuedMessage> {
-        self.seats.iter_mut().flat_map(|seat| std::mem::take(&mut seat.out)).collect()
+        self.replicas.iter_mut().flat_map(|replica| std::mem::take(&mut replica.out)).collect()
     }
 }

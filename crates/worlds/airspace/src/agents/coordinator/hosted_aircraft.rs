@@ -1,5 +1,4 @@
-//! The part of an airplane that coordinators see while they are aboard, and the news that they leave
-//! there for each other.
+//! What an airplane exposes to the coordinators that it hosts, and the news that they leave there for each other.
 
 use super::HostServices;
 use super::state::RoundData;
@@ -7,7 +6,7 @@ use crate::agents::link::ConversationEnd;
 use crate::agents::{OptimizationResult, Ownship};
 use crate::flight::{Point, distance_m};
 
-/// An airplane as coordinators see it.
+/// An airplane as the coordinators on it see it.
 #[derive(Debug, Clone)]
 pub(super) struct HostedAircraft {
     pub own: Ownship,
@@ -25,15 +24,15 @@ pub(super) struct HostedAircraft {
     /// Whether there is no one above, and will be none.
     pub is_orphan: bool,
     has_news: bool,
-    /// The end of the talk for the airplane.
+    /// The end of the conversation for the airplane.
     pub end: Option<ConversationEnd<OptimizationResult>>,
 }
 
 /// The news of the coordinator above for that of a part.
 #[derive(Debug, Clone)]
 pub(super) struct HierarchyReply {
-    pub gathered: RoundData,
-    /// Whether it has anything to say.
+    pub data: RoundData,
+    /// Whether it has any results.
     pub is_known: bool,
 }
 
@@ -54,47 +53,52 @@ impl HostedAircraft {
     }
 
     /// Returns the number of the coordinator above the others, if there is one.
-    pub(super) fn root_seat(&self) -> Option<usize> {
+    pub(super) fn root_number(&self) -> Option<usize> {
         (self.parts.len() > 1).then_some(self.parts.len())
     }
 
     pub(super) fn set_report(&mut self, report: RoundData) {
-        (self.report, self.has_news) = (Some(report), true);
+        self.report = Some(report);
+        self.has_news = true;
     }
 
     pub(super) fn set_reply(&mut self, answer: HierarchyReply) {
-        (self.report, self.answer, self.has_news) = (None, Some(answer), true);
+        self.report = None;
+        self.answer = Some(answer);
+        self.has_news = true;
     }
 
-    /// Ends the talk for the airplane, unless it has ended: its control stays as it is.
+    /// Ends the conversation for the airplane, unless it has ended: its control stays as it is.
     pub(super) fn conclude(&mut self, conclusion: OptimizationResult, unheard: Vec<usize>) {
-        let ended = || ConversationEnd { outcome: Some(conclusion), unheard, late: false };
-        self.end.get_or_insert_with(ended);
+        if self.end.is_none() {
+            self.end = Some(ConversationEnd { outcome: Some(conclusion), unheard, late: false });
+        }
     }
 
-    /// Ends the talk for an airplane that no coordinator can reach.
+    /// Ends the conversation for an airplane that no coordinator can reach.
     pub(super) fn conclude_alone(&mut self, unheard: Vec<usize>) {
-        let beacons = vec![None; self.own.briefing.ids.len()];
+        let beacons = vec![None; self.own.common.ids.len()];
         self.conclude(OptimizationResult { decided: None, beacons }, unheard);
     }
 }
 
 impl HostServices for HostedAircraft {
-    fn is_watching(&self, seat: usize) -> bool {
+    fn is_watching(&self, number: usize) -> bool {
         // Only the part's coordinator waits for the one above it.
-        let is_above = self.root_seat() == Some(seat) && self.report.is_some();
-        self.end.is_none() && (seat == self.part || is_above)
+        let is_above = self.root_number() == Some(number) && self.report.is_some();
+        self.end.is_none() && (number == self.part || is_above)
     }
 
     fn has_news(&mut self) -> bool {
         std::mem::take(&mut self.has_news)
     }
 
-    fn on_no_majority(&mut self, seat: usize, unanswering: &[usize]) {
-        if seat == self.part {
+    fn on_no_majority(&mut self, number: usize, unanswering: &[usize]) {
+        if number == self.part {
             self.conclude_alone(unanswering.to_vec());
-        } else if self.root_seat() == Some(seat) && !self.is_orphan {
-            (self.is_orphan, self.has_news) = (true, true);
+        } else if self.root_number() == Some(number) && !self.is_orphan {
+            self.is_orphan = true;
+            self.has_news = true;
         }
     }
 }
@@ -103,15 +107,15 @@ impl HostServices for HostedAircraft {
 /// parts: each time the first that is left and those nearest to it.
 pub(super) fn partition_group(at: &[Point]) -> Vec<Vec<usize>> {
     let size = (at.len() as f64).sqrt().ceil() as usize;
-    let mut left: Vec<usize> = (0..at.len()).collect();
+    let mut rest: Vec<usize> = (0..at.len()).collect();
     let mut parts = Vec::new();
-    while let Some(&head) = left.first() {
-        let from = |place: usize| distance_m(at[head], at[place]);
-        left.sort_by(|&a, &b| from(a).total_cmp(&from(b)).then(a.cmp(&b)));
-        let mut part: Vec<usize> = left.drain(..size.min(left.len())).collect();
+    while let Some(&first) = rest.first() {
+        let from_first_m = |place: usize| distance_m(at[first], at[place]);
+        rest.sort_by(|&a, &b| from_first_m(a).total_cmp(&from_first_m(b)).then(a.cmp(&b)));
+        let mut part: Vec<usize> = rest.drain(..size.min(rest.len())).collect();
         part.sort_unstable();
         parts.push(part);
-        left.sort_unstable();
+        rest.sort_unstable();
     }
     parts
 }

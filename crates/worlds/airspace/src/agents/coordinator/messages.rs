@@ -8,7 +8,7 @@ use sidestep_kernel::network::PacketBuffer;
 /// A message about one of the coordinators of a group.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) enum CoordinatorMessage {
-    /// "The coordinator has set out to you": with its state.
+    /// "The coordinator is on its way to you": with its state.
     Hop(Version),
     /// "It has arrived here."
     Ack(Version),
@@ -49,8 +49,8 @@ pub(super) struct VoteRequest {
 pub(super) type ParsedMessage<'a> = (u16, CoordinatorMessage, &'a [u8]);
 
 /// Returns a message in the form in which it travels: a state goes behind it.
-pub(super) fn encode(seat: u16, message: &CoordinatorMessage, state: &[u8]) -> PacketBuffer {
-    PacketBuffer::from_parts(&(seat, message), state)
+pub(super) fn encode(number: u16, message: &CoordinatorMessage, state: &[u8]) -> PacketBuffer {
+    PacketBuffer::from_parts(&(number, message), state)
 }
 
 /// A host that reads messages.
@@ -61,7 +61,7 @@ pub(super) struct MessageReader {
     /// Number of hosts of the group.
     pub group: usize,
     /// Number of coordinators of the group.
-    pub seats: usize,
+    pub replicas: usize,
 }
 
 /// Returns a message from host `from` to its reader.
@@ -73,13 +73,13 @@ pub(super) fn decode(
     from: usize,
     reader: MessageReader,
 ) -> Result<ParsedMessage<'_>, InvalidMessage> {
-    let MessageReader { me, group, seats } = reader;
+    let MessageReader { me, group, replicas } = reader;
     let read = postcard::take_from_bytes::<(u16, CoordinatorMessage)>(bytes);
-    let ((seat, message), state) = read.map_err(|_| InvalidMessage::Form)?;
+    let ((number, message), state) = read.map_err(|_| InvalidMessage::Form)?;
     InvalidMessage::Airplane.unless(from < group && from != me)?;
-    InvalidMessage::Kind.unless(usize::from(seat) < seats)?;
+    InvalidMessage::Kind.unless(usize::from(number) < replicas)?;
     InvalidMessage::Form.unless(message.has_state() || state.is_empty())?;
-    let is_right = match &message {
+    let is_valid = match &message {
         CoordinatorMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
         CoordinatorMessage::Ack(at) | CoordinatorMessage::Alive(at, _) => at.is_valid_for(group),
         CoordinatorMessage::Stale(epoch) => epoch.is_valid_for(group),
@@ -92,6 +92,6 @@ pub(super) fn decode(
             is_mine && copy.is_none_or(|copy| copy.is_valid_for(group))
         }
     };
-    InvalidMessage::Round.unless(is_right)?;
-    Ok((seat, message, state))
+    InvalidMessage::Round.unless(is_valid)?;
+    Ok((number, message, state))
 }

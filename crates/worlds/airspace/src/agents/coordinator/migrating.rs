@@ -30,11 +30,11 @@ pub(super) struct HostContext<'a> {
 
 /// A coordinator: the state that migrates.
 pub(super) trait MigratingCoordinator: Sized {
-    /// The part of a host that a coordinator can see while it is there.
+    /// What a host exposes to the coordinators that it hosts.
     type Services: HostServices;
 
-    /// Returns the coordinator number `seat` before it has visited any host.
-    fn new(ship: &Self::Services, seat: usize) -> Self;
+    /// Returns the coordinator with this number before it has visited any host.
+    fn new(services: &Self::Services, number: usize) -> Self;
 
     /// Returns its state in the form in which it travels.
     fn encode(&self) -> Vec<u8>;
@@ -43,31 +43,39 @@ pub(super) trait MigratingCoordinator: Sized {
     ///
     /// # Errors
     /// When any part of it is not sound.
-    fn decode(bytes: &[u8], ship: &Self::Services, seat: usize) -> Result<Self, InvalidMessage>;
+    fn decode(
+        bytes: &[u8],
+        services: &Self::Services,
+        number: usize,
+    ) -> Result<Self, InvalidMessage>;
 
-    /// Goes on until it has to hop, to wait, or is done.
-    fn advance(&mut self, ship: &mut Self::Services, here: &HostContext<'_>) -> CoordinatorStep;
+    /// Continues until it has to hop, to wait, or is done.
+    fn advance(
+        &mut self,
+        services: &mut Self::Services,
+        context: &HostContext<'_>,
+    ) -> CoordinatorStep;
 
-    /// Notes that a host cannot be reached.
+    /// Records that a host cannot be reached.
     fn on_unreachable(&mut self, place: usize);
 
     /// Returns whether it would be done if a host, to which it is on its way, cannot be reached.
     fn is_done_without(&self, place: usize) -> bool;
 }
 
-/// The part of a host that coordinators can see while they are there.
+/// What a host exposes to the coordinators that it hosts.
 pub(super) trait HostServices {
     /// Returns whether the host misses a coordinator that is not heard of.
-    fn is_watching(&self, seat: usize) -> bool;
+    fn is_watching(&self, number: usize) -> bool;
 
     /// Returns whether a coordinator has left news for another one on the host since the last call.
     fn has_news(&mut self) -> bool {
         false
     }
 
-    /// Takes the news that no majority can be found to bring a coordinator back, and which hosts
-    /// have answered nothing.
-    fn on_no_majority(&mut self, seat: usize, unanswering: &[usize]);
+    /// Called when no majority can be found to bring a coordinator back, with the hosts that
+    /// have not answered.
+    fn on_no_majority(&mut self, number: usize, unanswering: &[usize]);
 }
 
 /// The rules by which a host waits for others.
@@ -86,13 +94,13 @@ pub(super) struct HostConfig {
 }
 
 impl HostConfig {
-    /// Returns the ticks after which a host that has a coordinator in its care says so: a few of
-    /// them may be lost before it is missed.
+    /// Returns the ticks after which a host that has a coordinator in its care says so: a few messages
+    /// may be lost before it is missed.
     pub(super) fn heartbeat_ticks(&self) -> u64 {
         (self.election_timeout_ticks / 4).max(1)
     }
 
-    /// Returns the ticks after which a coordinator goes on without another one that it waits for:
+    /// Returns the ticks after which a coordinator continues without another one that it waits for:
     /// enough to bring that one back.
     pub(super) fn wait_timeout_ticks(&self) -> u64 {
         match self.retry_policy {

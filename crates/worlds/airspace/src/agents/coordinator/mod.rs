@@ -1,10 +1,10 @@
 //! The process integrated mechanism: coordinators whose state migrates, and the hosts that take them in.
 //!
 //! A coordinator visits the airplanes in turn. While it is on an airplane it can read that airplane's
-//! model: a host owns its own model only, and predicts ways with it, which the coordinator then carries along.
+//! model: a host owns its own model only, and makes predictions with it, which the coordinator then carries along.
 //! Its whole state is serialized for every hop, and read and checked on the other side; these are the
 //! bytes that are counted. With sampled expectations it makes a tour per round, because each round has new samples;
-//! with exact ones it gathers the ways of all actions in a first tour, and computes the rounds at the host from which
+//! with exact ones it gathers the predictions of all actions in a first tour, and computes the rounds at the host from which
 //! it set out. A last tour brings each airplane its control.
 //!
 //! `pim` has one coordinator for a group. `hierarchical-pim` (the paper's outlook) splits the group by
@@ -14,11 +14,11 @@
 //!
 //! | Module | Contents |
 //! |---|---|
-//! | `passenger` | a coordinator and a host, as they see each other |
-//! | `state`, `tour`, `aboard` | the coordinator of this world: its data, its tours, and its view of an airplane |
+//! | `migrating` | a coordinator and a host, as they see each other |
+//! | `state`, `itinerary`, `hosted_aircraft` | the coordinator of this world: its data, its tours, and its view of an airplane |
 //! | `check` | checks of arriving bytes: every accepted state can be computed with |
-//! | `epoch`, `messages`, `seat`, `election`, `host` | the protocol, which knows nothing of airplanes |
-//! | `party` | a host as a party to a talk |
+//! | `epoch`, `messages`, `replica`, `election`, `host` | the protocol, which knows nothing of airplanes |
+//! | `participant` | a host as a participant of a conversation |
 //!
 //! # The protocol
 //!
@@ -36,10 +36,10 @@
 //!    had no sign for some time, and need it, stand for election, one after the other by place.
 //! 4. **An election** (`Elect`, `Vote`): a candidate begins an epoch with a number above all that it has seen.
 //!    Others accept it and send their copy if it is newer, unless they have the coordinator in their care or
-//!    have had a sign of it, which they tell with its age. With a majority of the group (or half of it with the
+//!    have had a sign of it, which they send with its age. With a majority of the group (or half of it with the
 //!    first of all) the candidate brings the coordinator back from the newest copy, highest epoch first. Without
 //!    one it has no coordinator, and no control of one: its airplane decides alone, and under the shield stays on its
-//!    orbit wherever one that goes first has not accepted another way.
+//!    orbit wherever one that goes first has not accepted another plan.
 //!
 //! # Why one rules at any time
 //!
@@ -52,12 +52,12 @@
 //! one is, and a stale coordinator that is still alive somewhere is refused by every host that has seen the newer
 //! one.
 //!
-//! *(c) Only one that was accepted by a majority tells controls.* In the first epoch it has visited every
+//! *(c) Only one that was accepted by a majority delivers controls.* In the first epoch it has visited every
 //! airplane before it decides, because a hop that fails ends the epoch; later ones are elected.
 //!
 //! *(d) No host waits forever.* A hop and a candidacy are repeated a number of times. Signs of life age, hearsay too:
-//! a dead coordinator cannot be kept alive by two hosts that tell each other about it. A host that finds no majority
-//! goes on without; and when time is up the talk ends for each host by its own clock.
+//! a dead coordinator cannot be kept alive by two hosts that inform each other about it. A host that finds no majority
+//! goes on without; and when time is up the conversation ends for each host by its own clock.
 //!
 //! `tests/interleavings.rs` searches all orders of events of three real hosts with two faults (a crash, a loss, a
 //! copy, a delay beyond all patience) for a state in which (a), (b), (c) or (d) is wrong; `tests/chaos.rs` checks

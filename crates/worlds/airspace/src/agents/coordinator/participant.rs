@@ -1,4 +1,4 @@
-//! A host as a party to the talk of its group.
+//! A host as a participant of the conversation of its group.
 
 use super::HostConfig;
 use super::host::CoordinatorHost;
@@ -17,9 +17,9 @@ use std::sync::Arc;
 /// The program aboard one airplane that takes coordinators in, runs them, and sends them on.
 #[derive(Debug)]
 pub struct HostParticipant {
-    hosting: CoordinatorHost<Coordinator>,
+    host: CoordinatorHost<Coordinator>,
     group: Arc<[EntityId]>,
-    /// Number of ticks after which the talk ends.
+    /// Number of ticks after which the conversation ends.
     ticks: u64,
     is_silent: bool,
 }
@@ -27,16 +27,16 @@ pub struct HostParticipant {
 impl HostParticipant {
     /// Returns the host aboard an airplane. There is one coordinator for the group, or in a hierarchy one for each
     /// part of it and one above these.
-    pub fn new(own: Ownship, is_hierarchy: bool, radio: EndpointConfig) -> Self {
-        let EndpointConfig { group, me, patience, ticks, is_silent } = radio;
+    pub fn new(own: Ownship, is_hierarchy: bool, config: EndpointConfig) -> Self {
+        let EndpointConfig { group, me, patience, ticks, is_silent } = config;
         // No host waits forever, except where no message is lost.
         let patience = (patience.ticks < u64::MAX).then_some(patience);
-        let at: Vec<_> = own.briefing.poses.iter().map(|pose| pose.at).collect();
+        let at: Vec<_> = own.common.poses.iter().map(|pose| pose.at).collect();
         let parts =
             if is_hierarchy { partition_group(&at) } else { vec![(0..group.len()).collect()] };
-        let bytes = max_state_bytes(&own.briefing);
+        let bytes = max_state_bytes(&own.common);
         let miss_ticks = patience.map_or(u64::MAX, |patience| {
-            // The ticks of a tour, and those within which every host in touch answers; at most a quarter of the talk,
+            // The ticks of a tour, and those within which every host in touch answers; at most a quarter of the conversation,
             // so that enough is left to bring it back.
             let hops = group.len() as u64 + u64::from(patience.tries);
             hops.saturating_mul(patience.timeout_ticks(bytes)).min(ticks / 4).max(1)
@@ -53,34 +53,35 @@ impl HostParticipant {
         if parts.len() > 1 {
             stops.push((0..group.len()).collect());
         }
-        let hosting = CoordinatorHost::new(HostedAircraft::new(own, parts), &stops, rules);
-        Self { hosting, group, ticks, is_silent }
+        let host = CoordinatorHost::new(HostedAircraft::new(own, parts), &stops, rules);
+        Self { host, group, ticks, is_silent }
     }
 }
 
 /// Returns the number of bytes that the state of a coordinator of the whole group has at most.
-fn max_state_bytes(briefing: &CommonKnowledge) -> usize {
-    let (actions, block) = (briefing.max_actions(), samples_per_round(briefing).unwrap_or(0));
-    // A player, a decision, and the numbers beside the ways.
+fn max_state_bytes(common: &CommonKnowledge) -> usize {
+    let actions = common.max_actions();
+    let block = samples_per_round(common).unwrap_or(0);
+    // A player, a decision, and the numbers beside the predictions.
     let numbers = 10 * (6 * actions + 2 * block.max(actions)) + 10 * block + 256;
-    briefing.ids.len() * (briefing.max_message_bytes(block.max(actions)) + numbers) + 512
+    common.ids.len() * (common.max_message_bytes(block.max(actions)) + numbers) + 512
 }
 
 impl Participant for HostParticipant {
     fn progress(&self) -> Progress {
-        let epochs = self.hosting.seats.iter().map(|seat| seat.promised.number);
+        let epochs = self.host.replicas.iter().map(|replica| replica.promised.number);
         Progress { epoch: epochs.max().unwrap_or(0), ..Progress::default() }
     }
 
     fn start(&mut self, tick: u64) {
         if self.is_silent {
-            let me = self.hosting.rules.me;
+            let me = self.host.rules.me;
             let others = (0..self.group.len()).filter(|&place| place != me).collect();
-            return self.hosting.ship.conclude_alone(others);
+            return self.host.services.conclude_alone(others);
         }
         // A quarter of the time is left to bring the controls.
-        self.hosting.ship.sampling_end = tick.saturating_add(self.ticks / 4 * 3);
-        self.hosting.start(tick);
+        self.host.services.sampling_end = tick.saturating_add(self.ticks / 4 * 3);
+        self.host.start(tick);
     }
 
     fn on_message(
@@ -93,36 +94,36 @@ impl Participant for HostParticipant {
         if self.is_silent {
             return Ok(());
         }
-        self.hosting.on_message(place, message, tick)
+        self.host.on_message(place, message, tick)
     }
 
     fn on_timer(&mut self, tick: u64) {
         if !self.is_silent {
-            self.hosting.on_timer(tick);
+            self.host.on_timer(tick);
         }
     }
 
     fn next_timer(&self) -> Option<u64> {
-        self.hosting.next_timer().filter(|_| !self.is_silent)
+        self.host.next_timer().filter(|_| !self.is_silent)
     }
 
     /// Returns whether the airplane has its control, and no other one depends on it for now.
     fn is_done(&self) -> bool {
-        self.hosting.ship.end.is_some() && self.hosting.is_idle()
+        self.host.services.end.is_some() && self.host.is_idle()
     }
 
     fn take_messages(&mut self) -> Vec<OutgoingMessage> {
-        let sent = self.hosting.take_messages().into_iter();
-        let to = |place: usize| self.group[place];
-        sent.map(|QueuedMessage { to: place, message }| OutgoingMessage {
-            to: place.map(to),
-            message,
-        })
-        .collect()
+        let queued = self.host.take_messages().into_iter();
+        queued
+            .map(|QueuedMessage { to, message }| OutgoingMessage {
+                to: to.map(|place| self.group[place]),
+                message,
+            })
+            .collect()
     }
 
     fn max_message_bytes(&self) -> usize {
-        HEADER_BYTES + max_state_bytes(&self.hosting.ship.own.briefing)
+        HEADER_BYTES + max_state_bytes(&self.host.services.own.common)
     }
 }
 
@@ -130,7 +131,9 @@ impl WithOutcome for HostParticipant {
     type Outcome = OptimizationResult;
 
     fn finish(&mut self) -> ConversationEnd<OptimizationResult> {
-        let late = || ConversationEnd { outcome: None, unheard: Vec::new(), late: true };
-        self.hosting.ship.end.clone().unwrap_or_else(late)
+        match &self.host.services.end {
+            Some(end) => end.clone(),
+            None => ConversationEnd { outcome: None, unheard: Vec::new(), late: true },
+        }
     }
 }

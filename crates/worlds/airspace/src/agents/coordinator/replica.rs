@@ -23,15 +23,15 @@ pub(super) struct StateCopy {
     pub state: Arc<[u8]>,
 }
 
-/// The part that a host has in the coordinator at a time.
+/// The role of a host for the coordinator at a time.
 #[derive(Debug, Clone)]
 pub(super) enum ReplicaRole<P> {
     /// It is elsewhere.
     Idle,
     /// It is here.
     Hosting(HostedCoordinator<P>),
-    /// It has set out from here with the state of the copy, and is not known to have arrived.
-    Sending { to: usize, tries_left: u32, due: u64, beat_at: u64 },
+    /// It has left with the state of the copy, and is not known to have arrived.
+    Sending { to: usize, tries_left: u32, due: u64, heartbeat_at: u64 },
     /// It is missed, and this host wants to bring it back.
     Candidate(Candidate),
 }
@@ -40,16 +40,16 @@ pub(super) enum ReplicaRole<P> {
 #[derive(Debug, Clone)]
 pub(super) struct HostedCoordinator<P> {
     pub coordinator: P,
-    /// Tick in which the others are told that it is alive.
+    /// Tick in which the others are informed that it is alive.
     pub heartbeat_at: u64,
-    /// Tick in which it stops waiting here and goes on.
+    /// Tick in which it stops waiting here.
     pub timeout_at: u64,
 }
 
 /// A host that stands for election.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
-    pub asks: VoteRequest,
+    pub request: VoteRequest,
     /// The host that the coordinator could not reach from here.
     pub lost: Option<usize>,
     pub votes: Vec<bool>,
@@ -98,7 +98,7 @@ pub(super) struct CoordinatorReplica<P> {
 }
 
 impl<P: MigratingCoordinator> CoordinatorReplica<P> {
-    /// Returns the seat of the coordinator with this number, which begins on the first of `stops`.
+    /// Returns the replica of the coordinator with this number, which starts on the first of `stops`.
     pub(super) fn new(number: usize, stops: &[usize], rules: &Arc<HostConfig>) -> Self {
         let first = Epoch::initial(stops[0]);
         let rank = stops.iter().position(|&stop| stop == rules.me).unwrap_or(stops.len());
@@ -120,11 +120,11 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Starts: the coordinator is on the first host.
-    pub(super) fn start(&mut self, ship: &P::Services, tick: u64) {
+    pub(super) fn start(&mut self, services: &P::Services, tick: u64) {
         self.heard_at = tick;
         if usize::from(self.promised.owner) == self.rules.me {
-            let passenger = P::new(ship, self.number.into());
-            self.host(passenger, tick);
+            let coordinator = P::new(services, self.number.into());
+            self.host(coordinator, tick);
         }
     }
 
@@ -149,15 +149,12 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         matches!(self.role, ReplicaRole::Idle)
     }
 
-    /// Takes the coordinator in, or back in.
-    pub(super) fn host(&mut self, passenger: P, tick: u64) {
-        let beat_at = tick.saturating_add(self.rules.heartbeat_ticks());
-        let impatient_at = tick.saturating_add(self.rules.wait_timeout_ticks());
-        self.role = ReplicaRole::Hosting(HostedCoordinator {
-            coordinator: passenger,
-            heartbeat_at: beat_at,
-            timeout_at: impatient_at,
-        });
+    /// Hosts the coordinator from a tick on.
+    pub(super) fn host(&mut self, coordinator: P, tick: u64) {
+        let heartbeat_at = tick.saturating_add(self.rules.heartbeat_ticks());
+        let timeout_at = tick.saturating_add(self.rules.wait_timeout_ticks());
+        self.role =
+            ReplicaRole::Hosting(HostedCoordinator { coordinator, heartbeat_at, timeout_at });
     }
 
     /// Puts the coordinator back after it was run.
@@ -165,22 +162,23 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.role = ReplicaRole::Hosting(stay);
     }
 
-    /// Lets the coordinator hop to another host.
-    pub(super) fn migrate(&mut self, passenger: &P, to: usize, tick: u64) {
+    /// Sends the coordinator to another host.
+    pub(super) fn migrate(&mut self, coordinator: &P, to: usize, tick: u64) {
         let at = self.accepted.next();
-        let state: Arc<[u8]> = passenger.encode().into();
+        let state: Arc<[u8]> = coordinator.encode().into();
         self.record_alive(at, tick);
         self.send(to, &CoordinatorMessage::Hop(at), &state);
         // Where nothing is lost, it has left for good.
-        let Some(patience) = self.rules.retry_policy else { return };
-        let tries = if self.rules.expected[to] { patience.tries } else { patience.first_tries };
-        let (due, beat_at) =
-            (tick + patience.timeout_ticks(state.len()), tick + self.rules.heartbeat_ticks());
+        let Some(policy) = self.rules.retry_policy else { return };
+        let tries = if self.rules.expected[to] { policy.tries } else { policy.first_tries };
+        let due = tick + policy.timeout_ticks(state.len());
+        let heartbeat_at = tick + self.rules.heartbeat_ticks();
         self.copy = Some(StateCopy { at, state });
-        self.role = ReplicaRole::Sending { to, tries_left: tries.saturating_sub(1), due, beat_at };
+        self.role =
+            ReplicaRole::Sending { to, tries_left: tries.saturating_sub(1), due, heartbeat_at };
     }
 
-    /// Takes a checked message of another host.
+    /// Receives a checked message of another host.
     ///
     /// # Errors
     /// When the state that comes with it is not sound; nothing has changed then.
@@ -189,22 +187,22 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         message: CoordinatorMessage,
         state: &[u8],
-        ship: &P::Services,
+        services: &P::Services,
         tick: u64,
     ) -> Result<(), InvalidMessage> {
         match message {
-            CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, ship, tick)?,
+            CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, services, tick)?,
             CoordinatorMessage::Vote(epoch, copy) => {
                 let copy = copy.map(|at| StateCopy { at, state: state.into() });
-                self.on_vote(from, epoch, copy, ship, tick)?;
+                self.on_vote(from, epoch, copy, services, tick)?;
             }
             CoordinatorMessage::Ack(at) => self.on_ack(from, at, tick),
             CoordinatorMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
-            CoordinatorMessage::Stale(epoch) => self.on_stale(epoch, ship, tick),
+            CoordinatorMessage::Stale(epoch) => self.on_stale(epoch, services, tick),
             CoordinatorMessage::Elect(candidacy) => self.on_vote_request(from, candidacy, tick),
         }
-        if let ReplicaRole::Candidate(standing) = &mut self.role {
-            standing.heard[from] = true;
+        if let ReplicaRole::Candidate(candidate) = &mut self.role {
+            candidate.heard[from] = true;
         }
         Ok(())
     }
@@ -214,7 +212,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         at: Version,
         state: &[u8],
-        ship: &P::Services,
+        services: &P::Services,
         tick: u64,
     ) -> Result<(), InvalidMessage> {
         if at.epoch < self.promised {
@@ -223,11 +221,11 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             // A copy on the network, or the acknowledgement was lost.
             self.acknowledge(from, at);
         } else {
-            let passenger = P::decode(state, ship, self.number.into())?;
+            let coordinator = P::decode(state, services, self.number.into())?;
             self.record_alive(at, tick);
             self.accepted = at;
             self.acknowledge(from, at);
-            self.host(passenger, tick);
+            self.host(coordinator, tick);
         }
         Ok(())
     }
@@ -246,7 +244,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         }
     }
 
-    /// Takes the news that it was alive some ticks ago.
+    /// Receives the news that it was alive some ticks ago.
     fn on_alive(&mut self, from: usize, at: Version, ago: u64, tick: u64) {
         if at.epoch < self.promised {
             return self.send(from, &CoordinatorMessage::Stale(self.promised), &[]);
@@ -257,11 +255,11 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ReplicaRole::Hosting(_) => at.epoch > self.accepted.epoch,
             // It has arrived, if the host that it went to knows of it, or if it has come farther.
             ReplicaRole::Sending { to, .. } => self.has_arrived(*to, from, at),
-            ReplicaRole::Candidate(Candidate { asks, lost, .. }) => match lost {
+            ReplicaRole::Candidate(Candidate { request, lost, .. }) => match lost {
                 Some(lost) => self.has_arrived(*lost, from, at),
                 // The hearsay of others is of use unless it is so old that the coordinator is
                 // missed all the same.
-                None => at >= asks.seen && ago < self.rules.election_timeout_ticks,
+                None => at >= request.seen && ago < self.rules.election_timeout_ticks,
             },
         };
         if is_over {
@@ -275,29 +273,32 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         left.is_none_or(|left| at > left || (at == left && from == to))
     }
 
-    /// Takes the news that a newer epoch was accepted by another host. A host that has the
+    /// Receives the news that a newer epoch was accepted by another host. A host that has the
     /// coordinator in its care wants to bring it back in a still newer one, unless one is alive in
     /// that one.
-    fn on_stale(&mut self, epoch: Epoch, ship: &P::Services, tick: u64) {
+    fn on_stale(&mut self, epoch: Epoch, services: &P::Services, tick: u64) {
         if epoch <= self.promised {
             return;
         }
         self.promised = epoch;
         match std::mem::replace(&mut self.role, ReplicaRole::Idle) {
             ReplicaRole::Idle => {}
-            ReplicaRole::Sending { .. } => self.start_election(ElectionCause::Outdated, ship, tick),
-            ReplicaRole::Hosting(HostedCoordinator { coordinator: passenger, .. }) => {
-                self.copy = Some(StateCopy { at: self.accepted, state: passenger.encode().into() });
-                self.start_election(ElectionCause::Outdated, ship, tick);
+            ReplicaRole::Sending { .. } => {
+                self.start_election(ElectionCause::Outdated, services, tick)
             }
-            ReplicaRole::Candidate(standing) if standing.asks.epoch > epoch => {
-                self.role = ReplicaRole::Candidate(standing);
+            ReplicaRole::Hosting(HostedCoordinator { coordinator, .. }) => {
+                self.copy =
+                    Some(StateCopy { at: self.accepted, state: coordinator.encode().into() });
+                self.start_election(ElectionCause::Outdated, services, tick);
+            }
+            ReplicaRole::Candidate(candidate) if candidate.request.epoch > epoch => {
+                self.role = ReplicaRole::Candidate(candidate);
             }
             ReplicaRole::Candidate(_) => self.defer_election(tick),
         }
     }
 
-    /// Notes that the coordinator was alive at a tick, and has come as far as this.
+    /// Records that the coordinator was alive at a tick, and has come as far as this.
     pub(super) fn record_alive(&mut self, at: Version, heard_at: u64) {
         self.promised = self.promised.max(at.epoch);
         self.newest = self.newest.max(at);
@@ -305,64 +306,64 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Performs all actions that are due; `watches` says whether the host needs the coordinator.
-    pub(super) fn on_timer(&mut self, watches: bool, ship: &P::Services, tick: u64) {
+    pub(super) fn on_timer(&mut self, watches: bool, services: &P::Services, tick: u64) {
         if self.next_timer(watches).is_none_or(|due| due > tick) {
             return;
         }
         match &mut self.role {
-            ReplicaRole::Idle => self.start_election(ElectionCause::Unheard, ship, tick),
+            ReplicaRole::Idle => self.start_election(ElectionCause::Unheard, services, tick),
             ReplicaRole::Candidate(_) => self.retry_vote_requests(tick),
             ReplicaRole::Hosting(stay) if stay.heartbeat_at <= tick => {
                 stay.heartbeat_at = tick + self.rules.heartbeat_ticks();
                 self.broadcast(&CoordinatorMessage::Alive(self.accepted, 0));
             }
-            // The coordinator looks at the time when it is run.
+            // The coordinator checks the time when it is run.
             ReplicaRole::Hosting(_) => {}
-            ReplicaRole::Sending { .. } => self.retry_hop(ship, tick),
+            ReplicaRole::Sending { .. } => self.retry_hop(services, tick),
         }
     }
 
-    fn retry_hop(&mut self, ship: &P::Services, tick: u64) {
-        let (ReplicaRole::Sending { to, tries_left, due, beat_at }, Some(copy), Some(patience)) =
+    fn retry_hop(&mut self, services: &P::Services, tick: u64) {
+        let (ReplicaRole::Sending { to, tries_left, due, heartbeat_at }, Some(copy), Some(policy)) =
             (&mut self.role, self.copy.clone(), self.rules.retry_policy)
         else {
             return;
         };
         let to = *to;
-        if *beat_at <= tick {
-            *beat_at = tick + self.rules.heartbeat_ticks();
+        if *heartbeat_at <= tick {
+            *heartbeat_at = tick + self.rules.heartbeat_ticks();
             let message = encode(self.number, &CoordinatorMessage::Alive(copy.at, 0), &[]);
             self.out.push(QueuedMessage { to: None, message });
         }
         if *due > tick {
             return;
         }
-        *due = tick + patience.timeout_ticks(copy.state.len());
+        *due = tick + policy.timeout_ticks(copy.state.len());
         if let Some(left) = tries_left.checked_sub(1) {
             *tries_left = left;
             return self.send(to, &CoordinatorMessage::Hop(copy.at), &copy.state);
         }
-        let passenger = P::decode(&copy.state, ship, self.number.into());
-        if passenger.is_ok_and(|passenger| passenger.is_done_without(to)) {
+        let coordinator = P::decode(&copy.state, services, self.number.into());
+        if coordinator.is_ok_and(|coordinator| coordinator.is_done_without(to)) {
             self.role = ReplicaRole::Idle;
         } else {
-            // It may have arrived all the same, so it goes on in a new epoch or not at all.
-            self.start_election(ElectionCause::OnHop(to), ship, tick);
+            // It may have arrived all the same, so it continues in a new epoch or not at all.
+            self.start_election(ElectionCause::OnHop(to), services, tick);
         }
     }
 
     /// Returns the tick in which something is due.
     pub(super) fn next_timer(&self, watches: bool) -> Option<u64> {
-        let patience = self.rules.retry_policy?;
+        let policy = self.rules.retry_policy?;
         match &self.role {
             ReplicaRole::Idle if watches && self.unanswering.is_none() => {
                 let missed_at = self.election_timeout().max(self.quiet_until);
-                Some(missed_at.saturating_add(self.rank * patience.ticks))
+                Some(missed_at.saturating_add(self.rank * policy.ticks))
             }
             ReplicaRole::Idle => None,
             ReplicaRole::Hosting(stay) => Some(stay.heartbeat_at.min(stay.timeout_at)),
-            ReplicaRole::Sending { due, beat_at, .. } => Some(*due.min(beat_at)),
-            ReplicaRole::Candidate(standing) => Some(standing.due),
+            ReplicaRole::Sending { due, heartbeat_at, .. } => Some(*due.min(heartbeat_at)),
+            ReplicaRole::Candidate(candidate) => Some(candidate.due),
         }
     }
 

@@ -18,14 +18,14 @@ pub(super) struct MemberData {
     pub beacon: Option<StateBeacon>,
     /// Its learning player, when expectations are sampled.
     pub player: Option<Player>,
-    /// Its samples of this round; the ways gathered in this tour are beside them.
+    /// Its samples of this round, with the predictions that were gathered in this tour.
     pub samples: Vec<usize>,
-    pub ways: Vec<Prediction>,
-    /// Cost of the ways to the airplane itself.
+    pub predictions: Vec<Prediction>,
+    /// Cost of the predictions to the airplane itself.
     pub own_costs: Vec<f64>,
     pub separation_m: f64,
     pub levels: Levels,
-    /// Whether it could not be reached, so that its only way is presumed.
+    /// Whether it could not be reached, so that its only prediction is presumed.
     pub is_presumed: bool,
     pub decided: Option<ActionChoice>,
 }
@@ -73,14 +73,14 @@ pub(super) struct HierarchyData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Coordinator {
     pub task: CoordinatorTask,
-    pub gathered: RoundData,
+    pub data: RoundData,
     /// Present only in the coordinator above others.
-    pub overview: Option<HierarchyData>,
+    pub hierarchy: Option<HierarchyData>,
 }
 
 /// Returns the number of samples in a round, where there are any.
-pub(super) fn samples_per_round(briefing: &CommonKnowledge) -> Option<usize> {
-    match briefing.settings.estimator {
+pub(super) fn samples_per_round(common: &CommonKnowledge) -> Option<usize> {
+    match common.settings.estimator {
         Estimator::Exact => None,
         Estimator::Sampled { block, .. } => Some(block),
     }
@@ -97,33 +97,37 @@ impl MemberData {
         let options = &host.options;
         self.is_presumed = false;
         self.beacon = Some(host.beacon.clone());
-        (self.separation_m, self.levels) = (options.separation_m, options.levels);
-        let costs = own_costs(&host.briefing.objective, options);
-        let Some(block) = samples_per_round(&host.briefing) else {
-            self.ways.clone_from(&options.predictions);
+        self.separation_m = options.separation_m;
+        self.levels = options.levels;
+        let costs = own_costs(&host.common.objective, options);
+        let Some(block) = samples_per_round(&host.common) else {
+            self.predictions.clone_from(&options.predictions);
             self.own_costs = costs;
             return;
         };
         let player = self.player.get_or_insert_with(|| Player::new(options.predictions.len()));
         self.samples = host.samples(player, u64::from(round) * block as u64, block);
-        self.ways = self.samples.iter().map(|&x| options.predictions[x].clone()).collect();
+        self.predictions = self.samples.iter().map(|&x| options.predictions[x].clone()).collect();
         self.own_costs = self.samples.iter().map(|&x| costs[x]).collect();
     }
 
     /// Presumes an airplane that is out of reach, as seen from another one.
     pub(super) fn presume(&mut self, from: &Ownship) {
-        let (options, block) =
-            (from.presumed_predictions(self.place), samples_per_round(&from.briefing));
+        let options = from.presumed_predictions(self.place);
+        // Where all actions are compared, the presumed one counts as its only action.
+        let predictions = samples_per_round(&from.common).unwrap_or(1);
         self.is_presumed = true;
-        (self.separation_m, self.levels) = (options.separation_m, options.levels);
-        self.ways = vec![options.predictions[0].clone(); block.unwrap_or(1)];
-        self.own_costs = vec![0.0; block.unwrap_or(1)];
+        self.separation_m = options.separation_m;
+        self.levels = options.levels;
+        self.predictions = vec![options.predictions[0].clone(); predictions];
+        self.own_costs = vec![0.0; predictions];
         self.samples.clear();
     }
 
-    /// Forgets the ways and the results of samples, which are no longer needed after a round.
+    /// Drops the predictions and the results of samples, which are no longer needed after a round: they would travel
+    /// along.
     fn clear_samples(&mut self) {
-        self.ways.clear();
+        self.predictions.clear();
         self.own_costs.clear();
         self.samples.clear();
     }
@@ -132,36 +136,46 @@ impl MemberData {
 impl RoundData {
     /// Takes the step of the algorithm for which all have been visited. `is_late` says that time is
     /// nearly up, so that sampling ends.
-    pub(super) fn advance(&mut self, briefing: &CommonKnowledge, is_late: bool) {
+    pub(super) fn advance(&mut self, common: &CommonKnowledge, is_late: bool) {
         self.airplanes.sort_unstable_by_key(|airplane| airplane.place);
-        match briefing.settings.estimator {
-            Estimator::Exact => self.optimize(briefing),
+        match common.settings.estimator {
+            Estimator::Exact => self.optimize(common),
             Estimator::Sampled { block, ageing } => {
-                self.sampled_round(briefing, block, ageing, is_late);
+                self.sampled_round(common, block, ageing, is_late);
             }
         }
-        self.airplanes.iter_mut().for_each(MemberData::clear_samples);
+        for airplane in &mut self.airplanes {
+            airplane.clear_samples();
+        }
     }
 
     /// Makes all rounds with exact expectations.
-    fn optimize(&mut self, briefing: &CommonKnowledge) {
-        let options =
-            |a: &MemberData| ActionPredictions::new(a.ways.clone(), a.separation_m, a.levels);
-        let all: Vec<ActionPredictions> = self.airplanes.iter().map(options).collect();
+    fn optimize(&mut self, common: &CommonKnowledge) {
+        let all: Vec<ActionPredictions> = self
+            .airplanes
+            .iter()
+            .map(|a| ActionPredictions::new(a.predictions.clone(), a.separation_m, a.levels))
+            .collect();
         let own = self.airplanes.iter().map(|airplane| airplane.own_costs.clone()).collect();
         let mut game = PairwiseGame::new(own);
         for i in 0..all.len() {
             for j in i + 1..all.len() {
-                add_pair_costs(&mut game, &briefing.objective, [i, j], [&all[i], &all[j]]);
+                add_pair_costs(&mut game, &common.objective, [i, j], [&all[i], &all[j]]);
             }
         }
         let places: Vec<usize> = self.airplanes.iter().map(|a| a.place).collect();
-        let uniform = |player: usize, k: u64| briefing.uniform(places[player], k);
-        let outcome = optimize(&game, &briefing.settings, uniform);
+        let outcome = optimize(&game, &common.settings, |player: usize, k: u64| {
+            common.uniform(places[player], k)
+        });
         let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
         for (airplane, ((chosen, expected), chances)) in self.airplanes.iter_mut().zip(each) {
-            let (rounds, converged) = (outcome.rounds, outcome.converged);
-            let decided = ActionChoice { chosen, expected, rounds, converged, chances };
+            let decided = ActionChoice {
+                chosen,
+                expected,
+                rounds: outcome.rounds,
+                converged: outcome.converged,
+                chances,
+            };
             airplane.decided = (!airplane.is_presumed).then_some(decided);
         }
         self.is_final = true;
@@ -170,14 +184,14 @@ impl RoundData {
     /// Makes a round with samples.
     fn sampled_round(
         &mut self,
-        briefing: &CommonKnowledge,
+        common: &CommonKnowledge,
         block: usize,
         ageing: f64,
         is_late: bool,
     ) {
         interrupt::check();
-        let stop = briefing.settings.stop;
-        let change = self.learn(briefing, block, ageing);
+        let stop = common.settings.stop;
+        let change = self.learn(common, block, ageing);
         self.calm = stop.count_calm_rounds(self.calm, change);
         self.round += 1;
         let is_over = self.calm >= stop.calm_rounds || self.round >= stop.max_rounds;
@@ -185,39 +199,48 @@ impl RoundData {
             for airplane in self.airplanes.iter_mut().filter(|a| !a.is_presumed) {
                 let Some(player) = &airplane.player else { continue };
                 airplane.decided =
-                    briefing.action_choice(airplane.place, player, self.round, self.calm);
+                    common.action_choice(airplane.place, player, self.round, self.calm);
             }
             self.is_final = true;
         }
     }
 
-    /// Computes the costs once all ways of a round are known, summed in the same order as everywhere
+    /// Computes the costs once all predictions of a round are known, summed in the same order as everywhere
     /// else, and updates every player. Returns the largest change of a probability.
-    fn learn(&mut self, briefing: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
-        let (objective, all) = (&briefing.objective, &self.airplanes);
-        let part = |i: usize, k: usize| {
-            let own = &all[i];
-            let minds = |other: &&MemberData| {
-                other.place != own.place && other.levels.overlaps(&own.levels, objective.vertical_m)
-            };
-            all.iter().filter(minds).fold(own.own_costs[k], |sum, other| {
-                // Others are to keep farther away from one that is presumed.
-                let wanted_m = if other.is_presumed { other.separation_m } else { 0.0 };
-                let r = own.separation_m.max(wanted_m);
-                sum + objective.collision(&own.ways[k], &other.ways[k], [r, r])[0]
-            })
-        };
-        let total: Vec<f64> =
-            (0..block).map(|k| (0..all.len()).fold(0.0, |sum, i| sum + part(i, k))).collect();
-        let settings = briefing.settings;
-        let update = |airplane: &mut MemberData| {
-            let MemberData { player: Some(player), samples, .. } = airplane else { return 0.0 };
+    fn learn(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
+        let mut total = Vec::with_capacity(block);
+        for k in 0..block {
+            let parts = (0..self.airplanes.len()).map(|i| self.collision_cost(common, i, k));
+            total.push(parts.fold(0.0, |sum, part| sum + part));
+        }
+        let settings = common.settings;
+        let mut max_change: f64 = 0.0;
+        for airplane in &mut self.airplanes {
+            let MemberData { player: Some(player), samples, .. } = airplane else { continue };
             if samples.is_empty() {
-                return 0.0;
+                continue;
             }
             player.learn(samples, &total, ageing);
-            player.update(settings.update, settings.cooling)
-        };
-        self.airplanes.iter_mut().map(update).fold(0.0, f64::max)
+            max_change = max_change.max(player.update(settings.update, settings.cooling));
+        }
+        max_change
+    }
+
+    /// Returns the part of an airplane in the cost of the joint sample `k`.
+    fn collision_cost(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
+        let objective = &common.objective;
+        let own = &self.airplanes[i];
+        let mut cost = own.own_costs[k];
+        for other in &self.airplanes {
+            if other.place == own.place || !other.levels.overlaps(&own.levels, objective.vertical_m)
+            {
+                continue;
+            }
+            // Others are to keep farther away from one that is presumed.
+            let other_separation_m = if other.is_presumed { other.separation_m } else { 0.0 };
+            let r = own.separation_m.max(other_separation_m);
+            cost += objective.collision(&own.predictions[k], &other.predictions[k], [r, r])[0];
+        }
+        cost
     }
 }

@@ -1,4 +1,4 @@
-//! The scene as all airplanes of a group see it before they exchange their plans.
+//! The situation as all airplanes of a group see it before they exchange their plans.
 
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
@@ -8,7 +8,7 @@ use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Number of cycles after which airplanes take turns.
+/// Number of cycles after which airplanes take turns: long enough to get out of the others' reach.
 const PRIORITY_PERIOD_CYCLES: Cycle = 12;
 /// Bound on headings in messages, in radians.
 const MAX_HEADING_RAD: f64 = 1e6;
@@ -16,8 +16,8 @@ const MAX_HEADING_RAD: f64 = 1e6;
 /// An airplane as others see it, and as they know it from its filed plan.
 #[derive(Debug, Clone)]
 pub struct ObservedAircraft {
-    /// Its place, and its model. Of others, the fallback is known only where they are seen to be on it, and
-    /// neither rank nor names are.
+    /// Its position, and its model. Of others, the fallback is known only where they are seen to be on it, and
+    /// neither rank nor exempt pairs are.
     pub aircraft: ShieldedAircraft,
     /// Whether it is seen to be on its fallback.
     pub is_on_orbit: bool,
@@ -25,7 +25,7 @@ pub struct ObservedAircraft {
     pub takes_part: bool,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,
-    /// Largest number of different ways that it can propose.
+    /// Largest number of different profiles that it can propose.
     pub max_profiles: usize,
 }
 
@@ -34,20 +34,20 @@ impl ObservedAircraft {
     fn check_beacon(&self, beacon: &StateBeacon) -> Result<(), InvalidMessage> {
         let ShieldedAircraft { pose, omega_max_rad_s, orbit_rad_s, separation_m, .. } =
             self.aircraft;
-        let told = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
-        let is_filed = told == [omega_max_rad_s, orbit_rad_s, separation_m];
+        let claimed = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
+        let is_filed = claimed == [omega_max_rad_s, orbit_rad_s, separation_m];
         InvalidMessage::Plan.unless(is_filed && beacon.pose == pose)?;
         beacon.check(self.max_speed_m_s)
     }
 }
 
-/// The scene as all of a group see it, and numbers on which they have agreed, before they exchange
+/// The situation as all of a group see it, and numbers on which they have agreed, before they exchange
 /// their plans.
 #[derive(Debug, Clone)]
 pub struct ExchangeSetup {
     /// The air that all fly through.
     pub air: Air,
-    /// Airplanes at least this many meters above each other need not mind each other.
+    /// Airplanes at least this many meters above each other need not avoid each other.
     pub vertical_m: f64,
     /// The present cycle.
     pub now: Cycle,
@@ -63,15 +63,16 @@ impl ExchangeSetup {
     /// Returns whether the airplane at one place goes before another one: it flies on without the
     /// other's consent, but the other does not without its own.
     ///
-    /// One that is seen to fly a way goes before one on an orbit, so that it is soon out of the
+    /// One that is seen to fly a profile goes before one on an orbit, so that it is soon out of the
     /// other's reach. Among equals all go first in turn.
     pub fn has_priority(&self, place: usize, other: usize) -> bool {
-        let key = |place: usize| {
-            let ObservedAircraft { aircraft: flyer, is_on_orbit: orbits, .. } =
-                &self.aircraft[place];
-            (*orbits, turn_order(flyer.id, self.now), flyer.id)
-        };
-        key(place) < key(other)
+        self.priority_key(place) < self.priority_key(other)
+    }
+
+    /// Returns a key that is smaller for airplanes that go first.
+    fn priority_key(&self, place: usize) -> (bool, u64, EntityId) {
+        let ObservedAircraft { aircraft, is_on_orbit, .. } = &self.aircraft[place];
+        (*is_on_orbit, turn_order(aircraft.id, self.now), aircraft.id)
     }
 
     /// Checks the proposal of the airplane at a place.
@@ -80,41 +81,45 @@ impl ExchangeSetup {
         place: usize,
         proposal: &Proposal,
     ) -> Result<(), InvalidMessage> {
-        let Proposal { beacon, held, named, ways, .. } = proposal;
+        let Proposal { beacon, orbit_pose, exempt, profiles, .. } = proposal;
         self.aircraft[place].check_beacon(beacon)?;
-        let is_held = held.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(held.at);
-        InvalidMessage::Number.unless(is_held)?;
-        let are_known = named.iter().all(|&id| (id as usize) < self.airplanes);
-        InvalidMessage::Airplane.unless(are_known && is_ascending(named))?;
-        InvalidMessage::Length.unless(ways.len() <= self.aircraft[place].max_profiles)?;
-        ways.iter().try_for_each(|way| self.check_profile(place, way))
+        let is_valid_pose =
+            orbit_pose.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(orbit_pose.at);
+        InvalidMessage::Number.unless(is_valid_pose)?;
+        let are_known = exempt.iter().all(|&id| (id as usize) < self.airplanes);
+        InvalidMessage::Airplane.unless(are_known && is_ascending(exempt))?;
+        InvalidMessage::Length.unless(profiles.len() <= self.aircraft[place].max_profiles)?;
+        profiles.iter().try_for_each(|profile| self.check_profile(place, profile))
     }
 
-    /// Checks a way that the airplane at a place may fly.
+    /// Checks a profile that the airplane at a place may fly.
     pub(super) fn check_profile(
         &self,
         place: usize,
-        way: &TurnProfile,
+        profile: &TurnProfile,
     ) -> Result<(), InvalidMessage> {
-        let most_rad_s = self.aircraft[place].aircraft.omega_max_rad_s;
-        InvalidMessage::Length.unless(way.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
+        let max_rad_s = self.aircraft[place].aircraft.omega_max_rad_s;
+        InvalidMessage::Length
+            .unless(profile.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
         // Comparisons with NaN are false.
         InvalidMessage::Number
-            .unless(way.omegas_rad_s.iter().all(|omega| omega.abs() <= most_rad_s))
+            .unless(profile.omegas_rad_s.iter().all(|omega| omega.abs() <= max_rad_s))
     }
 
     /// Checks a list of members of the group.
     pub(super) fn check_members(&self, ids: &[EntityId]) -> Result<(), InvalidMessage> {
-        let is_member =
-            |id: &EntityId| self.aircraft.binary_search_by_key(id, |seen| seen.aircraft.id).is_ok();
-        InvalidMessage::Airplane.unless(is_ascending(ids) && ids.iter().all(is_member))
+        let are_members = ids
+            .iter()
+            .all(|id| self.aircraft.binary_search_by_key(id, |one| one.aircraft.id).is_ok());
+        InvalidMessage::Airplane.unless(is_ascending(ids) && are_members)
     }
 
     /// Returns the largest number of bytes of a message of the exchange.
     pub(super) fn max_message_bytes(&self) -> usize {
-        let ways = self.aircraft.iter().map(|seen| seen.max_profiles).max().unwrap_or(0);
-        let way = 8 * self.air.timing.points_per_dt() + 5;
-        256 + ways * way + 5 * self.airplanes
+        let profiles = self.aircraft.iter().map(|one| one.max_profiles).max().unwrap_or(0);
+        // A number of a message takes 8 bytes, a length or an id at most 5; the beacon is well below 256.
+        let profile_bytes = 8 * self.air.timing.points_per_dt() + 5;
+        256 + profiles * profile_bytes + 5 * self.airplanes
     }
 }
 

@@ -1,7 +1,7 @@
 //! Beacons: messages of airplanes about themselves, before they know the others that they decide with.
 
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::Pose2;
+use crate::flight::{KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperative;
 use crate::shield::Side;
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,14 @@ pub struct SurveillanceReport {
     pub orbit: Option<Side>,
 }
 
+impl SurveillanceReport {
+    /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
+    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
+        let &Self { id, pose, altitude_m, .. } = self;
+        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+    }
+}
+
 /// A message by which an airplane makes itself known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beacon {
@@ -30,8 +38,8 @@ pub struct Beacon {
     pub own: SurveillanceReport,
     /// Ids of those that it sees near it, rising.
     pub near: Vec<EntityId>,
-    /// Airplanes near it that mind no other, by rising id.
-    pub intruders: Vec<NonCooperative>,
+    /// Non-cooperative airplanes near it, by rising id.
+    pub non_cooperative: Vec<NonCooperative>,
 }
 
 /// A piece of knowledge about an airplane.
@@ -64,9 +72,9 @@ impl Item {
             Self::Report { heard, .. } => heard,
         };
         let is_known = |id: EntityId| (id as usize) < airplanes;
-        let rises = list.windows(2).all(|pair| pair[0] < pair[1]);
+        let is_ascending = list.windows(2).all(|pair| pair[0] < pair[1]);
         let are_others = list.iter().all(|&id| is_known(id) && id != self.about());
-        InvalidMessage::Airplane.unless(is_known(self.about()) && rises && are_others)?;
+        InvalidMessage::Airplane.unless(is_known(self.about()) && is_ascending && are_others)?;
         match self {
             Self::Beacon(beacon) => beacon.check(airplanes),
             Self::Report { .. } => Ok(()),
@@ -80,10 +88,10 @@ impl Beacon {
             self.own;
         InvalidMessage::Number.unless(heading_rad.abs() < MAX_HEADING_RAD)?;
         InvalidMessage::Number.unless(are_valid_coordinates([x, y, altitude_m]))?;
-        let rises = self.intruders.windows(2).all(|pair| pair[0].slot < pair[1].slot);
-        let are_known = self.intruders.iter().all(|one| (one.slot as usize) < airplanes);
-        InvalidMessage::Airplane.unless(rises && are_known)?;
-        InvalidMessage::Number.unless(self.intruders.iter().all(NonCooperative::is_valid))
+        let is_ascending = self.non_cooperative.windows(2).all(|pair| pair[0].slot < pair[1].slot);
+        let are_known = self.non_cooperative.iter().all(|one| (one.slot as usize) < airplanes);
+        InvalidMessage::Airplane.unless(is_ascending && are_known)?;
+        InvalidMessage::Number.unless(self.non_cooperative.iter().all(NonCooperative::is_valid))
     }
 }
 

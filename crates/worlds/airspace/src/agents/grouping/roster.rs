@@ -19,8 +19,8 @@ pub(super) struct Roster {
 struct ChainSearch {
     from: EntityId,
     chain: BTreeSet<EntityId>,
-    /// Those in it for which some that they have heard are not fully known yet, each with the number of those looked
-    /// at.
+    /// Those in it for which some that they have heard are not fully known yet, each with the number of those
+    /// visited.
     due: Vec<(EntityId, usize)>,
 }
 
@@ -33,27 +33,26 @@ impl ChainSearch {
 impl Roster {
     /// Returns the roster of an airplane that has heard nothing yet.
     pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
-        let settling = ChainSearch::new(own.own.id);
+        let chain_search = ChainSearch::new(own.own.id);
         let beacons = BTreeMap::from([(own.own.id, own)]);
-        Self { beacons, reports: BTreeMap::new(), is_sure, chain_search: settling }
+        Self { beacons, reports: BTreeMap::new(), is_sure, chain_search }
     }
 
-    /// Notes a beacon. Returns whether there was none of the airplane; a beacon from the airplane itself counts for
+    /// Records a beacon. Returns whether there was none of the airplane; a beacon from the airplane itself counts for
     /// more than one that others pass on.
     pub(super) fn add_beacon(&mut self, beacon: Beacon, is_own: bool) -> bool {
         let id = beacon.own.id;
         if !is_own && self.beacons.contains_key(&id) {
             return false;
         }
-        let is_other = |known: &Beacon| known.near != beacon.near;
-        if self.beacons.get(&id).is_some_and(is_other) {
+        if self.beacons.get(&id).is_some_and(|known| known.near != beacon.near) {
             // Another airplane has lied about it, and all conclusions from that are void.
             self.chain_search = ChainSearch::new(self.chain_search.from);
         }
         self.beacons.insert(id, beacon).is_none()
     }
 
-    /// Notes the airplanes that another one has heard. Returns whether that is new: the first report counts.
+    /// Records the airplanes that another one has heard. Returns whether that is new: the first report counts.
     pub(super) fn add_report(&mut self, id: EntityId, heard: Vec<EntityId>) -> bool {
         let is_new = !self.reports.contains_key(&id);
         self.reports.entry(id).or_insert(heard);
@@ -85,15 +84,16 @@ impl Roster {
 
     /// Returns whether one airplane does not hear another one's items from itself, as far as is known.
     pub(super) fn is_missing(&self, id: EntityId, about: EntityId) -> bool {
-        let has_not_heard = |heard: &Vec<EntityId>| heard.binary_search(&about).is_err();
-        !self.can_see(about, id) || self.reports.get(&id).is_some_and(has_not_heard)
+        let report = self.reports.get(&id);
+        !self.can_see(about, id) || report.is_some_and(|heard| heard.binary_search(&about).is_err())
     }
 
     /// Returns those near an airplane that it has heard, if that is known.
     fn heard_by(&self, id: EntityId) -> Option<&[EntityId]> {
-        match self.is_sure {
-            true => self.beacons.get(&id).map(|beacon| &beacon.near[..]),
-            false => self.reports.get(&id).map(Vec::as_slice),
+        if self.is_sure {
+            self.beacons.get(&id).map(|beacon| &beacon.near[..])
+        } else {
+            self.reports.get(&id).map(Vec::as_slice)
         }
     }
 
@@ -113,7 +113,9 @@ impl Roster {
     /// Returns all to which a chain of airplanes that hear each other leads from one, itself among them, and whether
     /// everything is known that this depends on.
     fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
-        let (mut chain, mut due, mut is_complete) = (BTreeSet::from([from]), vec![from], true);
+        let mut chain = BTreeSet::from([from]);
+        let mut due = vec![from];
+        let mut is_complete = true;
         while let Some(id) = due.pop() {
             is_complete &= self.is_fully_known(id);
             for &other in self.heard_by(id).unwrap_or_default() {
@@ -126,20 +128,20 @@ impl Roster {
         (chain, is_complete)
     }
 
-    /// Returns the same as [`Self::is_complete`] for the own airplane, and goes on from where it stopped before: each
-    /// link is looked at once, however often incomplete knowledge comes in.
+    /// Returns the same as [`Self::is_complete`] for the own airplane, and continues where it stopped before: each
+    /// link is visited once, however often incomplete knowledge arrives.
     pub(super) fn update_chain(&mut self) -> bool {
-        let mut settling = std::mem::replace(&mut self.chain_search, ChainSearch::new(0));
-        let is_complete = self.extend_chain(&mut settling);
-        self.chain_search = settling;
+        let mut search = std::mem::replace(&mut self.chain_search, ChainSearch::new(0));
+        let is_complete = self.extend_chain(&mut search);
+        self.chain_search = search;
         is_complete
     }
 
     fn extend_chain(&self, ChainSearch { chain, due, .. }: &mut ChainSearch) -> bool {
-        while let Some(&(id, looked_at)) = due.last() {
+        while let Some(&(id, visited)) = due.last() {
             let heard = self.heard_by(id).filter(|_| self.has_beacon(id));
             let Some(heard) = heard else { return false };
-            let Some(&other) = heard.get(looked_at) else {
+            let Some(&other) = heard.get(visited) else {
                 due.pop();
                 continue;
             };

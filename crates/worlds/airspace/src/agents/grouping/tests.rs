@@ -48,7 +48,7 @@ impl Links {
             me: near.iter().position(|&j| j == i).expect("it is among them"),
             expected: vec![true; near.len()],
             near: near.into_iter().map(sighted).collect(),
-            intruders: Vec::new(),
+            non_cooperative: Vec::new(),
             airplanes: 100,
             range_m: f64::INFINITY,
             certainty,
@@ -81,16 +81,18 @@ fn found(
     let n = links.near.len();
     let mut agents: Vec<GroupingAgent> = (0..n).map(|i| links.agent(i, certainty)).collect();
     let (mut due, mut sent) = (Vec::new(), 0);
-    let mut say = |due: &mut Vec<(usize, usize, Vec<Item>)>, from: usize, said: Vec<Vec<Item>>| {
-        for items in said {
+    let mut say = |due: &mut Vec<(usize, usize, Vec<Item>)>,
+                   from: usize,
+                   outgoing: Vec<Vec<Item>>| {
+        for items in outgoing {
             let to = (0..n).filter(|&to| links.near[from][to]);
             sent += to.clone().count();
             due.extend(to.filter(|&to| links.hears[to][from]).map(|to| (from, to, items.clone())));
         }
     };
     for (i, agent) in agents.iter_mut().enumerate() {
-        let said = agent.start();
-        say(&mut due, i, said);
+        let outgoing = agent.start();
+        say(&mut due, i, outgoing);
     }
     loop {
         while !due.is_empty() {
@@ -98,8 +100,8 @@ fn found(
             let seen = &agents[to].input.near;
             let place = seen.binary_search_by_key(&id(from), |one| one.id).expect("near");
             agents[to].check(place, &items).expect("sound");
-            let said = agents[to].on_message(place, items);
-            say(&mut due, to, said);
+            let outgoing = agents[to].on_message(place, items);
+            say(&mut due, to, outgoing);
         }
         if agents.iter().all(|agent| agent.is_done()) {
             break;
@@ -116,8 +118,8 @@ fn found(
         let (i, place) = all
             .find_map(|(i, agent)| Some((i, never_answers(i, agent)?)))
             .expect("nobody waits for what never comes");
-        let said = agents[i].on_peer_gone(place, false);
-        say(&mut due, i, said);
+        let outgoing = agents[i].on_peer_gone(place, false);
+        say(&mut due, i, outgoing);
     }
     let members = |agent: &GroupingAgent| {
         let found = agent.outcome().expect("done");
@@ -163,7 +165,7 @@ proptest! {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(908));
         let links = Links::drawn(n, near, heard, &mut draws);
         let ids = |of: &[bool]| (0..n).filter(|&j| of[j]).map(id).collect::<Vec<_>>();
-        let beacon = |i: usize| Beacon { own: sighted(i), near: ids(&links.near[i]), intruders: Vec::new() };
+        let beacon = |i: usize| Beacon { own: sighted(i), near: ids(&links.near[i]), non_cooperative: Vec::new() };
         let mut roster = Roster::new(beacon(0), is_sure);
         for _ in 0..12 * n {
             let i = draws.uniform_below(n as u32) as usize;
@@ -190,7 +192,7 @@ fn a_crowd_of_hundreds_is_found_at_once() {
     agent.start();
     let near = |i: usize| (0..n).filter(|&j| j != i).map(id).collect();
     for i in (1..n).rev() {
-        let beacon = Beacon { own: sighted(i), near: near(i), intruders: Vec::new() };
+        let beacon = Beacon { own: sighted(i), near: near(i), non_cooperative: Vec::new() };
         for from in [i, 1 + i % (n - 1), i] {
             assert!(agent.on_message(from, vec![Item::Beacon(beacon.clone())]).is_empty());
         }
@@ -210,7 +212,7 @@ fn among_those_that_all_see_each_other_nothing_is_passed_on() {
 fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(907));
     let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, PlanCertainty::Mixable);
-    let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], intruders: Vec::new() };
+    let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], non_cooperative: Vec::new() };
     let check = |beacon: &Beacon| agent.check(1, &vec![Item::Beacon(beacon.clone())]);
     assert_eq!(check(&right), Ok(()));
     let altered = |alter: fn(&mut Beacon)| {

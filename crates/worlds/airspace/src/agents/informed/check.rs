@@ -1,4 +1,4 @@
-//! Checks of the others' messages, before an agent takes them.
+//! Checks of the others' messages, before an agent accepts them.
 
 use super::{InformedAgent, InformedMessage};
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
@@ -11,40 +11,41 @@ impl InformedAgent {
         from: usize,
         message: &InformedMessage,
     ) -> Result<(), InvalidMessage> {
-        let briefing = &*self.own.briefing;
-        let filed = &briefing.filed[from];
+        let common = &*self.own.common;
+        let filed = &common.filed[from];
         let actions = filed.actions.len();
         match message {
-            InformedMessage::Ways { beacon, ways } => {
+            InformedMessage::Predictions { beacon, predictions } => {
                 InvalidMessage::Kind.unless(!self.by_model)?;
-                briefing.check_beacon(from, beacon)?;
-                briefing.check_predictions(ways, actions)
+                common.check_beacon(from, beacon)?;
+                common.check_predictions(predictions, actions)
             }
             InformedMessage::Model { beacon, next, mission, airplane, orders, altitude_m } => {
                 InvalidMessage::Kind.unless(self.by_model)?;
-                InvalidMessage::Airplane.unless(*airplane == briefing.ids[from])?;
-                briefing.check_beacon(from, beacon)?;
+                InvalidMessage::Airplane.unless(*airplane == common.ids[from])?;
+                common.check_beacon(from, beacon)?;
                 let is_short = mission.len() <= filed.max_way_points;
                 InvalidMessage::Length.unless(is_short && *next as usize <= mission.len())?;
                 InvalidMessage::Plan.unless(*orders as usize <= filed.orders)?;
-                let told_m = mission.as_flattened().iter().chain([altitude_m]);
-                InvalidMessage::Number.unless(are_valid_coordinates(told_m.copied()))
+                let coordinates_m = mission.as_flattened().iter().chain([altitude_m]);
+                InvalidMessage::Number.unless(are_valid_coordinates(coordinates_m.copied()))
             }
             InformedMessage::Samples { round, change, samples } => {
                 let Estimator::Sampled { block, .. } = self.own.settings().estimator else {
                     return Err(InvalidMessage::Kind);
                 };
-                briefing.check_round(*round, *change)?;
+                common.check_round(*round, *change)?;
                 InvalidMessage::Length.unless(samples.len() == block)?;
                 InvalidMessage::Number.unless(samples.iter().all(|&x| usize::from(x) < actions))
             }
             InformedMessage::Distribution { round, change, q } => {
                 InvalidMessage::Kind.unless(self.is_exact())?;
-                briefing.check_round(*round, *change)?;
+                common.check_round(*round, *change)?;
                 InvalidMessage::Length.unless(q.len() == actions)?;
-                let is_share = |p: &f64| (0.0..=1.0).contains(p);
-                let is_whole = (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
-                InvalidMessage::Number.unless(is_whole && q.iter().all(is_share))
+                let are_probabilities = q.iter().all(|p| (0.0..=1.0).contains(p));
+                // The sum is rounded.
+                let is_complete = (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
+                InvalidMessage::Number.unless(is_complete && are_probabilities)
             }
         }
     }

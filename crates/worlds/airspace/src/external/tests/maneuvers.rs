@@ -222,10 +222,12 @@ fn who_asks_what_was_ordered_does_not_use_it_up() {
     let mut run = lone("");
     run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.02] })
         .expect("right");
-    let told = run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
-    assert_eq!(told.value("Decides", "action"), Some(&"the turn that was ordered".into()));
+    let inspection =
+        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+    assert_eq!(inspection.value("Decides", "action"), Some(&"the turn that was ordered".into()));
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
-    let told = run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
-    assert_eq!(told.value("Decides", "action"), Some(&"to the way-point".into()));
+    let inspection =
+        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+    assert_eq!(inspection.value("Decides", "action"), Some(&"to the way-point".into()));
 }

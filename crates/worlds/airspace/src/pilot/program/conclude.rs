@@ -1,4 +1,4 @@
-//! The conclusions that a pilot draws: from its perception, and from the talks that it has ended.
+//! The conclusions that a pilot draws: from its perception, and from the conversations that it has ended.
 
 use super::Pilot;
 use super::cycle_state::CyclePhase;
@@ -16,124 +16,126 @@ use crate::flight::KnownAircraft;
 use crate::pilot::common_knowledge::unheard_aircraft;
 use crate::pilot::control::{Maneuver, OptimizerStats};
 use crate::pilot::conversations::ConversationOutcome;
-use crate::pilot::percept::SurveillanceReport;
 
 impl Pilot {
-    /// Notes the group that it has found; without an outcome it is alone.
-    fn on_group(&mut self, came: Option<ConversationOutcome>, tick: u64) {
-        let Some(turn) = &mut self.turn else { return };
-        let sight = &mut turn.percept;
-        let near = std::mem::take(&mut sight.group);
-        match came {
+    /// Stores the group that it has found; without an outcome it is alone.
+    fn on_group(&mut self, outcome: Option<ConversationOutcome>, tick: u64) {
+        let Some(state) = &mut self.state else { return };
+        let percept = &mut state.percept;
+        let near = std::mem::take(&mut percept.group);
+        match outcome {
             Some(ConversationOutcome::Grouping(found)) => {
-                (sight.group, sight.intruders) = (found.members, found.intruders);
+                percept.group = found.members;
+                percept.non_cooperative = found.non_cooperative;
             }
-            _ => sight.group = near.iter().filter(|one| one.id == self.id).copied().collect(),
+            _ => percept.group = near.iter().filter(|one| one.id == self.id).copied().collect(),
         }
-        turn.members = sight.members().into();
-        let is_member = |one: &SurveillanceReport| turn.members.binary_search(&one.id).is_ok();
-        turn.unheard = near.into_iter().filter(|one| !is_member(one)).collect();
-        let unheard = turn.unheard.iter().map(|one| one.id).collect();
-        turn.record_unheard(&self.world, unheard, &self.memory.contacts);
+        state.members = percept.members().into();
+        state.unheard =
+            near.into_iter().filter(|one| state.members.binary_search(&one.id).is_err()).collect();
+        let unheard = state.unheard.iter().map(|one| one.id).collect();
+        state.record_unheard(&self.world, unheard, &self.memory.contacts);
         self.decide(tick);
     }
 
-    /// Starts to choose its wishes.
+    /// Starts to choose its candidates.
     pub(super) fn decide(&mut self, tick: u64) {
-        let Some(turn) = &self.turn else { return };
+        let Some(state) = &self.state else { return };
         let group: Vec<KnownAircraft> =
-            turn.percept.group.iter().map(|one| one.known_aircraft()).collect();
-        let others = turn.percept.intruders.len() + turn.unheard.len();
-        let manner = DecisionStrategy::for_group(&self.world, &group, others);
-        match manner {
+            state.percept.group.iter().map(|one| one.known_aircraft()).collect();
+        let others = state.percept.non_cooperative.len() + state.unheard.len();
+        let strategy = DecisionStrategy::for_group(&self.world, &group, others);
+        match strategy {
             DecisionStrategy::Joint | DecisionStrategy::Reactive => {
                 self.start_conversation(Protocol::Decision, tick)
             }
             DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => {
-                self.decide_alone(manner, group.len())
+                self.decide_alone(strategy, group.len())
             }
         }
     }
 
-    /// Decides without a talk.
-    pub(super) fn decide_alone(&mut self, manner: DecisionStrategy, members: usize) {
-        let Some(turn) = &mut self.turn else { return };
-        let own = &turn.percept.own;
-        if manner == DecisionStrategy::GroupTooLarge && turn.members.first() == Some(&self.id) {
-            let event = Event::new(turn.percept.cycle, EventKind::GroupTooLarge, self.id);
-            turn.control.events.push(event.with_value(members as f64));
+    /// Decides without a conversation.
+    pub(super) fn decide_alone(&mut self, strategy: DecisionStrategy, members: usize) {
+        let Some(state) = &mut self.state else { return };
+        let own = &state.percept.own;
+        if strategy == DecisionStrategy::GroupTooLarge && state.members.first() == Some(&self.id) {
+            let event = Event::new(state.percept.cycle, EventKind::GroupTooLarge, self.id);
+            state.control.events.push(event.with_value(members as f64));
         }
-        let considered = candidates_alone(&self.world, own.known_aircraft(), own.wish.as_ref());
+        let considered =
+            candidates_alone(&self.world, own.known_aircraft(), own.external_action.as_ref());
         self.set_candidates(considered);
     }
 
-    /// Notes its wishes; without the shield it flies the first of them.
-    fn set_candidates(&mut self, considered: ManeuverCandidates) {
-        let Some(turn) = &mut self.turn else { return };
-        turn.candidates = considered;
-        turn.phase = CyclePhase::Decided;
+    /// Stores its candidates; without the shield it flies the first of them.
+    fn set_candidates(&mut self, candidates: ManeuverCandidates) {
+        let Some(state) = &mut self.state else { return };
+        state.candidates = candidates;
+        state.phase = CyclePhase::Decided;
         if !self.world.shield {
-            let way = turn.candidates.ways.first().cloned().unwrap_or_default();
-            let side = turn.percept.own.fallback;
-            turn.control.course = Maneuver::Way { wish: 0, way, side };
+            let profile = state.candidates.profiles.first().cloned().unwrap_or_default();
+            let side = state.percept.own.fallback;
+            state.control.maneuver = Maneuver::Profile { candidate: 0, profile, side };
             self.finish_cycle();
         }
     }
 
     fn finish_cycle(&mut self) {
-        if let Some(turn) = &mut self.turn {
-            turn.phase = CyclePhase::Over;
-            turn.control.memory = self.memory.clone();
+        if let Some(state) = &mut self.state {
+            state.phase = CyclePhase::Over;
+            state.control.memory = self.memory.clone();
         }
     }
 
-    /// Ends the talk that it is in, and draws the conclusion from it.
+    /// Ends the conversation that it is in, and draws the conclusion from it.
     pub(super) fn on_conversation_end(
         &mut self,
         ended: ConversationEnd<ConversationOutcome>,
         tick: u64,
     ) {
-        let Some(turn) = &mut self.turn else { return };
+        let Some(state) = &mut self.state else { return };
         if self.world.network.is_some() {
-            turn.record_end(&self.world, &ended, &self.memory.contacts);
+            state.record_end(&self.world, &ended, &self.memory.contacts);
         }
-        match std::mem::replace(&mut turn.phase, CyclePhase::Decided) {
-            CyclePhase::Grouping(talk) => {
-                self.push_past(talk);
+        match std::mem::replace(&mut state.phase, CyclePhase::Decided) {
+            CyclePhase::Grouping(conversation) => {
+                self.push_past(conversation);
                 self.on_group(ended.outcome, tick);
             }
-            CyclePhase::Deciding(talk) => {
-                self.push_past(talk);
+            CyclePhase::Deciding(conversation) => {
+                self.push_past(conversation);
                 match ended.outcome {
-                    Some(ConversationOutcome::Intents(told)) => self.on_intents(&told),
+                    Some(ConversationOutcome::Intents(intents)) => self.on_intents(&intents),
                     Some(ConversationOutcome::Optimization(conclusion)) => {
                         self.on_optimization(Some(conclusion))
                     }
                     _ => self.on_optimization(None),
                 }
             }
-            CyclePhase::Shielding(talk, allowed) => {
-                self.push_past(talk);
+            CyclePhase::Shielding(conversation, allowed) => {
+                self.push_past(conversation);
                 self.on_exchange(ended.outcome, &allowed);
             }
             CyclePhase::Decided | CyclePhase::Over => {}
         }
     }
 
-    /// Notes the outcome of the shield's exchange, in which it has proposed the ways that were `allowed`.
-    fn on_exchange(&mut self, came: Option<ConversationOutcome>, allowed: &[usize]) {
-        let Some(turn) = &mut self.turn else { return };
-        self.memory.contacts = match came {
+    /// Stores the outcome of the shield's exchange, in which it has proposed the candidates that were `allowed`.
+    fn on_exchange(&mut self, outcome: Option<ConversationOutcome>, allowed: &[usize]) {
+        let Some(state) = &mut self.state else { return };
+        self.memory.contacts = match outcome {
             Some(ConversationOutcome::Exchange(ExchangeResult {
                 decision,
                 held_back,
                 contacts,
             })) => {
                 if held_back {
-                    let event = Event::new(turn.percept.cycle, EventKind::HeldBack, self.id);
-                    turn.control.events.push(event);
+                    let event = Event::new(state.percept.cycle, EventKind::HeldBack, self.id);
+                    state.control.events.push(event);
                 }
-                turn.control.course = turn.candidates.maneuver(decision, allowed);
+                state.control.maneuver =
+                    Maneuver::from_decision(decision, allowed, &state.candidates);
                 contacts
             }
             // Without an agreement it no longer knows where any other airplane is.
@@ -142,33 +144,36 @@ impl Pilot {
         self.finish_cycle();
     }
 
-    /// Notes the outcome of an optimization; none if time was up before there was any.
-    fn on_optimization(&mut self, conclusion: Option<OptimizationResult>) {
-        let Some(turn) = &mut self.turn else { return };
+    /// Stores the outcome of an optimization; none if time was up before there was any.
+    fn on_optimization(&mut self, result: Option<OptimizationResult>) {
+        let Some(state) = &mut self.state else { return };
         let (decided, beacons) =
-            conclusion.map_or_else(Default::default, |came| (came.decided, came.beacons));
-        turn.control.optimized = Some(OptimizerStats::from_choice(decided.as_ref()));
+            result.map_or_else(Default::default, |result| (result.decided, result.beacons));
+        state.control.optimized = Some(OptimizerStats::from_choice(decided.as_ref()));
         if self.world.network.is_some() {
-            for (beacon, &id) in beacons.into_iter().zip(&*turn.members) {
+            for (beacon, &id) in beacons.into_iter().zip(&*state.members) {
                 if let Some(beacon) = beacon {
-                    record_beacon(&mut self.memory.contacts, id, beacon, turn.percept.cycle);
+                    record_beacon(&mut self.memory.contacts, id, beacon, state.percept.cycle);
                 }
             }
         }
         let considered =
-            candidates_by_choice(&self.world, turn.percept.own.known_aircraft(), decided);
+            candidates_by_choice(&self.world, state.percept.own.known_aircraft(), decided);
         self.set_candidates(considered);
     }
 
-    /// Finds the headings of all from their messages; one without a message is taken to fly straight on.
-    fn on_intents(&mut self, told: &[Option<Intent>]) {
-        let Some(turn) = &self.turn else { return };
-        let (mut group, mut memory, mut me) = (Vec::new(), Vec::new(), 0);
-        let beside = turn.unheard.iter().map(|one| unheard_aircraft(&self.world, one));
-        let mut intruders: Vec<_> = turn.percept.intruders.iter().cloned().chain(beside).collect();
-        for (one, intent) in turn.percept.group.iter().zip(told) {
+    /// Finds the headings of all from their messages; one without a message is assumed to fly straight on.
+    fn on_intents(&mut self, intents: &[Option<Intent>]) {
+        let Some(state) = &self.state else { return };
+        let mut group = Vec::new();
+        let mut memory = Vec::new();
+        let mut me = 0;
+        let unheard = state.unheard.iter().map(|one| unheard_aircraft(&self.world, one));
+        let mut non_cooperative: Vec<_> =
+            state.percept.non_cooperative.iter().cloned().chain(unheard).collect();
+        for (one, intent) in state.percept.group.iter().zip(intents) {
             let Some(intent) = intent else {
-                intruders.push(unheard_aircraft(&self.world, one));
+                non_cooperative.push(unheard_aircraft(&self.world, one));
                 continue;
             };
             if one.id == self.id {
@@ -179,7 +184,7 @@ impl Pilot {
             group.push(KnownAircraft { slot: one.id, pose: one.pose, next, orders, altitude_m });
             memory.push(intent.resolving.clone());
         }
-        let mut all = candidates_by_velocity(&self.world, &group, &intruders, &mut memory);
+        let mut all = candidates_by_velocity(&self.world, &group, &non_cooperative, &mut memory);
         if self.world.has_resolutions() {
             self.memory.resolving = memory.swap_remove(me);
         }

@@ -1,4 +1,4 @@
-//! A cycle of one airplane, up to its present stage.
+//! A cycle of one airplane, up to its present phase.
 
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::packet::{ConversationId, Protocol};
@@ -30,19 +30,19 @@ pub(super) struct CycleState {
 
 /// The part of a cycle that an airplane is in.
 pub(super) enum CyclePhase {
-    /// A talk that finds the group.
+    /// A conversation that finds the group.
     Grouping(Conversation<DynParticipant>),
-    /// A talk about the wishes of each.
+    /// A conversation in which candidates are chosen.
     Deciding(Conversation<DynParticipant>),
-    /// It has chosen its wishes, and waits until the shield's exchange starts.
+    /// It has chosen its candidates, and waits until the shield's exchange starts.
     Decided,
-    /// The shield's exchange; the places of the ways that it has proposed, among all that it considers.
+    /// The shield's exchange; the places of the profiles that it has proposed, among all candidates.
     Shielding(Conversation<DynParticipant>, Vec<usize>),
     /// The control is there.
     Over,
 }
 
-/// The place of a talk beside those of a cycle.
+/// When a conversation takes place, compared with those of a cycle.
 pub(super) enum ConversationTiming {
     /// It comes later.
     Later,
@@ -55,18 +55,18 @@ pub(super) enum ConversationTiming {
 }
 
 impl CycleState {
-    /// Returns the talk that it is in.
+    /// Returns the conversation that it is in.
     pub(super) fn conversation(&mut self) -> Option<&mut Conversation<DynParticipant>> {
         match &mut self.phase {
-            CyclePhase::Grouping(talk)
-            | CyclePhase::Deciding(talk)
-            | CyclePhase::Shielding(talk, _) => Some(talk),
+            CyclePhase::Grouping(conversation)
+            | CyclePhase::Deciding(conversation)
+            | CyclePhase::Shielding(conversation, _) => Some(conversation),
             CyclePhase::Decided | CyclePhase::Over => None,
         }
     }
 
-    /// Returns where a talk stands that is none of those that it has been in.
-    pub(super) fn timing_of(&self, talk: &ConversationId) -> ConversationTiming {
+    /// Returns where a conversation stands that is none of those that it has been in.
+    pub(super) fn timing_of(&self, conversation: &ConversationId) -> ConversationTiming {
         let topic = match self.phase {
             CyclePhase::Grouping(_) => Protocol::Group,
             CyclePhase::Deciding(_) | CyclePhase::Decided => Protocol::Decision,
@@ -78,28 +78,35 @@ impl CycleState {
         };
         // No airplane begins a cycle before all have ended the one before it.
         let last = self.percept.cycle.saturating_add(1);
-        match () {
-            () if talk.cycle > last => ConversationTiming::TooFarAhead,
-            () if here.is_before(talk) => ConversationTiming::Later,
-            () if (talk.cycle, talk.topic) == (here.cycle, here.topic) => {
-                ConversationTiming::OtherMembers
-            }
-            () => ConversationTiming::Past,
+        if conversation.cycle > last {
+            ConversationTiming::TooFarAhead
+        } else if here.is_before(conversation) {
+            ConversationTiming::Later
+        } else if (conversation.cycle, conversation.topic) == (here.cycle, here.topic) {
+            ConversationTiming::OtherMembers
+        } else {
+            ConversationTiming::Past
         }
     }
 
-    /// Notes the packets of the talk that it is in, and the time that it took.
+    /// Records the packets of the conversation that it is in, and the time that it took.
     pub(super) fn record_traffic(&mut self, ticks: u64) {
-        let (traffic, noted) = match &self.phase {
-            CyclePhase::Grouping(talk) => (talk.traffic(), &mut self.control.grouping),
-            CyclePhase::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
-            CyclePhase::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
+        let (traffic, recorded) = match &self.phase {
+            CyclePhase::Grouping(conversation) => {
+                (conversation.traffic(), &mut self.control.grouping)
+            }
+            CyclePhase::Deciding(conversation) => {
+                (conversation.traffic(), &mut self.control.deciding)
+            }
+            CyclePhase::Shielding(conversation, _) => {
+                (conversation.traffic(), &mut self.control.shielding)
+            }
             CyclePhase::Decided | CyclePhase::Over => return,
         };
-        *noted = NetworkTraffic { ticks, ..traffic };
+        *recorded = NetworkTraffic { ticks, ..traffic };
     }
 
-    /// Notes how a talk has ended, and the others that it no longer hears.
+    /// Records how a conversation has ended, and the others that it no longer hears.
     pub(super) fn record_end(
         &mut self,
         world: &AirspaceWorld,
@@ -120,7 +127,7 @@ impl CycleState {
         }
     }
 
-    /// Returns the ids of those that the party to a talk is to know, rising.
+    /// Returns the ids of those that the participant of a conversation is to know, rising.
     pub(super) fn members_of(&self, topic: Protocol) -> Arc<[EntityId]> {
         match topic {
             Protocol::Shield => self.exchange_members().into(),
@@ -128,7 +135,7 @@ impl CycleState {
         }
     }
 
-    /// Returns the ids of the airplanes that the party to the present talk knows, by their places.
+    /// Returns the ids of the airplanes that the participant to the present conversation knows, by their places.
     fn conversation_members(&self) -> Vec<EntityId> {
         match self.phase {
             CyclePhase::Shielding(..) => self.exchange_members(),
@@ -136,7 +143,7 @@ impl CycleState {
         }
     }
 
-    /// Returns the ids of all airplanes that the shield minds: its group, and those nearby that are not heard,
+    /// Returns the ids of all airplanes that the shield considers: its group, and those nearby that are not heard,
     /// rising.
     fn exchange_members(&self) -> Vec<EntityId> {
         let unheard = self.unheard.iter().map(|one| one.id);
@@ -145,21 +152,24 @@ impl CycleState {
         all
     }
 
-    /// Notes the others that are no longer heard.
+    /// Records the others that are no longer heard.
     pub(super) fn record_unheard(
         &mut self,
         world: &AirspaceWorld,
         unheard: Vec<EntityId>,
         contacts: &TrafficPicture,
     ) {
-        let (id, now) = (self.percept.own.id, self.percept.cycle);
-        let heard_in = |other: &EntityId| match contacts.get(other) {
-            Some(contact) => contact.heard_in,
-            None => world.first_cycle(*other as usize),
-        };
-        let lost = unheard.into_iter().filter(|other| heard_in(other) + 1 >= now);
-        let lost: Vec<Event> =
-            lost.map(|other| Event::new_pair(now, EventKind::Unheard, id, other)).collect();
-        self.control.events.extend(lost);
+        let id = self.percept.own.id;
+        let now = self.percept.cycle;
+        for other in unheard {
+            let heard_in = match contacts.get(&other) {
+                Some(contact) => contact.heard_in,
+                None => world.first_cycle(other as usize),
+            };
+            // One that has been unheard for longer was recorded then.
+            if heard_in + 1 >= now {
+                self.control.events.push(Event::new_pair(now, EventKind::Unheard, id, other));
+            }
+        }
     }
 }

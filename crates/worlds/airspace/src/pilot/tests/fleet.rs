@@ -187,20 +187,20 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         change(&mut controls[1]);
         controls
     };
-    let way = |omegas_rad_s: Vec<f64>| Maneuver::Way {
-        wish: 0,
-        way: crate::shield::TurnProfile { omegas_rad_s },
+    let profile = |omegas_rad_s: Vec<f64>| Maneuver::Profile {
+        candidate: 0,
+        profile: crate::shield::TurnProfile { omegas_rad_s },
         side: crate::shield::Side::Left,
     };
     let wrong: [(Vec<Control>, &str); 7] = [
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),
         (changed(&|control| control.cycle = 3), "give that of airplane 1 and cycle 0"),
-        (changed(&|control| control.course = way(vec![0.0; 4])), "give 5, one for each step"),
-        (changed(&|control| control.course = way(vec![f64::NAN; 5])), "a turn rate of NaN"),
-        (changed(&|control| control.course = way(vec![9.0; 5])), "a turn rate of 9"),
+        (changed(&|control| control.maneuver = profile(vec![0.0; 4])), "give 5, one for each step"),
+        (changed(&|control| control.maneuver = profile(vec![f64::NAN; 5])), "a turn rate of NaN"),
+        (changed(&|control| control.maneuver = profile(vec![9.0; 5])), "a turn rate of 9"),
         (
-            changed(&|control| control.course = way(vec![0.001; 5])),
-            "none of those that its actions",
+            changed(&|control| control.maneuver = profile(vec![0.001; 5])),
+            "those of none of its actions",
         ),
         ([good.clone(), good.clone()].concat(), "there are two of it"),
     ];
@@ -211,7 +211,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
     }
     let garbage = vec![(0, vec![0; 3])];
     let error = driven.submit_controls(&garbage).expect_err("refused").to_string();
-    assert!(error.contains("its bytes are none of a control"), "{error}");
+    assert!(error.contains("its bytes are no control"), "{error}");
     let mut direct = run("", FOUR);
     let error = direct.submit(Vec::new()).expect_err("refused").to_string();
     assert!(error.contains("one process decides for all"), "{error}");

@@ -49,40 +49,46 @@ fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
 /// Returns a packet that is well formed and says something else.
 fn forged(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (seal, message) = parse_packet::<Protocol>(payload, fingerprint).expect("a real packet");
-    PacketBuffer::from_bytes(&changed(message, draws)).into_packet(&seal)
+    let (header, message) = parse_packet::<Protocol>(payload, fingerprint).expect("a real packet");
+    PacketBuffer::from_bytes(&changed(message, draws)).into_packet(&header)
 }
 
 /// Returns a packet with a right message and a wrong head.
 fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (mut seal, message) =
+    let (mut header, message) =
         parse_packet::<Protocol>(payload, fingerprint).expect("a real packet");
-    let PacketHeader { conversation: talk, .. } = &mut seal;
+    let PacketHeader { conversation, .. } = &mut header;
     match draws.uniform_below(5) {
-        0 => talk.cycle = talk.cycle.wrapping_add(2 + u64::from(draws.uniform_below(1000))),
-        1 => talk.members ^= 1,
-        2 => seal.sender = draws.uniform_below(9) + 3,
-        3 => seal.fingerprint ^= 4,
-        _ => talk.cycle = u64::MAX,
+        0 => {
+            conversation.cycle =
+                conversation.cycle.wrapping_add(2 + u64::from(draws.uniform_below(1000)))
+        }
+        1 => conversation.members ^= 1,
+        2 => header.sender = draws.uniform_below(9) + 3,
+        3 => header.fingerprint ^= 4,
+        _ => conversation.cycle = u64::MAX,
     }
-    PacketBuffer::from_bytes(message).into_packet(&seal)
+    PacketBuffer::from_bytes(message).into_packet(&header)
 }
 
-/// Lets pilots talk in one cycle, and hands each of them `more` made of every packet before the packet itself.
-fn told_more(
+/// Runs the conversations of pilots in one cycle. Each receives, before every packet, what `more` makes of it. Returns
+/// the number of these additional packets.
+fn run_with_extra_packets(
     run: &AirspaceRun,
     pilots: &mut [Pilot],
     mut more: impl FnMut(&[u8]) -> Vec<u8>,
 ) -> u64 {
-    let (mut due, mut tick, mut told) = (VecDeque::new(), 0, 0);
-    for sight in run.percepts() {
-        let own = sight.own.id as usize;
-        pilots[own].start(sight, tick);
+    let mut due = VecDeque::new();
+    let mut tick = 0;
+    let mut extra_packets = 0;
+    for percept in run.percepts() {
+        let own = percept.own.id as usize;
+        pilots[own].start(percept, tick);
     }
     loop {
         for pilot in &mut *pilots {
-            for Packet { to, payload, .. } in pilot.take_packets() {
+            for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
                 due.extend(to.iter().map(|&other| (pilot.id(), other, payload.clone())));
             }
         }
@@ -92,11 +98,11 @@ fn told_more(
             let pilot = &mut pilots[to as usize];
             pilot.on_packet(from, &more(&payload), tick);
             pilot.on_packet(from, &payload, tick);
-            told += 1;
+            extra_packets += 1;
         }
         let timers = pilots.iter().filter_map(Pilot::next_timer).filter(|due| *due < u64::MAX);
         match (now, timers.min()) {
-            (0, None) => return told,
+            (0, None) => return extra_packets,
             (0, Some(next)) => tick = tick.max(next),
             _ => {}
         }
@@ -114,24 +120,26 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(902));
         let run = run(KINDS[kind], THREE);
-        let (mut alone, mut beset) = (TestPilots::from_run(&run), TestPilots::from_run(&run));
-        told_more(&run, &mut alone.pilots, <[u8]>::to_vec);
-        let told = told_more(&run, &mut beset.pilots, |payload| match is_damaged {
-            true => {
+        let mut alone = TestPilots::from_run(&run);
+        let mut disturbed = TestPilots::from_run(&run);
+        run_with_extra_packets(&run, &mut alone.pilots, <[u8]>::to_vec);
+        let extra_packets = run_with_extra_packets(&run, &mut disturbed.pilots, |payload| {
+            if is_damaged {
                 let mut bytes = payload.to_vec();
                 let at = draws.uniform_below(bytes.len() as u32) as usize;
                 bytes[at] ^= 1 << draws.uniform_below(8);
                 bytes
+            } else {
+                misplaced(payload, &mut draws)
             }
-            false => misplaced(payload, &mut draws),
         });
-        let refused: u64 = beset.pilots.iter().map(|pilot| pilot.drop_counts().total()).sum();
-        prop_assert!(told > 0);
-        prop_assert_eq!(refused, told, "each is counted");
-        for (found, expected) in beset.pilots.iter().zip(&alone.pilots) {
+        let refused: u64 = disturbed.pilots.iter().map(|pilot| pilot.drop_counts().total()).sum();
+        prop_assert!(extra_packets > 0);
+        prop_assert_eq!(refused, extra_packets, "each is counted");
+        for (found, expected) in disturbed.pilots.iter().zip(&alone.pilots) {
             let (found, expected) = (found.control(), expected.control());
-            let course = |control: &Option<Control>| control.as_ref().map(|one| one.course.clone());
-            prop_assert_eq!(course(&found), course(&expected));
+            let maneuver = |control: &Option<Control>| control.as_ref().map(|one| one.maneuver.clone());
+            prop_assert_eq!(maneuver(&found), maneuver(&expected));
         }
     }
 
@@ -142,27 +150,27 @@ proptest! {
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(903));
         let run = run(KINDS[kind], THREE);
-        let mut crew = TestPilots::from_run(&run);
+        let mut all = TestPilots::from_run(&run);
         let mut real = Vec::new();
-        told_more(&run, &mut crew.pilots, |payload| {
+        run_with_extra_packets(&run, &mut all.pilots, |payload| {
             real.push(payload.to_vec());
             forged(payload, &mut draws)
         });
         // The same again to pilots that hear nothing else, in any order.
-        let mut crew = TestPilots::from_run(&run);
-        let sights = run.percepts();
-        for sight in sights.iter().filter(|_| is_only) {
-            crew.pilots[sight.own.id as usize].start(sight.clone(), 0);
+        let mut all = TestPilots::from_run(&run);
+        let percepts = run.percepts();
+        for percept in percepts.iter().filter(|_| is_only) {
+            all.pilots[percept.own.id as usize].start(percept.clone(), 0);
         }
         for _ in 0..200 {
             let payload = &real[draws.uniform_below(real.len() as u32) as usize];
             let bytes = forged(payload, &mut draws);
             let from = EntityId::from(payload[28]);
             let to = (from as usize + 1 + draws.uniform_below(2) as usize) % 3;
-            crew.pilots[to].on_packet(from, &bytes, 1);
+            all.pilots[to].on_packet(from, &bytes, 1);
         }
-        for sight in sights {
-            crew.pilots[sight.own.id as usize].start(sight, 1);
+        for percept in percepts {
+            all.pilots[percept.own.id as usize].start(percept, 1);
         }
     }
 }
@@ -170,76 +178,76 @@ proptest! {
 #[test]
 fn who_floods_a_pilot_fills_no_memory() {
     let run = run("deployment = \"team\"", THREE);
-    let mut crew = TestPilots::from_run(&run);
-    let sight = run.percepts().swap_remove(0);
-    crew.pilots[0].start(sight.clone(), 0);
-    let seal = |cycle: Cycle, sequence: u32| PacketHeader {
+    let mut all = TestPilots::from_run(&run);
+    let percept = run.percepts().swap_remove(0);
+    all.pilots[0].start(percept.clone(), 0);
+    let header = |cycle: Cycle, sequence: u32| PacketHeader {
         fingerprint: run.world().fingerprint,
-        conversation: ConversationId::new(cycle, Protocol::Shield, &sight.members()),
+        conversation: ConversationId::new(cycle, Protocol::Shield, &percept.members()),
         sender: 1,
         sequence,
     };
     let large = vec![7; 1 << 18];
     for k in 0..100 {
-        let packet = PacketBuffer::from_bytes(&large).into_packet(&seal(u64::from(k) % 2, k));
-        crew.pilots[0].on_packet(1, &packet, 0);
+        let packet = PacketBuffer::from_bytes(&large).into_packet(&header(u64::from(k) % 2, k));
+        all.pilots[0].on_packet(1, &packet, 0);
     }
-    let refused = crew.pilots[0].drop_counts();
+    let refused = all.pilots[0].drop_counts();
     assert!(refused.get(DropReason::NoRoom) > 80, "{refused:?}");
-    let of_this = ConversationId::new(0, Protocol::Decision, &sight.members());
+    let of_this = ConversationId::new(0, Protocol::Decision, &percept.members());
     let packet = PacketBuffer::from_bytes(&large)
-        .into_packet(&PacketHeader { conversation: of_this, ..seal(0, 0) });
-    crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].drop_counts().get(DropReason::TooLarge), 1);
+        .into_packet(&PacketHeader { conversation: of_this, ..header(0, 0) });
+    all.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(all.pilots[0].drop_counts().get(DropReason::TooLarge), 1);
 }
 
 /// Each reason on its own.
 #[test]
-fn every_reason_is_told_from_the_others() {
+fn every_reason_differs_from_the_others() {
     let run = run("deployment = \"compact-team\"", THREE);
-    let mut crew = TestPilots::from_run(&run);
-    for sight in run.percepts() {
-        let own = sight.own.id as usize;
-        crew.pilots[own].start(sight, 0);
+    let mut all = TestPilots::from_run(&run);
+    for percept in run.percepts() {
+        let own = percept.own.id as usize;
+        all.pilots[own].start(percept, 0);
     }
-    let packet = crew.pilots[1].take_packets().swap_remove(0).payload;
-    let (seal, message) =
+    let packet = all.pilots[1].take_packets().swap_remove(0).payload;
+    let (header, message) =
         parse_packet::<Protocol>(&packet, run.world().fingerprint).expect("a real packet");
     let with = |change: &dyn Fn(&mut PacketHeader)| {
-        let mut seal = seal;
-        change(&mut seal);
-        PacketBuffer::from_bytes(message).into_packet(&seal)
+        let mut header = header;
+        change(&mut header);
+        PacketBuffer::from_bytes(message).into_packet(&header)
     };
     let bent = |at: usize, to: u8| {
         let mut bytes = packet.clone();
         bytes[at] = to;
         bytes
     };
-    let said = |bytes: &[u8]| PacketBuffer::from_bytes(bytes).into_packet(&seal);
+    let said = |bytes: &[u8]| PacketBuffer::from_bytes(bytes).into_packet(&header);
     let cases = [
         (packet[..43].to_vec(), DropReason::NoPacket),
         (bent(0, 0), DropReason::NoPacket),
         (bent(2, 9), DropReason::Version),
         (bent(60, 0xEE), DropReason::Damaged),
-        (with(&|seal| seal.fingerprint += 1), DropReason::Fingerprint),
-        (with(&|seal| seal.sender = 2), DropReason::Sender),
-        (with(&|seal| seal.conversation.members += 1), DropReason::OtherGroup),
-        (with(&|seal| seal.conversation.cycle = 7), DropReason::NoRoom),
+        (with(&|header| header.fingerprint += 1), DropReason::Fingerprint),
+        (with(&|header| header.sender = 2), DropReason::Sender),
+        (with(&|header| header.conversation.members += 1), DropReason::OtherGroup),
+        (with(&|header| header.conversation.cycle = 7), DropReason::NoRoom),
         (said(&[9, 9, 9]), DropReason::Unreadable),
         (said(&[message, &[0]].concat()), DropReason::Unreadable),
         // A message with a number beyond all possible ones.
         (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), DropReason::Unsound),
     ];
     for (bytes, why) in cases {
-        let before = crew.pilots[0].drop_counts();
-        crew.pilots[0].on_packet(1, &bytes, 0);
-        let after = crew.pilots[0].drop_counts();
+        let before = all.pilots[0].drop_counts();
+        all.pilots[0].on_packet(1, &bytes, 0);
+        let after = all.pilots[0].drop_counts();
         assert_eq!(
             (after.get(why), after.total()),
             (before.get(why) + 1, before.total() + 1),
             "{why:?}"
         );
     }
-    crew.pilots[0].on_packet(1, &packet, 0);
-    assert_eq!(crew.pilots[0].drop_counts().total(), 11, "the real one is taken");
+    all.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(all.pilots[0].drop_counts().total(), 11, "the real one is taken");
 }

@@ -12,21 +12,21 @@ enum PilotInput {
 }
 
 /// Lets pilots decide a cycle. The next input of any of them is drawn, so that packets overtake each other and some
-/// are in the second talk before others have begun the first.
-fn decided(pilots: &mut [Pilot], sights: Vec<Percept>, draws: &mut Draws) -> Vec<Control> {
-    let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
-    let mut due: Vec<(EntityId, PilotInput)> = sights
+/// are in the second conversation before others have begun the first.
+fn decided(pilots: &mut [Pilot], percepts: Vec<Percept>, draws: &mut Draws) -> Vec<Control> {
+    let ids: Vec<EntityId> = percepts.iter().map(|percept| percept.own.id).collect();
+    let mut due: Vec<(EntityId, PilotInput)> = percepts
         .into_iter()
-        .map(|sight| (sight.own.id, PilotInput::Sight(Box::new(sight))))
+        .map(|percept| (percept.own.id, PilotInput::Sight(Box::new(percept))))
         .collect();
     while !due.is_empty() {
         let (id, next) = due.swap_remove(draws.uniform_below(due.len() as u32) as usize);
         let pilot = &mut pilots[id as usize];
         match next {
-            PilotInput::Sight(sight) => pilot.start(*sight, 0),
+            PilotInput::Sight(percept) => pilot.start(*percept, 0),
             PilotInput::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
         }
-        for Packet { to, payload, .. } in pilot.take_packets() {
+        for OutgoingPacket { to, payload, .. } in pilot.take_packets() {
             due.extend(to.iter().map(|&other| (other, PilotInput::Packet(id, payload.clone()))));
         }
     }

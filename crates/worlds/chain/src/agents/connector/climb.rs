@@ -1,4 +1,4 @@
-//! A connector as the leader of its chain: it climbs the ladder of `motion::recovery`, motion after
+//! A connector as the leader of its chain: it climbs the ladder of `motion::recovery`, motion by
 //! motion.
 //!
 //! The ladder asks for the outcome of a motion and goes on at once; an agent has to wait for it. So
@@ -18,7 +18,7 @@ use sidestep_rods::{Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
 /// A leader's climb.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RecoveryProgress<const D: usize> {
-    wish: Intention<D>,
+    intention: Intention<D>,
     start: Point<D>,
     /// Answers so far.
     answers: Vec<LadderAnswer<D>>,
@@ -56,8 +56,8 @@ enum HaltReason<const D: usize> {
 }
 
 impl<const D: usize> RecoveryProgress<D> {
-    pub(super) fn new(wish: Intention<D>, start: Point<D>) -> Self {
-        Self { wish, start, answers: Vec::new(), waits: false, requests: 0 }
+    pub(super) fn new(intention: Intention<D>, start: Point<D>) -> Self {
+        Self { intention, start, answers: Vec::new(), waits: false, requests: 0 }
     }
 }
 
@@ -115,12 +115,12 @@ impl<const D: usize> ConnectorAgent<D> {
             return false;
         };
         climbing.waits = true;
-        let RecoveryProgress { wish, start, answers, .. } = &*climbing;
-        let mut ladder = RecoveryLadder { rungs: self.rungs, memory: wish.memory.clone() };
-        let motion = Motion::Connector { k: self.me as usize, to: wish.to.0 };
-        let request = Request { motion, source: wish.source, mode: VetoEffect::Exact };
+        let RecoveryProgress { intention, start, answers, .. } = &*climbing;
+        let mut ladder = RecoveryLadder { rungs: self.rungs, memory: intention.memory.clone() };
+        let motion = Motion::Connector { k: self.me as usize, to: intention.to.0 };
+        let request = Request { motion, source: intention.source, mode: VetoEffect::Exact };
         let mut replay = AnswerReplay { at: *start, answers: answers.iter() };
-        let climbed = ladder.climb_with(&mut replay, &request, &wish.situation);
+        let climbed = ladder.climb_with(&mut replay, &request, &intention.situation);
         let (climbed, objection) = match climbed {
             Ok(climbed) => climbed,
             Err(HaltReason::Asks(question)) => {
@@ -128,9 +128,9 @@ impl<const D: usize> ConnectorAgent<D> {
                 return true;
             }
             Err(HaltReason::Beyond) => {
-                let (by, reached) = (self.me as usize, replay.at);
-                let (reason, obstacle) = (VetoReason::Limit, None);
-                let veto = Veto { by, from: by, reason, obstacle, reached };
+                let by = self.me as usize;
+                let reason = VetoReason::Limit;
+                let veto = Veto { by, from: by, reason, obstacle: None, reached: replay.at };
                 (RecoveryOutcome::Vetoed(veto), Some(veto))
             }
         };
@@ -152,12 +152,14 @@ impl<const D: usize> ConnectorAgent<D> {
                     Motion::Connector { k, to } => (k as u32, to),
                     Motion::Rod { i, to } => (i as u32, to[0]),
                 };
-                let Intention { is_empty, is_open, .. } = climbing.wish;
-                let (request, source) = (climbing.requests, request.source);
+                let Intention { is_empty, is_open, .. } = climbing.intention;
+                let source = request.source;
+                let request = climbing.requests;
                 let order = LeadOrder { request, to, source, is_empty, is_open, only_asks };
-                match k == self.me {
-                    true => self.start_leading(order, None),
-                    false => self.send(self.far_side(), Message::Order(order)),
+                if k == self.me {
+                    self.start_leading(order, None);
+                } else {
+                    self.send(self.far_side(), Message::Order(order));
                 }
             }
         }
@@ -180,7 +182,7 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Takes the outcome of a motion that the ladder wanted.
     pub(super) fn receive_outcome(&mut self, outcome: Option<Outcome<D>>) {
-        let at = self.place.base;
+        let at = self.position.base;
         self.add_answer(
             outcome.map_or(LadderAnswer::Beyond, |outcome| LadderAnswer::Outcome(outcome, at)),
         );
@@ -197,7 +199,7 @@ impl<const D: usize> ConnectorAgent<D> {
                 self.start_leading(order, Some(from))
             }
             Message::AskEnd => {
-                let at = self.place.base;
+                let at = self.position.base;
                 let inward = self.beside[from].map(|track| track.base);
                 let ahead = inward.and_then(|inward| normalized(sub(at, inward)));
                 self.send(from, Message::End(WirePoint(at), ahead.map(WirePoint)));

@@ -1,15 +1,33 @@
-//! The clock of an agent, its packets on their way out, and the end of its cycle.
+//! The timers of an agent, its outgoing packets, and the end of its cycle.
 
-use super::{ConnectorAgent, OutgoingPacket};
+use super::ConnectorAgent;
 use crate::agents::control::{ConnectorMove, Control};
 use crate::agents::link::Link;
 use crate::agents::message::{MotionProtocol, Packet};
 use crate::agents::side::Side;
-use sidestep_kernel::network::{ConversationId, PacketHeader};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{
+    ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketHeader,
+};
+use std::sync::Arc;
 
-impl<const D: usize> ConnectorAgent<D> {
-    /// Looks at the clock: sends unconfirmed messages again, and gives up a neighbor that never confirms.
-    pub fn on_timer(&mut self, tick: u64) {
+impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
+    fn id(&self) -> EntityId {
+        self.first_id + self.me
+    }
+
+    /// Receives a packet. One that is not from a neighbor, cannot be read or is invalid is counted
+    /// and dropped.
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        self.now = self.now.max(tick);
+        let Err(why) = self.receive(from, bytes) else { return };
+        self.dropped.record(why);
+        // A packet that comes too late is of no use, and no sender's fault.
+        self.traffic.dropped += u64::from(why != DropReason::Stale);
+    }
+
+    /// Sends unconfirmed messages again, and gives up a neighbor that never confirms.
+    fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
         for side in Side::ALL {
             let link = self.links[side].as_mut().filter(|_| !self.is_silent);
@@ -23,6 +41,53 @@ impl<const D: usize> ConnectorAgent<D> {
         self.process();
     }
 
+    fn next_timer(&self) -> Option<u64> {
+        if self.is_done() {
+            return None;
+        }
+        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        links.filter_map(Link::next_retry).chain(self.deadline()).min()
+    }
+
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+        let Some(cycle) = self.cycle else { return Vec::new() };
+        if self.is_silent {
+            return Vec::new();
+        }
+        let mut out = Vec::new();
+        for side in Side::ALL {
+            let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
+            let missing = self.missing[side.other()];
+            let Some(parcel) =
+                self.links[side].as_mut().and_then(|link| link.next_parcel(self.now))
+            else {
+                continue;
+            };
+            let sequence = self.traffic.messages as u32;
+            let conversation =
+                ConversationId { cycle, topic: MotionProtocol, members: self.members };
+            let header = PacketHeader {
+                fingerprint: self.fingerprint,
+                conversation,
+                sender: self.id(),
+                sequence,
+            };
+            let payload = Packet { missing, parcel }.encode().into_packet(&header);
+            self.traffic.count(payload.len());
+            if let Some(link) = &mut self.links[side] {
+                link.record_packet(payload.len());
+            }
+            out.push(OutgoingPacket {
+                to: Arc::from([self.first_id + neighbor]),
+                sequence,
+                payload,
+            });
+        }
+        out
+    }
+}
+
+impl<const D: usize> ConnectorAgent<D> {
     /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
     fn end_cycle(&mut self) {
         for side in Side::ALL {
@@ -36,47 +101,12 @@ impl<const D: usize> ConnectorAgent<D> {
         self.is_closed = true;
     }
 
-    /// Returns the next tick in which it has to look at the clock, if there is one.
-    pub fn next_timer(&self) -> Option<u64> {
-        if self.is_done() {
-            return None;
-        }
-        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        links.filter_map(Link::next_retry).chain(self.deadline()).min()
-    }
-
     /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
     pub fn deadline(&self) -> Option<u64> {
         self.radio.map(|radio| self.began.saturating_add(radio.ticks))
     }
 
-    /// Returns the packets that it sends now.
-    pub fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
-        let mut out = Vec::new();
-        for side in Side::ALL {
-            let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
-            let missing = self.missing[side.other()];
-            let Some(parcel) =
-                self.links[side].as_mut().and_then(|link| link.next_parcel(self.now))
-            else {
-                continue;
-            };
-            let sequence = self.traffic.messages as u32;
-            let talk = ConversationId { cycle, topic: MotionProtocol, members: self.members };
-            let (fingerprint, sender) = (self.fingerprint, self.id());
-            let seal = PacketHeader { fingerprint, conversation: talk, sender, sequence };
-            let payload = Packet { missing, parcel }.encode().into_packet(&seal);
-            self.traffic.count(payload.len());
-            if let Some(link) = &mut self.links[side] {
-                link.record_size(payload.len());
-            }
-            out.push(OutgoingPacket { to: self.first_id + neighbor, sequence, payload });
-        }
-        out
-    }
-
-    /// Returns whether its cycle is over. It goes on answering questions.
+    /// Returns whether its cycle is over. It still answers questions of its neighbors.
     pub fn is_done(&self) -> bool {
         let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
         self.is_closed || self.is_over && links.all(Link::is_quiet)
@@ -87,9 +117,9 @@ impl<const D: usize> ConnectorAgent<D> {
         let cycle = self.cycle.filter(|_| self.is_done())?;
         let doubt = self.following.as_ref().filter(|following| following.has_consented);
         let goes = match (self.goes_in, doubt) {
-            (Some(request), _) => ConnectorMove::To { request, to: self.place.settled },
+            (Some(request), _) => ConnectorMove::To { request, to: self.position.settled },
             (None, Some(following)) => {
-                ConnectorMove::WithItsMaster { request: following.request, to: self.place.now }
+                ConnectorMove::WithItsMaster { request: following.request, to: self.position.now }
             }
             (None, None) => ConnectorMove::Stays,
         };

@@ -15,9 +15,9 @@ pub(super) struct SlaveMotion {
     pub(super) request: u32,
     sub_step: u32,
     master: Side,
-    /// Whether it has asked the connector beyond it,
+    /// Whether it has asked the connector beyond it.
     has_asked: bool,
-    /// and waits for the answer.
+    /// Whether it waits for the answer.
     waits: bool,
     /// Whether it has consented to the present sub-step.
     pub(super) has_consented: bool,
@@ -38,22 +38,23 @@ impl<const D: usize> ConnectorAgent<D> {
             self.accept_sub_step();
         }
         if let Some(master) = &mut self.beside[from] {
-            (master.base, master.now) = (prepare.mo, prepare.mn);
+            master.base = prepare.mo;
+            master.now = prepare.mn;
         }
         match self.reaction(from, rod, prepare) {
             Ok(reaction) => {
                 self.follow(from, prepare, &reaction, before.is_some_and(|f| f.has_asked));
             }
             Err(refusal) => {
-                self.place.revert();
+                self.position.revert();
                 self.following = before.map(|f| SlaveMotion { has_consented: false, ..f });
                 self.send_veto(from, refusal, LocalSolver::<D>::has_more_places(rod));
             }
         }
     }
 
-    /// Goes where its reaction takes it, and asks the next connector if that one has to react. It
-    /// may have asked that one in an earlier sub-step.
+    /// Moves as its reaction says, and asks the next connector if that one has to react. It may have asked that one in
+    /// an earlier sub-step.
     fn follow(
         &mut self,
         from: Side,
@@ -62,7 +63,7 @@ impl<const D: usize> ConnectorAgent<D> {
         had_asked: bool,
     ) {
         let Reaction { at, ends, rotated, has_others, has_turned } = *reaction;
-        self.place.now = at;
+        self.position.now = at;
         let onward = from.other();
         let asks = !ends && self.rods[onward].is_some();
         self.following = Some(SlaveMotion {
@@ -77,12 +78,17 @@ impl<const D: usize> ConnectorAgent<D> {
             has_turned,
         });
         if asks {
-            let (mo, mn, prev) = (self.place.base, at, Some(WirePoint(prepare.mn)));
-            let max_bend_rad = self.alone.max_bend_rad();
-            self.send(onward, Message::Prepare(Prepare { mo, mn, prev, max_bend_rad, ..*prepare }));
+            let next = Prepare {
+                mo: self.position.base,
+                mn: at,
+                prev: Some(WirePoint(prepare.mn)),
+                max_bend_rad: self.solver.max_bend_rad(),
+                ..*prepare
+            };
+            self.send(onward, Message::Prepare(next));
         } else {
-            let nobody = Consent { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
-            let consent = if ends { nobody } else { self.merged_consent(&nobody, rotated) };
+            let no_slaves = Consent { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
+            let consent = if ends { no_slaves } else { self.merged_consent(&no_slaves, rotated) };
             self.send(from, Message::Consent(consent));
         }
     }
@@ -103,7 +109,7 @@ impl<const D: usize> ConnectorAgent<D> {
             is_open: prepare.is_open,
             all_lengths: prepare.all_lengths,
         };
-        self.alone.react(self.place.base, rod, next, &self.obstacles, &pull)
+        self.solver.react(self.position.base, rod, next, &self.obstacles, &pull)
     }
 
     fn send_veto(&mut self, to: Side, refusal: PendingVeto, may_go_elsewhere: bool) {
@@ -115,11 +121,11 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Adds this connector's part to the sums of a consent.
     fn merged_consent(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
-        let way_m = distance(self.place.base, self.place.now);
+        let way_m = distance(self.position.base, self.position.now);
         Consent {
-            at: self.place.now,
+            at: self.position.now,
             touched: beyond.touched + 1,
-            changed: beyond.changed + u32::from(self.place.base != self.place.now),
+            changed: beyond.changed + u32::from(self.position.base != self.position.now),
             rotated: beyond.rotated + u32::from(rotated),
             longest_m: beyond.longest_m.max(way_m),
         }
@@ -129,8 +135,9 @@ impl<const D: usize> ConnectorAgent<D> {
     pub(super) fn on_consent(&mut self, from: Side, consent: &Consent<D>) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         if let Some(following) = waiting {
-            (following.waits, following.has_consented) = (false, true);
-            let (master, rotated) = (following.master, following.rotated);
+            following.waits = false;
+            following.has_consented = true;
+            let SlaveMotion { master, rotated, .. } = *following;
             self.record_neighbor(from, consent);
             let joined = self.merged_consent(consent, rotated);
             self.send(master, Message::Consent(joined));
@@ -145,14 +152,14 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Passes an objection on to its master, or to the motion that it leads. Where this connector could have
-    /// gone elsewhere, it is the search for a way that has ended.
+    /// Passes a veto on to its master, or to the motion that it leads. Where this connector had alternatives, the
+    /// reason is that the search for one has reached its limit.
     pub(super) fn on_veto(&mut self, from: Side, objection: VetoMessage) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         let Some(following) = waiting else { return self.receive_veto(from, &objection) };
         following.waits = false;
         let SlaveMotion { master, has_others, has_turned, .. } = *following;
-        self.place.revert();
+        self.position.revert();
         if let Some(beside) = &mut self.beside[from] {
             beside.revert();
         }
@@ -167,7 +174,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.send(master, Message::Object(objection));
     }
 
-    /// Goes, or stays where it was before the motion, and passes that on.
+    /// Carries out the motion, or returns to where it was before it, and passes that on.
     pub(super) fn on_settle(&mut self, from: Side, request: u32, goes: bool) {
         let is_its = |f: &mut SlaveMotion| {
             (f.request, f.master) == (request, from) && (f.has_consented || !goes)
@@ -179,22 +186,22 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Begins another motion, from the places where all are.
+    /// Begins another motion from the settled positions.
     pub(super) fn start_motion(&mut self) {
-        self.place.start();
+        self.position.start();
         self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.start()));
     }
 
     /// Accepts the present sub-step of a motion.
     pub(super) fn accept_sub_step(&mut self) {
-        self.place.accept();
+        self.position.accept();
         self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.accept()));
     }
 
     /// Ends a motion, which is carried out if it has a number here.
     pub(super) fn settle_motion(&mut self, request: Option<u32>) {
         let goes = request.is_some();
-        self.place.finish(goes);
+        self.position.finish(goes);
         self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.finish(goes)));
         self.goes_in = request.or(self.goes_in);
     }

@@ -1,5 +1,5 @@
-//! A connector as the initiator of one motion: sub-step after sub-step it asks both sides, and then
-//! says whether the motion is carried out.
+//! A connector as the initiator of one motion: in each sub-step it asks both sides, and at the end it
+//! sends whether the motion is carried out.
 
 use super::ConnectorAgent;
 use crate::agents::control::ExecutedMotion;
@@ -16,10 +16,11 @@ pub(super) struct LeadState<const D: usize> {
     /// The side from which the order came; none if it is its own.
     orderer: Option<Side>,
     from: Point<D>,
-    /// Number of sub-steps, and of the present one.
+    /// Number of sub-steps.
     n: usize,
+    /// The present sub-step, from 1.
     k: usize,
-    stage: LeadPhase,
+    phase: LeadPhase,
     has_asked: PerSide<bool>,
     moved: CompletedMotion<D>,
 }
@@ -51,8 +52,8 @@ impl<const D: usize> ConnectorAgent<D> {
     pub(super) fn start_leading(&mut self, order: LeadOrder<D>, orderer: Option<Side>) {
         self.start_motion();
         self.following = None;
-        let from = self.place.base;
-        let Ok(n) = self.alone.sub_steps(from, order.to, order.is_empty) else {
+        let from = self.position.base;
+        let Ok(n) = self.solver.sub_steps(from, order.to, order.is_empty) else {
             return self.send_outcome(orderer, None);
         };
         let me = self.me as usize;
@@ -64,23 +65,22 @@ impl<const D: usize> ConnectorAgent<D> {
             max_slave_step_m: 0.0,
             cut_short: None,
         };
-        let stage = match self.alone.may_lead(from, order.to) {
+        let phase = match self.solver.may_lead(from, order.to) {
             Ok(()) => LeadPhase::Step,
             Err(refusal) => LeadPhase::Object(self.own_veto(refusal)),
         };
         let has_asked = PerSide::default();
-        self.leading = Some(LeadState { order, orderer, from, n, k: 0, stage, has_asked, moved });
+        self.leading = Some(LeadState { order, orderer, from, n, k: 0, phase, has_asked, moved });
     }
 
     fn own_veto(&self, PendingVeto { reason, obstacle }: PendingVeto) -> VetoMessage {
-        let (has_turned, may_go_elsewhere) = (false, false);
-        VetoMessage { by: self.me, reason, obstacle, has_turned, may_go_elsewhere }
+        VetoMessage { by: self.me, reason, obstacle, has_turned: false, may_go_elsewhere: false }
     }
 
     /// Does the next thing in the motion that it leads; returns whether there was one to do.
     pub(super) fn advance_leading(&mut self) -> bool {
         let Some(mut leading) = self.leading.take() else { return false };
-        match leading.stage {
+        match leading.phase {
             LeadPhase::Wait(..) => {
                 self.leading = Some(leading);
                 return false;
@@ -89,32 +89,32 @@ impl<const D: usize> ConnectorAgent<D> {
             LeadPhase::Object(objection) => self.abort_lead(leading, &objection),
             LeadPhase::Step => {
                 leading.k += 1;
-                leading.stage = self.start_sub_step(&leading);
+                leading.phase = self.start_sub_step(&leading);
                 self.leading = Some(leading);
             }
             LeadPhase::Ask(side, lengths) => {
-                leading.stage = self.ask_side(&mut leading, side, lengths);
+                leading.phase = self.ask_side(&mut leading, side, lengths);
                 self.leading = Some(leading);
             }
         }
         true
     }
 
-    /// Goes on to a sub-step, which begins where the one before has led.
+    /// Starts a sub-step, which begins where the one before has ended.
     fn start_sub_step(&mut self, leading: &LeadState<D>) -> LeadPhase {
         let LeadState { order, from, n, k, .. } = leading;
         let to = if k == n { order.to } else { lerp(*from, order.to, *k as f64 / *n as f64) };
         self.accept_sub_step();
-        let at = self.place.base;
-        if self.alone.is_negligible(at, to) {
+        let at = self.position.base;
+        if self.solver.is_negligible(at, to) {
             return LeadPhase::Step;
         }
         if !order.is_open
-            && let Err(refusal) = self.alone.check_initiator(at, to, &self.obstacles)
+            && let Err(refusal) = self.solver.check_initiator(at, to, &self.obstacles)
         {
             return LeadPhase::Object(self.own_veto(refusal));
         }
-        self.place.now = to;
+        self.position.now = to;
         LeadPhase::Ask(Side::Above, LengthChoice::Own)
     }
 
@@ -134,10 +134,10 @@ impl<const D: usize> ConnectorAgent<D> {
         let prepare = Prepare {
             request: leading.order.request,
             sub_step: leading.k as u32,
-            mo: self.place.base,
-            mn: self.place.now,
+            mo: self.position.base,
+            mn: self.position.now,
             prev: other.map(|track| WirePoint(track.now)),
-            max_bend_rad: self.alone.max_bend_rad(),
+            max_bend_rad: self.solver.max_bend_rad(),
             is_open: leading.order.is_open,
             all_lengths: lengths == LengthChoice::All,
         };
@@ -145,23 +145,26 @@ impl<const D: usize> ConnectorAgent<D> {
         LeadPhase::Wait(side, lengths)
     }
 
-    /// Goes on after one side has consented.
+    /// Returns what follows the consent of one side.
     fn after_consent(&self, leading: &mut LeadState<D>, side: Side) -> LeadPhase {
         if side == Side::Above {
             return LeadPhase::Ask(Side::Below, LengthChoice::Own);
         }
         leading.moved.changed += 1;
-        let (me, touched) = (self.me as usize, &mut leading.moved.touched);
-        (touched.start, touched.end) = (touched.start.min(me), touched.end.max(me + 1));
+        let me = self.me as usize;
+        let touched = &mut leading.moved.touched;
+        touched.start = touched.start.min(me);
+        touched.end = touched.end.max(me + 1);
         LeadPhase::Step
     }
 
-    /// Takes the consent of one side to the motion that it leads; returns whether it waits for that.
+    /// Accepts the consent of one side to the motion that it leads; returns whether it waits for that.
     pub(super) fn receive_consent(&mut self, side: Side, consent: &Consent<D>) -> bool {
         let Some(mut leading) = self.leading.take() else { return false };
-        let waits = matches!(leading.stage, LeadPhase::Wait(from, _) if from == side);
+        let waits = matches!(leading.phase, LeadPhase::Wait(from, _) if from == side);
         if waits {
-            let (me, moved) = (self.me as usize, &mut leading.moved);
+            let me = self.me as usize;
+            let moved = &mut leading.moved;
             match side {
                 Side::Below => {
                     let first = me.saturating_sub(consent.touched as usize);
@@ -175,17 +178,17 @@ impl<const D: usize> ConnectorAgent<D> {
             moved.changed += consent.changed as usize;
             moved.rotated += consent.rotated as usize;
             moved.max_slave_step_m = moved.max_slave_step_m.max(consent.longest_m);
-            leading.stage = self.after_consent(&mut leading, side);
+            leading.phase = self.after_consent(&mut leading, side);
         }
         self.leading = Some(leading);
         waits
     }
 
-    /// Takes the objection of one side to the motion that it leads. If rods have turned, and could try other
+    /// Accepts the veto of one side to the motion that it leads. If rods have turned, and could try other
     /// lengths, that side is asked again.
     pub(super) fn receive_veto(&mut self, side: Side, objection: &VetoMessage) {
         let Some(leading) = &mut self.leading else { return };
-        let LeadPhase::Wait(from, lengths) = leading.stage else { return };
+        let LeadPhase::Wait(from, lengths) = leading.phase else { return };
         if from != side {
             return;
         }
@@ -193,10 +196,11 @@ impl<const D: usize> ConnectorAgent<D> {
         let repeats = lengths == LengthChoice::Own
             && has_turned
             && may_go_elsewhere
-            && self.alone.should_repeat();
-        leading.stage = match repeats {
-            true => LeadPhase::Ask(side, LengthChoice::All),
-            false => LeadPhase::Object(*objection),
+            && self.solver.should_repeat();
+        leading.phase = if repeats {
+            LeadPhase::Ask(side, LengthChoice::All)
+        } else {
+            LeadPhase::Object(*objection)
         };
     }
 
@@ -206,8 +210,11 @@ impl<const D: usize> ConnectorAgent<D> {
         let goes = !leading.order.only_asks;
         let touched = &leading.moved.touched;
         if goes && !touched.is_empty() {
-            let (first, last) = (touched.start as u32, touched.end as u32 - 1);
-            self.led = Some(ExecutedMotion { request: leading.order.request, first, last });
+            self.led = Some(ExecutedMotion {
+                request: leading.order.request,
+                first: touched.start as u32,
+                last: touched.end as u32 - 1,
+            });
         }
         self.send_settle(&leading, goes);
         self.send_outcome(leading.orderer, Some(Outcome::Moved(leading.moved)));
@@ -216,7 +223,9 @@ impl<const D: usize> ConnectorAgent<D> {
     /// Ends a motion to which a connector objects.
     fn abort_lead(&mut self, leading: LeadState<D>, objection: &VetoMessage) {
         let VetoMessage { by, reason, obstacle, .. } = *objection;
-        let (by, from, reached) = (by as usize, self.me as usize, self.place.base);
+        let by = by as usize;
+        let from = self.me as usize;
+        let reached = self.position.base;
         self.send_settle(&leading, false);
         let veto = Veto { by, from, reason, obstacle, reached };
         self.send_outcome(leading.orderer, Some(Outcome::Vetoed(veto)));
@@ -230,14 +239,14 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Breaks off the motion that it leads, if there is one: no connector moves.
+    /// Aborts the motion that it leads, if there is one: no connector moves.
     pub(super) fn give_up_leading(&mut self) {
         if let Some(leading) = self.leading.take() {
             self.send_settle(&leading, false);
         }
     }
 
-    /// Hands the outcome of a motion to its orderer.
+    /// Sends the outcome of a motion to the agent that ordered it.
     fn send_outcome(&mut self, orderer: Option<Side>, outcome: Option<Outcome<D>>) {
         match orderer {
             Some(side) => self.send(side, Message::Done(outcome)),

@@ -1,12 +1,13 @@
 //! Bytes that no agent sends: they are counted and dropped in any case, and never cause a panic.
 
 use super::{network, sights};
-use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol, OutgoingPacket};
+use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol};
 use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, Situation};
 use proptest::prelude::*;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::network::{
-    ConversationId, DropReason, PacketBuffer, PacketHeader, parse_packet,
+    ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketBuffer, PacketHeader,
+    parse_packet,
 };
 use sidestep_rods::geometry::Point;
 use sidestep_rods::serde_point::WirePoint;
@@ -58,7 +59,7 @@ fn packets() -> Vec<(u32, OutgoingPacket)> {
             return all;
         }
         for (from, out) in std::mem::take(&mut waiting) {
-            agents[out.to as usize].on_packet(from, &out.payload, 0);
+            agents[out.to[0] as usize].on_packet(from, &out.payload, 0);
             all.push((from, out));
         }
     }

@@ -5,6 +5,7 @@ use crate::scenario::ChainScenario;
 use crate::{ChainRun, chain_run};
 use serde_json::Value;
 use sidestep_kernel::control::ControlLog;
+use sidestep_kernel::network::NetworkAgent;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Digest, Simulation};
@@ -130,7 +131,7 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
                 let sent = agents[k].take_packets();
                 waiting.extend(sent.into_iter().map(|out| (agents[k].id(), out)));
                 while let Some((from, out)) = waiting.pop() {
-                    let to = (out.to - first) as usize;
+                    let to = (out.to[0] - first) as usize;
                     agents[to].on_packet(from, &out.payload, 0);
                     let sent = agents[to].take_packets();
                     waiting.extend(sent.into_iter().rev().map(|out| (agents[to].id(), out)));
@@ -166,7 +167,8 @@ fn hand_over(run: &mut ChainRun<2>) {
     talk_elsewhere(run, cycle);
     let mut controls = Vec::new();
     for (chain, first_id) in [(0, 0), (1, run.world().first_id(1))] {
-        let handed = run.state().body(chain).handed.clone().filter(|handed| handed.cycle == cycle);
+        let handed =
+            run.state().body(chain).submitted.clone().filter(|handed| handed.cycle == cycle);
         for (id, control) in (first_id..).zip(handed.into_iter().flat_map(|all| all.controls)) {
             let bytes = |one| postcard::to_stdvec(&one).expect("plain data");
             // Some come too late, and of some the process is gone.
@@ -254,7 +256,7 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
 fn hand_over_without(run: &mut ChainRun<2>, gone: &[u32]) {
     let cycle = run.cycle();
     talk_elsewhere(run, cycle);
-    let handed = run.state().body(0).handed.clone().expect("it has talked");
+    let handed = run.state().body(0).submitted.clone().expect("it has talked");
     let mut controls = Vec::new();
     for (id, control) in (0..).zip(handed.controls) {
         match control {
@@ -313,7 +315,7 @@ fn bytes_that_are_no_decision_are_refused_and_connectors_are_known_by_their_ids(
     assert!(refused(3, &[1, 2, 3]).contains("none of a decision of this build"));
     assert_eq!(world.read_control(0, 3, ChainControls::<2>::ABSENT_CONTROL), Ok(None));
     talk_elsewhere(&run, 0);
-    let handed = run.state().body(1).handed.clone().expect("it has talked");
+    let handed = run.state().body(1).submitted.clone().expect("it has talked");
     let control = handed.controls[3].clone().expect("a decision");
     let bytes = postcard::to_stdvec(&control).expect("plain data");
     assert_eq!(world.read_control(0, 11, &bytes), Ok(Some(control)));

@@ -1,6 +1,6 @@
-//! Convoys that are pulled through the pinned corridor.
+//! Chains that are pulled through the pinned corridor.
 
-use crate::fixtures::{clearance_m, convoy, corridor_line, corridor_walls};
+use crate::fixtures::{clearance_m, corridor_line, corridor_walls, straight_chain};
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{Obstacles, Outcome, Propagator, Request, Rod, Rotation, Rules};
 
@@ -15,7 +15,7 @@ struct Run {
     longest_slave_steps: f64,
 }
 
-/// Pulls a convoy along the middle of the corridor.
+/// Pulls a chain along the middle of the corridor.
 fn through_the_corridor(
     width_m: f64,
     followers: usize,
@@ -23,7 +23,7 @@ fn through_the_corridor(
     step_m: f64,
     rotation: Rotation,
 ) -> Run {
-    let mut chain = convoy(LEAD_M, followers, rod, 0.25);
+    let mut chain = straight_chain(LEAD_M, followers, rod, 0.25);
     let obstacles = Obstacles::new(corridor_walls(width_m), rod.max_m + 0.5).unwrap();
     let mut propagator = Propagator::new(Rules { rotation, ..Rules::default() });
     let mut run =

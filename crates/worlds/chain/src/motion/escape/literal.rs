@@ -1,8 +1,8 @@
-//! Escape by the slides' own method: one part after the other becomes the initiator of a motion.
+//! Escape by the slides' method: one part after the other becomes the initiator of a motion.
 //!
 //! Parts of the chain that are too near to an obstacle, the deepest first, go where no part gets
 //! deeper, and the chain follows by its rules. The slides set no limit to that. Here no connector,
-//! slaves included, is farther from its place at the start of the tick than its speed allows, and a
+//! slaves included, is farther from its position at the start of the tick than its speed allows, and a
 //! part that only this limit keeps from escaping is reported.
 
 use super::threat::{Nearness, Threat, collect, gap_m, nearness};
@@ -18,7 +18,7 @@ use sidestep_rods::{
 };
 use std::ops::Range;
 
-/// Leads parts out of the way one after the other.
+/// Escapes of one part after the other.
 #[derive(Debug, Clone)]
 pub(super) struct LiteralEscape<const D: usize> {
     rules: EscapeRules,
@@ -29,23 +29,28 @@ pub(super) struct LiteralEscape<const D: usize> {
     before: Vec<Point<D>>,
 }
 
-/// Distance by which a push goes beyond the depth, meters.
+/// Distance by which a push goes beyond the depth, meters, so that rounding leaves no violation.
 const PUSH_MARGIN_M: f64 = 1e-6;
-/// Least gain of a helpful motion, as a part of its length.
+/// Least gain of a helpful motion, as a fraction of its length.
 const MIN_GAIN: f64 = 0.05;
-/// Least motion of the point of contact, as a part of the way of a rod's end, for a helpful end.
+/// Least motion of the point of contact, as a fraction of the motion of a rod's end, for a helpful end.
 const MIN_LEVER: f64 = 0.1;
-/// Parts of the push that are tried, each in all directions.
+/// Fractions of the push that are tried, each in all directions.
 const PUSH_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.25];
 /// Directions that are tried, rad, from straight away to nearly across; the first of both signs
-/// leads off the obstacle's way.
+/// leads away from the obstacle's path.
 const PUSH_TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
 
 impl<const D: usize> LiteralEscape<D> {
-    /// Returns an escape that remembers nothing yet.
+    /// Returns an escape with empty buffers.
     pub(super) fn new(rules: EscapeRules) -> Self {
-        let (body, threats, vetoes, before) = Default::default();
-        Self { rules, body, threats, vetoes, before }
+        Self {
+            rules,
+            body: RodBvh::default(),
+            threats: Vec::new(),
+            vetoes: Vec::new(),
+            before: Vec::new(),
+        }
     }
 
     /// Moves the parts that are too near to a moving obstacle.
@@ -57,26 +62,26 @@ impl<const D: usize> LiteralEscape<D> {
         let reach_m = 2.0 * self.max_travel_m(tick);
         let within_m = |o: &Obstacle<D>| ahead.required_gap_m(o) + reach_m;
         collect(tick.chain, tick.obstacles, &mut self.body, within_m, &mut self.threats);
-        let mut told = EscapeReport::default();
+        let mut report = EscapeReport::default();
         if self.threats.is_empty() {
-            return Ok(told);
+            return Ok(report);
         }
         self.before.clear();
         self.before.extend_from_slice(tick.chain.points());
         let mut tries = self.rules.most / 2;
         if ahead != Margin::NONE {
-            self.relieve_round(tick, ahead, &mut tries, &mut told)?;
+            self.relieve_round(tick, ahead, &mut tries, &mut report)?;
         }
         tries += self.rules.most.div_ceil(2);
-        self.relieve_round(tick, Margin::NONE, &mut tries, &mut told)?;
-        self.report_trapped(tick, &mut told);
-        Ok(told)
+        self.relieve_round(tick, Margin::NONE, &mut tries, &mut report)?;
+        self.report_trapped(tick, &mut report);
+        Ok(report)
     }
 
     /// Returns the greatest distance from its start that a connector may have, or already has, meters.
     fn max_travel_m(&self, tick: &EscapeTick<'_, D>) -> f64 {
-        let ways_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
-        ways_m.fold(self.rules.max_step_m(), f64::max)
+        let distances_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
+        distances_m.fold(self.rules.max_step_m(), f64::max)
     }
 
     /// Relieves violations of one margin, the deepest first.
@@ -85,7 +90,7 @@ impl<const D: usize> LiteralEscape<D> {
         tick: &mut EscapeTick<'_, D>,
         margin: Margin,
         tries: &mut usize,
-        told: &mut EscapeReport<D>,
+        report: &mut EscapeReport<D>,
     ) -> Result<(), InputError> {
         self.vetoes.clear();
         self.measure_all(tick, margin);
@@ -96,14 +101,14 @@ impl<const D: usize> LiteralEscape<D> {
             match self.relieve(tick, deepest)? {
                 Ok(touched) => {
                     self.measure(tick, &touched);
-                    told.moves += 1;
+                    report.moves += 1;
                     let Threat { part, mover, .. } = self.threats[deepest];
                     let obstacle = tick.obstacles.moving()[mover].id;
-                    told.first = told.first.or(Some((part.connector(), obstacle)));
+                    report.first = report.first.or(Some((part.connector(), obstacle)));
                 }
                 Err(veto) => {
-                    told.vetoes += 1;
-                    told.capped += usize::from(veto.reason == VetoReason::StepLimit);
+                    report.vetoes += 1;
+                    report.capped += usize::from(veto.reason == VetoReason::StepLimit);
                     self.threats[deepest].given_up = true;
                     self.vetoes.push((self.threats[deepest], veto));
                 }
@@ -128,10 +133,11 @@ impl<const D: usize> LiteralEscape<D> {
         }
     }
 
-    /// Returns the deepest violation; of equals the first by part and obstacle.
+    /// Returns the deepest violation; of equals the first by part and obstacle, so that the order of the list does not
+    /// matter.
     fn deepest(&self) -> Option<usize> {
         let order = |&a: &usize, &b: &usize| {
-            let (a, b) = (&self.threats[a], &self.threats[b]);
+            let [a, b] = [a, b].map(|k| &self.threats[k]);
             a.depth_m.total_cmp(&b.depth_m).then((b.part, b.mover).cmp(&(a.part, a.mover)))
         };
         (0..self.threats.len())
@@ -140,8 +146,8 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if no motion
-    /// works: then every bit is as before. A base that objects is led back to its place by a return pass, so the
-    /// elbows of an arm get out of the way too.
+    /// works: then every bit is as before. A base that vetoes is led back to its position by a return pass, so that
+    /// the elbows of an arm escape, too.
     fn relieve(
         &mut self,
         tick: &mut EscapeTick<'_, D>,
@@ -150,7 +156,7 @@ impl<const D: usize> LiteralEscape<D> {
         let threat = self.threats[which];
         let mover = tick.obstacles.moving()[threat.mover];
         let near = nearness(tick.chain, threat.part, &mover);
-        let mut why = no_agent_veto(tick.chain, threat.part, mover.id);
+        let mut best_veto = no_agent_veto(tick.chain, threat.part, mover.id);
         for (k, lever) in movable_connectors(tick.chain, threat.part, &near).into_iter().flatten() {
             let push_m =
                 ((threat.depth_m + PUSH_MARGIN_M) / lever).min(self.max_distance_m(tick, k));
@@ -158,14 +164,14 @@ impl<const D: usize> LiteralEscape<D> {
                 let to = add_scaled(tick.chain.points()[k], way, push_m);
                 match self.attempt(tick, which, k, to)? {
                     Ok(touched) => return Ok(Ok(touched)),
-                    // If the speed limit was the only obstacle, that is more informative than any other
+                    // A veto by the speed limit is kept: it is more informative than any other
                     // reason.
-                    Err(veto) if why.reason != VetoReason::StepLimit => why = veto,
+                    Err(veto) if best_veto.reason != VetoReason::StepLimit => best_veto = veto,
                     Err(_) => (),
                 }
             }
         }
-        Ok(Err(why))
+        Ok(Err(best_veto))
     }
 
     /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
@@ -226,18 +232,17 @@ impl<const D: usize> LiteralEscape<D> {
         })
     }
 
-    /// Returns an objection if a motion did not bring the part farther away, or brought another as
-    /// deep.
+    /// Returns a veto if a motion did not bring the part farther away, or brought another as deep.
     fn check_gain(
         &self,
         tick: &EscapeTick<'_, D>,
         touched: &Range<usize>,
         which: usize,
         k: usize,
-        way_m: f64,
+        distance_m: f64,
     ) -> Option<Veto<D>> {
         let depth_m = self.threats[which].depth_m;
-        let bound_m = depth_m - MIN_GAIN * way_m.min(depth_m);
+        let bound_m = depth_m - MIN_GAIN * distance_m.min(depth_m);
         // Untouched parts are as deep as before.
         let all = self.threats.iter().enumerate();
         let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
@@ -251,18 +256,18 @@ impl<const D: usize> LiteralEscape<D> {
         })
     }
 
-    fn report_trapped(&mut self, tick: &EscapeTick<'_, D>, told: &mut EscapeReport<D>) {
+    fn report_trapped(&mut self, tick: &EscapeTick<'_, D>, report: &mut EscapeReport<D>) {
         self.measure_all(tick, Margin::NONE);
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
-        told.deepest_m = threat.depth_m;
+        report.deepest_m = threat.depth_m;
         let veto = self
             .vetoes
             .iter()
             .find(|(t, _)| (t.part, t.mover) == (threat.part, threat.mover))
             .map(|(_, veto)| *veto);
         let obstacle = tick.obstacles.moving()[threat.mover].id;
-        told.left = Some(TrappedPart { part: threat.part, obstacle, veto });
+        report.left = Some(TrappedPart { part: threat.part, obstacle, veto });
     }
 }
 
@@ -270,8 +275,8 @@ fn threat_depth<const D: usize>(tick: &EscapeTick<'_, D>, threat: &Threat) -> f6
     threat.margin_m - gap_m(tick.chain, threat.part, &tick.obstacles.moving()[threat.mover])
 }
 
-/// Returns the connectors that may move for a part, and the share of their way that the point of
-/// contact moves: for a rod the end nearer to the contact, then the other.
+/// Returns the connectors that may move for a part, and the fraction of their motion that the point of
+/// contact makes: for a rod the end nearer to the contact, then the other.
 fn movable_connectors<const D: usize>(
     chain: &Chain<D>,
     part: ChainPart,
@@ -288,14 +293,14 @@ fn movable_connectors<const D: usize>(
     ends.map(|end| end.filter(may_move))
 }
 
-/// Returns the objection of a part without a connector that may move.
+/// Returns the veto of a part without a connector that may move.
 fn no_agent_veto<const D: usize>(chain: &Chain<D>, part: ChainPart, obstacle: u32) -> Veto<D> {
     let (ChainPart::Connector(k) | ChainPart::Rod(k)) = part;
     let reason = if chain.connectors()[k].failed { VetoReason::Failed } else { VetoReason::Fixed };
     make_veto(chain, k, reason, obstacle)
 }
 
-/// Returns the ways that are tried, as parts of the push: all of it in every direction, then half.
+/// Returns the displacements that are tried, as fractions of the push: all of it in every direction, then half.
 fn push_directions<const D: usize>(
     away: Point<D>,
     velocity: Point<D>,
@@ -313,7 +318,7 @@ fn push_directions<const D: usize>(
     PUSH_FRACTIONS.into_iter().flat_map(all)
 }
 
-/// Returns directions across `away`, to turn it toward: the first off the obstacle's way.
+/// Returns directions perpendicular to `away` to turn it toward: the first away from the obstacle's path.
 fn turn_planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
     let off = normalized(velocity)
         .map(|v| add_scaled(away, v, -dot(away, v)))
@@ -331,8 +336,12 @@ fn cross_product<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
 
 /// Returns the point of a ball around `center` that is nearest to `to`.
 fn clamp_to_ball<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
-    let way_m = distance(center, to);
-    if way_m <= radius_m { to } else { add_scaled(center, sub(to, center), radius_m / way_m) }
+    let distance_m = distance(center, to);
+    if distance_m <= radius_m {
+        to
+    } else {
+        add_scaled(center, sub(to, center), radius_m / distance_m)
+    }
 }
 
 fn make_veto<const D: usize>(

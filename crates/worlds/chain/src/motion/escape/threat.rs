@@ -37,8 +37,9 @@ pub(super) struct Threat {
     pub(super) part: ChainPart,
     /// Index among [`Obstacles::moving`].
     pub(super) mover: usize,
-    /// The free space required around the obstacle, meters, and the depth of the part in it, as last measured.
+    /// The free space required around the obstacle, meters.
     pub(super) margin_m: f64,
+    /// Depth of the part in that space, as last measured, meters.
     pub(super) depth_m: f64,
     /// Whether it could not be relieved.
     pub(super) given_up: bool,
@@ -49,8 +50,8 @@ pub(super) struct Threat {
 pub(super) struct Nearness<const D: usize> {
     /// Distance of the surfaces, meters; negative if they overlap.
     pub(super) gap_m: f64,
-    /// Unit vector from the obstacle to the part. If the cores overlap it is across the obstacle's
-    /// way, to its left.
+    /// Unit vector from the obstacle to the part. If the cores overlap it is perpendicular to the obstacle's velocity,
+    /// to its left.
     pub(super) away: Point<D>,
     /// Position on the rod: 0 at its first end, 1 at its second.
     pub(super) along_rod: f64,
@@ -89,7 +90,7 @@ fn part_body<const D: usize>(chain: &Chain<D>, part: ChainPart) -> ([Point<D>; 2
     }
 }
 
-/// Returns the direction across the way of an obstacle, to its left.
+/// Returns the direction perpendicular to the velocity of an obstacle, to its left.
 pub(super) fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
     perpendicular(normalized(mover.velocity_m_s).unwrap_or(first_axis()))
 }
@@ -108,22 +109,24 @@ pub(super) fn collect<const D: usize>(
     }
     let n_rods = chain.rods().len();
     body.rebuild((0..n_rods).map(|i| rod_box(chain, i)));
-    // Parts of other chains are among the moving obstacles, but chains do not flee from them.
+    // Parts of other chains are among the moving obstacles, but chains do not escape from them: both stay in their
+    // claims, and two that escaped from each other would push each other away for ever.
     let movers = obstacles.moving().iter().enumerate();
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
-        let mut look = |part: ChainPart| {
+        let mut check = |part: ChainPart| {
             if gap_m(chain, part, mover) < within_m {
-                let (margin_m, depth_m, given_up) = Default::default();
-                threats.push(Threat { part, mover: k, margin_m, depth_m, given_up });
+                let threat =
+                    Threat { part, mover: k, margin_m: 0.0, depth_m: 0.0, given_up: false };
+                threats.push(threat);
             }
         };
         body.visit(&mover.bounds().grown(within_m), |rod| {
-            look(ChainPart::Connector(rod));
-            look(ChainPart::Rod(rod));
+            check(ChainPart::Connector(rod));
+            check(ChainPart::Rod(rod));
         });
         // The last connector starts no rod.
-        look(ChainPart::Connector(n_rods));
+        check(ChainPart::Connector(n_rods));
     }
 }
 

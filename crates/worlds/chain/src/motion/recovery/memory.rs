@@ -1,4 +1,4 @@
-//! The memory of a ladder from tick to tick.
+//! The memory of a recovery ladder from tick to tick.
 
 use super::RecoveryLimits;
 use serde::{Deserialize, Serialize};
@@ -8,15 +8,16 @@ use sidestep_rods::geometry::Point;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-/// Size of a place for the guard against going to and fro: cells of 0.1 m, and 16 headings.
+/// Side of the cells in which visits are counted, meters, to detect that an initiator moves to and fro.
 const CELL_M: f64 = 0.1;
+/// Number of headings that count as different visits to a cell.
 const HEADINGS: f64 = 16.0;
-/// Number of remembered places.
+/// Number of remembered visits; the oldest is forgotten.
 const MAX_VISITS: usize = 64;
-/// Approach to the goal, as a part of a cell, that counts as progress.
+/// Approach to the goal, as a fraction of a cell, that counts as progress.
 const MIN_PROGRESS_FRACTION: f64 = 0.1;
 
-/// An initiator's position on the ladder.
+/// An initiator's memory of its ladder.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RecoveryMemory {
     /// The side of the last good turn: 1 left, -1 right, 0 unknown; and its plane.
@@ -62,8 +63,8 @@ impl RecoveryMemory {
         if self.side == 0 { 1 } else { self.side }
     }
 
-    /// Notes the distance of the goal. Coming a cell nearer than ever before is progress, after
-    /// which failed rungs may be tried again.
+    /// Records the distance of the goal. Coming a cell nearer than ever before is progress, after
+    /// which the other end may lead again.
     pub(super) fn record_goal(&mut self, goal_m: Option<f64>) {
         let Some(goal_m) = goal_m else { return };
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
@@ -77,7 +78,7 @@ impl RecoveryMemory {
         self.pulling_back > 0
     }
 
-    /// Notes a motion as wanted, to which nothing could object.
+    /// Records a motion as wanted that nothing could veto.
     pub(crate) fn record_free_motion(
         &mut self,
         source: RequestSource,
@@ -110,7 +111,8 @@ impl RecoveryMemory {
     }
 
     pub(super) fn reset_failures(&mut self) {
-        (self.turns, self.waits) = (0, 0);
+        self.turns = 0;
+        self.waits = 0;
     }
 
     /// Counts a detour through a place; returns the number of times without progress.
@@ -134,7 +136,8 @@ impl RecoveryMemory {
         visit.times
     }
 
-    /// Counts a tick in which the other end led. After the last, the other side is tried first.
+    /// Counts a tick in which the other end led. After the last, the other side is tried first, because this one has
+    /// led to a dead end.
     pub(super) fn record_pull_back(&mut self) {
         self.pulling_back -= 1;
         if self.pulling_back == 0 {

@@ -37,7 +37,7 @@ fn read_map(
         return Err(source.error(
             section.span(),
             cause,
-            "leave it out, or name an image as `file`",
+            "leave it out, or give an image as `file`",
         ));
     }
     let box_size_m = s.box_size_m.map_or(0.25, f64::from);

@@ -29,7 +29,7 @@ pub(super) fn radio_remark(file: &RobotsFile) -> Option<Remark> {
         behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.get_ref().as_str()))
     };
     let is_idle = file.radio.is_some() && !file.robots.0.iter().any(speaks);
-    is_idle.then(|| Remark::note("radio", "nobody speaks: no robot has a behavior that broadcasts"))
+    is_idle.then(|| Remark::note("radio", "has no effect: no robot has a behavior that broadcasts"))
 }
 
 /// Refuses effectors that were learned for boxes of another size: a slip of a box is another length

@@ -253,7 +253,7 @@ impl FlowFieldBuilder<'_, '_> {
         }
         let cause = format!("a robot of {size} x {size} boxes fits nowhere in {rect:?}");
         let remedy =
-            "name a region with free boxes; its boxes stand for the robot's lower-left box";
+            "give a region with free boxes; its boxes stand for the robot's lower-left box";
         Err(compiler.source.error(self.span.clone(), cause, remedy))
     }
 }

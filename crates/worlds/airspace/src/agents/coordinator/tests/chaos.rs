@@ -124,19 +124,20 @@ impl Group {
     }
 
     pub(super) fn is_done(&self) -> bool {
-        (0..self.hosts.len()).all(|k| !self.is_alive[k] || self.hosts[k].ship.is_done())
+        (0..self.hosts.len()).all(|k| !self.is_alive[k] || self.hosts[k].services.is_done())
     }
 
     /// Returns the epochs of the coordinators that are on hosts which are alive.
-    pub(super) fn aboard(&self) -> Vec<Epoch> {
+    pub(super) fn is_here(&self) -> Vec<Epoch> {
         let alive = (0..self.hosts.len()).filter(|&k| self.is_alive[k]);
-        let seats = alive.map(|k| &self.hosts[k].seats[0]).filter(|seat| seat.is_hosting());
-        seats.map(|seat| seat.accepted.epoch).collect()
+        let replicas =
+            alive.map(|k| &self.hosts[k].replicas[0]).filter(|replica| replica.is_hosting());
+        replicas.map(|replica| replica.accepted.epoch).collect()
     }
 
     /// Returns whether a majority has accepted an epoch and no newer one.
     pub(super) fn is_accepted(&self, epoch: Epoch) -> bool {
-        let accepts = |host: &CoordinatorHost<TestCoordinator>| host.seats[0].promised == epoch;
+        let accepts = |host: &CoordinatorHost<TestCoordinator>| host.replicas[0].promised == epoch;
         is_majority(&self.hosts.iter().map(accepts).collect::<Vec<_>>())
     }
 }
@@ -177,11 +178,11 @@ fn one_rules(group: usize, rounds: u8, faults: Faults) -> Result<(), TestCaseErr
     while !group.is_done() {
         prop_assert!(group.tick < 60_000, "somebody waits forever");
         prop_assert!(group.step(), "nothing happens any more");
-        let aboard = group.aboard();
-        for (k, epoch) in aboard.iter().enumerate() {
-            prop_assert!(!aboard[..k].contains(epoch), "two coordinators of {epoch:?}");
+        let is_here = group.is_here();
+        for (k, epoch) in is_here.iter().enumerate() {
+            prop_assert!(!is_here[..k].contains(epoch), "two coordinators of {epoch:?}");
         }
-        let ruling = aboard.iter().filter(|epoch| group.is_accepted(**epoch)).count();
+        let ruling = is_here.iter().filter(|epoch| group.is_accepted(**epoch)).count();
         prop_assert!(ruling <= 1, "{ruling} coordinators are accepted by majorities");
     }
     Ok(())

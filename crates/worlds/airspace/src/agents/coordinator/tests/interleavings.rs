@@ -58,8 +58,8 @@ impl SystemState {
         whole
     }
 
-    fn hotel(&self, k: usize) -> &TestHost {
-        &self.hosts[k].ship
+    fn services(&self, k: usize) -> &TestHost {
+        &self.hosts[k].services
     }
 
     /// Collects the messages that a host has sent, and notes the epoch that it has accepted.
@@ -72,7 +72,7 @@ impl SystemState {
             self.flights.extend(flights.map(|to| (k, to, bytes.to_vec())));
         }
         self.flights.sort_unstable();
-        let promised = self.hosts[k].seats[0].promised;
+        let promised = self.hosts[k].replicas[0].promised;
         self.accepted.entry(promised).or_insert([false; GROUP])[k] = true;
     }
 
@@ -134,31 +134,34 @@ impl SystemState {
     }
 
     /// Returns the epochs of the coordinators that are on hosts which are alive.
-    fn aboard(&self) -> Vec<Epoch> {
-        let seats = (0..GROUP).filter(|&k| self.is_alive[k]).map(|k| &self.hosts[k].seats[0]);
-        seats.filter(|seat| seat.is_hosting()).map(|seat| seat.accepted.epoch).collect()
+    fn is_here(&self) -> Vec<Epoch> {
+        let replicas = (0..GROUP).filter(|&k| self.is_alive[k]).map(|k| &self.hosts[k].replicas[0]);
+        replicas
+            .filter(|replica| replica.is_hosting())
+            .map(|replica| replica.accepted.epoch)
+            .collect()
     }
 
     /// Returns whether a majority has accepted an epoch and no newer one; those that have crashed
     /// count as they were.
     fn is_accepted(&self, epoch: Epoch) -> bool {
         let have: Vec<bool> =
-            self.hosts.iter().map(|host| host.seats[0].promised == epoch).collect();
+            self.hosts.iter().map(|host| host.replicas[0].promised == epoch).collect();
         is_majority(&have)
     }
 
     /// Checks all that must hold at any time.
     fn check(&self) {
-        let aboard = self.aboard();
-        for (k, epoch) in aboard.iter().enumerate() {
-            assert!(!aboard[..k].contains(epoch), "two coordinators of {epoch:?}");
+        let is_here = self.is_here();
+        for (k, epoch) in is_here.iter().enumerate() {
+            assert!(!is_here[..k].contains(epoch), "two coordinators of {epoch:?}");
         }
-        let rule = aboard.iter().filter(|epoch| self.is_accepted(**epoch)).count();
+        let rule = is_here.iter().filter(|epoch| self.is_accepted(**epoch)).count();
         assert!(rule <= 1, "{rule} coordinators are accepted by majorities");
         for k in 0..GROUP {
-            if let Some(epoch) = self.hotel(k).told {
+            if let Some(epoch) = self.services(k).concluded {
                 let had = self.accepted.get(&epoch);
-                assert!(had.is_some_and(|had| is_majority(had)), "{k} was told by {epoch:?}");
+                assert!(had.is_some_and(|had| is_majority(had)), "{k} has a result of {epoch:?}");
             }
         }
     }
@@ -166,17 +169,17 @@ impl SystemState {
     /// Checks that no host goes back to an older epoch.
     fn check_after(&self, before: &Self) {
         for (now, then) in self.hosts.iter().zip(&before.hosts) {
-            assert!(now.seats[0].promised >= then.seats[0].promised);
+            assert!(now.replicas[0].promised >= then.replicas[0].promised);
         }
     }
 
     /// Checks the end: every living host has ended, and with a control if a majority is alive.
     fn check_end(&self) {
         for k in (0..GROUP).filter(|&k| self.is_alive[k]) {
-            let hotel = self.hotel(k);
-            assert!(hotel.is_done(), "{k} waits forever");
+            let services = self.services(k);
+            assert!(services.is_done(), "{k} waits forever");
             if is_majority(&self.is_alive) {
-                assert!(hotel.told.is_some(), "{k} is cut off, and a majority is alive");
+                assert!(services.concluded.is_some(), "{k} is cut off, and a majority is alive");
             }
         }
     }
@@ -192,25 +195,25 @@ impl SystemState {
         let mut bytes = Vec::with_capacity(512);
         let mut add = |piece: &dyn erased::Plain| piece.write(&mut bytes);
         for k in 0..GROUP {
-            add(&(self.is_alive[k], self.hotel(k).is_rested, self.hotel(k).is_cut_off));
-            add(&self.hotel(k).told);
-            let (seat, now) = (&self.hosts[k].seats[0], self.tick);
+            add(&(self.is_alive[k], self.services(k).is_rested, self.services(k).is_cut_off));
+            add(&self.services(k).concluded);
+            let (replica, now) = (&self.hosts[k].replicas[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
-            add(&(seat.promised, seat.newest, seat.accepted, seat.candidate_number));
-            add(&(left(seat.election_timeout()), left(seat.quiet_until)));
-            add(&seat.unanswering);
-            add(&seat.copy.as_ref().map(|copy| (copy.at, copy.state.to_vec())));
-            match &seat.role {
+            add(&(replica.promised, replica.newest, replica.accepted, replica.candidate_number));
+            add(&(left(replica.election_timeout()), left(replica.quiet_until)));
+            add(&replica.unanswering);
+            add(&replica.copy.as_ref().map(|copy| (copy.at, copy.state.to_vec())));
+            match &replica.role {
                 ReplicaRole::Idle => add(&0u8),
                 ReplicaRole::Hosting(stay) => {
                     add(&(1u8, left(stay.heartbeat_at), left(stay.timeout_at)));
                     add(&stay.coordinator);
                 }
-                ReplicaRole::Sending { to, tries_left, due, beat_at } => {
-                    add(&(2u8, *to, *tries_left, left(*due), left(*beat_at)));
+                ReplicaRole::Sending { to, tries_left, due, heartbeat_at } => {
+                    add(&(2u8, *to, *tries_left, left(*due), left(*heartbeat_at)));
                 }
                 ReplicaRole::Candidate(one) => {
-                    add(&(3u8, &one.asks, one.lost, one.tries_left, left(one.due)));
+                    add(&(3u8, &one.request, one.lost, one.tries_left, left(one.due)));
                     add(&(&one.votes, &one.heard));
                 }
             }
@@ -227,7 +230,7 @@ impl SystemState {
     }
 }
 
-/// Values that are told apart by their serialized form.
+/// Values that differ if their serialized forms do.
 mod erased {
     use serde::Serialize;
 

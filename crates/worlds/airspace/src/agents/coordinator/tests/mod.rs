@@ -26,7 +26,7 @@ struct TestCoordinator {
 enum TestTask {
     Visit(u8),
     Return,
-    Tell(u8),
+    Deliver(u8),
 }
 
 /// A host of tourists.
@@ -35,12 +35,12 @@ struct TestHost {
     me: usize,
     group: usize,
     rounds: u8,
-    /// Whether the tourist that is here has had a rest: it stays until anything happens.
+    /// Whether the coordinator that is here has waited: it stays until anything happens.
     is_rested: bool,
-    /// Whether tourists need no rest here.
+    /// Whether coordinators do not wait here.
     is_restless: bool,
-    /// The epoch of the one that has told it how it was.
-    told: Option<Epoch>,
+    /// The epoch of the coordinator that has delivered the result.
+    concluded: Option<Epoch>,
     is_cut_off: bool,
 }
 
@@ -56,21 +56,21 @@ impl HostServices for TestHost {
 
 impl TestHost {
     fn is_done(&self) -> bool {
-        self.told.is_some() || self.is_cut_off
+        self.concluded.is_some() || self.is_cut_off
     }
 }
 
 impl TestCoordinator {
     /// Returns the next host from number `k` on, without those that cannot be reached.
-    fn next(&self, k: u8, hotel: &TestHost) -> Option<u8> {
-        let stays = |place: usize| place == hotel.me || self.unreachable[place];
-        (k..hotel.group as u8).find(|&place| !stays(place.into()))
+    fn next(&self, k: u8, services: &TestHost) -> Option<u8> {
+        let stays = |place: usize| place == services.me || self.unreachable[place];
+        (k..services.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(&mut self, hotel: &TestHost, here: &HostContext<'_>) -> CoordinatorStep {
+    fn hop(&mut self, services: &TestHost, context: &HostContext<'_>) -> CoordinatorStep {
         loop {
             match self.task {
-                TestTask::Visit(k) => match self.next(k, hotel) {
+                TestTask::Visit(k) => match self.next(k, services) {
                     Some(next) => {
                         self.task = TestTask::Visit(next);
                         return CoordinatorStep::Hop(next.into());
@@ -78,17 +78,20 @@ impl TestCoordinator {
                     None => self.task = TestTask::Return,
                 },
                 TestTask::Return => {
-                    let home = usize::from(here.epochs[0].owner);
-                    if home != hotel.me {
+                    let home = usize::from(context.epochs[0].owner);
+                    if home != services.me {
                         return CoordinatorStep::Hop(home);
                     }
                     self.rounds_left = self.rounds_left.saturating_sub(1);
-                    self.task =
-                        if self.rounds_left > 0 { TestTask::Visit(0) } else { TestTask::Tell(0) };
+                    self.task = if self.rounds_left > 0 {
+                        TestTask::Visit(0)
+                    } else {
+                        TestTask::Deliver(0)
+                    };
                 }
-                TestTask::Tell(k) => match self.next(k, hotel) {
+                TestTask::Deliver(k) => match self.next(k, services) {
                     Some(next) => {
-                        self.task = TestTask::Tell(next);
+                        self.task = TestTask::Deliver(next);
                         return CoordinatorStep::Hop(next.into());
                     }
                     None => return CoordinatorStep::Done,
@@ -101,31 +104,31 @@ impl TestCoordinator {
 impl MigratingCoordinator for TestCoordinator {
     type Services = TestHost;
 
-    fn new(hotel: &TestHost, _: usize) -> Self {
-        let unreachable = vec![false; hotel.group];
-        Self { rounds_left: hotel.rounds, task: TestTask::Visit(0), unreachable }
+    fn new(services: &TestHost, _: usize) -> Self {
+        let unreachable = vec![false; services.group];
+        Self { rounds_left: services.rounds, task: TestTask::Visit(0), unreachable }
     }
 
     fn encode(&self) -> Vec<u8> {
         postcard::to_stdvec(self).expect("plain data")
     }
 
-    fn decode(bytes: &[u8], hotel: &TestHost, _: usize) -> Result<Self, InvalidMessage> {
+    fn decode(bytes: &[u8], services: &TestHost, _: usize) -> Result<Self, InvalidMessage> {
         let read: Self = postcard::from_bytes(bytes).map_err(|_| InvalidMessage::Form)?;
-        InvalidMessage::Length.unless(read.unreachable.len() == hotel.group)?;
+        InvalidMessage::Length.unless(read.unreachable.len() == services.group)?;
         Ok(read)
     }
 
-    fn advance(&mut self, hotel: &mut TestHost, here: &HostContext<'_>) -> CoordinatorStep {
-        if !hotel.is_restless && !std::mem::replace(&mut hotel.is_rested, true) {
+    fn advance(&mut self, services: &mut TestHost, context: &HostContext<'_>) -> CoordinatorStep {
+        if !services.is_restless && !std::mem::replace(&mut services.is_rested, true) {
             return CoordinatorStep::Stay;
         }
-        self.unreachable[hotel.me] = false;
-        let step = self.hop(hotel, here);
-        if matches!(self.task, TestTask::Tell(_)) {
-            hotel.told.get_or_insert(here.epochs[0]);
+        self.unreachable[services.me] = false;
+        let step = self.hop(services, context);
+        if matches!(self.task, TestTask::Deliver(_)) {
+            services.concluded.get_or_insert(context.epochs[0]);
         }
-        hotel.is_rested = false;
+        services.is_rested = false;
         step
     }
 
@@ -134,7 +137,7 @@ impl MigratingCoordinator for TestCoordinator {
     }
 
     fn is_done_without(&self, place: usize) -> bool {
-        let TestTask::Tell(k) = self.task else { return false };
+        let TestTask::Deliver(k) = self.task else { return false };
         (usize::from(k)..self.unreachable.len()).all(|k| k == place || self.unreachable[k])
     }
 }
@@ -147,8 +150,15 @@ fn hosts(
     miss_ticks: u64,
 ) -> Vec<CoordinatorHost<TestCoordinator>> {
     let host = |me: usize| {
-        let (is_rested, is_restless, told, is_cut_off) = (false, false, None, false);
-        let hotel = TestHost { me, group, rounds, is_rested, is_restless, told, is_cut_off };
+        let services = TestHost {
+            me,
+            group,
+            rounds,
+            is_rested: false,
+            is_restless: false,
+            concluded: None,
+            is_cut_off: false,
+        };
         let expected = vec![true; group];
         let rules = HostConfig {
             group,
@@ -157,7 +167,7 @@ fn hosts(
             expected,
             election_timeout_ticks: miss_ticks,
         };
-        CoordinatorHost::new(hotel, &[(0..group).collect()], rules)
+        CoordinatorHost::new(services, &[(0..group).collect()], rules)
     };
     (0..group).map(host).collect()
 }

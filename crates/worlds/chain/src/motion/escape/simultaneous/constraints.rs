@@ -1,4 +1,4 @@
-//! The laws that every motion keeps, in any case.
+//! The hard constraints, which every motion keeps.
 
 use super::super::threat::ChainPart;
 use super::contacts::{Contacts, nearest};
@@ -44,19 +44,19 @@ impl BendConstraint {
     }
 }
 
-/// Part by which corrected bends stay below their limits.
+/// Fraction by which corrected bends stay below their limits.
 const BEND_MARGIN: f64 = 1e-6;
-/// Rounding of ways, meters.
+/// Rounding of displacements, meters.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Places that are checked.
+/// Positions that are checked.
 pub(super) struct Constraints<'a, 'b, const D: usize> {
-    pub(super) given: &'a SolveInput<'b, D>,
+    pub(super) input: &'a SolveInput<'b, D>,
     pub(super) points: &'a [Point<D>],
 }
 
 impl<const D: usize> Constraints<'_, '_, D> {
-    /// Returns whether all laws hold.
+    /// Returns whether all hard constraints hold.
     pub(super) fn are_met(&self, contacts: &Contacts<D>, bends: &[BendConstraint]) -> bool {
         self.are_lengths_met()
             && self.are_travels_met()
@@ -67,7 +67,7 @@ impl<const D: usize> Constraints<'_, '_, D> {
             && contacts.walls.iter().all(|wall| {
                 let to = ends(self.points, wall.part);
                 let apart_m = wall.core.nearest_to_segment(to).distance_m;
-                let from = ends(self.given.chain.points(), wall.part);
+                let from = ends(self.input.chain.points(), wall.part);
                 apart_m >= wall.keep_m - TOLERANCE_M
                     && Sweep { from, to }.is_clear(&wall.core, wall.keep_m)
             })
@@ -75,17 +75,18 @@ impl<const D: usize> Constraints<'_, '_, D> {
 
     fn are_lengths_met(&self) -> bool {
         let ways = self.points.windows(2).map(|w| distance(w[0], w[1]));
-        ways.zip(self.given.chain.rods()).all(|(length_m, rod)| {
+        ways.zip(self.input.chain.rods()).all(|(length_m, rod)| {
             let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
             allowed.contains(&length_m)
         })
     }
 
     fn are_travels_met(&self) -> bool {
-        let SolveInput { chain, start, .. } = *self.given;
+        let SolveInput { chain, start, .. } = *self.input;
         self.points.iter().enumerate().all(|(k, p)| {
-            let (connector, was) = (&chain.connectors()[k], chain.points()[k]);
-            distance(start[k], *p) <= self.given.max_travel_m(k) + ROUNDING_M
+            let connector = &chain.connectors()[k];
+            let was = chain.points()[k];
+            distance(start[k], *p) <= self.input.max_travel_m(k) + ROUNDING_M
                 && connector.mobility.allows(*p, was)
                 && (!connector.is_still() || *p == was)
         })

@@ -46,7 +46,7 @@ impl<const D: usize> Contacts<D> {
         collect(chain, obstacles, &mut self.body, within_m, &mut self.threats);
     }
 
-    /// Collects walls and own parts that connectors may reach on a way of `way_m`.
+    /// Collects walls and own parts that connectors may reach with a displacement of `way_m`.
     pub(super) fn find_nearby(
         &mut self,
         chain: &Chain<D>,
@@ -58,7 +58,8 @@ impl<const D: usize> Contacts<D> {
         self.walls.clear();
         self.pairs.clear();
         for part in parts(chain) {
-            let (ends, radius_m) = (ends(chain.points(), part), radius_m(chain, part));
+            let ends = ends(chain.points(), part);
+            let radius_m = radius_m(chain, part);
             obstacles.visit(&Bounds::from_points(&ends).grown(radius_m + reach_m), |o| {
                 let apart_m = o.core.nearest_to_segment(ends).distance_m;
                 let touch_m = radius_m + o.radius_m;
@@ -97,7 +98,7 @@ impl<const D: usize> Contacts<D> {
     }
 }
 
-/// Distance within which a body is a contact, as a multiple of the way of a connector.
+/// Distance within which a body is a contact, as a multiple of a connector's longest displacement.
 const CONTACT_RANGE_FACTOR: f64 = 4.0;
 
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + use<D> {

@@ -1,9 +1,9 @@
-//! A way out for parts that are caught.
+//! Exits for parts that are caught.
 //!
-//! A part between two obstacles that close like tongs, or of a chain that others hold taut, gets
-//! out only through an obstacle, and the sooner the better. The ways that are tried: through any
-//! obstacle that touches the chain, in some directions. Each is rolled out on the chain around the
-//! place, with obstacles going straight on, and the one with the least time inside is taken.
+//! A part between two obstacles that close like tongs, or of a chain that others hold taut, can
+//! leave only through an obstacle, and the sooner the better. Candidates lead through any obstacle that
+//! touches the chain, in some directions. Each is rolled out on the connectors around the contact,
+//! with obstacles at constant velocity, and the one with the least time inside is taken.
 
 use super::super::EscapeRules;
 use super::super::threat::{ChainPart, gap_m};
@@ -19,11 +19,11 @@ use sidestep_rods::geometry::{
 use std::f64::consts::FRAC_PI_6;
 use std::ops::RangeInclusive;
 
-/// A chain's memory of its way out of where it was caught, and of how its leader keeps it out.
+/// A chain's plan to leave an obstacle that caught a part of it, and its leader's choice to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EscapePlan {
     passing: Option<ActiveExit>,
-    /// Ticks until another way may be looked for.
+    /// Ticks until the next search for an exit.
     pause: u32,
     /// Whether its leader rests.
     rests: bool,
@@ -35,13 +35,13 @@ struct ActiveExit {
     toward: [f64; 3],
 }
 
-/// Ticks from one choice of a way to the next.
+/// Ticks from one choice of an exit to the next: rollouts in every tick would take too long.
 const CHOICE_INTERVAL_TICKS: u32 = 4;
-/// Distance at which a chain is in danger: another way is looked for, meters.
+/// Gap below which a chain is in danger and an exit is searched for, meters.
 const DANGER_DISTANCE_M: f64 = 0.12;
-/// Most work of a choice: ticks of roll-outs times connectors in them.
+/// Limit on the work of a choice: ticks of rollouts times connectors in them.
 const MAX_WORK: usize = 100_000;
-/// Connectors to either side of those in contact that roll-outs take along.
+/// Connectors to either side of those in contact that rollouts include.
 const SIDE_CONNECTORS: usize = 12;
 
 impl EscapePlan {
@@ -50,22 +50,22 @@ impl EscapePlan {
         *self == Self::default()
     }
 
-    /// Returns whether the chain is on its way through an obstacle.
+    /// Returns whether the chain is leaving through an obstacle.
     pub(super) fn is_exiting(&self) -> bool {
         self.passing.is_some()
     }
 
-    /// Returns whether the chain's leader rests, to keep it out.
+    /// Returns whether the chain's leader rests, to keep the chain outside obstacles.
     pub(crate) fn is_resting(&self) -> bool {
         self.rests
     }
 
-    /// Remembers whether the leader rests.
+    /// Records whether the leader rests.
     pub(crate) fn set_resting(&mut self, rests: bool) {
         self.rests = rests;
     }
 
-    /// Forgets the way out of a chain with no obstacle near.
+    /// Forgets the exit of a chain with no obstacle near.
     pub(super) fn clear(&mut self) {
         *self = Self { rests: self.rests, ..Self::default() };
     }
@@ -79,22 +79,22 @@ impl EscapePlan {
             .map(|p| ExitDirection { obstacle: p.obstacle, toward: with_dimensions(p.toward) })
     }
 
-    /// Ends a way once no part is near the obstacle.
+    /// Ends an exit once no part is near the obstacle.
     pub(super) fn clear_if_passed<const D: usize>(
         &mut self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         solver: &EscapeSolver<D>,
     ) {
-        if self.exit_direction().is_some_and(|through| solver.has_passed(given, &through)) {
+        if self.exit_direction().is_some_and(|through| solver.has_passed(input, &through)) {
             self.passing = None;
         }
     }
 
-    /// Looks for the best way out; returns whether it is another than before.
+    /// Searches for the best exit; returns whether it is another than before.
     pub(super) fn plan<const D: usize>(
         &mut self,
         rules: &EscapeRules,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         solver: &EscapeSolver<D>,
         gap_m: f64,
     ) -> bool {
@@ -102,18 +102,19 @@ impl EscapePlan {
             return false;
         }
         self.pause = CHOICE_INTERVAL_TICKS;
-        let around = endangered_connectors(given, solver);
-        let Some(stage) = Rollout::cut(rules, given, around) else { return false };
+        let around = endangered_connectors(input, solver);
+        let Some(rollout) = Rollout::cut(rules, input, around) else { return false };
         let now = self.exit_direction();
-        let mut left = stage.ticks_for(MAX_WORK);
-        let cost_now = stage.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
+        let mut left = rollout.ticks_for(MAX_WORK);
+        let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
+        // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
         let mut best = (IMPROVEMENT_FACTOR * cost_now - 0.5, now);
-        for way in std::iter::once(None).chain(exit_candidates(given, solver).into_iter().map(Some))
+        for way in std::iter::once(None).chain(exit_candidates(input, solver).into_iter().map(Some))
         {
             if left == 0 {
                 break;
             }
-            let cost = stage.cost(&RolloutOptions::with_exit(way), best.0, &mut left);
+            let cost = rollout.cost(&RolloutOptions::with_exit(way), best.0, &mut left);
             if cost < best.0 {
                 best = (cost, way);
             }
@@ -125,25 +126,25 @@ impl EscapePlan {
     }
 }
 
-/// Returns the ways through the obstacles that touch the chain.
+/// Returns the exits through the obstacles that touch the chain.
 fn exit_candidates<const D: usize>(
-    given: &SolveInput<'_, D>,
+    input: &SolveInput<'_, D>,
     solver: &EscapeSolver<D>,
 ) -> Vec<ExitDirection<D>> {
     let mut ways = Vec::new();
     let threats = &solver.contacts.threats;
-    for (k, mover) in given.obstacles.moving().iter().enumerate() {
+    for (k, mover) in input.obstacles.moving().iter().enumerate() {
         let near = threats.iter().filter(|t| t.mover == k);
-        let gaps = near.map(|t| (gap_m(given.chain, t.part, mover), t.part));
+        let gaps = near.map(|t| (gap_m(input.chain, t.part, mover), t.part));
         let Some((gap_m, part)) = gaps.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
         if gap_m < 2.0 * DANGER_DISTANCE_M {
-            let nearest = mover.core.nearest_to_segment(ends(given.chain.points(), part));
+            let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), part));
             let through = scaled(direction_away(mover, &nearest), -1.0);
             let way = |toward| ExitDirection { obstacle: mover.id, toward };
             ways.push(exit_directions(through, mover.velocity_m_s).into_iter().map(way));
         }
     }
-    // Of each obstacle in turn, because there may be more than time allows.
+    // In turn of each obstacle, because the limit on the work may end the search before the last candidate.
     let mut all = Vec::new();
     while ways.iter().any(|ways| ways.len() > 0) {
         all.extend(ways.iter_mut().filter_map(Iterator::next));
@@ -151,7 +152,7 @@ fn exit_candidates<const D: usize>(
     all
 }
 
-/// Returns the directions that are tried: straight through, against the obstacle's way, between
+/// Returns the directions that are tried: straight through, against the obstacle's velocity, between
 /// the two, and around.
 fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) -> Vec<Point<D>> {
     let mut all = vec![through];
@@ -175,12 +176,12 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
     all
 }
 
-/// Returns the connectors of the chain around what is in danger.
+/// Returns the connectors of the chain around those in danger.
 fn endangered_connectors<const D: usize>(
-    given: &SolveInput<'_, D>,
+    input: &SolveInput<'_, D>,
     solver: &EscapeSolver<D>,
 ) -> RangeInclusive<usize> {
-    let SolveInput { chain, obstacles, .. } = *given;
+    let SolveInput { chain, obstacles, .. } = *input;
     let near = |mover: usize, part: ChainPart| {
         gap_m(chain, part, &obstacles.moving()[mover]) < 2.0 * DANGER_DISTANCE_M
     };

@@ -1,17 +1,17 @@
 //! Escape by a simultaneous solve of all constraints of a tick.
 //!
 //! ```text
-//! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold in any case
-//! way_out.rs     help for parts that are caught: roll-outs of ways through an obstacle
-//! leading.rs     the leader's choice before any part is caught: roll-outs of going on and of resting
-//! stage.rs       where roll-outs are made
-//! posture.rs     positions under trial
+//! solve.rs          new positions of all parts: contacts.rs, lengths.rs, and the hard constraints.rs
+//! escape_plan.rs    exits for parts that are caught: rollouts of motions through an obstacle
+//! leader_choice.rs  the leader's choice before any part is caught: rollouts of its motion and of resting
+//! rollout.rs        copies of a part of the chain on which motions are tried
+//! posture.rs        positions under trial
 //! ```
 //!
-//! One part that flees alone is held by its neighbors, which are not asked to move. Here all of them
-//! move, own parts push each other, and approaching obstacles are avoided by a margin as wide as their
-//! way in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
-//! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
+//! One part that escapes alone is held by its neighbors, which are not asked to move. Here all of them
+//! move, parts of the chain push each other, and approaching obstacles are avoided by a margin as wide as the
+//! distance that they travel in the look-ahead. If a part is caught all the same, because obstacles close like tongs
+//! or the chain is taut, it leaves through one of them, by the exit that rollouts find shortest.
 
 mod constraints;
 mod contacts;
@@ -37,7 +37,7 @@ use solve::EscapeSolver;
 pub(crate) use solve_input::LeadMotion;
 use solve_input::{ExitDirection, SoftConstraints, SolveInput};
 
-/// Leads all parts of a chain out of the way at once. It owns its buffers.
+/// Escapes of all parts of a chain at once. It owns its buffers.
 #[derive(Debug, Clone)]
 pub(super) struct SimultaneousEscape<const D: usize> {
     rules: EscapeRules,
@@ -46,56 +46,56 @@ pub(super) struct SimultaneousEscape<const D: usize> {
     start: Vec<Point<D>>,
 }
 
-/// Most steps of a tick, each at most as long as the thinnest part, so that no body is jumped over.
+/// Most steps of a tick, each at most as long as the thinnest part, so that no obstacle is tunneled through.
 const MAX_STEPS: f64 = 8.0;
 /// Rounds of a solve with margins, and rounds without.
 const ROUNDS: [usize; 2] = [24, 40];
-/// Part of its speed from which on a chain counts as pressed.
+/// Fraction of its maximum speed from which on a chain counts as pressed.
 const PRESSED_SPEED_FRACTION: f64 = 0.9;
 /// Penetration that counts as contact, meters.
 const TOUCH_M: f64 = 1e-9;
 
 impl<const D: usize> SimultaneousEscape<D> {
-    /// Returns an escape that remembers nothing yet.
+    /// Returns an escape with empty buffers.
     pub(super) fn new(rules: EscapeRules) -> Self {
         Self { rules, solver: EscapeSolver::default(), best: Vec::new(), start: Vec::new() }
     }
 
-    /// Moves the chain out of the way.
+    /// Moves the chain away from moving obstacles.
     pub(super) fn escape(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
         rules: &Rules,
         start: &[Point<D>],
-        way_out: &mut EscapePlan,
+        escape_plan: &mut EscapePlan,
     ) -> EscapeReport<D> {
         let thinnest_m = 4.0 * chain.step_m();
         let most_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (most_m / thinnest_m).ceil().max(1.0);
-        let mut told = EscapeReport::default();
-        way_out.tick();
+        let mut report = EscapeReport::default();
+        escape_plan.tick();
         for step in 1..=steps as usize {
             let most_m = most_m * step as f64 / steps;
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
-            let given = SolveInput { chain, obstacles, rules, start: &at, most_m };
-            let goes_on = self.find_step(&given, way_out, &mut told);
-            if goes_on {
+            let input = SolveInput { chain, obstacles, rules, start: &at, most_m };
+            let has_moved = self.find_step(&input, escape_plan, &mut report);
+            if has_moved {
                 chain.points_mut().copy_from_slice(&self.best);
             }
             self.start = at;
-            if !goes_on || told.left.is_none() {
+            if !has_moved || report.left.is_none() {
                 break;
             }
         }
         let ways_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
         let longest_m = ways_m.fold(0.0, f64::max);
-        told.is_pressed = told.left.is_some()
-            || way_out.is_exiting()
+        report.is_pressed = report.left.is_some()
+            || escape_plan.is_exiting()
             || longest_m > PRESSED_SPEED_FRACTION * most_m;
-        told
+        report
     }
 
     /// Returns whether a leader should rest.
@@ -107,51 +107,51 @@ impl<const D: usize> SimultaneousEscape<D> {
         lead: &LeadMotion<D>,
     ) -> bool {
         let most_m = self.rules.max_step_m();
-        let given = SolveInput { chain, obstacles, rules, start: chain.points(), most_m };
-        should_rest(&self.rules, &given, lead)
+        let input = SolveInput { chain, obstacles, rules, start: chain.points(), most_m };
+        should_rest(&self.rules, &input, lead)
     }
 
-    /// Finds the places of one step, in `best`; returns whether there are any.
+    /// Finds the positions of one step, in `best`; returns whether any part moves.
     fn find_step(
         &mut self,
-        given: &SolveInput<'_, D>,
-        way_out: &mut EscapePlan,
-        told: &mut EscapeReport<D>,
+        input: &SolveInput<'_, D>,
+        escape_plan: &mut EscapePlan,
+        report: &mut EscapeReport<D>,
     ) -> bool {
         let margin = self.rules.look_ahead_margin();
-        if !self.solver.find_contacts(given, margin) {
-            way_out.clear();
+        if !self.solver.find_contacts(input, margin) {
+            escape_plan.clear();
             return false;
         }
-        way_out.clear_if_passed(given, &self.solver);
-        let (before_m, nearest) = self.solver.min_gap(given, given.chain.points());
-        if before_m >= margin_around(given, margin, nearest) && !way_out.is_exiting() {
+        escape_plan.clear_if_passed(input, &self.solver);
+        let (before_m, nearest) = self.solver.min_gap(input, input.chain.points());
+        if before_m >= margin_around(input, margin, nearest) && !escape_plan.is_exiting() {
             return false;
         }
-        let mut gap_m = self.attempt(given, way_out.exit_direction(), before_m);
-        if way_out.plan(&self.rules, given, &self.solver, gap_m) {
-            gap_m = self.attempt(given, way_out.exit_direction(), before_m);
+        let mut gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
+        if escape_plan.plan(&self.rules, input, &self.solver, gap_m) {
+            gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
         }
-        self.report(given, gap_m, nearest, told)
+        self.report(input, gap_m, nearest, report)
     }
 
     /// Solves with the margins of the look-ahead and, if that leaves a part inside, without; the
     /// better one is in `best`. Returns its least gap, meters; the present one if nothing is better.
     fn attempt(
         &mut self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         through: Option<ExitDirection<D>>,
         before_m: f64,
     ) -> f64 {
         self.best.clear();
-        self.best.extend_from_slice(given.chain.points());
-        // On the way through an obstacle depth is no measure.
+        self.best.extend_from_slice(input.chain.points());
+        // On the way out through an obstacle a part gets deeper first, so depth is no measure.
         let mut best_m = if through.is_some() { f64::NEG_INFINITY } else { before_m };
         for margin in [self.rules.look_ahead_margin(), Margin::NONE] {
-            if !self.solver.solve(given, &SoftConstraints { margin, through, rounds: ROUNDS }) {
+            if !self.solver.solve(input, &SoftConstraints { margin, through, rounds: ROUNDS }) {
                 continue;
             }
-            let (gap_m, _) = self.solver.min_gap(given, &self.solver.points);
+            let (gap_m, _) = self.solver.min_gap(input, &self.solver.points);
             if gap_m > best_m || gap_m >= -TOUCH_M {
                 best_m = gap_m;
                 self.best.copy_from_slice(&self.solver.points);
@@ -165,30 +165,32 @@ impl<const D: usize> SimultaneousEscape<D> {
 
     fn report(
         &self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         gap_m: f64,
         nearest: Option<Threat>,
-        told: &mut EscapeReport<D>,
+        report: &mut EscapeReport<D>,
     ) -> bool {
-        let moved = self.best != given.chain.points();
+        let moved = self.best != input.chain.points();
         if let Some(threat) = nearest.filter(|_| moved) {
-            told.moves = 1;
-            let obstacle = given.obstacles.moving()[threat.mover].id;
-            told.first = told.first.or(Some((threat.part.connector(), obstacle)));
+            report.moves = 1;
+            let obstacle = input.obstacles.moving()[threat.mover].id;
+            report.first = report.first.or(Some((threat.part.connector(), obstacle)));
         }
-        (told.deepest_m, told.left) = (0.0, None);
-        let deepest = self.solver.min_gap(given, &self.best).1;
+        report.deepest_m = 0.0;
+        report.left = None;
+        let deepest = self.solver.min_gap(input, &self.best).1;
         if let Some(threat) = deepest.filter(|_| gap_m < -TOUCH_M) {
             let k = threat.part.connector();
-            let goes_m = distance(given.start[k], self.best[k]);
-            let is_capped = goes_m > PRESSED_SPEED_FRACTION * given.most_m;
-            (told.vetoes, told.capped) = (1, usize::from(is_capped));
+            let goes_m = distance(input.start[k], self.best[k]);
+            let is_capped = goes_m > PRESSED_SPEED_FRACTION * input.most_m;
+            report.vetoes = 1;
+            report.capped = usize::from(is_capped);
             let reason = if is_capped { VetoReason::StepLimit } else { VetoReason::Inside };
-            let obstacle = given.obstacles.moving()[threat.mover].id;
+            let obstacle = input.obstacles.moving()[threat.mover].id;
             let reached = self.best[k];
             let veto = Veto { by: k, from: k, reason, obstacle: Some(obstacle), reached };
-            told.deepest_m = -gap_m;
-            told.left = Some(TrappedPart { part: threat.part, obstacle, veto: Some(veto) });
+            report.deepest_m = -gap_m;
+            report.left = Some(TrappedPart { part: threat.part, obstacle, veto: Some(veto) });
         }
         moved
     }
@@ -196,10 +198,10 @@ impl<const D: usize> SimultaneousEscape<D> {
 
 /// Returns the margin around the obstacle of a threat, meters.
 fn margin_around<const D: usize>(
-    given: &SolveInput<'_, D>,
+    input: &SolveInput<'_, D>,
     margin: Margin,
     threat: Option<Threat>,
 ) -> f64 {
-    let mover = threat.map(|threat| &given.obstacles.moving()[threat.mover]);
+    let mover = threat.map(|threat| &input.obstacles.moving()[threat.mover]);
     mover.map_or(0.0, |mover| margin.required_gap_m(mover))
 }

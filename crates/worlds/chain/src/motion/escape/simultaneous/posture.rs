@@ -1,4 +1,4 @@
-//! Positions under trial, and the ease with which each gives way.
+//! Positions under trial, with the inverse masses by which corrections are shared, as in position-based dynamics.
 
 use super::super::threat::ChainPart;
 use sidestep_rods::geometry::{Point, add_scaled};
@@ -14,25 +14,26 @@ pub(super) struct TrialPosture<'a, const D: usize> {
 #[derive(Clone, Copy)]
 pub(super) struct PartPoint {
     pub(super) part: ChainPart,
-    /// Its place on a rod, from 0 to 1.
+    /// Its position on a rod, from 0 to 1.
     pub(super) along_rod: f64,
 }
 
-/// Ease below which a part counts as held.
+/// Inverse mass below which a part counts as held.
 const MIN_INVERSE_MASS: f64 = 1e-9;
 
 impl<const D: usize> TrialPosture<'_, D> {
-    /// Returns the ends of a part; for a connector its place twice.
+    /// Returns the ends of a part; for a connector its position twice.
     pub(super) fn ends(&self, part: ChainPart) -> [Point<D>; 2] {
         ends(self.points, part)
     }
 
-    /// Returns the ease with which a point of a part gives way; `along_rod` goes from 0 to 1.
+    /// Returns the inverse mass of a point of a part; `along_rod` is from 0 to 1.
     pub(super) fn inverse_mass(&self, part: ChainPart, along_rod: f64) -> f64 {
         match part {
             ChainPart::Connector(k) => self.inverse_mass[k],
             ChainPart::Rod(i) => {
-                let (a, b) = (1.0 - along_rod, along_rod);
+                let a = 1.0 - along_rod;
+                let b = along_rod;
                 a * a * self.inverse_mass[i] + b * b * self.inverse_mass[i + 1]
             }
         }
@@ -40,8 +41,8 @@ impl<const D: usize> TrialPosture<'_, D> {
 
     /// Moves a point of a part by a vector, with as little motion of the ends as that takes.
     pub(super) fn shift(&mut self, part: ChainPart, along_rod: f64, by: Point<D>) {
-        let ease = self.inverse_mass(part, along_rod);
-        if ease < MIN_INVERSE_MASS {
+        let inverse_mass = self.inverse_mass(part, along_rod);
+        if inverse_mass < MIN_INVERSE_MASS {
             return;
         }
         match part {
@@ -49,14 +50,13 @@ impl<const D: usize> TrialPosture<'_, D> {
             ChainPart::Rod(i) => {
                 for (k, lever) in [(i, 1.0 - along_rod), (i + 1, along_rod)] {
                     self.points[k] =
-                        add_scaled(self.points[k], by, lever * self.inverse_mass[k] / ease);
+                        add_scaled(self.points[k], by, lever * self.inverse_mass[k] / inverse_mass);
                 }
             }
         }
     }
 
-    /// Moves two points of two parts apart by `gap_m` along a direction, each as easily as it
-    /// gives way.
+    /// Moves two points of two parts apart by `gap_m` along a direction, each in proportion to its inverse mass.
     pub(super) fn separate(
         &mut self,
         one: PartPoint,
@@ -72,7 +72,7 @@ impl<const D: usize> TrialPosture<'_, D> {
     }
 }
 
-/// Returns the ends of a part; for a connector its place twice.
+/// Returns the ends of a part; for a connector its position twice.
 pub(super) fn ends<const D: usize>(points: &[Point<D>], part: ChainPart) -> [Point<D>; 2] {
     match part {
         ChainPart::Connector(k) => [points[k]; 2],

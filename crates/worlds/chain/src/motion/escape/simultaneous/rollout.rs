@@ -1,4 +1,4 @@
-//! The chain around a place, and the moving obstacles near it: where motions are rolled out.
+//! Rollouts: motions tried on a copy of a part of the chain, among the moving obstacles near it.
 
 use super::super::{EscapeRules, Margin};
 use super::solve::EscapeSolver;
@@ -19,49 +19,50 @@ pub(super) struct Rollout<'a, const D: usize> {
     ticks: usize,
 }
 
-/// The motions of a roll-out, beside those out of the way.
+/// The motions of a rollout, beside escapes.
 #[derive(Clone, Copy)]
 pub(super) struct RolloutOptions<const D: usize> {
     through: Option<ExitDirection<D>>,
     /// The connector that leads.
     lead: Option<LeadMotion<D>>,
-    /// Ticks without contact after which the roll-out ends.
+    /// Ticks without contact after which the rollout ends.
     clear: usize,
 }
 
-/// Factor by which a choice must be better than the present one.
+/// Factor by which the cost of a choice must be lower than that of the present one.
 pub(super) const IMPROVEMENT_FACTOR: f64 = 0.8;
-/// Longest time of a roll-out, s, and most ticks.
+/// Longest time of a rollout, s: farther ahead obstacles no longer move at constant velocity.
 const MAX_HORIZON_S: f64 = 3.0;
+/// Most ticks of a rollout, which limits the work where ticks are short.
 const MAX_TICKS: usize = 150;
-/// Ticks without contact after which a way out has ended.
+/// Ticks without contact after which an exit has ended.
 const CLEAR_TICKS: usize = 75;
 /// Cost of depth, in ticks per meter and tick.
 const DEPTH_COST: f64 = 0.2;
-/// Rounds of a solve in a roll-out, with margins and without.
+/// Rounds of a solve in a rollout, with margins and without; fewer than in a tick, because rollouts are many.
 const ROUNDS: [usize; 2] = [12, 20];
 
 impl<const D: usize> RolloutOptions<D> {
-    /// Returns a way through an obstacle, or none, while no connector leads.
+    /// Returns the options of an exit through an obstacle, or of none, while no connector leads.
     pub(super) fn with_exit(through: Option<ExitDirection<D>>) -> Self {
         Self { through, lead: None, clear: CLEAR_TICKS }
     }
 
-    /// Returns the way of a connector that leads.
+    /// Returns the options of a connector that leads.
     pub(super) fn with_lead(lead: LeadMotion<D>) -> Self {
         Self { through: None, lead: Some(lead), clear: MAX_TICKS }
     }
 }
 
 impl<'a, const D: usize> Rollout<'a, D> {
-    /// Cuts out the stage between two connectors; none if there is nothing to cut.
+    /// Returns a rollout of the connectors between two; none if there are none.
     pub(super) fn cut(
         rules: &EscapeRules,
-        given: &SolveInput<'a, D>,
+        input: &SolveInput<'a, D>,
         between: RangeInclusive<usize>,
     ) -> Option<Self> {
         let (from, to) = between.into_inner();
-        let SolveInput { chain, obstacles, most_m, .. } = *given;
+        let SolveInput { chain, obstacles, most_m, .. } = *input;
         let cut = Chain::new_broken(
             chain.points()[from..=to].to_vec(),
             chain.connectors()[from..=to].to_vec(),
@@ -78,7 +79,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
         let moving: Vec<_> = obstacles.moving().iter().filter(is_near).copied().collect();
         near.set_moving(&moving).ok()?;
         Some(Self {
-            rules: given.rules,
+            rules: input.rules,
             chain: cut.ok()?,
             obstacles: near,
             margin: rules.look_ahead_margin(),
@@ -93,7 +94,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
         self.obstacles.moving().iter().any(Obstacle::is_moving)
     }
 
-    /// Returns the ticks of roll-outs that an amount of work allows, in ticks times connectors.
+    /// Returns the ticks of rollouts that an amount of work allows, in ticks times connectors.
     pub(super) fn ticks_for(&self, work: usize) -> usize {
         work / self.chain.points().len()
     }
@@ -101,12 +102,15 @@ impl<'a, const D: usize> Rollout<'a, D> {
     /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
     /// `enough`, or when no tick is `left`.
     pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut usize) -> f64 {
-        let (mut chain, mut obstacles) = (self.chain.clone(), self.obstacles.clone());
-        let (mut solver, mut propagator) = (EscapeSolver::default(), self.propagator());
+        let mut chain = self.chain.clone();
+        let mut obstacles = self.obstacles.clone();
+        let mut solver = EscapeSolver::default();
+        let mut propagator = self.propagator();
         let RolloutOptions { mut through, lead, clear: clear_ticks } = *tried;
-        let (mut cost, mut clear) = (0.0, 0);
+        let mut cost = 0.0;
+        let mut clear = 0;
         if let Some(lead) = lead {
-            // This cycle's escape is over.
+            // The leader chooses after the escape of this cycle, so its motion comes first.
             let start = chain.points().to_vec();
             self.move_leader(&mut chain, &start, &obstacles, &mut propagator, lead);
             obstacles.advance(self.dt_s);
@@ -117,14 +121,14 @@ impl<'a, const D: usize> Rollout<'a, D> {
             }
             *left -= 1;
             let start = chain.points().to_vec();
-            let given = SolveInput {
+            let input = SolveInput {
                 chain: &chain,
                 obstacles: &obstacles,
                 rules: self.rules,
                 start: &start,
                 most_m: self.most_m,
             };
-            let gap_m = self.tick(&given, &mut solver, &mut through);
+            let gap_m = self.tick(&input, &mut solver, &mut through);
             chain.points_mut().copy_from_slice(&solver.points);
             clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
             if clear == 0 {
@@ -146,8 +150,8 @@ impl<'a, const D: usize> Rollout<'a, D> {
         Propagator::new(Rules { slave_step_max_m, ..*self.rules })
     }
 
-    /// Leads the chain on, unless it needs its speed to get out of the way. `start` holds the places at the start
-    /// of the tick.
+    /// Leads the chain on, unless it needs its speed to escape. `start` holds the positions at the start of the
+    /// tick.
     fn move_leader(
         &self,
         chain: &mut Chain<D>,
@@ -165,39 +169,38 @@ impl<'a, const D: usize> Rollout<'a, D> {
         }
         let escaped = chain.points().to_vec();
         let to = add(chain.points()[lead.k], lead.way_m);
-        // Out of the range of coordinates there is no leading.
+        // Beyond the range of coordinates nothing is led.
         let went = propagator.propagate(chain, obstacles, &Request::exact(lead.k, to));
         if went.is_err() || longest_m(chain) > self.most_m {
             chain.points_mut().copy_from_slice(&escaped);
         }
     }
 
-    /// Makes one tick of a roll-out; the new places are the solver's. Returns the least gap,
-    /// meters.
+    /// Makes one tick of a rollout; the solver has the new positions. Returns the least gap, meters.
     fn tick(
         &self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         solver: &mut EscapeSolver<D>,
         through: &mut Option<ExitDirection<D>>,
     ) -> f64 {
-        if !solver.find_contacts(given, self.margin) {
+        if !solver.find_contacts(input, self.margin) {
             solver.points.clear();
-            solver.points.extend_from_slice(given.chain.points());
+            solver.points.extend_from_slice(input.chain.points());
             return f64::INFINITY;
         }
-        if through.is_some_and(|through| solver.has_passed(given, &through)) {
+        if through.is_some_and(|through| solver.has_passed(input, &through)) {
             *through = None;
         }
-        let (before_m, _) = solver.min_gap(given, given.chain.points());
-        let wishes = SoftConstraints { margin: self.margin, through: *through, rounds: ROUNDS };
-        if solver.solve(given, &wishes) {
-            let (gap_m, _) = solver.min_gap(given, &solver.points);
+        let (before_m, _) = solver.min_gap(input, input.chain.points());
+        let soft = SoftConstraints { margin: self.margin, through: *through, rounds: ROUNDS };
+        if solver.solve(input, &soft) {
+            let (gap_m, _) = solver.min_gap(input, &solver.points);
             if through.is_some() || gap_m >= before_m.min(0.0) {
                 return gap_m;
             }
         }
         solver.points.clear();
-        solver.points.extend_from_slice(given.chain.points());
+        solver.points.extend_from_slice(input.chain.points());
         before_m
     }
 }

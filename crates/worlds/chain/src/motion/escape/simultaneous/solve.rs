@@ -18,104 +18,115 @@ use sidestep_rods::geometry::{
 };
 use std::f64::consts::PI;
 
-/// Finds places for all connectors. It owns its buffers.
+/// Finds positions for all connectors. It owns its buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EscapeSolver<const D: usize> {
     pub(super) contacts: Contacts<D>,
-    /// The places found.
+    /// The positions found.
     pub(super) points: Vec<Point<D>>,
-    ease: Vec<f64>,
+    inverse_mass: Vec<f64>,
     bends: Vec<BendConstraint>,
     lengths: LengthSolver<D>,
 }
 
-/// Distance around an obstacle in which the chain goes along on a way through it, as a multiple of
-/// its longest rod.
+/// Distance around an obstacle in which the chain joins an exit through it, as a multiple of its
+/// longest rod.
 const EXIT_RANGE_FACTOR: f64 = 2.0;
 /// Distance from which on an obstacle is passed, meters.
 const PASSED_DISTANCE_M: f64 = 0.17;
-/// Part of a margin's violation that a round corrects.
+/// Fraction of a margin's violation that a round corrects: all of it would push a part back and forth between two
+/// margins.
 const SOFT_FRACTION: f64 = 0.3;
-/// Rounds in which only laws count, and the number of them between two checks.
+/// Most rounds in which only hard constraints count.
 const MAX_SETTLE_ROUNDS: usize = 48;
+/// Number of those rounds between two checks, which cost more than a round.
 const CHECK_INTERVAL: usize = 8;
-/// Parts of the motion that are tried if all of it breaks a law.
+/// Fractions of the motion that are tried if all of it violates a hard constraint.
 const MOTION_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.2];
-/// Distance beyond contact that corrections aim at, at most, meters; and as a part of the distance.
+/// Distance beyond contact that corrections aim at, at most, meters.
 const MAX_SLACK_M: f64 = 1e-4;
+/// The same as a fraction of the distance to be kept.
 const SLACK_FRACTION: f64 = 0.01;
 /// Correction below which all is settled, meters.
 const SETTLE_TOLERANCE_M: f64 = 1e-6;
-/// Part of its longest way that a connector leaves free for the last corrections.
+/// Fraction of its longest motion that a connector leaves free for the last corrections.
 const RESERVE_FRACTION: f64 = 1e-4;
 
 impl<const D: usize> EscapeSolver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
-    pub(super) fn find_contacts(&mut self, given: &SolveInput<'_, D>, margin: Margin) -> bool {
-        let SolveInput { chain, obstacles, rules, most_m, .. } = *given;
+    pub(super) fn find_contacts(&mut self, input: &SolveInput<'_, D>, margin: Margin) -> bool {
+        let SolveInput { chain, obstacles, rules, most_m, .. } = *input;
         self.contacts.find_movers(chain, obstacles, margin, most_m);
         if self.contacts.threats.is_empty() {
             return false;
         }
         self.contacts.find_nearby(chain, obstacles, rules.self_collision, most_m);
-        self.ease.clear();
-        self.ease.extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
+        self.inverse_mass.clear();
+        self.inverse_mass
+            .extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
         self.bends.clear();
         let limited = chain.connectors().iter().enumerate().filter(|(_, c)| c.max_bend_rad < PI);
         self.bends.extend(limited.filter_map(|(k, _)| BendConstraint::from_connector(chain, k)));
         true
     }
 
-    /// Finds places by some wishes; returns whether they keep the laws.
-    pub(super) fn solve(&mut self, given: &SolveInput<'_, D>, wishes: &SoftConstraints<D>) -> bool {
+    /// Finds positions by soft constraints; returns whether they keep the hard ones.
+    pub(super) fn solve(
+        &mut self,
+        input: &SolveInput<'_, D>,
+        constraints: &SoftConstraints<D>,
+    ) -> bool {
         self.points.clear();
-        self.points.extend_from_slice(given.chain.points());
-        self.start_exit(given, wishes.through);
-        let [wishing, avoiding] = wishes.rounds;
-        for round in 0..wishing + avoiding {
-            let soft = (round < wishing).then_some(wishes.margin).filter(|m| *m != Margin::NONE);
-            let fled_m = self.push_from_movers(given, wishes.through, soft);
-            let held_m = self.push_from_walls();
-            self.lengths
-                .correct(&mut trial_posture(&mut self.points, &self.ease), given.chain.rods());
-            self.limit_travel(given);
-            if fled_m.max(held_m) < SETTLE_TOLERANCE_M {
+        self.points.extend_from_slice(input.chain.points());
+        self.start_exit(input, constraints.through);
+        let [with_margin, without_margin] = constraints.rounds;
+        for round in 0..with_margin + without_margin {
+            let soft =
+                (round < with_margin).then_some(constraints.margin).filter(|m| *m != Margin::NONE);
+            let mover_correction_m = self.push_from_movers(input, constraints.through, soft);
+            let wall_correction_m = self.push_from_walls();
+            self.lengths.correct(
+                &mut trial_posture(&mut self.points, &self.inverse_mass),
+                input.chain.rods(),
+            );
+            self.limit_travel(input);
+            if mover_correction_m.max(wall_correction_m) < SETTLE_TOLERANCE_M {
                 break;
             }
         }
-        self.settle(given)
+        self.settle(input)
     }
 
-    /// Lets the chain around an obstacle that it goes through set out together, because parts that are
-    /// only dragged along come late.
-    fn start_exit(&mut self, given: &SolveInput<'_, D>, through: Option<ExitDirection<D>>) {
+    /// Moves all connectors around an obstacle that the chain leaves through at once, because parts that are only
+    /// dragged would lag.
+    fn start_exit(&mut self, input: &SolveInput<'_, D>, through: Option<ExitDirection<D>>) {
         let Some(through) = through else { return };
-        let moving = given.obstacles.moving();
+        let moving = input.obstacles.moving();
         let Some(mover) = moving.iter().find(|o| o.id == through.obstacle) else { return };
-        let longest_m = given.chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
-        for (point, ease) in self.points.iter_mut().zip(&self.ease) {
+        let longest_m = input.chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+        for (point, inverse_mass) in self.points.iter_mut().zip(&self.inverse_mass) {
             let apart_m = mover.core.nearest_to_point(*point).distance_m - mover.radius_m;
             if apart_m < EXIT_RANGE_FACTOR * longest_m {
-                *point = add_scaled(*point, through.toward, ease * given.most_m);
+                *point = add_scaled(*point, through.toward, inverse_mass * input.most_m);
             }
         }
     }
 
-    /// Leads parts away from moving obstacles; returns the greatest correction, meters.
+    /// Pushes parts away from moving obstacles; returns the greatest correction, meters.
     fn push_from_movers(
         &mut self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         through: Option<ExitDirection<D>>,
         soft: Option<Margin>,
     ) -> f64 {
-        let Self { contacts, points, ease, .. } = self;
-        let mut posture = trial_posture(points, ease);
+        let Self { contacts, points, inverse_mass, .. } = self;
+        let mut posture = trial_posture(points, inverse_mass);
         let mut most_m = 0.0_f64;
         for threat in &contacts.threats {
-            let mover = &given.obstacles.moving()[threat.mover];
+            let mover = &input.obstacles.moving()[threat.mover];
             let ends = posture.ends(threat.part);
             let nearest = mover.core.nearest_to_segment(ends);
-            let gap_m = nearest.distance_m - mover.radius_m - radius_m(given.chain, threat.part);
+            let gap_m = nearest.distance_m - mover.radius_m - radius_m(input.chain, threat.part);
             let through = through.filter(|through| through.obstacle == mover.id);
             let keep_m = match (through, soft) {
                 (None, Some(margin)) => margin.required_gap_m(mover),
@@ -124,12 +135,11 @@ impl<const D: usize> EscapeSolver<D> {
             if gap_m >= keep_m {
                 continue;
             }
-            let by = match through {
-                Some(through) => scaled(through.toward, given.most_m),
-                None => {
-                    let part = if soft.is_some() { SOFT_FRACTION } else { 1.0 };
-                    scaled(direction_away(mover, &nearest), part * (keep_m - gap_m))
-                }
+            let by = if let Some(through) = through {
+                scaled(through.toward, input.most_m)
+            } else {
+                let fraction = if soft.is_some() { SOFT_FRACTION } else { 1.0 };
+                scaled(direction_away(mover, &nearest), fraction * (keep_m - gap_m))
             };
             posture.shift(threat.part, fraction_along(ends, nearest.on_body), by);
             most_m = most_m.max(keep_m - gap_m);
@@ -137,11 +147,11 @@ impl<const D: usize> EscapeSolver<D> {
         most_m
     }
 
-    /// Leads parts out of walls and apart, and bends back; returns the greatest correction,
+    /// Pushes parts out of walls and apart, and corrects bends; returns the greatest correction,
     /// meters.
     fn push_from_walls(&mut self) -> f64 {
-        let Self { contacts, points, ease, bends, .. } = self;
-        let mut posture = trial_posture(points, ease);
+        let Self { contacts, points, inverse_mass, bends, .. } = self;
+        let mut posture = trial_posture(points, inverse_mass);
         let mut most_m = 0.0_f64;
         for wall in &contacts.walls {
             let ends = posture.ends(wall.part);
@@ -164,8 +174,8 @@ impl<const D: usize> EscapeSolver<D> {
                     along_rod: fraction_along(posture.ends(part), at),
                 };
                 let [one, other] = [spot(one, nearest.on_body), spot(other, nearest.on_core)];
-                let across = || perpendicular(first_axis());
-                let away = normalized(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
+                let away = normalized(sub(nearest.on_core, nearest.on_body))
+                    .unwrap_or_else(|| perpendicular(first_axis()));
                 posture.separate(one, other, away, short_m);
                 most_m = most_m.max(short_m);
             }
@@ -173,63 +183,62 @@ impl<const D: usize> EscapeSolver<D> {
         bends.iter().fold(most_m, |most_m, bend| most_m.max(bend.correct(&mut posture)))
     }
 
-    /// Keeps every connector within its speed, and at an allowed place.
-    fn limit_travel(&mut self, given: &SolveInput<'_, D>) {
+    /// Keeps every connector within its speed, and at a position that its mobility allows.
+    fn limit_travel(&mut self, input: &SolveInput<'_, D>) {
         for (k, point) in self.points.iter_mut().enumerate() {
-            if self.ease[k] > 0.0 {
-                let room_m = given.max_travel_m(k) * (1.0 - RESERVE_FRACTION);
-                let connector = &given.chain.connectors()[k];
-                let allowed = connector.mobility.project(*point, given.chain.points()[k]);
-                *point = clamp_to_ball(given.start[k], allowed, room_m);
+            if self.inverse_mass[k] > 0.0 {
+                let room_m = input.max_travel_m(k) * (1.0 - RESERVE_FRACTION);
+                let connector = &input.chain.connectors()[k];
+                let allowed = connector.mobility.project(*point, input.chain.points()[k]);
+                *point = clamp_to_ball(input.start[k], allowed, room_m);
             }
         }
     }
 
-    /// Corrects until the laws hold, if necessary for a part of the motion; returns whether they
-    /// do.
-    fn settle(&mut self, given: &SolveInput<'_, D>) -> bool {
+    /// Corrects until the hard constraints hold, if necessary for a fraction of the motion; returns whether they do.
+    fn settle(&mut self, input: &SolveInput<'_, D>) -> bool {
         MOTION_FRACTIONS.iter().any(|&part| {
             if part < 1.0 {
-                for (point, from) in self.points.iter_mut().zip(given.chain.points()) {
+                for (point, from) in self.points.iter_mut().zip(input.chain.points()) {
                     *point = lerp(*from, *point, part);
                 }
             }
             (0..MAX_SETTLE_ROUNDS).any(|round| {
                 self.push_from_walls();
-                self.limit_travel(given);
-                let mut posture = trial_posture(&mut self.points, &self.ease);
-                self.lengths.restore(&mut posture, given.chain.rods());
-                round % CHECK_INTERVAL == 0 && self.meets_constraints(given)
+                self.limit_travel(input);
+                let mut posture = trial_posture(&mut self.points, &self.inverse_mass);
+                self.lengths.restore(&mut posture, input.chain.rods());
+                round % CHECK_INTERVAL == 0 && self.meets_constraints(input)
             })
         })
     }
 
-    fn meets_constraints(&self, given: &SolveInput<'_, D>) -> bool {
+    fn meets_constraints(&self, input: &SolveInput<'_, D>) -> bool {
         let Self { contacts, points, bends, .. } = self;
-        Constraints { given, points }.are_met(contacts, bends)
+        Constraints { input, points }.are_met(contacts, bends)
     }
 
     /// Returns whether all parts are farther from an obstacle than it takes to have passed it.
-    pub(super) fn has_passed(&self, given: &SolveInput<'_, D>, through: &ExitDirection<D>) -> bool {
-        let moving = given.obstacles.moving();
+    pub(super) fn has_passed(&self, input: &SolveInput<'_, D>, through: &ExitDirection<D>) -> bool {
+        let moving = input.obstacles.moving();
         let threats = self.contacts.threats.iter();
         threats.filter(|t| moving[t.mover].id == through.obstacle).all(|threat| {
-            gap_m(given.chain, threat.part, &moving[threat.mover]) > PASSED_DISTANCE_M
+            gap_m(input.chain, threat.part, &moving[threat.mover]) > PASSED_DISTANCE_M
         })
     }
 
-    /// Returns the least gap between the chain at some places and moving obstacles, meters, and the
+    /// Returns the least gap between the chain at some positions and moving obstacles, meters, and the
     /// threat that has it.
     pub(super) fn min_gap(
         &self,
-        given: &SolveInput<'_, D>,
+        input: &SolveInput<'_, D>,
         points: &[Point<D>],
     ) -> (f64, Option<Threat>) {
         let mut least = (f64::INFINITY, None);
         for threat in &self.contacts.threats {
-            let mover = &given.obstacles.moving()[threat.mover];
+            let mover = &input.obstacles.moving()[threat.mover];
             let apart_m = mover.core.nearest_to_segment(ends(points, threat.part)).distance_m;
-            let gap_m = apart_m - mover.radius_m - radius_m(given.chain, threat.part);
+            let gap_m = apart_m - mover.radius_m - radius_m(input.chain, threat.part);
             if gap_m < least.0 {
                 least = (gap_m, Some(*threat));
             }
@@ -240,9 +249,9 @@ impl<const D: usize> EscapeSolver<D> {
 
 fn trial_posture<'a, const D: usize>(
     points: &'a mut [Point<D>],
-    ease: &'a [f64],
+    inverse_mass: &'a [f64],
 ) -> TrialPosture<'a, D> {
-    TrialPosture { points, inverse_mass: ease }
+    TrialPosture { points, inverse_mass }
 }
 
 /// Returns the direction from an obstacle to the nearest point of a part.

@@ -1,18 +1,18 @@
-//! The givens of a solve, and its wishes.
+//! The input of a solve, and its soft constraints.
 
 use super::super::Margin;
 use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, Obstacles, Rules};
 
-/// The givens of a solve.
+/// The input of a solve.
 #[derive(Clone, Copy)]
 pub(super) struct SolveInput<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
     pub(super) rules: &'a Rules,
-    /// Positions from which ways count.
+    /// Positions from which displacements count.
     pub(super) start: &'a [Point<D>],
-    /// The longest way of a connector, meters.
+    /// Longest displacement of a connector, meters.
     pub(super) most_m: f64,
 }
 
@@ -24,16 +24,16 @@ impl<const D: usize> SolveInput<'_, D> {
     }
 }
 
-/// A leader and its wish.
+/// The motion that a leader wants.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeadMotion<const D: usize> {
     /// The connector that leads.
     pub(crate) k: usize,
-    /// The way that it wants to go in this tick, meters.
+    /// The displacement that it wants in this tick, meters.
     pub(crate) way_m: Point<D>,
 }
 
-/// A way through an obstacle: parts in it leave in one direction, even if another is shorter.
+/// An exit through an obstacle: parts in it leave in one direction, even if another is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ExitDirection<const D: usize> {
     pub(super) obstacle: u32,
@@ -41,7 +41,7 @@ pub(super) struct ExitDirection<const D: usize> {
     pub(super) toward: Point<D>,
 }
 
-/// The wishes of a solve, beside the laws.
+/// The soft constraints of a solve, beside the hard ones.
 #[derive(Clone, Copy)]
 pub(super) struct SoftConstraints<const D: usize> {
     pub(super) margin: Margin,

@@ -44,14 +44,14 @@ struct Case<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,
     escaper: Escaper<D>,
-    way_out: EscapePlan,
+    escape_plan: EscapePlan,
 }
 
 impl<const D: usize> Case<D> {
     fn new(chain: Chain<D>, obstacles: Vec<Obstacle<D>>, speed_max_m_s: f64) -> Self {
         let obstacles = Obstacles::new(obstacles, 1.0).unwrap();
         let escaper = Escaper::new(EscapeRules::new(DT_S, speed_max_m_s));
-        Self { chain, obstacles, escaper, way_out: EscapePlan::default() }
+        Self { chain, obstacles, escaper, escape_plan: EscapePlan::default() }
     }
 
     /// Makes a tick, and checks the laws.
@@ -59,8 +59,8 @@ impl<const D: usize> Case<D> {
         let start = self.chain.points().to_vec();
         self.obstacles.advance(DT_S);
         let mut propagator = Propagator::new(SOLID);
-        let Self { chain, obstacles, escaper, way_out } = self;
-        let told = escaper.escape(chain, obstacles, &mut propagator, &start, way_out).unwrap();
+        let Self { chain, obstacles, escaper, escape_plan } = self;
+        let told = escaper.escape(chain, obstacles, &mut propagator, &start, escape_plan).unwrap();
         let most_m = escaper.rules().speed_max_m_s * DT_S;
         for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
             assert!(distance(*from, *to) <= most_m + 1e-12, "connector {k} is too fast");
@@ -138,7 +138,7 @@ fn a_chain_between_tongs_is_out_again_within_a_second() {
         let mut case = Case::new(straight::<2>(14, SWARM, 0.25), discs, 1.0);
         let inside = (0..500).filter(|_| case.tick().deepest_m > 1e-6).count();
         assert!(inside <= 50, "{inside} ticks inside at {at_x}");
-        assert!(case.way_out.is_none(), "its way is forgotten once it is out");
+        assert!(case.escape_plan.is_none(), "its way is forgotten once it is out");
     }
 }
 

@@ -1,0 +1,85 @@
+//! The reports of a robot's beams at a pose, with their probabilities.
+
+use crate::model::MarkovModel;
+use crate::obstacle::GridPose;
+use crate::robot::SingleRobot;
+use sidestep_error_models::ray::{Crossing, crossings, turn_crossing};
+use sidestep_error_models::sensor::{FREE, NOTHING, Reading, SensorModel};
+use sidestep_kernel::InputError;
+use sidestep_scenario::suggestion;
+
+/// A beam of one of the robot's sensors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Beam {
+    /// Name of the sensor.
+    pub sensor: String,
+    /// Number of the beam, from 0 in the order of the sensor's bearings.
+    pub index: usize,
+}
+
+/// A beam with the boxes that it crosses, for every heading.
+pub(super) struct MountedBeam<'a> {
+    pub(super) sensor: &'a SensorModel,
+    reliable: bool,
+    crossed: [Vec<Crossing>; 4],
+}
+
+impl<'a> MountedBeam<'a> {
+    pub(super) fn new(model: &'a MarkovModel, beam: &Beam) -> Result<Self, InputError> {
+        let robot = &model.robot;
+        let sensors = &robot.sensors;
+        let found = sensors.iter().find(|s| s.name == beam.sensor);
+        let sensor = found.ok_or_else(|| unknown_sensor(&beam.sensor, sensors))?;
+        let bearings = &sensor.bearings_deg;
+        let Some(&bearing_deg) = bearings.get(beam.index) else {
+            let cause = format!("sensor `{}` has no beam {}", beam.sensor, beam.index);
+            let remedy = format!("count beams from 0 to {}", bearings.len() - 1);
+            return Err(InputError::new("--beam", cause, remedy));
+        };
+        let ahead = crossings(robot.size, bearing_deg, sensor.range_m / robot.map.box_size_m);
+        let crossed = std::array::from_fn(|heading| {
+            ahead.iter().map(|&c| turn_crossing(c, robot.size, heading as u8)).collect()
+        });
+        Ok(Self { sensor, reliable: robot.has_reliable_sensors, crossed })
+    }
+
+    /// Returns `P(reading
+    /// pose)`; readings of probability 0 are left out.
+    pub(super) fn readings(&self, robot: &SingleRobot, pose: GridPose) -> Vec<(Reading, f64)> {
+        let mut row = self.sensor.reading_row(self.truth(robot, pose), self.reliable);
+        row.retain(|reading| reading.1 > 0.0);
+        row
+    }
+
+    /// Returns the beam's true reading.
+    fn truth(&self, robot: &SingleRobot, pose: GridPose) -> Reading {
+        let kind_at = |c: &Crossing| robot.kind_at(pose.col + c.dx, pose.row + c.dy);
+        let mut met = self.crossed[usize::from(pose.heading)].iter().map(|c| (c, kind_at(c)));
+        let first = met.find(|(_, kind)| *kind != FREE);
+        let Some((crossing, kind)) = first else { return self.sensor.nothing() };
+        match self.sensor.designates[usize::from(kind)] {
+            // A kind that reads as nothing still hides what stands behind it.
+            NOTHING => self.sensor.nothing(),
+            observation => {
+                let class = self.sensor.class_of(crossing.distance, robot.map.box_size_m);
+                Reading { observation, class }
+            }
+        }
+    }
+}
+
+fn unknown_sensor(name: &str, sensors: &[SensorModel]) -> InputError {
+    let known: Vec<&str> = sensors.iter().map(|s| s.name.as_str()).collect();
+    let remedy = suggestion(name, &known);
+    InputError::new("--sensor", format!("the robot has no sensor `{name}`"), remedy)
+}
+
+/// Returns the beam of the first sensor that points most nearly ahead, if there is a sensor.
+pub(super) fn forward_beam(model: &MarkovModel) -> Option<Beam> {
+    let sensor = model.robot.sensors.first()?;
+    let off_ahead = |deg: f64| (deg - 360.0 * (deg / 360.0).round()).abs();
+    let by_bearing =
+        |a: &(usize, &f64), b: &(usize, &f64)| off_ahead(*a.1).total_cmp(&off_ahead(*b.1));
+    let (index, _) = sensor.bearings_deg.iter().enumerate().min_by(by_bearing)?;
+    Some(Beam { sensor: sensor.name.clone(), index })
+}

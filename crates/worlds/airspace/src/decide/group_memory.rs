@@ -1,0 +1,62 @@
+//! The memory that optimizing a group takes, computed in advance.
+
+use crate::flight::{KnownAircraft, Point, distance_m};
+use crate::settings::Deployment;
+use crate::world::AirspaceWorld;
+use sidestep_collectives::{Estimator, PairwiseGame};
+use sidestep_kernel::interrupt;
+
+/// Returns the largest number of bytes that optimizing a group takes: tables of its pairs, and
+/// predictions, in all the copies that its deployment has of them.
+pub(crate) fn max_group_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
+    let tables = table_bytes(world, group);
+    let predictions = prediction_bytes(world, group);
+    let members = group.len() as u64;
+    match (world.deployment, world.settings.estimator) {
+        (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
+            tables + predictions
+        }
+        // Each agent has the tables of its own pairs, and the predictions of all.
+        (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
+            2 * tables + members * predictions
+        }
+        // Each agent computes the costs of all samples to all members.
+        (Deployment::CompactTeam, Estimator::Sampled { .. }) => members * (tables + predictions),
+        // Each has the sampled predictions of all others, of this round and the one before.
+        (Deployment::Team, Estimator::Sampled { block, .. }) => {
+            let one = world.timing.horizon as u64 * size_of::<Point>() as u64;
+            predictions + 2 * members * members.saturating_sub(1) * block as u64 * one
+        }
+    }
+}
+
+/// Returns the bytes of the predictions of all actions of a group.
+fn prediction_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
+    let count: u64 = group.iter().map(|known| world.actions(known.slot).len() as u64).sum();
+    count * world.timing.horizon as u64 * size_of::<Point>() as u64
+}
+
+/// Returns the largest number of bytes that the tables of a group's pairs take.
+fn table_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
+    let actions = |known: &KnownAircraft| world.actions(known.slot).len() as u64;
+    let range_m = |a: &KnownAircraft, b: &KnownAircraft| {
+        world.interaction_range_m(a.slot as usize, b.slot as usize)
+    };
+    let max_range_m = group.iter().map(|known| range_m(known, known)).fold(0.0, f64::max);
+    // Sorted by x, so that only neighbors in that order have to be compared.
+    let mut by_x: Vec<&KnownAircraft> = group.iter().collect();
+    by_x.sort_unstable_by(|a, b| a.pose.at[0].total_cmp(&b.pose.at[0]));
+    let mut entries = 0;
+    for (k, a) in by_x.iter().enumerate() {
+        let next = by_x[k + 1..].iter().take_while(|b| b.pose.at[0] - a.pose.at[0] <= max_range_m);
+        for b in next {
+            interrupt::check();
+            if (a.altitude_m - b.altitude_m).abs() < world.vertical_m
+                && distance_m(a.pose.at, b.pose.at) <= range_m(a, b)
+            {
+                entries += actions(a) * actions(b);
+            }
+        }
+    }
+    entries * PairwiseGame::BYTES_PER_ENTRY
+}

@@ -1,0 +1,218 @@
+//! Runs whose pilots are outside of them: each cycle they receive their percepts, and return their controls.
+
+use crate::decide::possible_profiles;
+use crate::events::EventKind;
+use crate::pilot::{Control, Maneuver, Percept};
+use crate::settings::{Deployment, Method};
+use crate::shield::TurnProfile;
+use crate::state::AirspaceState;
+use crate::world::AirspaceWorld;
+use crate::world_impl::AirspaceRun;
+use sidestep_kernel::control::OrderError;
+use sidestep_kernel::{Cycle, EntityId, Simulation};
+use std::collections::BTreeMap;
+
+/// A run in which airplanes may be flown by pilots outside of it.
+pub trait Fleet {
+    /// Returns the percepts of the airplanes that decide in the cycle to come, by rising id. No result depends on
+    /// it.
+    fn percepts(&self) -> Vec<Percept>;
+
+    /// Submits the controls of airplanes for the cycle to come. An airplane without one stays on its stored orbit;
+    /// unless a network is given that may lose messages, so does its whole group, because then plans are safe only if
+    /// all fly them. A run that is recorded keeps the controls, so that it can be computed again.
+    ///
+    /// # Errors
+    /// When one of them is of another airplane or cycle, or cannot be flown; none is accepted then. When the run is
+    /// recorded without its controls, or one process decides for all.
+    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
+
+    /// Returns the controls, each serialized, that cannot be flown in the cycle to come, with the reasons.
+    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
+
+    /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
+    /// not reach, both by rising id.
+    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)>;
+}
+
+impl Fleet for AirspaceRun {
+    fn percepts(&self) -> Vec<Percept> {
+        self.world().percepts(self.state(), self.cycle())
+    }
+
+    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
+        let mut serialized = Vec::with_capacity(controls.len());
+        for control in &controls {
+            let bytes = postcard::to_stdvec(control).expect("controls are plain data");
+            serialized.push((control.id, bytes));
+        }
+        self.submit_controls(&serialized)
+    }
+
+    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
+        let percepts = self.percepts();
+        let mut invalid = Vec::new();
+        for (id, bytes) in controls {
+            let percept = percepts.iter().find(|percept| percept.own.id == *id);
+            if let Err(reason) = self.world().read_control(*id, bytes, percept) {
+                invalid.push((*id, reason));
+            }
+        }
+        invalid
+    }
+
+    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+        self.world().out_of_range(self.state(), self.cycle())
+    }
+}
+
+impl AirspaceWorld {
+    /// Returns the percepts of the airplanes that decide in cycle `now`.
+    pub(crate) fn percepts(&self, state: &AirspaceState, now: Cycle) -> Vec<Percept> {
+        let mut all = Vec::new();
+        self.for_each_group(state, now, |context, flown, non_cooperative| {
+            all.extend(flown.percepts(context, non_cooperative));
+        });
+        all.sort_unstable_by_key(|percept| percept.own.id);
+        all
+    }
+
+    /// Returns the others of its group that each airplane does not reach in cycle `now`.
+    fn out_of_range(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
+        let range_m = self.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
+        let mut all = Vec::new();
+        if range_m == f64::INFINITY {
+            return all;
+        }
+        self.for_each_group(state, now, |context, flown, _| {
+            for &own in &flown.ids {
+                let unreachable = flown
+                    .ids
+                    .iter()
+                    .copied()
+                    .filter(|&id| id != own && context.state.distance_m([own, id]) > range_m)
+                    .collect();
+                all.push((own, unreachable));
+            }
+        });
+        all.sort_unstable();
+        all
+    }
+
+    /// Stores the controls of airplanes, if all are valid.
+    pub(crate) fn store_controls(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        if self.deployment == Deployment::Direct {
+            let cause = "one process decides for all (deployment = \"direct\"); set deployment to team, \
+                         compact-team, pim or hierarchical-pim";
+            return Err(OrderError::NoExternalAgents { cause: cause.into() });
+        }
+        let percepts = self.percepts(state, now);
+        let percepts: BTreeMap<_, _> =
+            percepts.iter().map(|percept| (percept.own.id, percept)).collect();
+        let mut read = BTreeMap::new();
+        for (id, bytes) in controls {
+            let refused = |cause: String| {
+                let agent = format!("airplane {}", self.display_name(*id));
+                OrderError::Control { agent, cause }
+            };
+            let control =
+                self.read_control(*id, bytes, percepts.get(id).copied()).map_err(refused)?;
+            if read.insert(*id, control).is_some() {
+                return Err(refused("there are two of it; give one for each airplane".into()));
+            }
+        }
+        state.set_controls(now, read.into_values().collect());
+        Ok(())
+    }
+
+    /// Reads a control, and checks that its airplane can fly it.
+    fn read_control(
+        &self,
+        id: EntityId,
+        bytes: &[u8],
+        percept: Option<&Percept>,
+    ) -> Result<Control, String> {
+        let Some(percept) = percept else {
+            let cause =
+                "it does not decide in this cycle; give controls for those of `percepts` only";
+            return Err(cause.into());
+        };
+        let read = postcard::take_from_bytes::<Control>(bytes);
+        let Some((control, _)) = read.ok().filter(|(_, rest)| rest.is_empty()) else {
+            return Err("its bytes are no control of this build".into());
+        };
+        if (control.id, control.cycle) != (id, percept.cycle) {
+            return Err(format!(
+                "it is of airplane {} and cycle {}; give that of airplane {id} and cycle {}",
+                control.id, control.cycle, percept.cycle
+            ));
+        }
+        self.check_maneuver(percept, &control.maneuver)?;
+        self.check_control(&control)?;
+        Ok(control)
+    }
+
+    /// Checks that an airplane can fly a maneuver.
+    fn check_maneuver(&self, percept: &Percept, maneuver: &Maneuver) -> Result<(), String> {
+        let Maneuver::Profile { candidate, profile: TurnProfile { omegas_rad_s }, .. } = maneuver
+        else {
+            return Ok(());
+        };
+        let own = &percept.own;
+        let steps = self.timing.points_per_dt();
+        if omegas_rad_s.len() != steps {
+            let found = omegas_rad_s.len();
+            return Err(format!("it has {found} turn rates; give {steps}, one for each step"));
+        }
+        let max_rad_s = self.segment(own.id, own.orders).model.omega_max_rad_s;
+        // NaN is in no range.
+        let range = -max_rad_s..=max_rad_s;
+        if let Some(omega) = omegas_rad_s.iter().find(|omega| !range.contains(omega)) {
+            return Err(format!(
+                "a turn rate of {omega} rad/s; give {} to {max_rad_s}",
+                -max_rad_s
+            ));
+        }
+        let profiles = match self.method {
+            // A caller may order any heading, and a reactive method may choose any.
+            Method::Mvp | Method::Orca | Method::External => return Ok(()),
+            Method::Pc | Method::None => possible_profiles(self, own.known_aircraft()),
+        };
+        let is_known = profiles.iter().any(|profile| profile.omegas_rad_s == *omegas_rad_s);
+        if is_known && (*candidate as usize) < profiles.len() {
+            return Ok(());
+        }
+        Err("its turn rates are those of none of its actions; give those of one of them".into())
+    }
+
+    /// Checks the parts of a control beside the maneuver.
+    fn check_control(&self, control: &Control) -> Result<(), String> {
+        let n = self.airplanes.len();
+        let are_events_valid = control.events.iter().all(|event| {
+            let is_own = (event.airplane, event.cycle) == (control.id, control.cycle);
+            is_own
+                && is_pilot_event(event.kind)
+                && (event.other as usize) < n
+                && event.at_m.is_none()
+        });
+        let are_known = control.memory.contacts.keys().all(|&other| (other as usize) < n);
+        // Where the network is reliable, no airplane keeps any.
+        let are_contacts_valid = self.network.is_some() || control.memory.contacts.is_empty();
+        let are_resolutions_valid = control.memory.resolving.check(n).is_ok();
+        if are_events_valid && are_known && are_contacts_valid && are_resolutions_valid {
+            return Ok(());
+        }
+        Err("its events or its memory are impossible for a pilot".into())
+    }
+}
+
+/// Returns whether pilots report events of this kind; the run itself reports all others.
+fn is_pilot_event(kind: EventKind) -> bool {
+    use EventKind::{Deadline, GroupTooLarge, HeldBack, Unheard};
+    matches!(kind, Deadline | GroupTooLarge | HeldBack | Unheard)
+}

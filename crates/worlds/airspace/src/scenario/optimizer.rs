@@ -1,0 +1,197 @@
+//! The objective and the settings of the optimizer.
+
+use super::compile::Compiler;
+use crate::flight::Legs;
+use crate::objective::Objective;
+use crate::settings::{Held, ReactiveSettings};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::json;
+use sidestep_collectives::{
+    Choice, Estimator, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility,
+};
+use sidestep_kernel::{InputError, math};
+use sidestep_scenario::{Closed, LeftOpen, Number, Rule as _, invalid_value, schema_by_hand};
+
+/// Largest number of samples of a block. All of them are kept in memory, and with more an exact estimator is faster.
+const MAX_BLOCK_SAMPLES: usize = 10_000;
+/// Largest number of times in a list. Each adds as many actions as there are turn rates, and the cost of a pair grows
+/// with the square of the number of actions.
+const MAX_TIMES: usize = 20;
+
+/// A list of times.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Times(pub(super) Vec<f64>);
+
+impl<'de> Deserialize<'de> for Times {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let times_s = Vec::<f64>::deserialize(deserializer)?;
+        if times_s.iter().all(|t| Held::allows(*t)) && times_s.len() <= MAX_TIMES {
+            return Ok(Self(times_s));
+        }
+        let remedy = format!("give up to {MAX_TIMES} times, each {}", Held::description());
+        Err(invalid_value(format_args!("{times_s:?}"), &remedy))
+    }
+}
+
+schema_by_hand!(Times, {
+    let mut time = Held::limits();
+    time["type"] = "number".into();
+    json!({ "type": "array", "items": time, "maxItems": MAX_TIMES })
+});
+
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LegsSection {
+    /// Times for which an airplane turns.
+    turns_s: Times,
+    /// Times until which it then flies straight on.
+    until_s: Times,
+}
+
+/// The settings of a method that looks ahead anew in every step.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ReactiveSection {
+    /// Time within which conflicts are seen.
+    look_ahead_s: Option<Number<LookAhead>>,
+    /// Factor on the separation that is kept.
+    margin: Option<Number<Margin>>,
+}
+
+/// A time in which an airplane looks ahead.
+type LookAhead = LeftOpen<0, 100_000>;
+/// A factor on separations.
+type Margin = Closed<1, 10>;
+
+impl ReactiveSection {
+    /// Returns the settings, with those of `default` where none are given.
+    pub(super) fn or_default(&self, default: ReactiveSettings) -> ReactiveSettings {
+        ReactiveSettings {
+            look_ahead_s: self.look_ahead_s.map_or(default.look_ahead_s, f64::from),
+            margin: self.margin.map_or(default.margin, f64::from),
+        }
+    }
+}
+
+/// A yes or no; yes unless given.
+#[derive(Debug)]
+pub(super) struct Switch(pub(super) bool);
+
+impl Default for Switch {
+    fn default() -> Self {
+        Self(true)
+    }
+}
+
+impl<'de> Deserialize<'de> for Switch {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let given = toml::Value::deserialize(deserializer)?;
+        match given.as_str() {
+            Some("on") => Ok(Self(true)),
+            Some("off") => Ok(Self(false)),
+            _ => Err(invalid_value(given, "give \"on\" or \"off\"")),
+        }
+    }
+}
+
+schema_by_hand!(Switch, json!({ "enum": ["on", "off"], "default": "on" }));
+
+impl Compiler<'_> {
+    /// Returns the objective. Its sums are over points, and the scenario's weights are per second:
+    /// however fine the points are, the same paths have the same order.
+    pub(super) fn objective(&self, vertical_m: f64, dtau_s: f64) -> Objective {
+        let section = &self.file.airspace;
+        let is_paper = self.is_paper();
+        let beta_per_s = section.beta.map_or(0.995, f64::from);
+        Objective {
+            alpha: section.alpha.map_or(if is_paper { 1.0 } else { 0.001 }, f64::from) / dtau_s,
+            // The power is left out where it changes nothing, so that it rounds nothing either.
+            beta: if dtau_s == 1.0 { beta_per_s } else { math::powf(beta_per_s, dtau_s) },
+            inflation: section.inflation.map_or(if is_paper { 1.0 } else { 1.12 }, f64::from),
+            mask: true,
+            vertical_m,
+        }
+    }
+
+    pub(super) fn settings(&self) -> Result<OptimizerConfig, InputError> {
+        let section = &self.file.airspace;
+        let is_paper = self.is_paper();
+        let estimator =
+            if is_paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
+        let estimator = self.estimator()?.unwrap_or(estimator);
+        let choice = if is_paper { Choice::Draw } else { Choice::Argmax };
+        let order = if is_paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
+        Ok(OptimizerConfig {
+            estimator,
+            update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
+            order: section.order.unwrap_or(order),
+            utility: self.utility(estimator)?,
+            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.7 }, f64::from),
+            stop: StopCriterion {
+                threshold: 1e-3,
+                calm_rounds: 3,
+                max_rounds: section.max_rounds.map_or(200, |rounds| rounds.0),
+            },
+            choice: section.choice.unwrap_or(choice),
+        })
+    }
+
+    fn estimator(&self) -> Result<Option<Estimator>, InputError> {
+        let Some(given) = &self.file.airspace.estimator else { return Ok(None) };
+        if let Estimator::Sampled { block, ageing } = *given.get_ref()
+            && !((1..=MAX_BLOCK_SAMPLES).contains(&block) && (0.0..=1.0).contains(&ageing))
+        {
+            let cause = format!("an estimator with block = {block}, ageing = {ageing}");
+            let remedy =
+                format!("give a block of 1 to {MAX_BLOCK_SAMPLES} samples, ageing from 0 to 1");
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(Some(*given.get_ref()))
+    }
+
+    /// Returns the cost that samples show. Exact expectations show all of it at once.
+    fn utility(&self, estimator: Estimator) -> Result<Utility, InputError> {
+        let Some(given) = &self.file.airspace.utility else { return Ok(Utility::default()) };
+        if estimator == Estimator::Exact {
+            let cause = "a utility, but expectations are exact: there are no samples to show it";
+            let remedy = "leave utility out, or set estimator = { kind = \"sampled\", block = 20, \
+                          ageing = 0.7 }";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(*given.get_ref())
+    }
+
+    fn update(&self) -> Result<Option<Update>, InputError> {
+        let Some(given) = &self.file.airspace.update else { return Ok(None) };
+        let (Update::NearestNewton { step } | Update::Brouwer { step }) = *given.get_ref();
+        if step > 0.0 && step <= 1.0 {
+            return Ok(Some(*given.get_ref()));
+        }
+        let cause = format!("an update with step = {step}");
+        Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
+    }
+
+    pub(super) fn legs(&self) -> Result<Legs, InputError> {
+        let Some(given) = &self.file.airspace.legs else {
+            return Ok(if self.is_paper() { Legs::default() } else { Legs::default_preset() });
+        };
+        let LegsSection { turns_s: Times(turns_s), until_s: Times(until_s) } = given.get_ref();
+        if turns_s.is_empty() != until_s.is_empty() {
+            let cause = "legs with one of turns_s and until_s";
+            let remedy = "give both, or neither for no legs";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        let longest_turn_s = turns_s.iter().copied().fold(0.0, f64::max);
+        let earliest_end_s = until_s.iter().copied().fold(f64::INFINITY, f64::min);
+        if longest_turn_s >= earliest_end_s {
+            let cause = format!(
+                "a leg whose turn takes {longest_turn_s} s, and that ends after {earliest_end_s} s"
+            );
+            let remedy = "give turns_s that are all shorter than each until_s; turns without a leg \
+                          are holds_s";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(Legs { turns_s: turns_s.clone(), until_s: until_s.clone() })
+    }
+}

@@ -1,0 +1,36 @@
+//! What a worker needs in a phase: the borrowed inputs, and its own buffers.
+
+use crate::agents::network_traffic::NetworkTraffic;
+use crate::decide::Optimization;
+use crate::events::Event;
+use crate::rows::FlownLeg;
+use crate::state::PairRecord;
+use crate::trace::InspectionTrace;
+use crate::world::AirspaceWorld;
+use sidestep_kernel::{Cycle, Slot};
+use std::collections::BTreeMap;
+
+/// A worker's turn in one phase of one cycle.
+pub(crate) type PhaseContext<'a> = sidestep_kernel::PhaseContext<'a, AirspaceWorld>;
+
+/// A worker's buffers and sums, kept between tasks.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Pairs that came near each other.
+    pub(crate) pairs: BTreeMap<(Slot, Slot), PairRecord>,
+    pub(crate) optimizations: Vec<Optimization>,
+    /// Beacons by which airplanes have found their groups.
+    pub(crate) grouped: NetworkTraffic,
+    /// Messages and bytes that the shield has sent.
+    pub(crate) exchanged: NetworkTraffic,
+    pub(crate) events: Vec<Event>,
+    pub(crate) flown: Vec<FlownLeg>,
+    /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
+    pub(crate) too_close: Vec<(Cycle, Slot, Slot)>,
+    /// Processor time spent deciding, in nanoseconds: reported beside the results, never part of
+    /// them.
+    pub(crate) decide_ns: u64,
+    pub(crate) flying: Vec<Slot>,
+    /// Notes for an inspection of an airplane; none in a run.
+    pub(crate) trace: Option<Box<InspectionTrace>>,
+}

@@ -1,0 +1,140 @@
+//! Choices and numbers that a scenario makes and that lower layers depend on.
+
+mod values;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
+pub(crate) use values::{
+    Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation, LevelGap, LookAhead,
+    Rounds, SeparationM, Speed, Step, Tolerance, TurnRate, Turns, Weight,
+};
+
+/// The methods by which airplanes choose their actions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Probability collectives.
+    #[default]
+    Pc,
+    /// Optimal reciprocal collision avoidance.
+    Orca,
+    /// Modified voltage potential.
+    Mvp,
+    /// Straight to the way-point, without regard to others.
+    None,
+    /// Follows the orders of a caller of the library; without them, its flight plan.
+    External,
+}
+
+impl Method {
+    /// The methods by which airplanes decide themselves.
+    pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
+
+    /// Returns its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pc => "pc",
+            Self::Orca => "orca",
+            Self::Mvp => "mvp",
+            Self::None => "none",
+            Self::External => "external",
+        }
+    }
+}
+
+/// Random errors that the optimizer does not know of.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Disturbance {
+    /// Standard deviation of known positions, per coordinate, in meters.
+    pub position_m: f64,
+    /// Standard deviation of the unwanted change of heading per `dt`, in radians.
+    pub heading_rad: f64,
+}
+
+/// The way in which airplanes learn their groups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grouping {
+    /// Groups are announced, by an observer that sees all.
+    #[default]
+    Announced,
+    /// Airplanes find their groups from beacons of those near them.
+    Heard,
+}
+
+/// The settings of a method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReactiveSettings {
+    /// Time in seconds within which losses of separation are avoided.
+    pub look_ahead_s: f64,
+    /// Factor on separations when avoiding.
+    pub margin: f64,
+}
+
+/// A deployment of the optimizer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Deployment {
+    /// One process decides for all.
+    #[default]
+    Direct,
+    /// An agent per airplane, which sends its possible ways.
+    Team,
+    /// A coordinator that migrates.
+    Pim,
+    /// Coordinators that migrate, one above the others.
+    HierarchicalPim,
+    /// An agent per airplane, which sends its model.
+    CompactTeam,
+}
+
+impl Deployment {
+    /// Returns its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Team => "team",
+            Self::Pim => "pim",
+            Self::HierarchicalPim => "hierarchical-pim",
+            Self::CompactTeam => "compact-team",
+        }
+    }
+
+    /// Returns the reason why it cannot run with some settings, if there is one.
+    pub(crate) fn unsupported_reason(self, settings: &OptimizerConfig) -> Option<&'static str> {
+        let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
+        let as_in_the_paper =
+            settings.order == UpdateOrder::Parallel && settings.utility == Utility::Joint;
+        (self != Self::Direct && sampled && !as_in_the_paper)
+            .then_some("agents that sample update in parallel and learn from the joint cost")
+    }
+}
+
+/// The tables that a run keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordSection {
+    /// A row per airplane and cycle.
+    pub trajectories: bool,
+    /// A row per event, see [`super::events`].
+    pub events: bool,
+    /// A row per optimization.
+    pub optimizations: bool,
+    /// The controls of airplanes with pilots outside of the run, so that it can be computed again.
+    pub controls: bool,
+    /// Number of cycles between two checkpoints; 0 for none.
+    pub checkpoint_every: u64,
+}
+
+impl Default for RecordSection {
+    fn default() -> Self {
+        Self {
+            trajectories: true,
+            events: true,
+            optimizations: true,
+            controls: false,
+            checkpoint_every: 1000,
+        }
+    }
+}
