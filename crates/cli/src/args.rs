@@ -10,7 +10,7 @@ use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Write as _;
 
-/// Display order of global options: after those of each command.
+/// Display order of global options: after those of each command, which clap numbers from 0.
 const GLOBAL_DISPLAY_ORDER: usize = 900;
 
 /// Simulate and compare decentralized motion of many agents that must not collide.
@@ -41,40 +41,40 @@ Exit codes: 0 done, 1 the command failed or the answer is no, \
 impl Cli {
     /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
     pub(crate) fn parse_process_args() -> Self {
-        let words = without_help_of_help(std::env::args_os());
+        let args = without_help_of_help(std::env::args_os());
         let matches =
-            command().try_get_matches_from(words).unwrap_or_else(|error| exit_with(&error));
+            command().try_get_matches_from(args).unwrap_or_else(|error| exit_with(&error));
         Self::from_arg_matches(&matches).unwrap_or_else(|error| exit_with(&error))
     }
 }
 
 /// Ends the process with help or with the error in its arguments.
-fn exit_with(told: &clap::Error) -> ! {
-    let code = match check_write(told.print().and_then(|()| std::io::stdout().flush())) {
-        Err(failure) if !told.use_stderr() => {
+fn exit_with(error: &clap::Error) -> ! {
+    let code = match check_write(error.print().and_then(|()| std::io::stdout().flush())) {
+        Err(failure) if !error.use_stderr() => {
             Console::new(false, false).error(&failure);
             ExitCode::from(&failure) as i32
         }
-        _ => told.exit_code(),
+        _ => error.exit_code(),
     };
     std::process::exit(code)
 }
 
 /// Returns the arguments with `help --help` as `help`: the command `help` has no options of its own.
-fn without_help_of_help(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
-    let mut words: Vec<OsString> = words.collect();
-    if let [_, first, second] = words.as_slice()
+fn without_help_of_help(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut args: Vec<OsString> = args.collect();
+    if let [_, first, second] = args.as_slice()
         && first == "help"
         && (second == "--help" || second == "-h")
     {
-        words.pop();
+        args.pop();
     }
-    words
+    args
 }
 
 /// Returns the command line; its help lists the commands by their use.
 pub(crate) fn command() -> clap::Command {
-    // Without a terminal, clap would take 100 columns.
+    // clap takes 100 columns where there is no terminal: help in a pipe would depend on it.
     let command = Cli::command().term_width(prose_columns().into());
     let listed = command_list(&command);
     command.help_template(format!(
@@ -83,9 +83,9 @@ pub(crate) fn command() -> clap::Command {
     ))
 }
 
-fn heading(words: &str) -> String {
+fn heading(title: &str) -> String {
     let style = *Styles::styled().get_header();
-    format!("{style}{words}:{style:#}")
+    format!("{style}{title}:{style:#}")
 }
 
 fn command_list(command: &clap::Command) -> String {

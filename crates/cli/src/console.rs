@@ -81,12 +81,12 @@ impl Console {
     }
 }
 
-/// Returns the number of columns that text may take: those of the terminal; without one, as the variable
-/// `COLUMNS` says, or [`LINE_COLS`].
+/// Returns the number of columns that text may take: those of the terminal; without one, the value of the variable
+/// `COLUMNS`, or [`LINE_COLS`].
 pub(crate) fn terminal_columns() -> u16 {
-    let told = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
+    let variable = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
     let terminal = terminal_size::terminal_size().map(|(width, _)| width.0);
-    terminal.or_else(told).unwrap_or(LINE_COLS as u16)
+    terminal.or_else(variable).unwrap_or(LINE_COLS as u16)
 }
 
 /// Returns the number of columns that prose may take.
@@ -100,11 +100,10 @@ fn write_out(text: &str) -> Result<(), Failure> {
     check_write(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
 }
 
-/// Returns whether standard output took the text that was written to it. A reader that has closed the pipe (`| head`)
-/// is not an error.
+/// Checks the result of writing to standard output. A reader that has closed the pipe (`| head`) is not an error.
 ///
 /// # Errors
-/// When it did not.
+/// When writing failed in another way.
 pub(crate) fn check_write(result: io::Result<()>) -> Result<(), Failure> {
     match result {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
@@ -127,10 +126,13 @@ pub(crate) fn format_columns(table: &Table) -> String {
     blocks.iter().map(text).collect::<Vec<_>>().join("\n")
 }
 
+/// Columns before each line of a table.
+const INDENT: usize = 2;
+
 /// Columns between two columns of a table.
 const COLUMN_GAP: usize = 3;
 
-/// Largest width of a first column that stands beside the others.
+/// Largest width of a first column that stands beside the others: half a line, so that each block holds some of them.
 const MAX_FIRST_COLUMN_COLS: usize = 40;
 
 fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
@@ -144,19 +146,20 @@ fn blocks(widths: &[usize]) -> Vec<Range<usize>> {
     let mut blocks: Vec<Range<usize>> = Vec::new();
     let mut used = usize::MAX;
     for (k, width) in widths.iter().enumerate().skip(1) {
-        let more = COLUMN_GAP + width;
+        let added = COLUMN_GAP + width;
         match blocks.last_mut() {
-            Some(block) if used.saturating_add(more) <= LINE_COLS => {
+            Some(block) if used.saturating_add(added) <= LINE_COLS => {
                 block.end = k + 1;
-                used += more;
+                used += added;
             }
             _ => {
                 blocks.push(k..k + 1);
-                used = 2 + first + more;
+                used = INDENT + first + added;
             }
         }
     }
     if blocks.is_empty() {
+        // A table of one column.
         blocks.push(1..1);
     }
     blocks
@@ -170,9 +173,10 @@ fn block_text(lines: &[Vec<&str>], block: &Range<usize>) -> String {
     let line = |line: &Vec<&str>| {
         let cell = |k: usize| format!("{:COLUMN_GAP$}{:>width$}", "", line[k], width = widths[k]);
         let cells: String = block.clone().map(cell).collect();
-        match first <= MAX_FIRST_COLUMN_COLS {
-            true => format!("  {}\n", format!("{:<first$}{cells}", line[0]).trim_end()),
-            false => format!("  {}\n  {}\n", line[0], cells.trim_end()),
+        if first <= MAX_FIRST_COLUMN_COLS {
+            format!("  {}\n", format!("{:<first$}{cells}", line[0]).trim_end())
+        } else {
+            format!("  {}\n  {}\n", line[0], cells.trim_end())
         }
     };
     lines.iter().map(line).collect()

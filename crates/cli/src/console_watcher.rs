@@ -8,11 +8,12 @@ use sidestep::kernel::Interrupt;
 use sidestep_session::{Progress, Watcher};
 use std::sync::{Mutex, PoisonError};
 
-/// Shows progress, passes warnings on, and asks to stop after Ctrl-C.
+/// Shows progress, prints warnings, and asks to stop after Ctrl-C.
 #[derive(Debug)]
 pub(crate) struct ConsoleWatcher {
     console: Console,
-    shown: Mutex<Option<ProgressDisplay>>,
+    /// What is on the terminal: a bar of its own kind for each kind of work, from the first progress to the last.
+    display: Mutex<Option<ProgressDisplay>>,
 }
 
 #[derive(Debug)]
@@ -24,30 +25,30 @@ enum ProgressDisplay {
 impl ConsoleWatcher {
     /// Returns a watcher that prints to `console`.
     pub(crate) fn new(console: Console) -> Self {
-        Self { console, shown: Mutex::new(None) }
+        Self { console, display: Mutex::new(None) }
     }
 }
 
 impl Watcher for ConsoleWatcher {
     fn on_progress(&self, progress: Progress<'_>) {
-        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut display = self.display.lock().unwrap_or_else(PoisonError::into_inner);
         match progress {
             Progress::Cycles { from, done, until } => {
                 let new =
                     || ProgressDisplay::Bar(RunProgress::for_cycles(self.console, from, until));
-                shown.get_or_insert_with(new).set(done);
+                display.get_or_insert_with(new).set(done);
             }
             Progress::Runs { before, done, of } => {
                 let new = || ProgressDisplay::Bar(RunProgress::for_runs(self.console, before, of));
-                shown.get_or_insert_with(new).set(done);
+                display.get_or_insert_with(new).set(done);
             }
             Progress::Stage { what, share } => {
                 let new = || ProgressDisplay::Stages(StageProgress::new(self.console));
-                if let ProgressDisplay::Stages(stages) = shown.get_or_insert_with(new) {
+                if let ProgressDisplay::Stages(stages) = display.get_or_insert_with(new) {
                     stages.set(what, share);
                 }
             }
-            Progress::Ended => match shown.take() {
+            Progress::Ended => match display.take() {
                 Some(ProgressDisplay::Bar(bar)) => bar.clear(),
                 Some(ProgressDisplay::Stages(stages)) => stages.clear(),
                 None => {}

@@ -1,4 +1,4 @@
-//! The table of a fleet's nodes while they fly, in 80 columns.
+//! The table of a fleet's nodes while it runs, in 80 columns.
 
 use crate::console::Console;
 use crate::progress::RunProgress;
@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 /// Time between two tables where there is no terminal to draw one over the other.
 const PRINT_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Lines of a terminal that a table leaves free.
+/// Lines of a terminal that a table leaves free, for the command line above and warnings below: a table that scrolls cannot be
+/// drawn over.
 const FREE_LINES: usize = 4;
 
 /// A fleet on the terminal: a table, or a bar.
@@ -19,8 +20,9 @@ pub(crate) struct FleetTable {
     is_table: bool,
     is_terminal: bool,
     bar: Option<RunProgress>,
-    /// Number of lines of the table that stands there.
+    /// Number of lines of the table that was printed last.
     lines: usize,
+    /// Time of the next table where there is no terminal.
     next: Instant,
 }
 
@@ -46,13 +48,13 @@ impl FleetTable {
             terminal_size::terminal_size().map_or(usize::MAX, |(_, height)| height.0.into());
         let text = table(now, height.saturating_sub(FREE_LINES));
         let mut out = std::io::stderr().lock();
-        let over = match self.lines {
-            // Up to its first line, and all below away.
+        let erase = match self.lines {
+            // ANSI: to the start of the table's first line (CPL), then erase to the end of the screen (ED).
             lines if self.is_terminal && lines > 0 => format!("\x1b[{lines}F\x1b[J"),
             _ => String::new(),
         };
         self.lines = text.lines().count();
-        let _ = write!(out, "{over}{text}").and_then(|()| out.flush());
+        let _ = write!(out, "{erase}{text}").and_then(|()| out.flush());
     }
 
     /// Takes the bar away; the last table stays.
@@ -63,12 +65,13 @@ impl FleetTable {
     }
 }
 
-/// Returns the table of a fleet in `most_lines` lines at most: nodes in trouble come first where not all fit.
-fn table(now: &FleetStatus, most_lines: usize) -> String {
+/// Returns the table of a fleet in at most `max_lines` lines; where not all nodes fit, those in trouble come first.
+fn table(now: &FleetStatus, max_lines: usize) -> String {
     let mut nodes: Vec<&NodeStatus> = now.nodes.iter().collect();
-    let waits = usize::from(!now.waits_for.is_empty());
-    let room = most_lines.saturating_sub(3 + waits).max(1);
-    if nodes.len() > room {
+    let waiting_lines = usize::from(!now.waits_for.is_empty());
+    // Besides the rows: two lines of headings, and the one that counts the nodes left out.
+    let max_rows = max_lines.saturating_sub(3 + waiting_lines).max(1);
+    if nodes.len() > max_rows {
         nodes.sort_by_key(|node| (!is_lost(node), std::cmp::Reverse(node.late), node.agent));
     }
     let mut text = heading(now);
@@ -77,19 +80,19 @@ fn table(now: &FleetStatus, most_lines: usize) -> String {
         "{:>9}  state    epoch  heard  round   flown   late  silent   msg/s     kB/s",
         now.noun
     );
-    for node in nodes.iter().take(room) {
+    for node in nodes.iter().take(max_rows) {
         text.push_str(&row(node, now.nodes.len()));
     }
-    if nodes.len() > room {
-        let _ = writeln!(text, "and {} more", nodes.len() - room);
+    if nodes.len() > max_rows {
+        let _ = writeln!(text, "and {} more", nodes.len() - max_rows);
     }
     text
 }
 
 fn heading(now: &FleetStatus) -> String {
     if !now.has_begun {
-        let there = now.nodes.iter().filter(|node| node.state != "awaited").count();
-        return format!("{there} of {} nodes are there\n", now.nodes.len());
+        let present = now.nodes.iter().filter(|node| node.state != "awaited").count();
+        return format!("{present} of {} nodes are there\n", now.nodes.len());
     }
     let ms = |time: Option<f64>| time.map_or("-".into(), |ms| format!("{ms}"));
     let (p50, p99) = (ms(now.talk_p50_ms), ms(now.talk_p99_ms));
@@ -112,7 +115,7 @@ fn waiting_line(now: &FleetStatus) -> String {
     }
 }
 
-/// Returns whether nothing is heard of a node that was there.
+/// Returns whether a node was there and is not heard anymore.
 fn is_lost(node: &NodeStatus) -> bool {
     ["gone", "silent"].contains(&&*node.state)
 }

@@ -1,4 +1,5 @@
-//! Fleets that the studio watches: `sidestep-link` hears them, in a thread for each, and a screen shows them.
+//! Fleets that the studio watches: `sidestep-link` receives their views, in a thread for each, and a feed hands them to the
+//! studio.
 
 use crate::exit::Failure;
 use crate::interrupt;
@@ -12,32 +13,32 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
+/// Seconds that a fleet has to answer; after as long a silence it is taken to be lost. As long as the default of --lease.
 const FLEET_TIMEOUT_S: f64 = 10.0;
 
-/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to
-/// end shows its last view for a second.
+/// Time between two attempts to reach a fleet at an endpoint where one has ended or was lost. It is longer than the second
+/// for which a server that ends still publishes its last view, so that the same fleet is not taken for a new one.
 const RECONNECT_DELAY: Duration = Duration::from_secs(2);
 
-/// Returns whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
-pub(crate) fn is_endpoint(named: &Path) -> bool {
-    let is_one = named.to_str().and_then(|text| {
+/// Returns whether an argument is a fleet's endpoint, e.g. `tcp/127.0.0.1:7600`, rather than a file.
+pub(crate) fn is_endpoint(argument: &Path) -> bool {
+    let has_form = argument.to_str().and_then(|text| {
         let address = ["tcp/", "tls/"].iter().find_map(|protocol| text.strip_prefix(protocol))?;
         let (host, port) = address.rsplit_once(':')?;
         Some(!host.is_empty() && !host.contains('/') && port.parse::<u16>().is_ok())
     });
-    is_one == Some(true) && !named.exists()
+    has_form == Some(true) && !argument.exists()
 }
 
-/// Divides the named things into files and endpoints of fleets.
-pub(crate) fn split_endpoints(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+/// Divides arguments into files and endpoints of fleets.
+pub(crate) fn split_endpoints(arguments: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     let (fleets, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
-        named.iter().partition(|path| is_endpoint(path));
+        arguments.iter().partition(|path| is_endpoint(path));
     let fleets = fleets.into_iter().map(|path| path.display().to_string()).collect();
     (files.into_iter().cloned().collect(), fleets)
 }
 
-/// Begins to watch a fleet; returns its screen once it has answered.
+/// Begins to watch a fleet; returns its feed once the fleet has answered.
 ///
 /// # Errors
 /// When the program that carries the network is not there, or the fleet does not answer.
@@ -48,46 +49,47 @@ pub(crate) fn start_watching(endpoint: &str, tls: Option<Tls>) -> Result<Arc<Fle
         tls,
         patience_s: FLEET_TIMEOUT_S,
     });
-    let (began, begins) = channel();
+    let (first_sender, first) = channel();
     let endpoint = endpoint.to_string();
-    std::thread::spawn(move || watch_fleets(&job, &endpoint, &began));
-    // It says how it began, or why it did not, in any case.
-    begins.recv().unwrap_or(Err(Failure::Interrupted))
+    std::thread::spawn(move || watch_fleets(&job, &endpoint, &first_sender));
+    // The thread sends a feed or a failure, unless the command is interrupted before.
+    first.recv().unwrap_or(Err(Failure::Interrupted))
 }
 
-/// Puts the news of one fleet after the other that flies there on a screen, until the command is interrupted.
-fn watch_fleets(job: &Job, endpoint: &str, began: &Sender<Result<Arc<FleetFeed>, Failure>>) {
-    let mut screen = None;
+/// Publishes the views of one fleet after the other at an endpoint, until the command is interrupted. The feed, or the reason
+/// why there is none, is sent to `first`.
+fn watch_fleets(job: &Job, endpoint: &str, first: &Sender<Result<Arc<FleetFeed>, Failure>>) {
+    let mut feed = None;
     while !interrupt::is_requested() {
-        match (watch_fleet(job, endpoint, began, &mut screen), &screen) {
-            (Err(failure), Some(screen)) => {
+        match (watch_fleet(job, endpoint, first, &mut feed), &feed) {
+            (Err(failure), Some(feed)) => {
                 let JobError { cause, remedy, .. } = JobError::from(&failure);
-                screen.mark_lost(&cause, &remedy);
+                feed.mark_lost(&cause, &remedy);
             }
-            (Err(failure), None) => return drop(began.send(Err(failure))),
+            (Err(failure), None) => return drop(first.send(Err(failure))),
             (Ok(()), _) => {}
         }
         sleep(RECONNECT_DELAY);
     }
 }
 
-/// Puts the news of a fleet on a screen, until it is over or gone.
+/// Publishes the views of a fleet, until it has ended or is lost.
 fn watch_fleet(
     job: &Job,
     endpoint: &str,
-    began: &Sender<Result<Arc<FleetFeed>, Failure>>,
-    screen: &mut Option<Arc<FleetFeed>>,
+    first: &Sender<Result<Arc<FleetFeed>, Failure>>,
+    feed: &mut Option<Arc<FleetFeed>>,
 ) -> Result<(), Failure> {
-    link::run_job(job, |told| match (told, &*screen) {
-        (LinkMessage::Scene(staged), None) => {
-            let made = Arc::new(FleetFeed::new(endpoint.to_string(), *staged));
-            // The waiting thread is there until it has an answer.
-            let _ = began.send(Ok(made.clone()));
-            *screen = Some(made);
+    link::run_job(job, |message| match (message, &*feed) {
+        (LinkMessage::Scene(scene), None) => {
+            let new = Arc::new(FleetFeed::new(endpoint.to_string(), *scene));
+            // The receiver waits until it has this.
+            let _ = first.send(Ok(new.clone()));
+            *feed = Some(new);
         }
-        (LinkMessage::Scene(staged), Some(screen)) => screen.restart(*staged),
-        (LinkMessage::Seen(seen), Some(screen)) => screen.publish(*seen),
-        // Said of other jobs, or by the end of this one.
+        (LinkMessage::Scene(scene), Some(feed)) => feed.restart(*scene),
+        (LinkMessage::Seen(view), Some(feed)) => feed.publish(*view),
+        // A view before its scene cannot be shown; the other messages belong to other jobs, or are handled by `run_job`.
         _ => {}
     })
 }
@@ -98,8 +100,9 @@ mod tests {
 
     #[test]
     fn endpoints_are_told_from_files() {
-        let named = ["tcp/127.0.0.1:7600", "tls/host:1", "a.toml", "tcp/a", "tcp/a/b:1", "tcp/:1"];
-        let (files, fleets) = split_endpoints(&named.map(PathBuf::from));
+        let arguments =
+            ["tcp/127.0.0.1:7600", "tls/host:1", "a.toml", "tcp/a", "tcp/a/b:1", "tcp/:1"];
+        let (files, fleets) = split_endpoints(&arguments.map(PathBuf::from));
         assert_eq!(fleets, ["tcp/127.0.0.1:7600", "tls/host:1"]);
         assert_eq!(files.len(), 4);
     }

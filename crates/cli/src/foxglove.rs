@@ -1,9 +1,9 @@
-//! The words about viewers that watch runs live.
+//! The address at which viewers watch runs live.
 
 use crate::console::Console;
 use sidestep_session::ViewerAddress;
 
-/// Says where viewers are served, and warns of an address that others can reach.
+/// Prints the address for viewers, and warns of one that others can reach.
 pub(crate) fn print_address(at: &ViewerAddress, console: Console) {
     console.note(format!("Foxglove and Lichtblick: open a connection to {}", at.url()));
     if at.is_public() {

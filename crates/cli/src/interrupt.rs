@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time that a cycle has to come to its end.
+/// Time that a cycle has to end after Ctrl-C: most take milliseconds, and a user accepts to wait a second.
 const CYCLE_TIMEOUT: Duration = Duration::from_secs(1);
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
@@ -28,7 +28,7 @@ pub(crate) fn listen() -> Result<(), Failure> {
         if REQUESTED.swap(true, Ordering::Relaxed) {
             std::process::exit(ExitCode::Interrupted as i32);
         }
-        // A thread of its own, so that the next signal is heard meanwhile.
+        // Another thread waits, so that the second signal is handled meanwhile.
         std::thread::spawn(|| {
             std::thread::sleep(CYCLE_TIMEOUT);
             cycle_interrupt().raise();
@@ -36,7 +36,7 @@ pub(crate) fn listen() -> Result<(), Failure> {
     })
 }
 
-/// Returns the interrupt at which runs look within their cycles.
+/// Returns the interrupt that runs check within their cycles.
 pub(crate) fn cycle_interrupt() -> Interrupt {
     CYCLE_INTERRUPT.get_or_init(Interrupt::default).clone()
 }

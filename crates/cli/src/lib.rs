@@ -38,7 +38,7 @@ use sidestep::scenario::Worlds;
 use sidestep::worlds::WORLDS;
 use std::sync::OnceLock;
 
-/// The worlds of this program, once they are not the usual ones.
+/// The worlds of [`main_with`].
 static OWN_WORLDS: OnceLock<Worlds> = OnceLock::new();
 
 /// Returns the worlds of this program.
@@ -50,7 +50,8 @@ fn worlds() -> &'static Worlds {
 /// [`WORLDS`] with parts of your own. Recordings belong to the program that made them: another program, or
 /// this one with other code, does not continue them.
 pub fn main_with(worlds: Worlds) -> std::process::ExitCode {
-    // Results follow from the added code, of which the program itself is all there is to see.
+    // A recording must not be continued by code that would give other results. The added code is known only as a part of
+    // the program's file, so the digest of that file stands for it.
     let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
     let digest = Digest::hash_bytes(&program).to_string();
     OWN_WORLDS.get_or_init(|| worlds.with_added_code(&digest));

@@ -1,4 +1,4 @@
-//! The program `sidestep-link`, which alone carries the network: found, started, given a job, and ended.
+//! The program `sidestep-link`, which alone contains the network stack: it is found, started, given a job, and ended.
 
 use crate::exit::Failure;
 use crate::interrupt;
@@ -14,10 +14,10 @@ use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Variable with the path of the program, for users who have it elsewhere.
+/// Environment variable with the path of the program, for users who have it elsewhere.
 const PATH_VARIABLE: &str = "SIDESTEP_LINK";
 
-/// Time between two looks at whether to end.
+/// Time between two checks for an interrupt.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Options of the server and of nodes.
@@ -43,7 +43,7 @@ pub(crate) struct LinkArgs {
     tls: TlsArgs,
 }
 
-/// Options of certificates, with which both ends of every link prove their identity.
+/// Options of certificates, with which both ends of every link prove their identity (mutual TLS).
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TlsArgs {
     /// Certificate of the authority (CA) that signed those of all parties (PEM)
@@ -100,13 +100,14 @@ impl TlsArgs {
 
 /// Returns the program: as the variable says, beside this one, or on the path.
 pub(crate) fn find_program() -> Result<PathBuf, InputError> {
-    let named = std::env::var_os(PATH_VARIABLE).map(PathBuf::from);
+    let variable = std::env::var_os(PATH_VARIABLE).map(PathBuf::from);
     let file = format!("{LINK_PROGRAM}{}", std::env::consts::EXE_SUFFIX);
-    let beside = std::env::current_exe().ok().map(|own| own.with_file_name(&file));
+    let beside = std::env::current_exe().ok().map(|program| program.with_file_name(&file));
     let path = std::env::var_os("PATH").unwrap_or_default();
     let on_path = std::env::split_paths(&path).map(|folder| folder.join(&file));
-    let found = match named {
-        Some(named) => Some(named).filter(|path| path.is_file()),
+    let found = match variable {
+        // A user who set the variable wants no other program in its place.
+        Some(path) => Some(path).filter(|path| path.is_file()),
         None => beside.into_iter().chain(on_path).find(|path| path.is_file()),
     };
     found.ok_or_else(|| {
@@ -119,22 +120,22 @@ pub(crate) fn find_program() -> Result<PathBuf, InputError> {
     })
 }
 
-/// Lets the program do a job, and hands its messages to `take`. Ctrl-C asks it to end in good order.
+/// Lets the program do a job, and calls `on_message` with its messages. Ctrl-C asks it to end in good order.
 ///
 /// # Errors
 /// When it is not there, cannot do it, or ends before it is done.
-pub(crate) fn run_job(job: &Job, mut take: impl FnMut(LinkMessage)) -> Result<(), Failure> {
+pub(crate) fn run_job(job: &Job, mut on_message: impl FnMut(LinkMessage)) -> Result<(), Failure> {
     interrupt::listen()?;
     let job = job_line(job)?;
     let mut child = spawn_program()?;
-    let told = receive_messages(&mut child);
+    let messages = receive_messages(&mut child);
     let mut stdin = child.stdin.take();
     send_job(stdin.as_mut(), &job);
-    let mut failed = None;
+    let mut error = None;
     loop {
-        match told.recv_timeout(STOP_POLL_INTERVAL) {
-            Ok(LinkMessage::Failed(why)) => failed = Some(why),
-            Ok(told) => take(told),
+        match messages.recv_timeout(STOP_POLL_INTERVAL) {
+            Ok(LinkMessage::Failed(reason)) => error = Some(reason),
+            Ok(message) => on_message(message),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -144,13 +145,14 @@ pub(crate) fn run_job(job: &Job, mut take: impl FnMut(LinkMessage)) -> Result<()
         }
     }
     let status = child.wait().map_err(|e| cannot_start_error(&e))?;
-    exit_result(status, failed)
+    exit_result(status, error)
 }
 
 fn spawn_program() -> Result<Child, Failure> {
     let mut command = Command::new(find_program()?);
     command.stdin(Stdio::piped()).stdout(Stdio::piped());
-    // Ctrl-C in a terminal comes to this process, which asks the program to end.
+    // A terminal sends Ctrl-C to a whole process group. In a group of its own, the program does not get it: this process asks it
+    // to end, so that the fleet can finish its cycle.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.spawn().map_err(|e| cannot_start_error(&e))
@@ -173,34 +175,35 @@ fn job_line(job: &Job) -> Result<String, InputError> {
     Ok(text + "\n")
 }
 
-/// Hands over the job. A program that has ended at once says why by itself.
+/// Sends the job. A failure to write is not reported here: the program has ended then, and its own message or exit status says
+/// why.
 fn send_job(stdin: Option<&mut ChildStdin>, line: &str) {
     if let Some(stdin) = stdin {
         let _ = stdin.write_all(line.as_bytes()).and_then(|()| stdin.flush());
     }
 }
 
-/// Returns the messages of the program as they come.
+/// Returns the messages of the program as they arrive. Lines that are no messages are dropped.
 fn receive_messages(child: &mut Child) -> Receiver<LinkMessage> {
-    let (sender, told) = channel();
+    let (sender, messages) = channel();
     let out = child.stdout.take();
     std::thread::spawn(move || {
         for line in
             out.into_iter().flat_map(|out| BufReader::new(out).lines()).map_while(Result::ok)
         {
-            if let Ok(one) = serde_json::from_str(&line)
-                && sender.send(one).is_err()
+            if let Ok(message) = serde_json::from_str(&line)
+                && sender.send(message).is_err()
             {
                 return;
             }
         }
     });
-    told
+    messages
 }
 
-fn exit_result(status: ExitStatus, failed: Option<JobError>) -> Result<(), Failure> {
-    match failed {
-        Some(failed) => Err(failed.into_error()),
+fn exit_result(status: ExitStatus, error: Option<JobError>) -> Result<(), Failure> {
+    match error {
+        Some(error) => Err(error.into_error()),
         None if status.success() => Ok(()),
         None if interrupt::is_requested() => Err(Failure::Interrupted),
         None => {

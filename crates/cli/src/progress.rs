@@ -16,7 +16,7 @@ impl RunProgress {
         let bar = new_bar(console, until);
         bar.set_style(style());
         bar.set_position(from);
-        // The rate counts this process alone, not the cycles of an earlier one.
+        // Of a resumed run, the rate and the time left follow from the cycles of this process alone.
         bar.reset_elapsed();
         bar.reset_eta();
         Self(bar)
@@ -48,8 +48,8 @@ impl RunProgress {
 
 /// Returns a bar that is hidden if the console shows no progress.
 fn new_bar(console: Console, length: u64) -> ProgressBar {
-    let shown = console.shows_progress();
-    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let is_shown = console.shows_progress();
+    let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     ProgressBar::with_draw_target(Some(length), target)
 }
 
@@ -57,7 +57,7 @@ fn new_bar(console: Console, length: u64) -> ProgressBar {
 #[derive(Debug)]
 pub(crate) struct StageProgress(ProgressBar);
 
-/// Number of steps of the bar of [`StageProgress`].
+/// Length of the bar of [`StageProgress`], which counts in whole steps.
 const STEPS: f64 = 1000.0;
 
 impl StageProgress {

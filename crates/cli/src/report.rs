@@ -71,8 +71,8 @@ fn phases_text(phases_s: &Phases) -> String {
 
 /// Formats a rate with as many digits as it needs.
 fn format_rate(per_second: f64) -> String {
-    match per_second < 1e5 {
-        true => group_thousands(per_second as u64),
-        false => format!("{:.2} million", per_second / 1e6),
+    if per_second < 1e5 {
+        return group_thousands(per_second as u64);
     }
+    format!("{:.2} million", per_second / 1e6)
 }

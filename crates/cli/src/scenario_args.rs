@@ -85,8 +85,7 @@ impl ScenarioArgs {
 }
 
 impl ChangeArgs {
-    /// Returns all overrides except the seed: `--set` first, because options with a name of their
-    /// own win.
+    /// Returns all overrides except the seed: `--set` first, so that options with a name of their own replace its values.
     pub(crate) fn settings(&self) -> Vec<String> {
         let mut all = self.overrides.clone();
         all.extend(self.cycles.map(|cycles| format!("cycles={cycles}")));

@@ -44,7 +44,7 @@ pub(crate) struct ArmArgs {
 
 /// An arm in a posture.
 pub(crate) struct Arm {
-    pub(crate) chosen: ArmSelection,
+    pub(crate) selection: ArmSelection,
     pub(crate) values: Vec<f64>,
 }
 
@@ -54,13 +54,13 @@ impl ArmArgs {
     /// # Errors
     /// When a file, a link, a group, the posture or the values are wrong.
     pub(crate) fn load(&self) -> Result<Arm, InputError> {
-        let chosen = self.files().load()?;
+        let selection = self.files().load()?;
         let (place, values) = match &self.joints {
             Some(text) => ("--joints", parse_numbers("--joints", text)?),
-            None => ("--posture", chosen.posture(self.posture.as_deref())?),
+            None => ("--posture", selection.posture(self.posture.as_deref())?),
         };
-        chosen.chain.check_count(place, &values)?;
-        Ok(Arm { chosen, values })
+        selection.chain.check_count(place, &values)?;
+        Ok(Arm { selection, values })
     }
 
     fn files(&self) -> ArmFiles {
@@ -129,12 +129,12 @@ struct RodLimits {
 impl Arm {
     /// Returns the positions of the arm at these joint values.
     pub(crate) fn positions(&self, values: &[f64]) -> ArmPositions {
-        let chain = &self.chosen.chain;
+        let chain = &self.selection.chain;
         let frames = chain.forward(values);
         let skeleton = chain.skeleton();
         let Transform { rotation, origin_m } = frames.tip;
         ArmPositions {
-            robot: self.chosen.model.name.clone(),
+            robot: self.selection.model.name.clone(),
             base_link: chain.base.clone(),
             tip_link: chain.tip.clone(),
             tip: origin_m,

@@ -7,10 +7,11 @@ use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::Path;
 
-/// Drawn thickness of links, and radius of connectors, as parts of the arm's length.
+/// Drawn thickness of links, and radius of connectors, as fractions of the arm's length: the picture's scale follows from the
+/// arm, and a connector is a little thicker than the links that it joins.
 const THICKNESS_FRACTION: f64 = 0.012;
 const RADIUS_FRACTION: f64 = 0.014;
-/// Drawn radius of a target, as a part of the arm's length.
+/// Drawn radius of a target, as a fraction of the arm's length.
 const TARGET_FRACTION: f64 = 0.02;
 
 /// The content of a picture.
@@ -21,7 +22,7 @@ pub(crate) struct ArmPicture<'a> {
     pub(crate) connectors: &'a [Vector],
     /// Target position of the tip, in m.
     pub(crate) target: Option<Vector>,
-    /// The obstacles in the way.
+    /// The obstacles.
     pub(crate) obstacles: &'a [Sphere],
 }
 
@@ -37,7 +38,7 @@ impl ArmPicture<'_> {
             dimensions: 3,
             cycle_s: 1.0,
             floor: None,
-            bodies: self.still(length_m),
+            bodies: self.static_bodies(length_m),
             names: vec![(BodyKind::Connector, 0, self.robot.into())],
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };
@@ -48,11 +49,11 @@ impl ArmPicture<'_> {
 
     /// Returns the length of all links together, which the drawn sizes follow.
     fn length_m(&self) -> f64 {
-        let apart = |pair: &[Vector]| {
+        let distance = |pair: &[Vector]| {
             let square = |k: usize| (pair[1][k] - pair[0][k]).powi(2);
             (square(0) + square(1) + square(2)).sqrt()
         };
-        self.connectors.windows(2).map(apart).sum::<f64>().max(1e-3)
+        self.connectors.windows(2).map(distance).sum::<f64>().max(1e-3)
     }
 
     fn arm(&self, length_m: f64) -> Vec<Body> {
@@ -69,10 +70,10 @@ impl ArmPicture<'_> {
         std::iter::once(links).chain((0..).zip(self.connectors).map(connector)).collect()
     }
 
-    fn still(&self, length_m: f64) -> Vec<Body> {
-        let sphere = |(number, it): (u32, &Sphere)| {
-            let ball = Shape::Sphere { radius_m: it.radius_m };
-            Body::new(BodyKind::Obstacle, number, Pose::from_position(it.center_m), ball)
+    fn static_bodies(&self, length_m: f64) -> Vec<Body> {
+        let sphere = |(number, obstacle): (u32, &Sphere)| {
+            let ball = Shape::Sphere { radius_m: obstacle.radius_m };
+            Body::new(BodyKind::Obstacle, number, Pose::from_position(obstacle.center_m), ball)
         };
         let target = self.target.map(|at_m| {
             let ball = Shape::Sphere { radius_m: TARGET_FRACTION * length_m };

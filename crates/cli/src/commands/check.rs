@@ -17,9 +17,9 @@ Examples:
   sidestep check office.toml --set robots.0.size=3
   sidestep check office.toml --json | jq .bodies";
 
-/// Memory that recording takes beside the run, by measurement: writers of tables, and the picture.
+/// Memory that recording takes besides the run, as measured: the writers of tables, and the picture.
 const RECORDING_BYTES: u64 = 35_000_000;
-/// The same for each body: rows that wait, its track, and its part of the picture.
+/// The same for each body: buffered rows, its track, and its part of the picture.
 const RECORDING_BYTES_PER_BODY: u64 = 3000;
 
 /// Validate a scenario and describe it, without running it.
@@ -44,21 +44,23 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         return Err(error.into());
     }
     let (source, compiled) = match args.scenario.compile() {
-        Ok(right) => right,
+        Ok(compiled) => compiled,
         Err(first) => return print_all_errors(args, first, console),
     };
-    let mut found = compiled.contents(&source);
+    let mut contents = compiled.contents(&source);
     if let Some(foreign) = foreign {
-        if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), foreign.json) {
-            all.extend(more);
+        if let (Some(fields), Value::Object(added)) = (contents.json.as_object_mut(), foreign.json)
+        {
+            fields.extend(added);
         }
-        found.text.push_str(&align_pairs(&foreign.lines));
+        contents.text.push_str(&align_pairs(&foreign.lines));
     }
-    measure_memory(&source, compiled.as_ref(), &mut found);
+    measure_memory(&source, compiled.as_ref(), &mut contents);
     let remarks = compiled.remarks();
-    found.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
+    contents.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
-    console.print_result(&found.json, || heading + &found.text + &format_remarks(&remarks))?;
+    console
+        .print_result(&contents.json, || heading + &contents.text + &format_remarks(&remarks))?;
     Ok(ExitCode::Done)
 }
 
@@ -81,22 +83,23 @@ fn print_all_errors(
     Ok(ExitCode::WrongInput)
 }
 
-/// Adds the memory that a run takes: that of this process, because a run begins in the same way.
-fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, found: &mut Description) {
-    // Kept until the memory is measured.
+/// Adds the memory that a run takes: the peak of this process once it has started one.
+fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &mut Description) {
     let _run = compiled.start(source, 1);
     let Some(bytes) = peak_bytes() else { return };
     let recorded =
         bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.body_count() as u64;
-    found.json["memory_bytes"] = bytes.into();
-    found.json["recorded_memory_bytes"] = recorded.into();
+    contents.json["memory_bytes"] = bytes.into();
+    contents.json["recorded_memory_bytes"] = recorded.into();
     let mb = |bytes: u64| bytes.div_ceil(1_000_000);
-    let words = format!("  A run takes about {} MB of memory", mb(bytes));
-    found.text.push_str(&format!("{words}, recorded up to {} MB\n", mb(recorded)));
+    contents.text.push_str(&format!(
+        "  A run takes about {} MB of memory, recorded up to {} MB\n",
+        mb(bytes),
+        mb(recorded)
+    ));
 }
 
-/// Returns the most memory that this process has taken so far; `None` where the system does not
-/// tell.
+/// Returns the peak of this process's memory so far; `None` on systems without `/proc`.
 fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -106,6 +109,6 @@ fn peak_bytes() -> Option<u64> {
 
 /// Returns remarks as text: severity and key on a line, and the text below.
 fn format_remarks(remarks: &[Remark]) -> String {
-    let one = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
-    remarks.iter().map(one).collect()
+    let text = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
+    remarks.iter().map(text).collect()
 }

@@ -21,7 +21,7 @@ pub(crate) struct CompletionsArgs {
     shell: Shell,
 }
 
-/// The result for programs.
+/// The result as JSON.
 #[derive(Debug, Serialize)]
 struct CompletionsOutput {
     shell: String,
@@ -36,7 +36,7 @@ pub(crate) fn completions(args: &CompletionsArgs, console: Console) -> Result<Ex
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut args::command(), "sidestep", &mut script);
     let script = String::from_utf8(script).expect("scripts are text");
-    let printed = CompletionsOutput { shell: args.shell.to_string(), script };
-    console.print_result(&printed, || printed.script.clone())?;
+    let output = CompletionsOutput { shell: args.shell.to_string(), script };
+    console.print_result(&output, || output.script.clone())?;
     Ok(ExitCode::Done)
 }

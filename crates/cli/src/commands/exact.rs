@@ -110,17 +110,17 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
     // A scenario without a name is named by its file.
     let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
     let model = markov_model(compiled).map_err(in_file)?;
-    let chosen = policy(&args.policy)?;
-    let mut summary = model.summary(&args.policy, &chosen, args.top)?;
+    let policy = policy(&args.policy)?;
+    let mut summary = model.summary(&args.policy, &policy, args.top)?;
     if let Some(runs) = args.runs {
         let cycles = compiled.cycles;
-        summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
+        summary.comparison = Some(compare(compiled, &source, &policy, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
     console.print_result(&summary, || text(&summary, scenario_name(compiled, &source)))?;
     Ok(match summary.comparison {
         None | Some(Comparison { agrees: Some(true), .. }) => ExitCode::Done,
-        // Runs that are too few confirm nothing, and the user who asked for them wants to know.
+        // Too few runs confirm nothing, and a script that asked for the comparison must not take them for an agreement.
         Some(_) => ExitCode::Failed,
     })
 }
@@ -138,10 +138,10 @@ fn export(model: &MarkovModel, args: &ExportArgs) -> Result<Option<PomdpSize>, F
 
 /// Replaces the library's name of an option by `--beam`, which includes it here.
 fn with_option_name(error: InputError) -> InputError {
-    match error.place() {
-        "--sensor" => InputError::new("--beam", error.cause(), error.remedy()),
-        _ => error,
+    if error.place() == "--sensor" {
+        return InputError::new("--beam", error.cause(), error.remedy());
     }
+    error
 }
 
 fn text(summary: &Summary, name: &str) -> String {
@@ -164,8 +164,8 @@ fn key_value(name: &str, value: String) -> (String, String) {
 
 fn visited_text(summary: &Summary) -> String {
     let boxes = summary.most_visited.iter();
-    let words = boxes.map(|b| format!("[{}, {}] {:.2} %", b.col, b.row, 100.0 * b.share));
-    words.collect::<Vec<_>>().join(", ")
+    let texts = boxes.map(|b| format!("[{}, {}] {:.2} %", b.col, b.row, 100.0 * b.share));
+    texts.collect::<Vec<_>>().join(", ")
 }
 
 fn pomdp_text(size: PomdpSize) -> String {

@@ -139,27 +139,27 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     }
     match export::export(&recorded, &export_request(args), &ConsoleWatcher::new(console)) {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
-        written => {
-            print_result(args.to, &written?, console)?;
+        result => {
+            print_result(args.to, &result?, console)?;
             Ok(ExitCode::Done)
         }
     }
 }
 
 fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
-    let film = AnimationOptions { fps: args.fps, width_px: args.width };
-    let form = match args.to {
+    let animation = AnimationOptions { fps: args.fps, width_px: args.width };
+    let format = match args.to {
         ExportFormat::Csv => export::Format::Csv(args.table.clone()),
         ExportFormat::Parquet => export::Format::Parquet(args.table.clone()),
         ExportFormat::Mcap => export::Format::Mcap,
         ExportFormat::RosBag => export::Format::RosBag,
         ExportFormat::Svg => export::Format::Svg,
         ExportFormat::Png => export::Format::Png { width_px: args.width },
-        ExportFormat::Gif => export::Format::Gif(film),
-        ExportFormat::Mp4Frames => export::Format::Frames(film),
+        ExportFormat::Gif => export::Format::Gif(animation),
+        ExportFormat::Mp4Frames => export::Format::Frames(animation),
     };
     ExportRequest {
-        form,
+        format,
         out: args.out.as_deref(),
         replace: args.replace,
         from: args.from,
@@ -171,30 +171,30 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
 
 /// Refuses options that have no effect on the chosen format.
 fn check_options(args: &ExportArgs) -> Result<(), InputError> {
-    let form = args.to;
+    let format = args.to;
     let given = [
-        ("--until", args.until.is_some(), !form.is_picture()),
-        ("--every", args.every.is_some(), !form.is_picture()),
-        ("--table", args.table.is_some(), form.is_table()),
-        ("--fps", args.fps.is_some(), form.is_animation()),
-        ("--width", args.width.is_some(), form.is_animation() || form == ExportFormat::Png),
+        ("--until", args.until.is_some(), !format.is_picture()),
+        ("--every", args.every.is_some(), !format.is_picture()),
+        ("--table", args.table.is_some(), format.is_table()),
+        ("--fps", args.fps.is_some(), format.is_animation()),
+        ("--width", args.width.is_some(), format.is_animation() || format == ExportFormat::Png),
     ];
-    match given.iter().find(|(_, is_given, has_meaning)| *is_given && !has_meaning) {
-        None => Ok(()),
-        Some((option, ..)) => {
-            let cause = format!("means nothing for --to {}", form.name());
-            Err(InputError::new(*option, cause, "leave it out"))
+    for (option, is_given, has_meaning) in given {
+        if is_given && !has_meaning {
+            let cause = format!("means nothing for --to {}", format.name());
+            return Err(InputError::new(option, cause, "leave it out"));
         }
     }
+    Ok(())
 }
 
 /// Prints which files were written.
 fn print_result(
-    form: ExportFormat,
+    format: ExportFormat,
     written: &ExportResult,
     console: Console,
 ) -> Result<(), Failure> {
-    let ExportResult { paths, is_confirmed, film } = written;
+    let ExportResult { paths, is_confirmed, animation } = written;
     let shown: Vec<String> = paths.iter().map(display_path).collect();
     let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
@@ -205,16 +205,16 @@ fn print_result(
             paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();
         let size = format!("  {} bytes\n", group_thousands(bytes));
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
-        let film = film.map_or(String::new(), |(pictures, fps)| {
-            animation_text(form, pictures, fps, &paths[0])
+        let animation = animation.map_or(String::new(), |(pictures, fps)| {
+            animation_text(format, pictures, fps, &paths[0])
         });
-        format!("{names}{size}{confirmed}{film}")
+        format!("{names}{size}{confirmed}{animation}")
     })
 }
 
-/// Returns how long a film is, or how to join its frames.
-fn animation_text(form: ExportFormat, pictures: usize, fps: u16, path: &Path) -> String {
-    if form == ExportFormat::Gif {
+/// Returns the length of an animation, or the command that joins its frames.
+fn animation_text(format: ExportFormat, pictures: usize, fps: u16, path: &Path) -> String {
+    if format == ExportFormat::Gif {
         return format!("  {pictures} pictures, {:.1} s\n", pictures as f64 / f64::from(fps));
     }
     let folder = path.display();

@@ -1,4 +1,4 @@
-//! The part that `run` and `resume` share: driving the run to its end, and its report.
+//! The part that `run` and `resume` share: advancing the run to its end, and printing its summary.
 
 use crate::console::Console;
 use crate::console_watcher::ConsoleWatcher;
@@ -8,12 +8,12 @@ use crate::report::summary_text;
 use sidestep_session::{ManagedRun, RunStatus, Summary};
 use std::path::Path;
 
-/// Drives the run to its end (or until Ctrl-C), and stores and prints the summary.
+/// Advances the run to its end (or until Ctrl-C), and stores and prints the summary.
 ///
 /// # Errors
 /// When something cannot be stored.
-pub(super) fn run_to_end(journey: ManagedRun, console: Console) -> Result<ExitCode, Failure> {
-    let summary = journey.run_to_end(&ConsoleWatcher::new(console))?;
+pub(super) fn run_to_end(run: ManagedRun, console: Console) -> Result<ExitCode, Failure> {
+    let summary = run.run_to_end(&ConsoleWatcher::new(console))?;
     let short = || format!("{}\n", summary.digest);
     console.print_result_or_short(&summary, short, || summary_text(&summary))?;
     Ok(print_next_step(&summary, console))
@@ -30,8 +30,9 @@ fn print_next_step(summary: &Summary, console: Console) -> ExitCode {
             }
         });
     }
-    match interrupt::is_requested() && summary.status == RunStatus::Incomplete {
-        true => ExitCode::Interrupted,
-        false => ExitCode::Done,
+    // A run whose last cycle ended despite Ctrl-C is complete, and so is the command.
+    if interrupt::is_requested() && summary.status == RunStatus::Incomplete {
+        return ExitCode::Interrupted;
     }
+    ExitCode::Done
 }

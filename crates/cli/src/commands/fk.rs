@@ -39,13 +39,13 @@ pub(crate) struct FkArgs {
 /// When a file, a link, the posture or the values are wrong.
 pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {
     let arm = args.arm.load()?;
-    let placed = arm.positions(&arm.values);
+    let positions = arm.positions(&arm.values);
     if let Some(path) = &args.png {
-        placed.picture(None, &[]).write(path)?;
+        positions.picture(None, &[]).write(path)?;
     }
-    console.print_result(&placed, || placed.text())?;
-    if !placed.outside_limits.is_empty() {
-        console.warn(format!("outside limits: {}", placed.outside_limits.join(", ")));
+    console.print_result(&positions, || positions.text())?;
+    if !positions.outside_limits.is_empty() {
+        console.warn(format!("outside limits: {}", positions.outside_limits.join(", ")));
     }
     Ok(ExitCode::Done)
 }

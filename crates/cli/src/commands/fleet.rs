@@ -30,7 +30,7 @@ The program sidestep-link does it: `cargo install --path crates/link`. In lockst
 out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; what is recorded \
 continues with `sidestep resume DIR`.";
 
-/// The course of time, by its name.
+/// How time passes, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ClockArg {
     /// The server waits for every agent: the same results as in one process
@@ -39,7 +39,7 @@ enum ClockArg {
     Realtime,
 }
 
-/// The way from node to node, by its name.
+/// How packets get from node to node, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TopologyArg {
     /// Every node is connected to every other
@@ -108,25 +108,25 @@ fn parse_speed(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When anything is wrong with its input, or the fleet comes to no end.
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
-    let mut shown = FleetTable::new(console, args.watch);
-    let mut ended = None;
-    let done = run_job(&Job::Fleet(args.job()), |told| match told {
+    let mut table = FleetTable::new(console, args.watch);
+    let mut end = None;
+    let result = run_job(&Job::Fleet(args.job()), |message| match message {
         LinkMessage::Listens(endpoints) => {
-            // Lockstep is over before it could be watched, unless it waits for nodes.
+            // A fleet in lockstep with all its nodes here ends before a user could join or watch it.
             if args.nodes.is_some() || args.clock == ClockArg::Realtime {
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
-        LinkMessage::Fleet(now) => shown.update(&now),
-        LinkMessage::Ended { summary, outcome, fleet } => ended = Some((summary, outcome, fleet)),
-        // The caller has it already; the others are for watchers.
+        LinkMessage::Fleet(now) => table.update(&now),
+        LinkMessage::Ended { summary, outcome, fleet } => end = Some((summary, outcome, fleet)),
+        // `run_job` returns the failure; scenes and views are for watchers.
         LinkMessage::Failed(_) | LinkMessage::Scene(_) | LinkMessage::Seen(_) => {}
     });
-    shown.clear();
-    if let Some((summary, outcome, fleet)) = ended {
+    table.clear();
+    if let Some((summary, outcome, fleet)) = end {
         args.print_results(&summary, outcome, &fleet, console)?;
     }
-    match done {
+    match result {
         Ok(()) => Ok(ExitCode::Done),
         Err(Failure::Interrupted) => {
             if let Some(folder) = args.out.as_ref().map(|folder| folder.display()) {
@@ -142,7 +142,7 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
 
 impl FleetArgs {
     fn job(&self) -> FleetJob {
-        let any = || vec![format!("{}/127.0.0.1:0", self.link.protocol())];
+        let loopback = || vec![format!("{}/127.0.0.1:0", self.link.protocol())];
         FleetJob {
             common: self
                 .link
@@ -156,14 +156,13 @@ impl FleetArgs {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
             },
-            listen: if self.listen.is_empty() { any() } else { self.listen.clone() },
+            listen: if self.listen.is_empty() { loopback() } else { self.listen.clone() },
             out: self.out.clone(),
             replace: self.replace,
             packets: self.packets,
         }
     }
 
-    /// Prints the results.
     fn print_results(
         &self,
         summary: &Value,

@@ -196,7 +196,7 @@ struct EffectorLog {
     run: Option<PathBuf>,
 }
 
-/// The topics of a bag that say where the robot was.
+/// The topics of a bag with the robot's poses.
 #[derive(Debug, Args)]
 struct TopicArgs {
     /// Topic of odometry (with --bag), e.g. /odom; of transforms with frames: /tf:odom:base_link
@@ -265,47 +265,50 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_sensor(place, text, name, &model)
             };
-            let assumed = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
-            print_report(&model.report, &args.target.add("sensors", add)?, assumed, console)?;
+            let assumptions = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
+            print_report(&model.report, &args.target.add("sensors", add)?, assumptions, console)?;
         }
         LearnCommand::Effector(args) => {
             let model = learn_effector(args, console)?;
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_effector(place, text, name, &model)
             };
-            let assumed = || smoothing(&args.estimate);
-            print_report(&model.report, &args.target.add("effectors", add)?, assumed, console)?;
+            let assumptions = || smoothing(&args.estimate);
+            print_report(&model.report, &args.target.add("effectors", add)?, assumptions, console)?;
         }
     }
     Ok(ExitCode::Done)
 }
 
-/// Prints the result and `written`, the line about the profile, with the assumptions of the profile; if quiet,
-/// that line alone.
+/// Prints the result and `written`, the line about the profile, with the assumptions of the profile; if quiet, that line
+/// alone.
 fn print_report(
     report: &(impl Serialize + Display),
     written: &str,
-    assumed: impl FnOnce() -> String,
+    assumptions: impl FnOnce() -> String,
     console: Console,
 ) -> Result<(), Failure> {
     console.print_result_or_short(
         report,
         || written.to_owned(),
-        || match written {
-            "" => report.to_string(),
-            _ => format!("{report}\n{written}{}", assumed()),
+        || {
+            if written.is_empty() {
+                return report.to_string();
+            }
+            format!("{report}\n{written}{}", assumptions())
         },
     )
 }
 
-/// Returns the facts about a sensor that the log does not tell, and the profile must state.
+/// Returns the facts about a sensor that a profile must state although the log does not contain them.
 fn assumptions(profile: &SensorProfile) -> String {
     let bearings: Vec<String> = profile.bearings_deg.iter().map(f64::to_string).collect();
-    let (bearings, range_m) = (bearings.join(", "), profile.range_m);
+    let bearings = bearings.join(", ");
+    let range_m = profile.range_m;
     let beams =
         format!("Its beams look at {bearings} degrees, {range_m} m far (--bearings, --range).");
     let other =
-        |(kind, seen): &(String, String)| format!("It sees a {kind} as `{seen}` (designates).");
+        |(kind, class): &(String, String)| format!("It sees a {kind} as `{class}` (designates).");
     let lines = std::iter::once(beams).chain(profile.designates.iter().map(other));
     lines.map(|line| indented(&line)).collect()
 }
@@ -313,17 +316,16 @@ fn assumptions(profile: &SensorProfile) -> String {
 /// Returns the line on how probabilities of the profile differ from shares of counts.
 fn smoothing(estimate: &EstimateArgs) -> String {
     let alpha = estimate.alpha;
-    let words = format!(
-        "Its probabilities are of counts with {alpha} added to each (--alpha), so that nothing is impossible."
-    );
-    match alpha > 0.0 {
-        true => indented(&words),
-        false => String::new(),
+    if alpha <= 0.0 {
+        return String::new();
     }
+    indented(&format!(
+        "Its probabilities are of counts with {alpha} added to each (--alpha), so that nothing is impossible."
+    ))
 }
 
-fn indented(words: &str) -> String {
-    format!("  {}\n", wrap(words, LINE_COLS - 2).join("\n  "))
+fn indented(text: &str) -> String {
+    format!("  {}\n", wrap(text, LINE_COLS - 2).join("\n  "))
 }
 
 fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
@@ -382,7 +384,7 @@ fn no_log() -> InputError {
     InputError::new("sidestep learn", "no log is given", "see `sidestep learn --help`")
 }
 
-/// Largest profile in bytes that can be added to.
+/// Largest profile in bytes that can be added to. A profile has kilobytes; a wrong path may lead to a log of gigabytes.
 const MAX_PROFILE_BYTES: u64 = 64 << 20;
 
 impl TargetArgs {
@@ -393,16 +395,18 @@ impl TargetArgs {
         section: impl FnOnce(&str, &str, &str) -> Result<String, InputError>,
     ) -> Result<String, Failure> {
         let Some(path) = &self.profile else { return Ok(String::new()) };
-        let text = match path.exists() {
-            true => read_text(path, MAX_PROFILE_BYTES)?,
-            false => profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy()),
+        let text = if path.exists() {
+            read_text(path, MAX_PROFILE_BYTES)?
+        } else {
+            profile::empty(&path.file_stem().unwrap_or_default().to_string_lossy())
         };
         let new = section(&path.display().to_string(), &text, &self.name)?;
         write_atomically(path, |file| file.write_all(new.as_bytes()))?;
-        let (name, path) = (&self.name, path.display());
-        Ok(match profile::has_section(&text, group, name) {
-            true => format!("Replaced `{name}` in {path}\n"),
-            false => format!("Added `{name}` to {path}\n"),
-        })
+        let name = &self.name;
+        let path = path.display();
+        if profile::has_section(&text, group, name) {
+            return Ok(format!("Replaced `{name}` in {path}\n"));
+        }
+        Ok(format!("Added `{name}` to {path}\n"))
     }
 }

@@ -33,8 +33,8 @@ pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure>
         let remedy = "give a folder where you may write";
         InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
     })?;
-    let said = || format!("Wrote manual pages to {}.\n", folder.display());
-    console.print_result(&json!({ "folder": display_path(folder) }), said)?;
+    let text = || format!("Wrote manual pages to {}.\n", folder.display());
+    console.print_result(&json!({ "folder": display_path(folder) }), text)?;
     Ok(ExitCode::Done)
 }
 

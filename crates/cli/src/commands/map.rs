@@ -106,9 +106,13 @@ pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure>
 fn read(args: &MapArgs) -> Result<(MapCounts, GridMap), InputError> {
     let policy = args.unknown.into();
     let Some(pixels) = load_pixel_map(&args.file, args.resolution_m)? else {
-        let (resolution_m, unknown) = (args.resolution_m, UnknownPolicy::Keep);
-        let boxes = GridOptions { box_size_m: args.box_size_m, resolution_m, unknown };
-        let map = load_map(&args.file, boxes)?;
+        // A map in characters is given in boxes. Unknown ones are counted before the policy replaces them.
+        let options = GridOptions {
+            box_size_m: args.box_size_m,
+            resolution_m: args.resolution_m,
+            unknown: UnknownPolicy::Keep,
+        };
+        let map = load_map(&args.file, options)?;
         let pixels = map.counts();
         let map = map.with_unknown(policy);
         return Ok((counts(&map, (map.width(), map.height()), pixels, map.box_size_m), map));

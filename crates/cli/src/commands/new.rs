@@ -33,8 +33,8 @@ pub(crate) struct NewArgs {
 
 /// The names of the worlds, each with a description.
 pub(crate) fn world_names() -> PossibleValuesParser {
-    let named = |kind: &dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
-    PossibleValuesParser::new(worlds().iter().map(named))
+    let value = |world: &dyn WorldType| PossibleValue::new(world.name()).help(world.about());
+    PossibleValuesParser::new(worlds().iter().map(value))
 }
 
 /// Runs the command.
@@ -42,10 +42,10 @@ pub(crate) fn world_names() -> PossibleValuesParser {
 /// # Errors
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
-    let kind = worlds().find(&args.world).expect("the parser takes these names alone");
-    let default = || PathBuf::from(format!("{}.toml", kind.name()));
+    let world = worlds().find(&args.world).expect("the parser takes these names alone");
+    let default = || PathBuf::from(format!("{}.toml", world.name()));
     let path = args.file.clone().unwrap_or_else(default);
-    write_new(&path, kind.default_scenario())?;
+    write_new(&path, world.default_scenario())?;
     let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
     let json = json!({ "file": display_path(&path), "world": args.world });
     console.print_result(&json, || format!("Wrote {}\n{next}", path.display()))?;

@@ -89,7 +89,7 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
     };
     run_job(&Job::Node(job), |_| {})?;
     let agent = args.agent();
-    let words =
+    let text =
         || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun());
     let result = match agent {
         AgentName::Airplane(id) => json!({ "airplane": id }),
@@ -97,6 +97,6 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
             json!({ "chain": chain, "connector": connector })
         }
     };
-    console.print_result_or_short(&result, String::new, words)?;
+    console.print_result_or_short(&result, String::new, text)?;
     Ok(ExitCode::Done)
 }

@@ -55,28 +55,29 @@ pub(crate) struct ReplayArgs {
 /// When the folder or the cycle is wrong, or the state differs from the recorded one.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {
     let recorded = RecordedRun::open(worlds(), &args.recorded)?;
-    let (workers, watch) = (args.workers.count(), ConsoleWatcher::new(console));
+    let workers = args.workers.count();
+    let watch = ConsoleWatcher::new(console);
     interrupt::listen()?;
-    let replayed = match args.cycle {
+    let report = match args.cycle {
         Some(cycle) => replay_to(&recorded, cycle, workers, &watch),
         None => replay_all(&recorded, workers, &watch),
     };
-    let mut replayed = match replayed {
+    let mut report = match report {
         Err(Failure::Interrupted) => return Ok(ExitCode::Interrupted),
         other => other?,
     };
     if let Some(png) = &args.png {
-        replayed.draw(&recorded, png)?;
+        report.draw(&recorded, png)?;
     }
     match args.cycle {
-        Some(_) => print_cycle(&replayed, args.all, console)?,
-        None => print_end(&replayed, recorded.is_complete, console)?,
+        Some(_) => print_cycle(&report, args.all, console)?,
+        None => print_end(&report, recorded.is_complete, console)?,
     }
     Ok(ExitCode::Done)
 }
 
-fn print_end(replayed: &ReplayReport, is_complete: bool, console: Console) -> Result<(), Failure> {
-    let ReplayReport { run, effort, .. } = replayed;
+fn print_end(report: &ReplayReport, is_complete: bool, console: Console) -> Result<(), Failure> {
+    let ReplayReport { run, effort, .. } = report;
     let digest = run.digest().to_string();
     let json = json!({
         "cycle": run.cycle(),
@@ -95,11 +96,11 @@ fn print_end(replayed: &ReplayReport, is_complete: bool, console: Console) -> Re
 /// Lines of a state that are printed unless all are asked for: a heading, and some bodies.
 const MAX_STATE_LINES: usize = 11;
 
-/// Returns the first lines of a state in words, and how to see the others.
+/// Returns the first lines of a state, and the option that shows the others.
 fn first_lines(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
     match lines.len().saturating_sub(MAX_STATE_LINES) {
-        // A line that counts a single one takes the room of that one.
+        // A single further line takes no more room than the line that would count it.
         0 | 1 => text.into(),
         more => format!(
             "{}\n  and {} more rows: --all\n",
@@ -109,8 +110,8 @@ fn first_lines(text: &str) -> String {
     }
 }
 
-fn print_cycle(replayed: &ReplayReport, shows_all: bool, console: Console) -> Result<(), Failure> {
-    let ReplayReport { run, compared_poses, .. } = replayed;
+fn print_cycle(report: &ReplayReport, shows_all: bool, console: Console) -> Result<(), Failure> {
+    let ReplayReport { run, compared_poses, .. } = report;
     let poses = run.poses();
     let digest = run.digest().to_string();
     let json = json!({

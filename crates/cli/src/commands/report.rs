@@ -67,7 +67,7 @@ struct PrintArgs {
 enum FigureFormat {
     Svg,
     Png,
-    /// Refused, with a way to get it.
+    /// Refused, with the name of a program that converts SVG to it.
     #[value(hide = true)]
     Pdf,
 }
@@ -78,21 +78,22 @@ enum FigureFormat {
 /// When the folder holds nothing to report, something in it is damaged, or the report cannot be
 /// written.
 pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
-    let pages = report_files(args)?;
-    args.print.figures()?;
-    let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
+    let files = report_files(args)?;
+    // Wrong options are refused before a large folder is read.
     let figures = args.print.figures()?;
+    let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
     figures.iter().try_for_each(|print| check_labels(print, &document))?;
-    pages.store(&document, PngOutput::None)?;
-    let figures = figures.map(|print| args.print.store(&print, &document, &pages)).transpose()?;
-    let (html, markdown) = (pages.html.display(), pages.markdown());
-    let shown = figures.as_ref().map(|folder| folder.display().to_string());
+    files.store(&document, PngOutput::None)?;
+    let figures = figures.map(|print| args.print.store(&print, &document, &files)).transpose()?;
+    let html = files.html.display();
+    let markdown = files.markdown();
+    let figures = figures.as_ref().map(|folder| folder.display().to_string());
     let json = json!({
         "html": html.to_string(),
         "markdown": markdown.display().to_string(),
-        "figures": shown,
+        "figures": figures,
     });
-    let more = shown.map_or(String::new(), |folder| format!("{folder}\n"));
+    let more = figures.map_or(String::new(), |folder| format!("{folder}\n"));
     console.print_result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
     Ok(ExitCode::Done)
 }
@@ -128,9 +129,9 @@ impl PrintArgs {
         &self,
         print: &PrintStyle,
         document: &Document,
-        pages: &ReportFiles,
+        files: &ReportFiles,
     ) -> Result<PathBuf, Failure> {
-        let folder = pages.html.with_file_name(format!("{}-print", pages.stem()));
+        let folder = files.html.with_file_name(format!("{}-print", files.stem()));
         std::fs::create_dir_all(&folder).map_err(|e| Failure::cannot_write(&folder, &e))?;
         for SvgFile { stem, svg } in print.figures(document)? {
             let at = |ending: &str| folder.join(format!("{stem}.{ending}"));
@@ -155,7 +156,7 @@ fn check_labels(print: &PrintStyle, document: &Document) -> Result<(), InputErro
     Err(InputError::new("--label", cause, "write them as the figure's axis or legend does"))
 }
 
-/// Reads width and height in mm.
+/// Parses width and height in mm.
 fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
     let side = |side: &str| side.trim().parse::<f64>().ok();
     let sides: Vec<Option<f64>> = text.split('x').map(side).collect();
@@ -172,7 +173,7 @@ fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Reads words and their replacements.
+/// Parses a label and its replacement.
 fn parse_label(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {

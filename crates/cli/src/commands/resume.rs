@@ -48,28 +48,28 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     if Folder::is_at(&args.folder) {
         return resume_sweep(args, console);
     }
-    let view = RunReader::open(&args.folder)?;
-    if view.manifest.status == Status::Complete && args.cycles.is_none() {
-        return print_finished(&view, console);
+    let reader = RunReader::open(&args.folder)?;
+    if reader.manifest.status == Status::Complete && args.cycles.is_none() {
+        return print_finished(&reader, console);
     }
     let workers = args.workers.count();
     interrupt::listen()?;
-    let journey = ManagedRun::resume(worlds(), &args.folder, workers, args.cycles)?;
-    let cycle = group_thousands(journey.cycle());
+    let run = ManagedRun::resume(worlds(), &args.folder, workers, args.cycles)?;
+    let cycle = group_thousands(run.cycle());
     console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
-    run_to_end(journey, console)
+    run_to_end(run, console)
 }
 
 /// Prints the results of a finished run: a user who resumes all runs need not know which had ended.
-fn print_finished(view: &RunReader, console: Console) -> Result<ExitCode, Failure> {
-    let folder = view.path.display();
-    let cycles = group_thousands(view.manifest.cycles_done);
+fn print_finished(reader: &RunReader, console: Console) -> Result<ExitCode, Failure> {
+    let folder = reader.path.display();
+    let cycles = group_thousands(reader.manifest.cycles_done);
     console.note(format!(
         "{folder} is complete ({cycles} cycles): nothing is left to run. `sidestep report {folder}` writes \
          its page."
     ));
-    let digest = view.manifest.digest.as_deref().unwrap_or_default();
-    console.print_result(&read_summary(&view.path)?, || format!("{digest}\n"))?;
+    let digest = reader.manifest.digest.as_deref().unwrap_or_default();
+    console.print_result(&read_summary(&reader.path)?, || format!("{digest}\n"))?;
     Ok(ExitCode::Done)
 }
 

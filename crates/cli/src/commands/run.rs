@@ -89,36 +89,36 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     args.many.check_single_run()?;
     let (source, compiled) = args.scenario.compile()?;
     print_warnings(&compiled.remarks(), console);
-    let told = worlds().translate(&args.scenario.file)?;
+    let import = worlds().translate(&args.scenario.file)?;
     let workers = args.workers.count();
-    let keep = OutputPaths {
+    let paths = OutputPaths {
         folder: args.out.as_deref(),
         mcap: args.mcap.as_deref().map(|file| (file, args.mcap_every)),
         replace: args.replace,
     };
     interrupt::listen()?;
-    // Before anything is written.
+    // An address that cannot be used is refused before anything is written.
     let viewers = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
-    let mut journey = ManagedRun::start(worlds(), compiled.as_ref(), &source, workers, keep)?
-        .with_import_report(told);
+    let mut run = ManagedRun::start(worlds(), compiled.as_ref(), &source, workers, paths)?
+        .with_import_report(import);
     if let Some(at) = &viewers {
-        serve_viewers(&mut journey, at, console)?;
+        serve_viewers(&mut run, at, console)?;
     }
-    run_to_end(journey, console)
+    run_to_end(run, console)
 }
 
-/// Starts to show a run to viewers, and says where.
+/// Starts to serve a run to viewers, and prints the address.
 fn serve_viewers(
-    journey: &mut ManagedRun,
+    run: &mut ManagedRun,
     at: &ViewerAddress,
     console: Console,
 ) -> Result<(), Failure> {
-    journey.serve_viewers(at)?;
+    run.serve_viewers(at)?;
     foxglove::print_address(at, console);
     Ok(())
 }
 
-/// Prints the warnings of `sidestep check`, too: few users want a run to which they apply.
+/// Prints the warnings that `sidestep check` prints, too: few users want a run to which they apply.
 fn print_warnings(remarks: &[Remark], console: Console) {
     for remark in remarks.iter().filter(|remark| remark.severity == Severity::Warning) {
         console.warn(wrap(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));

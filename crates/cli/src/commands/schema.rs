@@ -34,20 +34,20 @@ pub(crate) struct SchemaArgs {
     out: Option<PathBuf>,
 }
 
-/// The word for sweep files.
+/// The name of sweep files, beside those of worlds.
 const SWEEP_NAME: &str = "sweep";
 
-/// Returns files beside scenarios, each with a word for it and its schema.
+/// Returns the kinds of files besides scenarios, by name, each with its schema.
 fn other_files() -> Vec<(&'static str, Value)> {
-    let own = worlds().iter().flat_map(|kind| kind.other_files());
-    own.chain([(SWEEP_NAME, sidestep::experiment::sweep::file::schema())]).collect()
+    let of_worlds = worlds().iter().flat_map(|world| world.other_files());
+    of_worlds.chain([(SWEEP_NAME, sidestep::experiment::sweep::file::schema())]).collect()
 }
 
-/// The names of the worlds, and the words for other files.
+/// The names of the worlds and of other files.
 fn schema_names() -> PossibleValuesParser {
-    let world = |kind: &dyn WorldType| PossibleValue::new(kind.name()).help(kind.about());
-    let other = |(word, schema): &(&'static str, Value)| {
-        PossibleValue::new(*word).help(schema["title"].as_str().unwrap_or_default().to_string())
+    let world = |world: &dyn WorldType| PossibleValue::new(world.name()).help(world.about());
+    let other = |(name, schema): &(&'static str, Value)| {
+        PossibleValue::new(*name).help(schema["title"].as_str().unwrap_or_default().to_string())
     };
     let others = other_files();
     PossibleValuesParser::new(worlds().iter().map(world).chain(others.iter().map(other)))
@@ -59,7 +59,7 @@ fn schema_names() -> PossibleValuesParser {
 /// When the file cannot be written.
 pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Failure> {
     let of = args.of.as_deref();
-    let other = other_files().into_iter().find(|(word, _)| Some(*word) == of);
+    let other = other_files().into_iter().find(|(name, _)| Some(*name) == of);
     let schema = other.map(|(_, schema)| schema).or_else(|| worlds().schema(of));
     let schema = schema.expect("the parser takes these names alone");
     let text = format!("{schema:#}\n");

@@ -29,7 +29,7 @@ Examples:
 The page may read what lies below the given folders, the folders of the given \
 files, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
 
-/// The time between two looks at whether to end.
+/// The time between two checks for an interrupt.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Watch, steer, replay and edit in the browser.
@@ -99,7 +99,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     Ok(ExitCode::Done)
 }
 
-/// Tells the address of the studio and whether others can reach it, and opens it in a browser where that is safe.
+/// Prints the address of the studio and whether others can reach it, and opens it in a browser where that is safe.
 fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
     let url = studio.url();
     if studio.is_open_to_others() {
@@ -116,11 +116,14 @@ fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Fail
         || format!("{url}\n"),
         || format!("The studio is at {url}\nCtrl-C ends it.\n"),
     )?;
-    // The arguments of a process are there for all users of a machine to read, so no browser is given the token.
-    match (no_open, studio.is_open_to_others()) {
-        (true, _) => {}
-        (false, true) => console.note("Open the address yourself: it has the token in it."),
-        (false, false) => open_browser(&url, console),
+    if no_open {
+        return Ok(());
+    }
+    if studio.is_open_to_others() {
+        // All users of a machine can read the arguments of a process, so the token is not passed to a browser.
+        console.note("Open the address yourself: it has the token in it.");
+    } else {
+        open_browser(&url, console);
     }
     Ok(())
 }
@@ -139,16 +142,18 @@ fn wait_for_end(studio: &Studio) -> Result<(), Failure> {
 
 /// Opens a page in the user's browser, if there is one.
 fn open_browser(url: &str, console: Console) {
-    let (program, args): (&str, &[&str]) = match () {
-        () if cfg!(windows) => ("cmd", &["/c", "start", ""]),
-        () if cfg!(target_os = "macos") => ("open", &[]),
-        () => ("xdg-open", &[]),
+    let (program, args): (&str, &[&str]) = if cfg!(windows) {
+        // `start` takes its first argument for a window's title if it is quoted.
+        ("cmd", &["/c", "start", ""])
+    } else if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else {
+        ("xdg-open", &[])
     };
     let mut command = Command::new(program);
     command.args(args).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let started = command.spawn();
-    match started {
-        // Its end does not matter, but must be waited for.
+    match command.spawn() {
+        // A thread waits for its end, so that no zombie process is left.
         Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
         Err(_) => console.note("No browser could be started: open the address yourself."),
     }

@@ -149,34 +149,32 @@ pub(super) fn run_sweep(
     workers: usize,
     console: Console,
 ) -> Result<ExitCode, Failure> {
-    let wanted = many.sweep(file, changes)?;
+    let planned = many.sweep(file, changes)?;
     interrupt::listen()?;
     let watch = ConsoleWatcher::new(console);
     let Some(out) = out else {
-        let (plan, ended) = sweep::run_in_memory(worlds(), &wanted, workers, &watch)?;
-        return print_results(SweepOutput { plan: &plan, folder: None, console }, ended, "");
+        let (plan, end) = sweep::run_in_memory(worlds(), &planned, workers, &watch)?;
+        return print_results(SweepOutput { plan: &plan, folder: None, console }, end, "");
     };
-    run_remaining(
-        &sweep::open_or_create(worlds(), &wanted, out, workers, &watch)?,
-        workers,
-        console,
-    )
+    let folder = sweep::open_or_create(worlds(), &planned, out, workers, &watch)?;
+    run_remaining(&folder, workers, console)
 }
 
 fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
-    let (folder, workers) = (Folder::open(&args.folder)?, args.workers.count());
+    let folder = Folder::open(&args.folder)?;
+    let workers = args.workers.count();
     interrupt::listen()?;
-    let ended =
+    let end =
         sweep::run_share(worlds(), &folder, args.shard, workers, &ConsoleWatcher::new(console))?;
-    let told = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
-    print_share(told, args.shard, ended)
+    let output = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
+    print_share(output, args.shard, end)
 }
 
 fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    let ended = sweep::collect(worlds(), &folder, &ConsoleWatcher::new(console))?;
-    let told = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
-    print_results(told, ended, "The runs are collected already.")
+    let end = sweep::collect(worlds(), &folder, &ConsoleWatcher::new(console))?;
+    let output = SweepOutput { plan: folder.plan(), folder: Some(&folder), console };
+    print_results(output, end, "The runs are collected already.")
 }
 
 fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -186,10 +184,10 @@ fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
 }
 
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
-    let wanted = args.many.sweep(&args.file, &args.changes)?;
+    let planned = args.many.sweep(&args.file, &args.changes)?;
     interrupt::listen()?;
-    let (workers, watch) = (args.workers.count(), ConsoleWatcher::new(console));
-    let folder = sweep::create(worlds(), &wanted, &args.out, workers, &watch)?;
+    let watch = ConsoleWatcher::new(console);
+    let folder = sweep::create(worlds(), &planned, &args.out, args.workers.count(), &watch)?;
     let plan = folder.plan();
     let json = json!({
         "folder": display_path(&args.out),
@@ -203,21 +201,21 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     Ok(ExitCode::Done)
 }
 
-/// Returns the plan in words, and the commands that run it. Where a precision ends the sweep it has no shares,
-/// because the rule takes all runs to be seen.
+/// Returns the plan as text, and the commands that run it. A sweep that ends at a precision has no shares, because its
+/// stopping rule needs the results of all runs in one process.
 fn plan_lines(plan: &Plan, out: &Path) -> Vec<(String, String)> {
-    let (dir, all) = (out.display(), group_thousands(plan.runs()));
-    let most = if plan.until.is_some() { "at most " } else { "" };
+    let dir = out.display();
+    let all = group_thousands(plan.runs());
+    let at_most = if plan.until.is_some() { "at most " } else { "" };
     let mut lines = vec![
         ("variants", group_thousands(plan.variants.len() as u64)),
-        ("runs", format!("{most}{} of each, {most}{all} in all", plan.replicates)),
+        ("runs", format!("{at_most}{} of each, {at_most}{all} in all", plan.replicates)),
     ];
-    lines.extend(match plan.until.is_some() {
-        true => vec![("run them", format!("sidestep resume {dir}"))],
-        false => vec![
-            ("run them", format!("sidestep sweep run {dir} --shard 0/1")),
-            ("join them", format!("sidestep sweep collect {dir}")),
-        ],
-    });
-    lines.into_iter().map(|(name, words)| (name.to_string(), words)).collect()
+    if plan.until.is_some() {
+        lines.push(("run them", format!("sidestep resume {dir}")));
+    } else {
+        lines.push(("run them", format!("sidestep sweep run {dir} --shard 0/1")));
+        lines.push(("join them", format!("sidestep sweep collect {dir}")));
+    }
+    lines.into_iter().map(|(name, value)| (name.to_string(), value)).collect()
 }

@@ -1,4 +1,4 @@
-//! Many runs: options -> a sweep, and its results as text.
+//! Many runs: options -> a sweep, and its results.
 //!
 //! ```text
 //! args.rs     options and files -> a sweep         output.rs    its results, as text and JSON
@@ -29,7 +29,7 @@ pub(crate) fn run_remaining(
     console: Console,
 ) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
-    let ended = sweep::run_remaining(worlds(), folder, workers, &ConsoleWatcher::new(console))?;
-    let told = SweepOutput { plan: folder.plan(), folder: Some(folder), console };
-    print_results(told, ended, "All runs are finished already.")
+    let end = sweep::run_remaining(worlds(), folder, workers, &ConsoleWatcher::new(console))?;
+    let output = SweepOutput { plan: folder.plan(), folder: Some(folder), console };
+    print_results(output, end, "All runs are finished already.")
 }

@@ -13,7 +13,7 @@ use sidestep_document::Table;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{self, Folder, SweepEnd, SweepResult, SweepTiming};
 
-/// Largest number of failed runs that are listed.
+/// Largest number of failed runs, or of metrics without a table, that are listed: many have the same cause.
 const MAX_LISTED_FAILURES: usize = 5;
 
 fn timing_text(effort: &SweepTiming) -> String {
@@ -36,23 +36,23 @@ pub(crate) struct SweepOutput<'a> {
     pub(crate) console: Console,
 }
 
-/// Summarizes the runs and prints the results; `already` mentions runs that were finished before.
+/// Summarizes the runs and prints the results; `done_note` is printed if all runs were finished before.
 /// Failed runs are listed, and make the exit code 1.
 ///
 /// # Errors
 /// When a metric that is to be reported does not exist, or the results cannot be written.
 pub(crate) fn print_results(
-    told: SweepOutput<'_>,
-    ended: SweepEnd,
-    already: &str,
+    output: SweepOutput<'_>,
+    end: SweepEnd,
+    done_note: &str,
 ) -> Result<ExitCode, Failure> {
-    let SweepOutput { plan, folder, console } = told;
-    let done = match ended {
+    let SweepOutput { plan, folder, console } = output;
+    let done = match end {
         SweepEnd::Done(done) => done,
-        SweepEnd::Interrupted(runs) => return print_interrupted(told, runs),
+        SweepEnd::Interrupted(runs) => return print_interrupted(output, runs),
     };
     if done.was_done {
-        console.note(already);
+        console.note(done_note);
     }
     let table = &done.table;
     let stages = StageProgress::new(console);
@@ -60,21 +60,21 @@ pub(crate) fn print_results(
         plan.summary_with_progress(worlds(), table, &mut |share| stages.set("intervals", share));
     stages.clear();
     let summary = summary?;
-    let failed = print_failures(told, table);
+    let failed = print_failures(output, table);
     let json = done.to_json(plan, folder, &summary);
     let short = || match folder {
         Some(folder) => format!("{}\n", folder.results_file().display()),
         None => tables(&summary),
     };
     console.print_result_or_short(&json, short, || {
-        text(told, table, &summary, &variant_stops(plan, table), done.effort)
+        text(output, table, &summary, &variant_stops(plan, table), done.effort)
     })?;
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 
 /// Prints how many runs of an interrupted sweep are finished.
-fn print_interrupted(told: SweepOutput<'_>, finished: usize) -> Result<ExitCode, Failure> {
-    let SweepOutput { plan, folder, console } = told;
+fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCode, Failure> {
+    let SweepOutput { plan, folder, console } = output;
     let path = folder.map(Folder::path);
     match path.map(display_path) {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
@@ -119,18 +119,18 @@ fn text(
     let mut lines = Vec::new();
     // Metrics that the user did not ask for need no remark.
     if plan.metrics.is_empty()
-        && let Some(words) = omitted_metrics_text(summary)
+        && let Some(omitted) = omitted_metrics_text(summary)
     {
-        lines.push(("not shown".to_string(), words));
+        lines.push(("not shown".to_string(), omitted));
     }
     lines.extend(summary.notes.iter().map(|note| ("note".to_string(), note.clone())));
     for VariantStop { variant, runs, reason } in stopped {
-        let words = format!(
+        let stop = format!(
             "{} after {runs} runs: {}",
             plan.variants[*variant as usize],
             reason.describe()
         );
-        lines.push(("stopped".to_string(), words));
+        lines.push(("stopped".to_string(), stop));
     }
     if effort.runs > 0 {
         lines.push(("time".to_string(), timing_text(&effort)));
@@ -157,19 +157,21 @@ fn omitted_metrics_text(summary: &Summary) -> Option<String> {
             None => reasons.push((reason, vec![metric])),
         }
     }
-    let words = |(reason, metrics): &(&str, Vec<&str>)| {
-        let more = metrics.len().saturating_sub(MAX_LISTED_FAILURES);
-        let first = metrics[..metrics.len() - more].join(", ");
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("{first}{more} ({reason})")
-    };
-    let all: Vec<String> = reasons.iter().map(words).collect();
-    (!all.is_empty()).then(|| all.join("; "))
+    let texts: Vec<String> =
+        reasons.iter().map(|(reason, metrics)| omitted_text(reason, metrics)).collect();
+    (!texts.is_empty()).then(|| texts.join("; "))
+}
+
+fn omitted_text(reason: &str, metrics: &[&str]) -> String {
+    let unlisted = metrics.len().saturating_sub(MAX_LISTED_FAILURES);
+    let first = metrics[..metrics.len() - unlisted].join(", ");
+    let more = if unlisted > 0 { format!(" and {unlisted} more") } else { String::new() };
+    format!("{first}{more} ({reason})")
 }
 
 /// Prints the first failed runs and how to run them again, and returns the number of all.
-fn print_failures(told: SweepOutput<'_>, table: &RunTable) -> usize {
-    let SweepOutput { plan, folder, console } = told;
+fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
+    let SweepOutput { plan, folder, console } = output;
     let cell = table.column("cell");
     let cell_of = |row: usize| {
         let id = cell.and_then(|c| c.values.number(row)).map(|id| id as u64);
@@ -183,8 +185,8 @@ fn print_failures(told: SweepOutput<'_>, table: &RunTable) -> usize {
             format!("\n  again: sidestep run {} --seed {}", scenario.display(), cell.seed)
         });
         let variant = &plan.variants[cell.variant as usize];
-        let why = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
-        console.warn(format!("a run failed: {variant}, seed {}: {why}{again}", cell.seed));
+        let cause = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
+        console.warn(format!("a run failed: {variant}, seed {}: {cause}{again}", cell.seed));
     }
     if failed.len() > MAX_LISTED_FAILURES {
         console.warn(format!("{} more runs failed", failed.len() - MAX_LISTED_FAILURES));
@@ -197,19 +199,19 @@ fn print_failures(told: SweepOutput<'_>, table: &RunTable) -> usize {
 /// # Errors
 /// When that cannot be written.
 pub(crate) fn print_share(
-    told: SweepOutput<'_>,
+    output: SweepOutput<'_>,
     shard: Shard,
-    ended: SweepEnd,
+    end: SweepEnd,
 ) -> Result<ExitCode, Failure> {
-    let console = told.console;
-    let SweepResult { table, effort, was_done } = match ended {
+    let console = output.console;
+    let SweepResult { table, effort, was_done } = match end {
         SweepEnd::Done(done) => done,
-        SweepEnd::Interrupted(runs) => return print_interrupted(told, runs),
+        SweepEnd::Interrupted(runs) => return print_interrupted(output, runs),
     };
     if was_done {
         console.note(format!("Share {shard} is finished already."));
     }
-    let failed = print_failures(told, &table);
+    let failed = print_failures(output, &table);
     let json = json!({
         "share": shard.to_string(),
         "runs": table.runs(),

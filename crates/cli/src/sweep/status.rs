@@ -30,8 +30,8 @@ pub(crate) fn print_status(
     let short = || format!("{} {of} {}\n", status.runs, status.total);
     console.print_result_or_short(&json, short, || {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
-        let (runs, all) =
-            (group_thousands(status.runs), format_count(status.total as usize, "run"));
+        let runs = group_thousands(status.runs);
+        let all = format_count(status.total as usize, "run");
         format!("# {name}: {runs} {of} {all}\n\n{}", align_pairs(&lines(folder, status)))
     })
 }
@@ -39,7 +39,7 @@ pub(crate) fn print_status(
 fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
     let path = folder.path().display();
     let mut lines: Vec<(String, String)> = Vec::new();
-    let mut line = |name: &str, words: String| lines.push((name.to_string(), words));
+    let mut line = |name: &str, value: String| lines.push((name.to_string(), value));
     for share in &status.shares {
         line(&format!("share {}", share.share), share_text(share));
     }
@@ -53,15 +53,15 @@ fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
     for failure in status.failures.iter().take(MAX_LISTED_FAILURES) {
         line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
     }
-    let is_all = status.runs == status.total;
-    let next = match status.is_complete {
-        true => Some(("view it", format!("sidestep report {path}"))),
-        // Two processes that run the same trials only slow each other down.
-        false if status.is_active => None,
-        false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
-        false => Some(("continue", format!("sidestep resume {path}"))),
-    };
-    lines.extend(next.map(|(name, words)| (name.to_string(), words)));
+    if status.is_complete {
+        line("view it", format!("sidestep report {path}"));
+    } else if status.is_active {
+        // No advice: a second process would run the same cells again.
+    } else if status.runs == status.total {
+        line("join them", format!("sidestep sweep collect {path}"));
+    } else {
+        line("continue", format!("sidestep resume {path}"));
+    }
     lines
 }
 

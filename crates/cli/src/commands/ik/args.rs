@@ -98,7 +98,7 @@ impl FreeAxis {
     const ROTATIONS: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
 }
 
-/// A place of the tip, and its orientation if one is asked for.
+/// A target of the tip: a position, and an orientation if `is_turned`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TipTarget {
     pub(super) pose: Transform,
@@ -136,7 +136,7 @@ impl GoalArgs {
         if !counts {
             return Ok((None, Vec::new()));
         }
-        let (body, remarks) = arm.chosen.body();
+        let (body, remarks) = arm.selection.body();
         if is_own && body.is_empty() {
             let cause = ["no link has a collision shape that can be read".to_owned()];
             let cause = [&cause[..], &remarks[..]].concat().join("; ");
@@ -211,7 +211,7 @@ fn parse_sphere(text: &String) -> Result<Sphere, InputError> {
     Ok(Sphere { center_m: [x, y, z], radius_m })
 }
 
-/// Reads the `N` numbers that an option takes, each of a size that a place in m can have.
+/// Parses the `N` lengths of an option, each of a size that a position in m can have.
 pub(super) fn parse_lengths<const N: usize>(
     option: &str,
     form: &str,
@@ -221,12 +221,12 @@ pub(super) fn parse_lengths<const N: usize>(
     parse_array(option, text, &format!("write {form} in m, such as {example}"))
 }
 
-/// Reads roll, pitch and yaw.
+/// Parses roll, pitch and yaw.
 pub(super) fn parse_rpy(option: &str, text: &str) -> Result<Vector, InputError> {
     parse_array(option, text, "write roll,pitch,yaw in rad, such as 3.1416,0,0.5")
 }
 
-/// Reads a quaternion.
+/// Parses a quaternion.
 pub(super) fn parse_quaternion(option: &str, text: &str) -> Result<[f64; 4], InputError> {
     parse_array(option, text, "write x,y,z,w, scalar last, such as 0,0,0,1 for no turn at all")
 }
@@ -236,13 +236,13 @@ fn parse_array<const N: usize>(
     text: &str,
     remedy: &str,
 ) -> Result<[f64; N], InputError> {
-    let found = parse_numbers(option, text)?;
-    let all: [f64; N] = found.try_into().map_err(|found: Vec<f64>| {
-        let cause = format!("`{text}` has {} of {N} numbers", found.len());
+    let numbers = parse_numbers(option, text)?;
+    let array: [f64; N] = numbers.try_into().map_err(|numbers: Vec<f64>| {
+        let cause = format!("`{text}` has {} of {N} numbers", numbers.len());
         InputError::new(option, cause, remedy)
     })?;
-    match all.iter().find(|x| !(-1e7..=1e7).contains(*x)) {
-        None => Ok(all),
+    match array.iter().find(|x| !(-1e7..=1e7).contains(*x)) {
+        None => Ok(array),
         Some(x) => Err(InputError::new(option, format!("{x} is out of range"), remedy)),
     }
 }

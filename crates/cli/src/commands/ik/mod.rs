@@ -1,9 +1,9 @@
 //! `sidestep ik`: inverse kinematics of a robot arm.
 //!
 //! ```text
-//! ask      options -> goals
-//! found    an answer as text and JSON
-//! targets  many targets from a table, and the table of their answers
+//! args.rs     options -> goals
+//! output.rs   a result as text and JSON
+//! targets.rs  many targets from a table, and the table of their results
 //! ```
 
 mod args;
@@ -112,14 +112,14 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     }
     let (body, remarks) = args.goal.body(&arm)?;
     let goal = args.goal.goal(args.pose()?, &body)?;
-    let answer = arm.chosen.chain.solve(&goal, &arm.values)?;
+    let result = arm.selection.chain.solve(&goal, &arm.values)?;
     remarks.iter().for_each(|remark| console.note(remark));
-    let found = IkOutput::new(&arm, &goal, answer, remarks);
+    let output = IkOutput::new(&arm, &goal, result, remarks);
     if let Some(path) = &args.png {
-        found.placed.picture(Some(goal.target.origin_m), &goal.spheres).write(path)?;
+        output.positions.picture(Some(goal.target.origin_m), &goal.spheres).write(path)?;
     }
-    console.print_result(&found, || found.text())?;
-    Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
+    console.print_result(&output, || output.text())?;
+    Ok(if output.reached { ExitCode::Done } else { ExitCode::Failed })
 }
 
 impl IkArgs {

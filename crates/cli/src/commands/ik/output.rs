@@ -1,11 +1,11 @@
-//! An answer of `sidestep ik` as text and JSON.
+//! A result of `sidestep ik` as text and JSON.
 
 use super::super::arm::{Arm, ArmPositions, format_numbers, format_point};
 use crate::console::{LINE_COLS, align_pairs, wrap};
 use serde::Serialize;
 use sidestep::arms::kinematics::{ArmGoal, IkResult, IkSolution, OrientationMask, Vector};
 
-/// The answer of the command.
+/// The result of the command.
 #[derive(Debug, Serialize)]
 pub(super) struct IkOutput {
     pub(super) reached: bool,
@@ -30,9 +30,9 @@ pub(super) struct IkOutput {
     remarks: Vec<String>,
     /// Number of requested postures.
     #[serde(skip)]
-    wanted: usize,
+    requested: usize,
     #[serde(flatten)]
-    pub(super) placed: ArmPositions,
+    pub(super) positions: ArmPositions,
 }
 
 #[derive(Debug, Serialize)]
@@ -44,7 +44,7 @@ struct Solution {
 }
 
 impl IkOutput {
-    pub(super) fn new(arm: &Arm, goal: &ArmGoal, answer: IkResult, remarks: Vec<String>) -> Self {
+    pub(super) fn new(arm: &Arm, goal: &ArmGoal, result: IkResult, remarks: Vec<String>) -> Self {
         let is_turned = goal.asked.turn != OrientationMask::Free;
         let angle = |error_rad: f64| is_turned.then_some(error_rad);
         let solution = |posture: &IkSolution| Solution {
@@ -53,25 +53,25 @@ impl IkOutput {
             error_rad: angle(posture.error_rad),
         };
         let first = IkSolution {
-            values: answer.values.clone(),
-            error_m: answer.error_m,
-            error_rad: answer.error_rad,
+            values: result.values.clone(),
+            error_m: result.error_m,
+            error_rad: result.error_rad,
         };
-        let all = answer.reached.then_some(&first).into_iter().chain(&answer.others);
+        let all = result.reached.then_some(&first).into_iter().chain(&result.others);
         Self {
-            reached: answer.reached,
-            error_m: answer.error_m,
-            error_rad: angle(answer.error_rad),
-            reason: answer.reason.map(|reason| reason.to_string()),
+            reached: result.reached,
+            error_m: result.error_m,
+            error_rad: angle(result.error_rad),
+            reason: result.reason.map(|reason| reason.to_string()),
             target: goal.target.origin_m,
             target_quaternion: is_turned.then(|| goal.target.quaternion()),
-            engine: answer.engine.name(),
-            iterations: answer.iterations,
-            starts: answer.starts,
+            engine: result.engine.name(),
+            iterations: result.iterations,
+            starts: result.starts,
             solutions: all.map(solution).collect(),
             remarks,
-            wanted: goal.solutions,
-            placed: arm.positions(&answer.values),
+            requested: goal.solutions,
+            positions: arm.positions(&result.values),
         }
     }
 
@@ -79,10 +79,10 @@ impl IkOutput {
         let verdict = match &self.reason {
             None => "The target is reached.".to_owned(),
             Some(reason) => {
-                let words = format!("The target is not reached: {reason}.");
+                let text = format!("The target is not reached: {reason}.");
                 format!(
                     "{}\nThe nearest posture found is shown.",
-                    wrap(&words, LINE_COLS).join("\n")
+                    wrap(&text, LINE_COLS).join("\n")
                 )
             }
         };
@@ -94,19 +94,27 @@ impl IkOutput {
             rows.insert(1, ("quaternion".to_owned(), format_numbers(&quaternion)));
             rows.push(("turned off".to_owned(), format!("{} rad", format_numbers(&[error_rad]))));
         }
-        format!("{}{}{}{verdict}\n", self.placed.text(), align_pairs(&rows), self.solutions_text())
+        format!(
+            "{}{}{}{verdict}\n",
+            self.positions.text(),
+            align_pairs(&rows),
+            self.solutions_text()
+        )
     }
 
     /// Returns the postures as a list, if several were requested.
     fn solutions_text(&self) -> String {
-        if self.wanted == 1 || !self.reached {
+        if self.requested == 1 || !self.reached {
             return String::new();
         }
         let rows = self.solutions.iter().enumerate();
         let rows = rows.map(|(i, s)| (format!("posture {}", i + 1), format_numbers(&s.joints)));
         let found = self.solutions.len();
-        let missing = if found < self.wanted {
-            format!("Found {found} of {} postures; more --restarts may find more.\n", self.wanted)
+        let missing = if found < self.requested {
+            format!(
+                "Found {found} of {} postures; more --restarts may find more.\n",
+                self.requested
+            )
         } else {
             String::new()
         };

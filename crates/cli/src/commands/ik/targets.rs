@@ -1,4 +1,4 @@
-//! Many targets from a table, and the table of their answers.
+//! Many targets from a table, and the table of their results.
 
 use super::super::arm::Arm;
 use super::args::{GoalArgs, TipTarget};
@@ -18,21 +18,21 @@ const QUATERNION_COLUMNS: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 /// The largest number in a table: a place in m, or an angle in rad.
 const MAX_VALUE: f64 = 1e7;
 
-/// The answers to all targets.
+/// The results of all targets.
 #[derive(Debug, Serialize)]
 struct IkTable {
     targets: usize,
     reached: usize,
     /// Meshes that stand as boxes, and shapes that could not be read.
     remarks: Vec<String>,
-    /// Names of the joints that the values of each answer belong to.
+    /// Names of the joints that the values of each result belong to.
     joint_names: Vec<String>,
     /// CPU time of the search in us per target. It is no part of the results.
     cpu_us_per_target: f64,
     answers: Vec<IkTableRow>,
 }
 
-/// The answer to a target.
+/// The result of a target.
 #[derive(Debug, Serialize)]
 struct IkTableRow {
     reached: bool,
@@ -47,7 +47,7 @@ struct IkTableRow {
     reason: Option<String>,
 }
 
-/// Answers all targets of a table.
+/// Solves all targets of a table, and prints the results.
 ///
 /// # Errors
 /// When the table or an option is wrong.
@@ -60,15 +60,15 @@ pub(super) fn solve_table(
     let (body, remarks) = args.body(arm)?;
     let goals = read_targets(path)?.into_iter().map(|target| args.goal(target, &body));
     let goals = goals.collect::<Result<Vec<_>, InputError>>()?;
-    let started = ProcessTime::now();
-    let solved = goals.iter().map(|goal| arm.chosen.chain.solve(goal, &arm.values));
+    let start = ProcessTime::now();
+    let solved = goals.iter().map(|goal| arm.selection.chain.solve(goal, &arm.values));
     let solved = solved.collect::<Result<Vec<_>, InputError>>()?;
-    let cpu_us = started.elapsed().as_secs_f64() * 1e6;
+    let cpu_us = start.elapsed().as_secs_f64() * 1e6;
     let answers = IkTable {
         targets: goals.len(),
         reached: solved.iter().filter(|answer| answer.reached).count(),
         remarks,
-        joint_names: arm.chosen.chain.variables.iter().map(|v| v.name.clone()).collect(),
+        joint_names: arm.selection.chain.variables.iter().map(|v| v.name.clone()).collect(),
         cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
         answers: solved.into_iter().map(IkTableRow::new).collect(),
     };
@@ -80,16 +80,16 @@ pub(super) fn solve_table(
 }
 
 impl IkTableRow {
-    fn new(answer: IkResult) -> Self {
+    fn new(result: IkResult) -> Self {
         Self {
-            reached: answer.reached,
-            error_m: answer.error_m,
-            error_rad: answer.error_rad,
-            iterations: answer.iterations,
-            starts: answer.starts,
-            joints: answer.values,
-            others: answer.others.into_iter().map(|posture| posture.values).collect(),
-            reason: answer.reason.map(|reason| reason.to_string()),
+            reached: result.reached,
+            error_m: result.error_m,
+            error_rad: result.error_rad,
+            iterations: result.iterations,
+            starts: result.starts,
+            joints: result.values,
+            others: result.others.into_iter().map(|posture| posture.values).collect(),
+            reason: result.reason.map(|reason| reason.to_string()),
         }
     }
 
@@ -128,15 +128,16 @@ fn read_targets(path: &Path) -> Result<Vec<TipTarget>, InputError> {
     let table = CsvTable::read(path)?;
     let turns =
         |names: &[&str]| names[POSITION_COLUMNS.len()..].iter().any(|n| table.find(n).is_some());
-    let (turned, of_quaternion) = (turns(&RPY_COLUMNS), turns(&QUATERNION_COLUMNS));
-    if turned && of_quaternion {
+    let has_rpy = turns(&RPY_COLUMNS);
+    let has_quaternions = turns(&QUATERNION_COLUMNS);
+    if has_rpy && has_quaternions {
         let cause = "the header has both angles and quaternions";
         let remedy = "keep roll,pitch,yaw or qx,qy,qz,qw";
         return Err(InputError::new(table.place(), cause, remedy).with_position(1, 1));
     }
-    if turned {
+    if has_rpy {
         read_rpy_targets(&table)
-    } else if of_quaternion {
+    } else if has_quaternions {
         read_quaternion_targets(&table)
     } else {
         let position = table.columns(POSITION_COLUMNS)?;
@@ -170,14 +171,14 @@ fn values<const N: usize>(
     row: CsvRow,
     columns: [usize; N],
 ) -> Result<[f64; N], InputError> {
-    let mut found = [0.0; N];
-    for (value, column) in found.iter_mut().zip(columns) {
-        let word = row.field(column);
-        *value = word.number(&table.place())?;
+    let mut numbers = [0.0; N];
+    for (value, column) in numbers.iter_mut().zip(columns) {
+        let field = row.field(column);
+        *value = field.number(&table.place())?;
         if value.abs() > MAX_VALUE {
             let cause = format!("{value} is out of range");
-            return Err(word.error(&table.place(), cause, "give places in m and angles in rad"));
+            return Err(field.error(&table.place(), cause, "give places in m and angles in rad"));
         }
     }
-    Ok(found)
+    Ok(numbers)
 }

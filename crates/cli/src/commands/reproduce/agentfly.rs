@@ -13,7 +13,8 @@ use sidestep_session::fleet::{
 };
 use std::path::{Path, PathBuf};
 
-/// Seconds after which an airplane that is not heard is taken to be gone: all share this machine.
+/// Seconds of silence after which an airplane is taken to be lost: long, since all processes share this machine and may wait
+/// for a processor.
 const LEASE_S: f64 = 60.0;
 
 /// The extent of the experiments.
@@ -33,7 +34,7 @@ pub(super) struct AgentflyArgs {
     seeds: Option<u32>,
 }
 
-/// Measures over real sockets, if the program is there that carries them.
+/// Measures over real sockets, if the program for them is installed.
 fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeasurements, Failure> {
     if let Err(missing) = link::find_program() {
         let reason = missing.to_string();
@@ -44,11 +45,11 @@ fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeas
         tempfile::tempdir().map_err(|e| Failure::cannot_write(&std::env::temp_dir(), &e))?;
     let file = folder.path().join("superconflict.toml");
     let stages = StageProgress::new(console);
-    let mut flies = |text: &str| -> Result<FlightMeasurement, Failure> {
+    let mut fly = |text: &str| -> Result<FlightMeasurement, Failure> {
         std::fs::write(&file, text).map_err(|e| Failure::cannot_write(&file, &e))?;
         measure_fleet(&file)
     };
-    let measured = agentfly::measure(plan, &mut flies, &mut |what, share| stages.set(what, share));
+    let measured = agentfly::measure(plan, &mut fly, &mut |what, share| stages.set(what, share));
     stages.clear();
     measured
 }
@@ -56,10 +57,11 @@ fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeas
 /// Flies a scenario with a process for each airplane, and returns the measurements.
 fn measure_fleet(file: &Path) -> Result<FlightMeasurement, Failure> {
     let mut measured = FlightMeasurement::default();
-    link::run_job(&Job::Fleet(fleet_job(file)), |told| {
-        if let LinkMessage::Ended { fleet, .. } = told {
+    link::run_job(&Job::Fleet(fleet_job(file)), |message| {
+        if let LinkMessage::Ended { fleet, .. } = message {
             let sum = |of: fn(&NodeStatus) -> u64| fleet.nodes.iter().map(of).sum::<u64>() as f64;
-            let (messages, bytes) = (sum(|node| node.packets), sum(|node| node.bytes));
+            let messages = sum(|node| node.packets);
+            let bytes = sum(|node| node.bytes);
             measured = FlightMeasurement { elapsed_s: fleet.flown_s, messages, bytes };
         }
     })?;
@@ -99,10 +101,9 @@ pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCod
     let report = agentfly::run(&plan, &mut |what, share| stages.set(what, share));
     stages.clear();
     let report = report?.with_sockets(measure_sockets(&plan, console)?);
-    let (document, claims, quick) = (report.document(), &report.claims, plan.quick);
     store_and_print(
         &report,
-        &PaperResults { document, claims, quick },
+        &PaperResults { document: report.document(), claims: &report.claims, quick: plan.quick },
         args.out.as_deref(),
         console,
     )

@@ -65,11 +65,13 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
     };
     let scenes = scenes::all(&report.plan);
     let pictures: Vec<Picture> = scenes.iter().map(described_picture).collect::<Result<_, _>>()?;
-    let document = report.document(pictures);
-    let (claims, quick) = (&report.claims, report.plan.quick);
     store_and_print(
         &report,
-        &PaperResults { document, claims, quick },
+        &PaperResults {
+            document: report.document(pictures),
+            claims: &report.claims,
+            quick: report.plan.quick,
+        },
         args.out.as_deref(),
         console,
     )
@@ -77,9 +79,9 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
 
 /// Returns a picture with a caption that starts with a description of the scene.
 fn described_picture(scene: &Scene) -> Result<Picture, DrawError> {
-    let what = describe(&scene.scenery, &scene.frame, &scene.trails);
+    let description = describe(&scene.scenery, &scene.frame, &scene.trails);
     let picture = scene_picture(scene)?;
-    Ok(Picture { caption: format!("{what} {}", picture.caption), ..picture })
+    Ok(Picture { caption: format!("{description} {}", picture.caption), ..picture })
 }
 
 fn run(
@@ -96,31 +98,32 @@ fn run(
     })
 }
 
-/// Runs the experiments with recordings on disk, as the paper did, and deletes these at the end;
-/// after a failure also the folder, if it was made for them.
+/// Runs the experiments with recordings on disk, as the paper did, because writing is a part of the measured time. They are
+/// deleted at the end; after a failure also the folder, if it was created for them.
 fn run_with_recordings(
     plan: &LoriaConfig,
     folder: &Path,
     console: Console,
 ) -> Result<LoriaReport, Failure> {
     let timed = folder.join("timed-runs");
-    let found = folder.exists();
+    let had_folder = folder.exists();
     std::fs::create_dir_all(&timed).map_err(|e| Failure::cannot_write(&timed, &e))?;
-    let (at, above) = (timed.clone(), folder.to_path_buf());
-    let clean_up = move |failed: bool| {
-        let _ = std::fs::remove_dir_all(&at);
-        if failed && !found {
-            let _ = std::fs::remove_dir(&above);
+    let recordings = timed.clone();
+    let parent = folder.to_path_buf();
+    let clean_up = move |has_failed: bool| {
+        let _ = std::fs::remove_dir_all(&recordings);
+        if has_failed && !had_folder {
+            let _ = std::fs::remove_dir(&parent);
         }
     };
-    let interrupted = clean_up.clone();
-    interrupt::on_interrupt(move || interrupted(true))?;
-    let mut made = 0;
-    let mut new = |schemas: &[TableSchema]| {
-        made += 1;
-        recorder(&timed.join(format!("{made:04}")), schemas)
+    let clean_up_after_interrupt = clean_up.clone();
+    interrupt::on_interrupt(move || clean_up_after_interrupt(true))?;
+    let mut count = 0;
+    let mut new_recorder = |schemas: &[TableSchema]| {
+        count += 1;
+        recorder(&timed.join(format!("{count:04}")), schemas)
     };
-    let report = run(plan, &mut new, console);
+    let report = run(plan, &mut new_recorder, console);
     clean_up(report.is_err());
     report
 }

@@ -58,18 +58,19 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
 
 /// Returns a picture with its title and caption beside it.
 fn scene_picture(scene: &Scene) -> Result<Picture, DrawError> {
-    let (title, caption) = (String::new(), String::new());
-    let options = PictureOptions { style: Style::MAP, title, caption };
+    let options =
+        PictureOptions { style: Style::MAP, title: String::new(), caption: String::new() };
     let svg = draw(&scene.scenery, &scene.frame, &scene.trails, &options)?;
     Ok(Picture { title: scene.title.clone(), caption: scene.caption.clone(), svg })
 }
 
 fn check_vacant(folder: &Path) -> Result<(), InputError> {
-    let is_taken = match std::fs::read_dir(folder) {
+    let is_used = match std::fs::read_dir(folder) {
         Ok(mut entries) => entries.next().is_some(),
+        // A file, or a folder that may not be read.
         Err(_) => folder.exists(),
     };
-    if !is_taken {
+    if !is_used {
         return Ok(());
     }
     Err(InputError::new(folder.display(), "already exists and is not empty", "give a new folder"))
@@ -91,10 +92,10 @@ fn store_and_print(
 ) -> Result<ExitCode, Failure> {
     if let Some(folder) = out {
         let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
-        let pages = ReportFiles { html: folder.join("report.html"), pictures: "figures".into() };
+        let files = ReportFiles { html: folder.join("report.html"), pictures: "figures".into() };
         std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(folder, &e))?;
         write_atomically(&folder.join("report.json"), |file| file.write_all(&json))?;
-        pages.store(&outcome.document, PngOutput::AlsoPng)?;
+        files.store(&outcome.document, PngOutput::AlsoPng)?;
     }
     console.print_result(report, || summary(outcome, out))?;
     Ok(ExitCode::Done)

@@ -49,11 +49,13 @@ pub(super) fn reproduce(args: &SerpentineArgs, console: Console) -> Result<ExitC
     let report = report?;
     let pictures: Vec<Picture> =
         report.scenes.iter().map(scene_picture).collect::<Result<_, _>>()?;
-    let (document, claims) = (report.document(pictures), &report.claims);
-    let quick = report.plan.quick;
     store_and_print(
         &report,
-        &PaperResults { document, claims, quick },
+        &PaperResults {
+            document: report.document(pictures),
+            claims: &report.claims,
+            quick: report.plan.quick,
+        },
         args.out.as_deref(),
         console,
     )
